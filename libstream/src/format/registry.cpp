@@ -61,13 +61,8 @@ bool is_ept_name(const std::string& file) {
   return std::filesystem::path(file).filename() == kEptName;
 }
 
-/// As messages name a file.
-std::string shown(const std::string& file) {
-  return file == kStandardStream ? "standard input" : file;
-}
-
 [[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
-  throw Error({.file = shown(file),
+  throw Error({.file = shown_name(file),
                .where = {},
                .cause = "is " + std::string(format.name) + ", which cannot be read",
                .remedy = std::string(format.remedy)});
@@ -102,7 +97,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
   if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
   throw Error(
-      {.file = shown(file),
+      {.file = shown_name(file),
        .where = {},
        .cause = head.empty() ? "the file is empty" : "neither content nor name tell its format",
        .remedy = "name the format: " + known_formats()});
@@ -126,15 +121,15 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   for (const std::string& file : files) {
     const Format& other = format_of(file, options);
     if (&other != &format) {
-      throw Error(
-          {.file = shown(file),
-           .where = {},
-           .cause = "is " + other.name + ", but " + shown(files.front()) + " is " + format.name,
-           .remedy = "name files of one format, of a folder by that format"});
+      throw Error({.file = shown_name(file),
+                   .where = {},
+                   .cause = "is " + other.name + ", but " + shown_name(files.front()) + " is " +
+                            format.name,
+                   .remedy = "name files of one format, of a folder by that format"});
     }
     if (is_seekable(file) || packed_format_of(file) == &format) continue;
     if (!format.streams && !format.self_contained) {
-      throw Error({.file = shown(file),
+      throw Error({.file = shown_name(file),
                    .where = {},
                    .cause = format.name + " cannot be read from a pipe or out of gzip",
                    .remedy = "name a file, unpacked"});
@@ -148,14 +143,14 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .remedy = "it can be read only once"});
   }
   if (options.heights_of_colour != HeightsOfColour::none && format.name != png_format().name) {
-    throw Error({.file = shown(files.front()),
+    throw Error({.file = shown_name(files.front()),
                  .where = {},
                  .cause = "is " + format.name + ", whose heights are no colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
   if (options.selection.resolution > 0 && format.name != las_format().name &&
       format.name != ept_format().name) {
-    throw Error({.file = shown(files.front()),
+    throw Error({.file = shown_name(files.front()),
                  .where = {},
                  .cause = "is " + format.name + ", which has no octree to read to a resolution",
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
@@ -163,7 +158,7 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   const bool triangles = options.entities == Entities::triangles;
   if (options.entities != Entities::points && !(triangles ? format.triangles : format.lines)) {
     throw Error(
-        {.file = shown(files.front()),
+        {.file = shown_name(files.front()),
          .where = {},
          .cause = "is " + format.name + ", which has no " + (triangles ? "triangles" : "lines"),
          .remedy = std::string(triangles ? "name a mesh (OBJ, OFF, PLY, STL)" : "name GeoJSON") +
@@ -171,13 +166,13 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   }
   auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
-    throw Error({.file = shown(files.front()),
+    throw Error({.file = shown_name(files.front()),
                  .where = {},
                  .cause = "is " + format.name + ", whose points are no cells",
                  .remedy = "leave `cell` out"});
   }
   if (options.band != 1 && !source->info().grid) {
-    throw Error({.file = shown(files.front()),
+    throw Error({.file = shown_name(files.front()),
                  .where = {},
                  .cause = "is " + format.name + ", whose points have no bands",
                  .remedy = "leave `band` out"});

@@ -30,10 +30,6 @@ std::map<std::string, std::unique_ptr<Input>>& heads() {
   return kept;
 }
 
-std::string shown(const std::string& file) {
-  return file == kStandardStream ? "standard input" : file;
-}
-
 int open_for_reading(const std::string& file) {
   if (file == kStandardStream) return STDIN_FILENO;
   struct stat status {};
@@ -123,7 +119,7 @@ Input::Input(const std::string& file, const std::stop_token& stop, std::size_t a
     buffer_.resize(std::max(buffer_.size(), at_once));
     return;
   }
-  name_ = shown(file);
+  name_ = shown_name(file);
   descriptor_ = std::make_unique<Descriptor>(file, stop);
   size_ = descriptor_->size();
   buffer_.resize(at_once);
@@ -204,6 +200,10 @@ bool Input::skip(std::uint64_t count) {
     count -= step;
   }
   return true;
+}
+
+std::string shown_name(const std::string& file) {
+  return file == kStandardStream ? "standard input" : file;
 }
 
 bool is_rereadable(const std::string& file) {

@@ -8,6 +8,9 @@
 
 namespace terrace::stream {
 
+/// The name of a file in messages: "standard input" for kStandardStream.
+std::string shown_name(const std::string& file);
+
 /// True for a file that can be reopened from its start; false for pipes and standard input.
 bool is_rereadable(const std::string& file);
 
