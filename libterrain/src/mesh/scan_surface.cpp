@@ -18,8 +18,8 @@ namespace {
 /// ground, and the surface.
 constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
 
-void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t bytes_per_point,
-                  std::uint64_t memory_bytes) {
+void check_surface_memory(const stream::Store& store, const Detail& detail,
+                          std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
   std::uint64_t points = 0;
   for_each_wanted_record(
       store, detail,
@@ -111,9 +111,9 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     throw UsageError("a surface by another method has no tetrahedra");
   }
   const stream::Store source = store.with_stop(context.stop);
-  check_memory(source, detail,
-               options.method ? options.method->bytes_per_point : kSurfaceBytesPerPoint,
-               context.memory_or(0));
+  check_surface_memory(source, detail,
+                       options.method ? options.method->bytes_per_point : kSurfaceBytesPerPoint,
+                       context.memory_or(0));
   TriangleMesh points = detail_points(source, detail);
   const std::vector<stream::Point3> ground = on_ground(points.positions, source.schema());
   ScanSurface out;

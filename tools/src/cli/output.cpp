@@ -17,7 +17,7 @@ namespace terrace::tools {
 namespace {
 
 /// No table of ours has longer lines.
-constexpr std::size_t kLongestLine = 64u << 10;
+constexpr std::size_t kLongestMarkLine = 64u << 10;
 
 /// As std::to_chars() writes it.
 bool is_number_of_ours(std::string_view cell) {
@@ -85,7 +85,7 @@ class Table {
 bool is_our_table(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   Table table;
-  std::string line(kLongestLine, '\0');
+  std::string line(kLongestMarkLine, '\0');
   while (file.getline(line.data(), static_cast<std::streamsize>(line.size()))) {
     // Our last line has an end: a truncated one is not ours.
     if (file.eof()) return false;

@@ -14,7 +14,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::uint64_t kSeeds = 32;
-constexpr double kMostPoints = 3000;
+constexpr double kMostPointsAround = 3000;
 constexpr unsigned kRank = 8;
 
 /// A point, and a box around points near it.
@@ -57,7 +57,8 @@ StoredBox grown(StoredBox box) {
 StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
   constexpr unsigned kHalvings = 60;
   StoredBox box = seed.box;
-  for (unsigned i = 0; i < kHalvings && query.estimate(tall(grown(box)), kMostPoints) > kMostPoints;
+  for (unsigned i = 0;
+       i < kHalvings && query.estimate(tall(grown(box)), kMostPointsAround) > kMostPointsAround;
        ++i) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double quarter = 0.25 * (box.max[axis] - box.min[axis]);
@@ -100,7 +101,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
   std::vector<Point2> stored;
   for (const Seed& seed : some_seeds(store, places)) {
     const StoredBox box = box_of(seed, reader.query()), around = grown(box);
-    if (reader.query().estimate(tall(around), kMostPoints) > kMostPoints) continue;
+    if (reader.query().estimate(tall(around), kMostPointsAround) > kMostPointsAround) continue;
     points.clear();
     reader.points(around, points);
     const std::vector<stream::Point3> ground = on_the_ground(points, places, stored);
