@@ -21,12 +21,13 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/orientation.hpp"
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 #include "random.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/region.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 
 /// Clouds, and what any mesh of them must be.
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "base/orientation.hpp"
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 #include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
