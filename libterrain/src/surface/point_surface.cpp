@@ -15,8 +15,8 @@ namespace {
 constexpr double kFar = std::numeric_limits<double>::infinity();
 /// More than a square of a distance is wrong by: differences, squares and their sum.
 constexpr double kDoubt = 8 * std::numeric_limits<double>::epsilon();
-/// Cells around in which there may be nothing before the hull is asked.
-constexpr std::uint32_t kFarApex = 8;
+/// Cells around that are looked at without regard to the circle, at most.
+constexpr std::uint32_t kFarthest = 8;
 /// Decoded clusters to keep, for circles that reach beyond what is loaded.
 constexpr std::uint64_t kCacheBytes = std::uint64_t{4} << 20;
 
@@ -152,7 +152,7 @@ void PointSurface::find_triangle(const Target& target) {
       changed = false;
       cells_->near(target.place, reach, offer);
     } while (changed);
-    if (cells_->is_near(cover.bounds(), reach)) break;
+    if (reach >= kFarthest || cells_->is_near(cover.bounds(), reach)) break;
   }
   do {
     changed = false;
@@ -172,8 +172,8 @@ std::optional<Point2> PointSurface::apex(const Point2& a, const Point2& b) {
   };
   for (std::uint32_t reach = 1;; reach *= 2) {
     cells_->near(b, reach, offer);
-    if (best && cells_->is_near(cover.bounds(), reach)) break;
-    if (best || reach < kFarApex) continue;
+    if (best && (reach >= kFarthest || cells_->is_near(cover.bounds(), reach))) break;
+    if (best || reach < kFarthest) continue;
     for (const Point2& corner : hull_.corners()) offer(corner);
     if (!best) return std::nullopt;
   }
@@ -314,7 +314,7 @@ Point2 PointSurface::nearest(const Point2& place) {
   for (std::uint32_t reach = 1;; reach *= 2) {
     cells_->near(place, reach, offer);
     if (bound < kFar && cells_->is_near(disk(place, bound).bounds(), reach)) break;
-    if (bound < kFar || reach < kFarApex) continue;
+    if (bound < kFar || reach < kFarthest) continue;
     for (const Point2& corner : hull_.corners()) offer(corner);
   }
   for_each_in(disk(place, bound), place, offer);
