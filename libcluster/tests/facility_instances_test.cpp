@@ -107,7 +107,7 @@ TEST(FacilityInstances, ReaderRefusesWhatIsNotAnInstance) {
   EXPECT_EQ(small.connection, (std::vector{1.5, 2.5}));
   EXPECT_EQ(read("simple", "FILE: x\n2 2 0\n1 5 1 2\n2 6 3 4\n").connection,
             (std::vector{1.0, 2.0, 3.0, 4.0}));
-  // Of repeated edges the last counts, and paths may be shorter than edges.
+  // The last of repeated edges counts, and paths may be shorter than edges.
   EXPECT_EQ(read("pmed", "3 4 1\n1 2 9\n2 3 1\n1 3 8\n2 1 2\n").connection,
             (std::vector{0.0, 2.0, 3.0, 2.0, 0.0, 1.0, 3.0, 1.0, 0.0}));
   for (const auto& [format, text] : std::vector<std::pair<std::string, std::string>>{

@@ -18,7 +18,7 @@ namespace {
 
 /// Points that are looked at together.
 constexpr std::size_t kWindowPoints = 1u << 18;
-/// Of the windows of an orderly stream one in so many is judged, by one point in so many.
+/// In an ordered stream every fourth window is judged, by every fourth of its points.
 constexpr std::size_t kJudgedWindows = 4;
 constexpr std::size_t kJudgedPoints = 4;
 /// Blocks so many times wider than those of a k-d tree are not compact.
@@ -147,7 +147,7 @@ class SpatialSource final : public OrderedSource {
     for (const Point3& p : block.positions) places_.push_back({p, places_.size()});
   }
 
-  /// Of the window in `places_`, which comes back in another order.
+  /// The spread of the window in `places_`, which is reordered.
   double spread(std::size_t block_points) {
     const std::size_t blocks = blocks_of(places_.size(), block_points);
     std::vector<std::size_t> begins;

@@ -101,7 +101,7 @@ struct Selection {
   /// infinite. Rasters, COPC, EPT and LAS whose header lies outside are read only as far as needed;
   /// a raster's columns and rows count from its first cell near the box.
   std::optional<Box3> region{};
-  /// Of the points in `region` those at whose x, y this is false are left out too; empty: none is.
+  /// Points in `region` at whose x, y this is false are left out too; empty: no others are.
   /// Called by the thread that reads.
   std::function<bool(const std::array<double, 2>& place)> covers{};
   /// Above 0: points of an octree's nodes down to the first depth whose spacing is at most this, in

@@ -132,7 +132,7 @@ void append_entry(std::string& page, const OctreeNode& node) {
   append_entry(page, node, node.offset, node.bytes, static_cast<std::int64_t>(node.points));
 }
 
-/// Of each node the end of its subtree, which begins with it.
+/// For each node, the end of the subtree that begins with it.
 std::vector<std::size_t> subtree_ends(std::span<const OctreeNode> nodes) {
   std::vector<std::size_t> ends(nodes.size(), nodes.size()), open;
   for (std::size_t i = 0; i < nodes.size(); ++i) {

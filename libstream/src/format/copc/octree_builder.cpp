@@ -80,8 +80,8 @@ std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t at
   // four.
   constexpr std::uint64_t kBuckets = 8u << 20;
   const std::uint64_t kept = record_bytes + sizeof(std::uint64_t) + sizeof(Item);
-  // Of records in memory the nodes on the way up have copies, in vectors that have grown. Beside
-  // them are a node, its child, and what is written of it.
+  // Nodes on the way up hold copies of the records in memory, in vectors that have grown. A node,
+  // its child and the bytes that are written for it come on top.
   return kBuckets + at_once * 3 * kept + kChildren * kMostPromoted * (2 * kept + record_bytes);
 }
 

@@ -24,7 +24,7 @@ constexpr std::uint64_t kMostTagBytes = std::uint64_t{4} << 20;
 constexpr std::size_t kMostHeldBytes = std::size_t{64} << 20;
 constexpr std::size_t kDeepest = 32;
 
-/// Of a node of a map with two short strings.
+/// The size of a node of a map with two short strings.
 constexpr std::size_t kAttributeBytes = 112;
 
 /// What the parser has read. Its handlers are C functions: they must not throw.

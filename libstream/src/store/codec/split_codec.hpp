@@ -22,7 +22,7 @@ struct IntegerBox {
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< low + size is the first value beyond
 };
 
-/// Of n points how many lie in the lower half.
+/// How many of n points lie in the lower half.
 template <class Coder>
 TERRACE_STORE_INLINE void code_split(Coder& coder, std::uint32_t n, std::uint32_t& below) {
   if (n < context::kSplitDirect) {
@@ -114,7 +114,7 @@ struct NarrowPoints {
   }
   // Without branches, which would be coin tosses.
   TERRACE_STORE_INLINE static BoxSide longest(const Box& box) {
-    // Of equals the first wins.
+    // The first of equal sides wins.
     const auto rank = [&](unsigned axis) {
       return static_cast<std::int64_t>(field(box.extent, axis) << 2 | (2 - axis));
     };

@@ -228,7 +228,7 @@ void BlockEncoder::load_attributes() {
   }
 }
 
-/// Of a floating type: those of all points, or the one.
+/// The values of a floating type: one for all points, or one each.
 void BlockEncoder::load_numbers(Attribute& attribute) {
   const bool single = attribute.type == ScalarType::f32;
   std::size_t count = block_->positions.size();
