@@ -37,7 +37,7 @@ constexpr double kOverlapping = 10000;
 /// than a window, to each side, is loaded.
 constexpr double kParts = 8;
 /// So many mean distances of points around a box are loaded too: hardly a circle reaches farther.
-constexpr double kSampleMargin = 8;
+constexpr double kMargin = 8;
 /// What a thread may need: a window of usual size where points crowd.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
 /// For reading, beside the points.
@@ -241,7 +241,7 @@ class PointSampler final : public HeightSampler {
     if (numbers.empty()) return;
     const StoredBox& box = part.box;
     const double area = (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]);
-    const double margin = kSampleMargin * std::sqrt(area / std::max(part.points, 1.0));
+    const double margin = kMargin * std::sqrt(area / std::max(part.points, 1.0));
     if (is_dense(part, numbers.size())) {
       if (worker.load(box, margin, room_, part.is_window())) {
         return answer_along(worker, box, numbers, places, out);

@@ -12,7 +12,7 @@ constexpr double kPointsPerCell = 2;
 /// Points crowd if those that share a cell with one of them are so many on average.
 constexpr double kCrowd = 48;
 /// So many are sorted without more memory.
-constexpr std::size_t kFewInCells = 16;
+constexpr std::size_t kFew = 16;
 
 }  // namespace
 
@@ -107,7 +107,7 @@ void PointCells::drop_duplicates() {
       for (std::uint32_t i = first; i < end; ++i) sorted.emplace_back(places_[i], heights_[i]);
       // Stable: of equal ones the first stays so.
       const auto less = [](const auto& a, const auto& b) { return a.first < b.first; };
-      if (sorted.size() > kFewInCells) {
+      if (sorted.size() > kFew) {
         std::stable_sort(sorted.begin(), sorted.end(), less);
       } else {
         for (auto at = sorted.begin() + 1; at != sorted.end(); ++at) {

@@ -12,13 +12,13 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr double kFarAway = std::numeric_limits<double>::infinity();
+constexpr double kFar = std::numeric_limits<double>::infinity();
 /// More than a square of a distance is wrong by: differences, squares and their sum.
 constexpr double kDoubt = 8 * std::numeric_limits<double>::epsilon();
 /// Cells around that are looked at without regard to the circle, at most.
 constexpr std::uint32_t kFarthest = 8;
 /// Decoded clusters to keep, for circles that reach beyond what is loaded.
-constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
+constexpr std::uint64_t kCacheBytes = std::uint64_t{4} << 20;
 
 CircleCover circle_of(const std::array<Point2, 3>& t) {
   return CircleCover::of_triangle(t[0], t[1], t[2]);
@@ -60,7 +60,7 @@ PointSurface::PointSurface(const stream::Store& store, unsigned level, const Poi
       level_(level),
       hull_(hull),
       too_long_(std::move(too_long)),
-      query_(store, kSurfaceCacheBytes) {
+      query_(store, kCacheBytes) {
   own_.clear();
 }
 
@@ -106,7 +106,7 @@ void PointSurface::for_each_in(const CircleCover& cover, const Point2& from, con
       [&](const stream::Box3& whole) {
         const StoredBox box = flat(whole);
         // Of a box that is one place the head is known, and so is its place.
-        if (box.min == box.max || cells_->knows(box) || !cover.meets(box)) return kFarAway;
+        if (box.min == box.max || cells_->knows(box) || !cover.meets(box)) return kFar;
         return least_square(box, from);
       },
       [&](const stream::StoreQuery::Node& node) {
@@ -296,11 +296,11 @@ SurfacePoint PointSurface::natural(const Point2& place) {
 
 Point2 PointSurface::nearest(const Point2& place) {
   Point2 best{};
-  double bound = kFarAway;  ///< the square of its distance, or a little more
+  double bound = kFar;  ///< the square of its distance, or a little more
   const auto offer = [&](const Point2& p) {
     const double square = square_of(p[0] - place[0], p[1] - place[1]);
     if (square > bound) return;
-    if (bound < kFarAway) {
+    if (bound < kFar) {
       // Doubles tell most of them apart.
       const bool is_nearer = square * (1 + kDoubt) * (1 + kDoubt) < bound;
       if (!is_nearer) {
@@ -313,8 +313,8 @@ Point2 PointSurface::nearest(const Point2& place) {
   };
   for (std::uint32_t reach = 1;; reach *= 2) {
     cells_->near(place, reach, offer);
-    if (bound < kFarAway && cells_->is_near(disk(place, bound).bounds(), reach)) break;
-    if (bound < kFarAway || reach < kFarthest) continue;
+    if (bound < kFar && cells_->is_near(disk(place, bound).bounds(), reach)) break;
+    if (bound < kFar || reach < kFarthest) continue;
     for (const Point2& corner : hull_.corners()) offer(corner);
   }
   for_each_in(disk(place, bound), place, offer);
