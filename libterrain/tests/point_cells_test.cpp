@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "mesh/bounded/point_cells.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -7,8 +9,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include "mesh/bounded/point_mesh_cells.hpp"
 
 namespace terrace::terrain {
 namespace {
