@@ -194,8 +194,8 @@ struct ReadLevel {
         EXPECT_EQ(TIFFReadEncodedTile(tiff, number, tile.data(), -1),
                   static_cast<tmsize_t>(tile.size() * sizeof(T)));
         for (std::uint32_t r = 0; r < std::min(side, rows - top); ++r) {
-          std::copy_n(tile.begin() + r * side, std::min(side, columns - left),
-                      samples.begin() + std::size_t{top + r} * columns + left);
+          std::copy_n(tile.data() + r * side, std::min(side, columns - left),
+                      samples.data() + std::size_t{top + r} * columns + left);
         }
       }
     }
@@ -238,7 +238,7 @@ void write_with_overviews(const fs::path& path, const GeoTiffOptions& options,
   writer.commit();
 }
 
-std::string bytes_of(const fs::path& path) {
+std::string geotiff_bytes_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -268,9 +268,9 @@ void expect_overviews(std::mt19937_64& random, GeoTiffOverviews overviews,
     samples[i] = there ? static_cast<T>(1 + random() % 250) : static_cast<T>(*nodata);
   }
   write_with_overviews(path, options, samples, random);
-  const std::string first = bytes_of(path);
+  const std::string first = geotiff_bytes_of(path);
   write_with_overviews(path, options, samples, random);
-  EXPECT_EQ(bytes_of(path), first) << "depends on the order of the tiles";
+  EXPECT_EQ(geotiff_bytes_of(path), first) << "depends on the order of the tiles";
 
   std::uint32_t columns = options.columns, rows = options.rows;
   std::vector<T> below = samples;

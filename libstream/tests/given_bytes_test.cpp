@@ -65,7 +65,7 @@ TEST(GivenBytes, KeepsToItsBudgetAndDropsWhatWasUnusedLongest) {
   const std::vector<std::byte> ten(10);
   const auto source = given.open()("a");
   std::vector<std::byte> out(10);
-  for (const std::uint64_t at : {0, 20, 40}) given.give("a", at, ten);
+  for (const std::uint64_t at : {0u, 20u, 40u}) given.give("a", at, ten);
   source->read(0, out);  // now 20 is the oldest
   given.give("a", 60, ten);
   EXPECT_EQ(given.bytes(), 30u);

@@ -33,7 +33,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint64_t kBlock = 16;
+constexpr std::uint64_t kBlockSide = 16;
 
 /// What was read of a raster.
 struct Reading {
@@ -52,16 +52,17 @@ class MadeRaster final : public Raster {
     info_.rows = rows;
     info_.sample.type = ScalarType::i32;
     info_.world = world;
-    info_.block_columns = info_.block_rows = kBlock;
+    info_.block_columns = info_.block_rows = kBlockSide;
   }
   [[nodiscard]] const RasterInfo& info() const override { return info_; }
   bool read_over(const CellWindow& window, const CellBuffer& out) override {
     reading_.cells += window.columns * window.rows;
     EXPECT_LE(window.column + window.columns, info_.columns);
     EXPECT_LE(window.row + window.rows, info_.rows);
-    for (std::uint64_t r = window.row / kBlock; r * kBlock < window.row + window.rows; ++r) {
-      for (std::uint64_t c = window.column / kBlock; c * kBlock < window.column + window.columns;
-           ++c) {
+    for (std::uint64_t r = window.row / kBlockSide; r * kBlockSide < window.row + window.rows;
+         ++r) {
+      for (std::uint64_t c = window.column / kBlockSide;
+           c * kBlockSide < window.column + window.columns; ++c) {
         reading_.blocks.emplace_back(c, r);
       }
     }
