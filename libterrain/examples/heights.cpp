@@ -33,7 +33,9 @@ int main(int argc, char** argv) {
   std::size_t rows = 0;
   const auto profile = terrain::write_profile(
       store, {.line = {{8.3, 46.4}, {8.6, 46.6}}, .step = 500.0},
-      [&rows](std::string_view text) { rows += std::count(text.begin(), text.end(), '\n'); },
+      [&rows](std::string_view text) {
+        rows += static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+      },
       context);
   std::printf("%llu heights at %zu places on %.1f km\n", 1ULL * profile.answered, rows - 1,
               profile.metres / 1000);
