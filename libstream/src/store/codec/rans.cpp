@@ -12,7 +12,7 @@ namespace {
 /// 2^64 / frequency, rounded up but for the first two.
 constexpr std::array<std::uint64_t, kScale + 1> kReciprocals = [] {
   std::array<std::uint64_t, kScale + 1> reciprocals{};
-  for (std::uint64_t f = 2; f <= kScale; ++f) reciprocals[f] = UINT64_MAX / f + 1;
+  for (std::uint32_t f = 2; f <= kScale; ++f) reciprocals[f] = UINT64_MAX / f + 1;
   return reciprocals;
 }();
 
