@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/tri/point_cloud.hpp"
 
-#include <bit>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 
 #include "check_input.hpp"
 #include "free_slots.hpp"
@@ -22,6 +22,13 @@ std::uint64_t mixed(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
   x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
   return x ^ (x >> 31);
+}
+
+/// std::bit_cast, which Debian's Emscripten lacks.
+std::uint64_t bits_of(double value) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits;
 }
 
 }  // namespace
@@ -121,7 +128,7 @@ std::uint64_t PointCloud::hash() const {
   std::uint64_t sum = mixed(impl_->count);
   for (const VertexId vertex : all_vertices()) {
     std::uint64_t one = 0;
-    for (const double c : point(vertex)) one = mixed(one ^ std::bit_cast<std::uint64_t>(c + 0.0));
+    for (const double c : point(vertex)) one = mixed(one ^ bits_of(c + 0.0));
     sum += one;
   }
   return sum;
