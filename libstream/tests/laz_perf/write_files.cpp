@@ -65,7 +65,7 @@ int main(int argc, char** argv) {
     write_scan(path + ".copc.laz", format, 100'000);
     write_scan(path + ".las", format, 100'000);
   }
-  // Of its few nodes each has a page.
+  // Each of its few nodes has a page of its own.
   write_scan(argv[2] + std::string("/pages.copc.laz"), 6, 100'000, 4);
   write_scan(argv[2] + std::string("/pages.las"), 6, 100'000);
   const std::filesystem::path folder(argv[1]);

@@ -119,7 +119,7 @@ class ViewFront {
   ViewColumns bounds_;
   ViewDemand bound_demand_;
 
-  // Of the current step.
+  // State of the current step.
   const View* view_ = nullptr;
   std::vector<Candidate> candidates_;  // a heap
   std::vector<Candidate> soon_;

@@ -207,7 +207,7 @@ TERRACE_EXPORT(pick) int terrace_pick() {
   });
 }
 
-/// Of what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
+/// Pins the cluster picked last: 1 expands it, 0 collapses it, -1 releases every pin.
 TERRACE_EXPORT(pin) int terrace_pin(int how) {
   return guarded([&] {
     Module& m = module();

@@ -27,7 +27,7 @@ Point3 cross(const Point3& a, const Point3& b) {
 template <class Value>
 class Blocks {
  public:
-  /// Of growth all is new.
+  /// Blocks that are added count as changed.
   void grow(std::size_t slots) {
     const std::size_t blocks = (slots + SceneChanges::kBlock - 1) / SceneChanges::kBlock;
     if (blocks * SceneChanges::kBlock <= values_.size()) return;
@@ -117,7 +117,7 @@ class SceneOf final : public Scene {
       if (tri::level_of(hit.cluster) < view_.model().top()) clusters = {hit.cluster};
     } else if (mesh().alive(picked_)) {
       view_.model().heads(picked_, clusters);
-      // Of those that the point heads, the coarsest that is not expanded.
+      // The coarsest cluster that the point heads and that is not expanded.
       std::erase_if(clusters, [&](tri::ClusterId id) { return !view_.model().can_expand(id); });
       if (clusters.size() > 1) clusters.resize(1);
     }
@@ -320,7 +320,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
       const double along = dot(to, way);
       if (along <= 0) continue;
       const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
-      // Of those about as near to the line the nearer ones hide the others.
+      // Among points about as near to the line, the nearest to the eye hides the others.
       if (aside > angle || along * (1 + aside / angle) >= best) continue;
       best = along * (1 + aside / angle);
       told(vertex, view_.stored(vertex), place);

@@ -66,7 +66,7 @@ class Scene {
   /// The changes since the last call; all there is at first.
   virtual const SceneChanges& take_changes() = 0;
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const = 0;
-  /// Of the triangulation, or the set of points.
+  /// The hash of the triangulation, or of the set of points.
   [[nodiscard]] virtual std::uint64_t hash() const = 0;
   /// Where a ray meets the surface first; of points, the one nearest to the ray's line as seen from
   /// its origin, within `angle` (radians). O(what is drawn).

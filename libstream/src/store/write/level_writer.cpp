@@ -11,7 +11,7 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Of those held back, so many at most tell how columns are best coded.
+/// At most so many of the blocks held back are used to choose how columns are coded.
 constexpr std::size_t kTrialBlocks = 8;
 
 std::string file_name(unsigned level, const char* what) {

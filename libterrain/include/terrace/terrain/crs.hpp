@@ -162,7 +162,7 @@ class RegionConversion {
   RegionConversion() = default;
   /// to_regions: from the store's CRS to that of the regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
-  /// Of a source whose CRS is `system`, to regions in the CRS `named` as for
+  /// From the CRS of a source, `system`, to that of the regions, `named` as for
   /// CoordinateSystem::parse. Throws: UsageError for an unknown CRS, stream::Error if nothing leads
   /// from one datum to the other.
   RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,

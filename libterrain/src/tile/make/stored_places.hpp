@@ -36,8 +36,8 @@ class StoredPlaces {
     return {first_longitude_, last_longitude_};
   }
 
-  /// Of a raster: the least distance of neighbouring samples in degrees along a parallel or
-  /// meridian, as far as the corners of 64 x 64 parts of it tell.
+  /// For rasters: the least distance of neighbouring samples in degrees along a parallel or
+  /// meridian, estimated at the corners of 64 x 64 parts.
   [[nodiscard]] double lattice_spacing() const;
 
   /// The boxes of stored coordinates that contain all points of a geographic box: none if it does
