@@ -56,6 +56,7 @@ class Viewer {
   private before: Hit|null = null;
   private linkTimer = 0;
   private pivotTimer = 0;
+  private pivoting = false;  ///< the ground in the middle of the picture is being looked for
 
   constructor() {
     this.renderer = new Renderer(this.canvas);
@@ -92,7 +93,8 @@ class Viewer {
     });
   }
   get settled(): boolean {
-    return !this.moved && this.status !== null && this.status.serial === this.serial && this.status.state.settled && !this.renderer.sliding(this.now);
+    if (this.moved || this.pivoting || this.status === null || this.status.serial !== this.serial) return false;
+    return this.status.state.settled && !this.renderer.sliding(this.now);
   }
   get state(): object {
     return {
@@ -122,6 +124,9 @@ class Viewer {
     this.store = name;
     this.manifest = null;
     this.status = null;
+    clearTimeout(this.pivotTimer);
+    this.pivotTimer = 0;
+    this.pivoting = false;
     this.closePlace();
     element<HTMLSelectElement>('store').value = name;
     element('progress').hidden = false;
@@ -375,15 +380,19 @@ class Viewer {
   }
   private change(): void {
     this.moved = true;
+    this.pivoting = true;
     clearTimeout(this.pivotTimer);
     this.pivotTimer = window.setTimeout(() => void this.turnAboutWhatIsSeen(), 250);
   }
   /// Once the camera rests: what it turns about is the ground in the middle of the picture.
   private async turnAboutWhatIsSeen(): Promise<void> {
+    const timer = this.pivotTimer;
     const eye = this.camera.eye, direction = this.camera.direction;
     const hit = await this.pickRay(eye, direction, 0.02);
-    if (!hit || length(add(this.camera.eye, eye, -1)) > 0) return;
-    this.camera.retarget(length(add(hit.place as Vec3, eye, -1)));
+    if (timer !== this.pivotTimer) return;
+    if (hit && length(add(this.camera.eye, eye, -1)) === 0) this.camera.retarget(length(add(hit.place as Vec3, eye, -1)));
+    this.pivoting = false;
+    this.writeLink();
   }
   private at(event: {clientX: number, clientY: number}): [number, number] {
     return [2 * event.clientX / this.canvas.clientWidth - 1, 1 - 2 * event.clientY / this.canvas.clientHeight];
