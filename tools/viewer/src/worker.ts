@@ -154,7 +154,7 @@ class Session {
       return;
     }
     this.opened = true;
-    post({type: 'opened', manifest: this.manifest, box: result.box, triangles: result.triangles});
+    post({type: 'opened', manifest: this.manifest, scene: result});
     this.schedule();
   }
   private frame(): void {
