@@ -9,6 +9,26 @@
 #include "with_type.hpp"
 
 namespace terrace::stream {
+namespace {
+
+/// Copies a few bytes, by words: inlined, unlike a call for a size that is not known.
+inline void copy_short(const std::byte* from, std::byte* to, std::size_t bytes) {
+  using Word = std::uint64_t;
+  if (bytes < sizeof(Word)) {
+    for (std::size_t i = 0; i < bytes; ++i) to[i] = from[i];
+    return;
+  }
+  const auto copy_at = [&](std::size_t at) {
+    Word word;
+    std::memcpy(&word, from + at, sizeof word);
+    std::memcpy(to + at, &word, sizeof word);
+  };
+  for (std::size_t at = 0; at + sizeof(Word) < bytes; at += sizeof(Word)) copy_at(at);
+  copy_at(bytes - sizeof(Word));
+}
+
+}  // namespace
+
 PackedPoints::PackedPoints(const Schema& schema) {
   std::size_t bytes = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -37,8 +57,8 @@ void PackedPoints::pack(const PointBlock& block, std::vector<std::byte>& records
   const std::size_t payload = payload_bytes();
   if (payload == 0) return;
   for (std::size_t i = 0; i < block.size(); ++i) {
-    std::memcpy(records.data() + i * record_bytes_ + payload_offset_,
-                block.payload.data() + i * payload, payload);
+    copy_short(block.payload.data() + i * payload,
+               records.data() + i * record_bytes_ + payload_offset_, payload);
   }
 }
 
@@ -74,8 +94,8 @@ void PackedPoints::unpack(std::span<const std::byte> records,
   block.payload.resize(numbers.size() * payload);
   if (payload == 0) return;
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    std::memcpy(block.payload.data() + i * payload,
-                records.data() + numbers[i] * record_bytes_ + payload_offset_, payload);
+    copy_short(records.data() + numbers[i] * record_bytes_ + payload_offset_,
+               block.payload.data() + i * payload, payload);
   }
 }
 

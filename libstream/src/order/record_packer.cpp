@@ -14,6 +14,8 @@ namespace {
 /// Runs are copied as words of this many bytes. What a word brings along is written over by the
 /// next one; only so many of the last records could bring along bytes beyond their ends.
 constexpr std::size_t kWordBytes = sizeof(std::uint64_t);
+/// Fewer bytes that are the same are written with those around them.
+constexpr std::size_t kLeastGap = 3;
 
 void copy_word(const std::byte* from, std::byte* to) {
   std::uint64_t word;
@@ -26,15 +28,26 @@ void copy_word(const std::byte* from, std::byte* to) {
 /// Returns how many bytes are written of each record.
 std::size_t RecordPacker::find_runs(std::span<const std::byte> differing) {
   runs_.clear();
+  // Short gaps are written: fewer runs are faster.
+  const auto same_at = [&](std::size_t at) {
+    std::size_t end = at;
+    while (end < record_bytes_ && differing[end] == std::byte{0}) ++end;
+    return end - at >= kLeastGap ? end : at;
+  };
   std::size_t written = 0;
+  const auto add = [&](std::size_t from, std::size_t to, bool same) {
+    for (std::size_t at = from; at < to; at += kWordBytes) {
+      const std::size_t bytes = std::min(kWordBytes, to - at);
+      runs_.push_back({.in_record = at, .written = written, .bytes = bytes, .same = same});
+      if (!same) written += bytes;
+    }
+  };
   for (std::size_t at = 0; at < record_bytes_;) {
-    const bool same = differing[at] == std::byte{0};
-    const std::size_t limit = std::min(at + kWordBytes, record_bytes_);
-    std::size_t end = at + 1;
-    while (end < limit && (differing[end] == std::byte{0}) == same) ++end;
-    runs_.push_back({.in_record = at, .written = written, .bytes = end - at, .same = same});
-    if (!same) written += end - at;
-    at = end;
+    const std::size_t same_to = same_at(at);
+    add(at, same_to, true);
+    at = same_to;
+    while (at < record_bytes_ && same_at(at) == at) ++at;
+    add(same_to, at, false);
   }
   return written;
 }

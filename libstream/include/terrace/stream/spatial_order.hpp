@@ -51,7 +51,7 @@ class OrderedSource : public PointSource {
 /// that follow. They go into 256 buckets, the leaves of a k-d tree over the window, in a temporary
 /// file; once all are there the buckets come back one after another, each cut by a k-d tree into
 /// blocks. A bucket of more than 262,144 points is first divided in turn, which takes no more disk
-/// as what has been read is written over. The file holds packed records, in chunks of 32 KiB less
+/// as what has been read is written over. The file holds chunks of 32 KiB of packed records, less
 /// the bytes that are the same in a whole chunk. Cells of a raster stay as they are.
 ///
 /// The order depends on nothing but the points, their order and the options. Memory, which
