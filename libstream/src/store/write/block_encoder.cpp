@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "differing_bits.hpp"
 #include "store/codec/column_codec.hpp"
 #include "store/codec/form.hpp"
 #include "terrace/stream/error.hpp"
@@ -68,29 +69,6 @@ void gather_integers(ScalarType type, const std::byte* payload, std::size_t stri
     case ScalarType::u64:
       return gather_integers<std::uint64_t>(payload, stride, points, out);
   }
-}
-
-/// Byte by byte of a record, the bits in which the records of a payload differ.
-void find_differing_bits(std::span<const std::byte> payload, std::size_t stride,
-                         std::vector<std::byte>& differing) {
-  differing.assign(stride, std::byte{0});
-  const std::size_t count = stride == 0 ? 0 : payload.size() / stride;
-  const auto find = [&](std::size_t offset, auto word) {
-    using Word = decltype(word);
-    if (count == 0) return;
-    const std::byte* at = payload.data() + offset;
-    const Word first = load<Word>(reinterpret_cast<const std::uint8_t*>(at));
-    Word bits = 0;
-    for (std::size_t i = 0; i < count; ++i, at += stride) {
-      bits =
-          static_cast<Word>(bits | (load<Word>(reinterpret_cast<const std::uint8_t*>(at)) ^ first));
-    }
-    std::memcpy(differing.data() + offset, &bits, sizeof bits);
-  };
-  std::size_t offset = 0;
-  for (; offset + 8 <= stride; offset += 8) find(offset, std::uint64_t{});
-  if (offset < stride && stride >= 8) return find(stride - 8, std::uint64_t{});
-  for (; offset < stride; ++offset) find(offset, std::uint8_t{});
 }
 
 /// The extent of a column of an attribute, as keys.
