@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <utility>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "surface/cluster_frontier.hpp"
 #include "surface/lattice_surface.hpp"
 #include "surface/store_window.hpp"
+#include "surface/surface_corner.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -81,17 +81,10 @@ class PointWindow {
   /// By slot of vertex, as libtri wants them.
   [[nodiscard]] const std::vector<double>& heights() const { return heights_; }
 
-  /// A point of the surface.
-  struct Corner {
-    Point2 place;
-    double height = 0;
-  };
-  [[nodiscard]] Corner corner(tri::VertexId vertex) const;
+  [[nodiscard]] SurfaceCorner corner(tri::VertexId vertex) const;
   /// Counter-clockwise.
-  [[nodiscard]] std::array<Corner, 3> corners_with_heights(tri::TriangleId triangle) const;
+  [[nodiscard]] SurfaceTriangle corners_with_heights(tri::TriangleId triangle) const;
 
-  /// Whether an edge between two places is so long that triangles with it are no surface.
-  using TooLong = std::function<bool(const Point2&, const Point2&)>;
   void set_limit(TooLong too_long) { too_long_ = std::move(too_long); }
 
   /// The linear surface at a place of the box. On an edge and on a vertex the height comes from the
@@ -178,7 +171,6 @@ class PointWindow {
   [[nodiscard]] SurfacePoint at_edge(tri::TriangleId triangle, std::size_t edge,
                                      const Point2& place) const;
   [[nodiscard]] SurfacePoint at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const;
-  [[nodiscard]] bool is_surface(tri::TriangleId triangle) const;
   [[nodiscard]] std::array<Point2, 3> corners(tri::TriangleId triangle) const;
 
   const stream::Store& store_;
