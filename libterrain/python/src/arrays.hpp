@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -58,6 +59,14 @@ py::array_t<T> to_array(std::vector<std::array<T, N>>&& values) {
                           [](void* p) { delete static_cast<std::vector<std::array<T, N>>*>(p); });
   return py::array_t<T>({static_cast<py::ssize_t>(kept->size()), static_cast<py::ssize_t>(N)},
                         reinterpret_cast<const T*>(kept->data()), owner);
+}
+
+/// Numbers with -1 in place of `nobody`.
+inline py::array_t<std::int64_t> with_nobody(std::span<const std::uint32_t> numbers,
+                                             std::uint32_t nobody) {
+  std::vector<std::int64_t> result(numbers.begin(), numbers.end());
+  std::replace(result.begin(), result.end(), std::int64_t{nobody}, std::int64_t{-1});
+  return to_array(std::move(result));
 }
 
 /// The value of a name. Throws: ValueError that lists the known ones.

@@ -86,6 +86,10 @@ py::tuple k_means(const Array<double>& given, const py::object& start, std::size
   std::vector<cluster::Point3> centres;
   if (!start.is_none()) centres = points_of(start.cast<Array<double>>());
   const auto weighing = numbers_of(weights, "weights");
+  if (!weighing.empty() && weighing.size() != points.size()) {
+    throw py::value_error("there are " + std::to_string(weighing.size()) + " weights of " +
+                          std::to_string(points.size()) + " points");
+  }
   const cluster::KMeansOptions options{.clusters = clusters,
                                        .seed = seed,
                                        .restarts = restarts,
@@ -141,13 +145,9 @@ py::tuple facility_location(const Array<double>& given, double facility_cost,
                                          .seed = seed,
                                          .threads = all_or(threads)};
   cluster::FacilitySolution made = released([&] { return solve(problem, options); });
-  std::vector<std::int64_t> labels(made.assignment.size());
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    labels[i] = made.assignment[i] == cluster::kOutlier ? -1 : made.assignment[i];
-  }
-  return py::make_tuple(to_array(std::move(made.facilities)), to_array(std::move(labels)),
-                        made.opening_cost, made.connection_cost, made.outlier_cost,
-                        made.lower_bound);
+  return py::make_tuple(to_array(std::move(made.facilities)),
+                        with_nobody(made.assignment, cluster::kOutlier), made.opening_cost,
+                        made.connection_cost, made.outlier_cost, made.lower_bound);
 }
 
 }  // namespace

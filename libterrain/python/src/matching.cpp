@@ -17,12 +17,8 @@ namespace {
 /// (column of each row or -1, cost, row duals, column duals)
 template <class Number>
 py::tuple arrays_of_assignment(matching::BasicAssignment<Number>&& made) {
-  std::vector<std::int64_t> columns(made.column.size());
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    columns[i] = made.column[i] == matching::kUnassigned ? -1 : made.column[i];
-  }
-  return py::make_tuple(to_array(std::move(columns)), made.cost, to_array(std::move(made.row_dual)),
-                        to_array(std::move(made.column_dual)));
+  return py::make_tuple(with_nobody(made.column, matching::kUnassigned), made.cost,
+                        to_array(std::move(made.row_dual)), to_array(std::move(made.column_dual)));
 }
 
 template <class T>
@@ -42,19 +38,17 @@ py::tuple assign_places(const Array<double>& a, const Array<double>& b) {
 
 /// (mate of each point or -1, cost, bound, optimal)
 template <std::size_t N>
-py::tuple match(const Array<double>& given, std::size_t exact_limit, unsigned rounds,
-                unsigned threads) {
+py::tuple match(const Array<double>& given, std::size_t exact_limit, std::size_t window,
+                unsigned rounds, unsigned threads) {
   const auto points = rows_of<N>(given, "points");
   matching::LargeMatchingOptions options;
   options.exact_limit = exact_limit;
+  options.window = window;
   options.rounds = rounds;
   options.threads = threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
   matching::LargeMatching made = released([&] { return match_large(points, options); });
-  std::vector<std::int64_t> mates(made.mate.size());
-  for (std::size_t i = 0; i < mates.size(); ++i) {
-    mates[i] = made.mate[i] == matching::kNobody ? -1 : made.mate[i];
-  }
-  return py::make_tuple(to_array(std::move(mates)), made.cost, made.dual_bound, made.optimal);
+  return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, made.dual_bound,
+                        made.optimal);
 }
 
 }  // namespace
@@ -67,10 +61,10 @@ void bind_matching(py::module_& module) {
     return a.ndim() == 2 && a.shape(1) == 3 ? assign_places<3>(a, b) : assign_places<2>(a, b);
   });
   module.def("match_points", [](const Array<double>& points, std::size_t exact_limit,
-                                unsigned rounds, unsigned threads) {
+                                std::size_t window, unsigned rounds, unsigned threads) {
     return points.ndim() == 2 && points.shape(1) == 3
-               ? match<3>(points, exact_limit, rounds, threads)
-               : match<2>(points, exact_limit, rounds, threads);
+               ? match<3>(points, exact_limit, window, rounds, threads)
+               : match<2>(points, exact_limit, window, rounds, threads);
   });
 }
 

@@ -70,7 +70,7 @@ def kmeans(points, clusters, *, weights=None, seed=1, restarts=1, max_iterations
     """
     points = as_rows(points, 'points')
     start, count = None, 0
-    if hasattr(clusters, '__index__'):
+    if np.ndim(clusters) == 0:
         count = whole(clusters, 'clusters', 1)
     else:
         start = as_rows(clusters, 'clusters', points.shape[1:])

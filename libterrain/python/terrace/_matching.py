@@ -73,16 +73,16 @@ class Matching:
         return f'<terrace.Matching: {len(self.pairs)} pairs, cost {self.cost:g}{", optimal" if self.optimal else ""}>'
 
 
-def matching(points, *, exact_limit=500_000, rounds=8, threads=None):
+def matching(points, *, exact_limit=500_000, window=50_000, rounds=8, threads=None):
     """Pairs of points with the least sum of Euclidean distances; of an odd number one is left over.
 
-    points: shape (n, 2) or (n, 3). Up to ``exact_limit`` points the optimum, beyond it windows matched in ``rounds``,
-    with a proven bound. About n^1.2. Source: J. Skala, 4.3.2, 7.5; J. Edmonds, 1965; W. Cook, A. Rohe, 1999.
+    points: shape (n, 2) or (n, 3). Up to ``exact_limit`` points the optimum, beyond it windows of ``window`` points
+    matched in ``rounds``, with a proven bound. About n^1.2. Source: J. Skala, 4.3.2, 7.5; J. Edmonds, 1965; W. Cook, A. Rohe, 1999.
 
     >>> matching([[0, 0], [5, 0], [0, 1], [5, 2]])
     <terrace.Matching: 2 pairs, cost 3, optimal>
     """
-    return Matching(*_core.match_points(as_rows(points, 'points'), whole(exact_limit, 'exact_limit', 1),
+    return Matching(*_core.match_points(as_rows(points, 'points'), whole(exact_limit, 'exact_limit', 1), whole(window, 'window', 4),
                                         whole(rounds, 'rounds'), _threads(threads)))
 
 
