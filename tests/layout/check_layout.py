@@ -13,6 +13,8 @@ import sys
 LIBRARIES = ['stream', 'cluster', 'matching', 'tri', 'terrain']
 # Who may use whom among them; the others know no sibling.
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
+# What joins all of them for another language.
+BINDINGS = 'libterrain/python'
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
@@ -49,6 +51,7 @@ RESTRICTED = [
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'CLI/', ['tools']),
+    (r'pybind11/|Python\.h', [BINDINGS]),
     (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'tools', 'tests'] + IN_STREAM),
     (r'gtest/|gmock/', TESTS + ['tools']),
     (r'benchmark/', BENCHES),
@@ -118,7 +121,7 @@ def check_include(path, bracket, name):
     """The breaches of one #include line."""
     library = library_of(path)
     if library:
-        for other in LIBRARIES:
+        for other in LIBRARIES if not below(path, BINDINGS) else []:
             if other not in [library] + SIBLINGS.get(library, []) and name.startswith(f'terrace/{other}/'):
                 yield f'includes its sibling\'s <{name}>'
         if bracket == '"':
@@ -214,7 +217,7 @@ def check_meson(root):
             if os.path.basename(path) != 'meson.build':
                 continue
             for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
-                sibling = name.startswith('terrace-') and name[8:] not in [library] + SIBLINGS.get(library, [])
+                sibling = not below(path, BINDINGS) and name.startswith('terrace-') and name[8:] not in [library] + SIBLINGS.get(library, [])
                 if sibling or (name in ('geographiclib', 'proj', 'geos') and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
                     yield f'{path}: depends on {name}'
         for folder, ending, list_path, cut in LISTED:

@@ -57,6 +57,10 @@ class CheckLayout(unittest.TestCase):
         # Build folders and what lies in them are nobody's source.
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/build-x/a.cpp', '')), [])
 
+    def test_bindings_may_use_every_library(self):
+        text = head('libterrain') + '#include <pybind11/numpy.h>\n#include <terrace/matching/a.hpp>\n'
+        self.assertEqual(self.breaches(lambda root: write(root, 'libterrain/python/src/b.cpp', text)), [])
+
     def test_each_breach_is_found(self):
         apache = '// SPDX-License-Identifier: Apache-2.0\n'
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
@@ -74,6 +78,7 @@ class CheckLayout(unittest.TestCase):
             ('tools/src/b.cpp', gpl + '#include <tiffio.h>\n', 'which only'),
             ('libtri/src/b.cpp', head('libtri') + '#include <GeographicLib/UTMUPS.hpp>\n', 'which only'),
             ('tools/src/b.cpp', gpl + '#include <proj.h>\n', 'which only'),
+            ('libterrain/src/base/b.cpp', apache + '#include <pybind11/numpy.h>\n', 'which only'),
             ('libterrain/src/earth/b.cpp', gpl + '#include <geos_c.h>\n', 'which only'),
             ('libcluster/src/b.cpp', apache + '#include <lemon/matching.h>\n', 'which only'),
             ('libcluster/src/b.cpp', '#include <vector>\n', 'no SPDX line'),

@@ -36,7 +36,8 @@ Error system_error(std::string file, const std::string& action, int error_number
   return Error({.file = std::move(file),
                 .where = {},
                 .cause = action + ": " + std::generic_category().message(error_number),
-                .remedy = std::move(remedy)});
+                .remedy = std::move(remedy),
+                .error_number = error_number});
 }
 
 }  // namespace terrace::stream

@@ -215,7 +215,9 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   const auto stop_reading = [&reading] { reading.request_stop(); };
   const std::stop_callback on_stop(context.stop, stop_reading);
   source_options.stop = reading.get_token();
-  std::unique_ptr<stream::PointSource> source = stream::open_source(request.inputs, source_options);
+  std::unique_ptr<stream::PointSource> source =
+      request.open ? request.open(source_options)
+                   : stream::open_source(request.inputs, source_options);
   if (request.most_points > 0) {
     source = std::make_unique<FirstPoints>(std::move(source), request.most_points);
   }
@@ -299,7 +301,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   so_far = points->progress();
   if (so_far.points == 0) {
     throw stream::Error(
-        {.file = request.inputs.front(),
+        {.file = info.files.empty() ? std::string() : info.files.front(),
          .where = {},
          .cause = so_far.excluded > 0
                       ? "none of its " + std::to_string(so_far.excluded) + " points is selected"

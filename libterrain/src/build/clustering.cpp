@@ -54,7 +54,7 @@ AttributeAxis axis_of(const std::string& name, const BuildRequest& request,
     if (attribute.name == name) return {attribute, schema.attribute_offset(i)};
     known += (known.empty() ? "" : ", ") + attribute.name;
   }
-  throw stream::Error({.file = request.inputs.front(),
+  throw stream::Error({.file = input_name(request),
                        .where = {},
                        .cause = "its points have no attribute \"" + name + "\"",
                        .remedy = known.empty() ? "they have no attributes: leave out `channel`"
@@ -69,8 +69,8 @@ void set_channels(const BuildRequest& request, const stream::Schema& schema,
     options.channels.weights.push_back(weight);
   }
   if (axes.empty()) return;
-  options.channels.read = [axes, file = request.inputs.front()](std::span<const std::byte> record,
-                                                                std::span<double> values) {
+  options.channels.read = [axes, file = input_name(request)](std::span<const std::byte> record,
+                                                             std::span<double> values) {
     for (std::size_t i = 0; i < axes.size(); ++i) {
       const stream::Channel& channel = axes[i].channel;
       values[i] = stream::to_double(channel.type, record.data() + axes[i].offset) * channel.scale +
@@ -127,7 +127,7 @@ void set_corners(const BuildRequest& request, const stream::Schema& schema,
     throw UsageError(entities + " have no " + cluster::name_of(request.strategy) +
                      " search: theirs are automatic, full scan and facilities");
   }
-  const CornerReader read(schema, request.entities, request.inputs.front());
+  const CornerReader read(schema, request.entities, input_name(request));
   options.corners.count = read.most();
   options.corners.ordered = request.entities == stream::Entities::polylines;
   if (!options.corners.ordered) {
@@ -148,7 +148,7 @@ void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>&
   if (std::isinf(request.outlier_price)) return;
   const auto same = [](const stream::Channel& channel) { return channel.name == kOutlierName; };
   if (std::any_of(attributes.begin(), attributes.end(), same)) {
-    throw stream::Error({.file = request.inputs.front(),
+    throw stream::Error({.file = input_name(request),
                          .where = {},
                          .cause = std::string("its points have an attribute \"") + kOutlierName +
                                   "\" already, the name that `outlier_price` marks outliers by",

@@ -19,6 +19,11 @@ namespace terrace::terrain {
 /// The attribute that marks outliers: 1 for them, 0 for all others. It is the last.
 inline constexpr const char* kOutlierName = "outlier";
 
+/// The input in messages.
+[[nodiscard]] inline std::string input_name(const BuildRequest& request) {
+  return request.inputs.empty() ? "the source" : request.inputs.front();
+}
+
 /// Adds the mark of outliers to the attributes, if the request has a price for them.
 /// Throws: stream::Error if the source has an attribute of that name.
 void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>& attributes);

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/parallel.hpp"
 #include "base/stored_entities.hpp"
 #include "sample/samplers.hpp"
+#include "surface/ground_slope.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -20,6 +26,32 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& given,
         "explicitly");
   }
   return make_lattice_sampler(store, options, context);
+}
+
+std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<const Point2> places,
+                                       const SamplerOptions& options, const Context& context) {
+  constexpr std::size_t kPlacesAtOnce = 16384;
+  const std::unique_ptr<HeightSampler> sampler = make_sampler(store, options, context);
+  const GroundSlope ground(store);
+  std::vector<Point2> stored(places.size());
+  std::vector<SurfacePoint> surface(places.size());
+  std::vector<GroundPoint> found(places.size());
+  const auto in_pieces = [&](const auto& work) {
+    parallel_for((places.size() + kPlacesAtOnce - 1) / kPlacesAtOnce, std::max(1U, context.threads),
+                 [&](unsigned, std::size_t piece) {
+                   const std::size_t begin = piece * kPlacesAtOnce;
+                   const std::size_t end = std::min(begin + kPlacesAtOnce, places.size());
+                   for (std::size_t i = begin; i < end; ++i) work(i);
+                 });
+  };
+  in_pieces([&](std::size_t i) { stored[i] = ground.stored(places[i]); });
+  sampler->sample(stored, surface);
+  in_pieces([&](std::size_t i) {
+    if (std::isnan(surface[i].height)) return;
+    const tri::Gradient gradient = ground.on_ground(stored[i], surface[i]);
+    found[i] = {.height = surface[i].height, .east = gradient.x, .north = gradient.y};
+  });
+  return found;
 }
 
 }  // namespace terrace::terrain

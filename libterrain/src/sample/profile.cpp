@@ -32,20 +32,18 @@ Point2 between(const Point2& a, const Point2& b, double t) {
 class ProfileRun {
  public:
   ProfileRun(const stream::Store& store, const ProfileRequest& request,
-             const std::function<void(std::string_view)>& write, const Context& context)
+             const std::function<void(std::span<const ProfilePoint>)>& take, const Context& context)
       : request_(request),
-        write_(write),
+        take_(take),
         ground_(store),
         distance_(LineDistance::of(store)),
-        sampler_(make_sampler(store, request.sampler, context)),
-        heights_(FixedText::for_numbers_up_to(largest(store))) {
+        sampler_(make_sampler(store, request.sampler, context)) {
     if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
       crossings_.emplace(store, request.sampler, context.memory_or(0));
     }
   }
 
   ProfileOutcome run() {
-    write_(std::string(kProfileHead) + '\n');
     add(request_.line.front(), 0);
     for (std::size_t leg = 0; leg + 1 < request_.line.size(); ++leg) {
       const Point2 &a = request_.line[leg], &b = request_.line[leg + 1];
@@ -64,12 +62,6 @@ class ProfileRun {
   }
 
  private:
-  static double largest(const stream::Store& store) {
-    const stream::Channel& z = store.schema().coordinates[2];
-    const auto height = [&](double raw) { return std::abs(raw * z.scale + z.offset); };
-    return std::max(height(store.bounds().min[2]), height(store.bounds().max[2]));
-  }
-
   /// Every so many metres of the leg.
   void walk(const Point2& a, const Point2& b) {
     const double step = *request_.step;
@@ -171,20 +163,13 @@ class ProfileRun {
       const bool missed = std::isnan(surface_[i].height);
       if (missed && method != tri::Interpolation::kNearest) surface_[i].height = known_[i];
     }
-    std::string text;
+    points_.resize(places_.size());
     for (std::size_t i = 0; i < places_.size(); ++i) {
-      metres_text_.append(text, metres_[i]);
-      text += ',';
-      text += number_text(places_[i][0]);
-      text += ',';
-      text += number_text(places_[i][1]);
-      text += ',';
-      heights_.append(text, surface_[i].height);
-      text += '\n';
+      points_[i] = {.metres = metres_[i], .place = places_[i], .height = surface_[i].height};
       outcome_.answered += std::isnan(surface_[i].height) ? 0 : 1;
     }
     outcome_.points += places_.size();
-    write_(text);
+    take_(points_);
     places_.clear();
     metres_.clear();
     stored_.clear();
@@ -192,26 +177,55 @@ class ProfileRun {
   }
 
   const ProfileRequest& request_;
-  const std::function<void(std::string_view)>& write_;
+  const std::function<void(std::span<const ProfilePoint>)>& take_;
   GroundSlope ground_;
   LineDistance distance_;
   std::unique_ptr<HeightSampler> sampler_;
-  FixedText heights_, metres_text_{4};
   ProfileOutcome outcome_;
   double next_step_ = 1, last_ = 0;
   std::vector<Point2> places_, stored_;
   std::vector<double> metres_, known_;
   std::optional<SurfaceCrossings> crossings_;
   std::vector<SurfacePoint> surface_;
+  std::vector<ProfilePoint> points_;
 };
 
+double largest_height(const stream::Store& store) {
+  const stream::Channel& z = store.schema().coordinates[2];
+  const auto height = [&](double raw) { return std::abs(raw * z.scale + z.offset); };
+  return std::max(height(store.bounds().min[2]), height(store.bounds().max[2]));
+}
+
 }  // namespace
+
+ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
+                       const std::function<void(std::span<const ProfilePoint>)>& take,
+                       const Context& context) {
+  need_points(store, "a profile");
+  if (request.line.size() < 2) throw UsageError("a profile needs a line of two places or more");
+  return ProfileRun(store.with_stop(context.stop), request, take, context).run();
+}
 
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write,
                              const Context& context) {
-  need_points(store, "a profile");
-  return ProfileRun(store.with_stop(context.stop), request, write, context).run();
+  const FixedText heights = FixedText::for_numbers_up_to(largest_height(store)), metres(4);
+  std::string text = std::string(kProfileHead) + '\n';
+  const auto add_rows = [&](std::span<const ProfilePoint> points) {
+    for (const ProfilePoint& point : points) {
+      metres.append(text, point.metres);
+      text += ',';
+      text += number_text(point.place[0]);
+      text += ',';
+      text += number_text(point.place[1]);
+      text += ',';
+      heights.append(text, point.height);
+      text += '\n';
+    }
+    write(text);
+    text.clear();
+  };
+  return profile(store, request, add_rows, context);
 }
 
 }  // namespace terrace::terrain

@@ -11,10 +11,11 @@ namespace terrace::stream {
 class Error : public std::runtime_error {
  public:
   struct Parts {
-    std::string file;    ///< the file as the caller named it
-    std::string where;   ///< "line 12", "byte 4096", "tile 3,4", "cluster 0/17"
-    std::string cause;   ///< what is wrong
-    std::string remedy;  ///< what the user can do
+    std::string file;      ///< the file as the caller named it
+    std::string where;     ///< "line 12", "byte 4096", "tile 3,4", "cluster 0/17"
+    std::string cause;     ///< what is wrong
+    std::string remedy;    ///< what the user can do
+    int error_number = 0;  ///< errno of the system call that failed; 0: none did
   };
 
   explicit Error(Parts parts);

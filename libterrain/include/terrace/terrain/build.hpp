@@ -4,7 +4,9 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,6 +26,9 @@ namespace terrace::terrain {
 struct BuildRequest {
   /// Rasters (several form a mosaic) or point files; "-" is standard input.
   std::vector<std::string> inputs{};
+  /// In place of `inputs`: opens a source of the caller's, such as stream::open_memory(), with
+  /// these options.
+  std::function<std::unique_ptr<stream::PointSource>(const stream::SourceOptions&)> open{};
   std::filesystem::path store{};  ///< the folder to create
   bool replace = false;
   std::string input_format{};  ///< empty: told by content

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,8 +28,13 @@ struct ProfileOutcome {
   double metres = 0;  ///< length of the line
 };
 
-/// Rows distance,x,y,height along the line: metres from its begin, the place in the store's CRS,
-/// and the height, empty where there is none.
+struct ProfilePoint {
+  double metres = 0;  ///< from the line's begin
+  Point2 place{};     ///< in the store's CRS
+  double height = 0;  ///< in the store's vertical unit; NaN where there is none
+};
+
+/// The surface along the line.
 ///
 /// With a step, every so many metres and at the end. Without, at the line's places and wherever it
 /// crosses a column, a row or a diagonal of a raster's lattice, or, of irregular points and coarser
@@ -36,8 +42,16 @@ struct ProfileOutcome {
 /// profile is the surface itself.
 ///
 /// Distances are geodesics (line_distance.hpp) summed over pieces so short that the line's bend
-/// does not show; without a CRS they are the map's. Memory: some thousand rows at a time.
+/// does not show; without a CRS they are the map's.
+///
+/// take: gets the points in order, some thousand at a time.
 /// Throws: stream::Error on a damaged store, stream::Stopped, UsageError as make_sampler().
+ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
+                       const std::function<void(std::span<const ProfilePoint>)>& take,
+                       const Context& context = {});
+
+/// The same as rows distance,x,y,height of text with a line of names before them, the height empty
+/// where there is none.
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write,
                              const Context& context = {});

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/memory_source.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "format/selection.hpp"
+#include "terrace/stream/error.hpp"
+#include "with_type.hpp"
+
+namespace terrace::stream {
+namespace {
+
+const std::byte* number_at(const MemoryColumn& column, std::uint64_t index) {
+  return column.first + static_cast<std::ptrdiff_t>(index) * column.stride;
+}
+
+class ColumnSource final : public PointSource {
+ public:
+  ColumnSource(MemoryPoints points, const SourceOptions& options)
+      : points_(std::move(points)), block_points_(std::max<std::size_t>(options.block_points, 1)) {
+    assert(points_.attributes.size() == points_.info.attributes.size());
+    points_.info.points = points_.count;
+    if (options.crs) points_.info.crs = *options.crs;
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return points_.info; }
+  [[nodiscard]] Progress progress() const override {
+    return {.points = delivered_,
+            .fraction = points_.count == 0
+                            ? 1.0
+                            : static_cast<double>(delivered_) / static_cast<double>(points_.count)};
+  }
+
+  bool next(PointBlock& block) override {
+    block.clear();
+    const auto size = static_cast<std::size_t>(
+        std::min<std::uint64_t>(block_points_, points_.count - delivered_));
+    if (size == 0) return false;
+    block.positions.resize(size);
+    for (std::size_t axis = 0; axis < 3; ++axis) fill_axis(axis, block);
+    const SourceInfo& info = points_.info;
+    const std::size_t record = info.payload_size();
+    block.payload.resize(size * record);
+    for (std::size_t a = 0; a < points_.attributes.size(); ++a) {
+      const std::size_t bytes = size_of(info.attributes[a].type);
+      std::byte* to = block.payload.data() + info.attribute_offset(a);
+      for (std::size_t i = 0; i < size; ++i, to += record) {
+        std::memcpy(to, number_at(points_.attributes[a], delivered_ + i), bytes);
+      }
+    }
+    delivered_ += size;
+    return true;
+  }
+
+ private:
+  void fill_axis(std::size_t axis, PointBlock& block) const {
+    with_type(points_.info.coordinates[axis].type, [&]<class T>(T number) {
+      for (std::size_t i = 0; i < block.positions.size(); ++i) {
+        std::memcpy(&number, number_at(points_.coordinates[axis], delivered_ + i), sizeof number);
+        const auto value = static_cast<double>(number);
+        if (!std::isfinite(value)) {
+          throw Error({.file = points_.info.files.empty() ? "" : points_.info.files.front(),
+                       .where = "point " + std::to_string(delivered_ + i),
+                       .cause = "its " + points_.info.coordinates[axis].name + " is not finite",
+                       .remedy = "leave such points out"});
+        }
+        block.positions[i][axis] = value;
+      }
+    });
+  }
+
+  MemoryPoints points_;
+  std::size_t block_points_;
+  std::uint64_t delivered_ = 0;
+};
+
+class SampleArray final : public Raster {
+ public:
+  explicit SampleArray(const MemoryRaster& raster) : raster_(raster) {}
+
+  [[nodiscard]] const RasterInfo& info() const override { return raster_.info; }
+
+  bool read_over(const CellWindow& window, const CellBuffer& out) override {
+    return with_type(raster_.info.sample.type, [&]<class T>(T sample) {
+      bool any = false;
+      for (std::uint64_t r = 0; r < window.rows; ++r) {
+        const MemoryColumn row{
+            raster_.first + static_cast<std::ptrdiff_t>(window.row + r) * raster_.row_stride,
+            raster_.column_stride};
+        for (std::uint64_t c = 0; c < window.columns; ++c) {
+          std::memcpy(&sample, number_at(row, window.column + c), sizeof sample);
+          if (!has_data(sample)) continue;
+          const std::size_t cell = r * out.stride + c;
+          std::memcpy(out.samples + cell * sizeof sample, &sample, sizeof sample);
+          out.valid[cell] = 1;
+          any = true;
+        }
+      }
+      return any;
+    });
+  }
+
+ private:
+  template <class T>
+  [[nodiscard]] bool has_data(T sample) const {
+    if constexpr (std::is_floating_point_v<T>) {
+      if (!std::isfinite(sample)) return false;
+    }
+    return !raster_.info.nodata || static_cast<double>(sample) != *raster_.info.nodata;
+  }
+
+  MemoryRaster raster_;
+};
+
+std::unique_ptr<PointSource> selected(std::unique_ptr<PointSource> source,
+                                      const SourceOptions& options) {
+  source = selection_of(std::move(source), options);
+  if (options.blocks_ahead == 0) return source;
+  return read_ahead(std::move(source), options.blocks_ahead, std::stop_source(std::nostopstate),
+                    options.stop);
+}
+
+}  // namespace
+
+std::unique_ptr<PointSource> open_memory(MemoryPoints points, const SourceOptions& options) {
+  return selected(std::make_unique<ColumnSource>(std::move(points), options), options);
+}
+
+std::unique_ptr<PointSource> open_memory(const MemoryRaster& raster, const SourceOptions& options) {
+  return selected(points_of(std::make_unique<SampleArray>(raster), options), options);
+}
+
+}  // namespace terrace::stream

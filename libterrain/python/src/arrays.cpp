@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arrays.hpp"
+
+#include <limits>
+#include <optional>
+
+namespace terrace::python {
+namespace {
+
+constexpr std::array<std::string_view, 10> kTypeNames{"i1", "u1", "i2", "u2", "i4",
+                                                      "u4", "i8", "u8", "f4", "f8"};
+
+}  // namespace
+
+std::string type_name(stream::ScalarType type) {
+  return std::string(kTypeNames[static_cast<std::size_t>(type)]);
+}
+
+stream::ScalarType scalar_type(const py::dtype& type, const std::string& what) {
+  const std::string name = type.kind() + std::to_string(type.itemsize());
+  for (std::size_t i = 0; i < kTypeNames.size(); ++i) {
+    if (kTypeNames[i] == name && type.byteorder() != '>') return static_cast<stream::ScalarType>(i);
+  }
+  throw py::type_error(what + " has the type " +
+                       std::string(py::str(static_cast<const py::object&>(type))) +
+                       "; numbers of 8 to 64 bits in the machine's byte order are needed");
+}
+
+py::dtype record_type(const stream::Schema& schema, const std::vector<std::string>& more) {
+  py::list fields;
+  for (const char* name : {"x", "y", "z"}) fields.append(py::make_tuple(name, "f8"));
+  for (const stream::Channel& attribute : schema.attributes) {
+    // Names of the coordinates, and names that come twice, get a mark.
+    std::string name = attribute.name;
+    const auto taken = [&] {
+      for (const py::handle field : fields) {
+        if (field.cast<py::tuple>()[0].cast<std::string>() == name) return true;
+      }
+      return name.empty();
+    };
+    while (taken()) name += '_';
+    fields.append(py::make_tuple(name, type_name(attribute.type)));
+  }
+  for (const std::string& name : more) fields.append(py::make_tuple(name, "f8"));
+  return py::dtype::from_args(fields);
+}
+
+py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type) {
+  auto* const kept = new std::vector<std::byte>(std::move(bytes));
+  const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<std::byte>*>(p); });
+  return {type, std::vector<py::ssize_t>{static_cast<py::ssize_t>(kept->size()) / type.itemsize()},
+          std::vector<py::ssize_t>{type.itemsize()}, kept->data(), owner};
+}
+
+std::optional<terrain::Region> region_of(const py::object& given) {
+  if (given.is_none()) return std::nullopt;
+  if (py::isinstance<py::tuple>(given)) {
+    stream::Box3 box;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.min[axis] = given.cast<py::tuple>()[axis].cast<double>();
+      box.max[axis] = given.cast<py::tuple>()[3 + axis].cast<double>();
+    }
+    return terrain::Region::of_box(box);
+  }
+  std::vector<terrain::Polygon> polygons;
+  for (const py::handle polygon : given) {
+    terrain::Polygon& rings = polygons.emplace_back();
+    for (const py::handle ring : polygon) {
+      const auto array = ring.cast<Array<double>>();
+      const auto places = rows_of<2>(array, "a ring");
+      rings.emplace_back(places.begin(), places.end());
+    }
+  }
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return terrain::Region::of_polygons(std::move(polygons), -kInfinity, kInfinity);
+}
+
+}  // namespace terrace::python

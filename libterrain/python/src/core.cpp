@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core.hpp"
+
+#include <exception>
+#include <new>
+#include <stdexcept>
+
+#include <terrace/stream/error.hpp>
+#include <terrace/terrain/error.hpp>
+
+namespace terrace::python {
+namespace {
+
+py::handle error_type;  // terrace.Error, kept by the module
+
+/// The library's errors as Python's: a failed system call as OSError of its kind, other faults of
+/// data as terrace.Error, values that make no sense as ValueError.
+void translate(std::exception_ptr thrown) {
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const stream::Error& error) {
+    if (error.parts().error_number != 0) {
+      const py::tuple arguments = py::make_tuple(error.parts().error_number, error.what());
+      PyErr_SetObject(PyExc_OSError, arguments.ptr());
+    } else {
+      PyErr_SetString(error_type.ptr(), error.what());
+    }
+  } catch (const terrain::UsageError& error) {
+    PyErr_SetString(PyExc_ValueError, error.what());
+  } catch (const stream::Stopped&) {
+    PyErr_SetString(PyExc_KeyboardInterrupt, "stopped");
+  }
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, module) {
+  module.doc() = "The compiled half of terrace; use the package terrace.";
+  static py::exception<stream::Error> error(module, "Error");
+  error.attr("__module__") = "terrace";
+  error.attr("__doc__") = "Bad data: file, place, cause and remedy in one line.";
+  error_type = error;
+  py::register_exception_translator(&translate);
+  bind_build(module);
+  bind_store(module);
+  bind_heights(module);
+  bind_mesh(module);
+  bind_tiles(module);
+  bind_view(module);
+  bind_delaunay(module);
+  bind_cluster(module);
+  bind_matching(module);
+}
+
+}  // namespace terrace::python

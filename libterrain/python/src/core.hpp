@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+/// The compiled half of the Python module: conversions and calls only. One source per concept adds
+/// its functions to the module; python/terrace has what users see.
+
+namespace terrace::python {
+
+namespace py = pybind11;
+
+void bind_build(py::module_& module);
+void bind_store(py::module_& module);
+void bind_heights(py::module_& module);
+void bind_mesh(py::module_& module);
+void bind_tiles(py::module_& module);
+void bind_view(py::module_& module);
+void bind_delaunay(py::module_& module);
+void bind_cluster(py::module_& module);
+void bind_matching(py::module_& module);
+
+}  // namespace terrace::python

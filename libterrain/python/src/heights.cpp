@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+#include <terrace/stream/raster.hpp>
+#include <terrace/terrain/contours.hpp>
+#include <terrace/terrain/heights.hpp>
+#include <terrace/terrain/profile.hpp>
+#include <terrace/terrain/raster.hpp>
+
+#include "arrays.hpp"
+#include "call.hpp"
+#include "store.hpp"
+
+namespace terrace::python {
+namespace {
+
+terrain::SamplerOptions sampler_of(const std::string& method, unsigned level,
+                                   std::optional<double> max_edge) {
+  return {.method = named<tri::Interpolation>(method, "method",
+                                              {{"linear", tri::Interpolation::kLinear},
+                                               {"natural", tri::Interpolation::kNaturalNeighbour},
+                                               {"nearest", tri::Interpolation::kNearest}}),
+          .level = level,
+          .max_edge = max_edge};
+}
+
+/// Rows of height, east, north.
+py::array sample(const OpenStore& open, const Array<double>& xy, const std::string& method,
+                 unsigned level, std::optional<double> max_edge, const std::string& crs,
+                 const py::tuple& how) {
+  const stream::Store& store = open.get();
+  const auto given = rows_of<2>(xy, "xy");
+  const terrain::SamplerOptions options = sampler_of(method, level, max_edge);
+  std::vector<terrain::GroundPoint> found = Job(how).run([&](const terrain::Context& context) {
+    const auto change = change_to(store, crs);
+    if (!change) return sample_places(store, given, options, context);
+    std::vector<terrain::Point2> places(given.begin(), given.end());
+    change->reverse(places);
+    return sample_places(store, places, options, context);
+  });
+  auto* const kept = new std::vector<terrain::GroundPoint>(std::move(found));
+  const py::capsule owner(
+      kept, [](void* p) { delete static_cast<std::vector<terrain::GroundPoint>*>(p); });
+  static_assert(sizeof(terrain::GroundPoint) == 3 * sizeof(double));
+  return py::array_t<double>({static_cast<py::ssize_t>(kept->size()), py::ssize_t{3}},
+                             reinterpret_cast<const double*>(kept->data()), owner);
+}
+
+/// Rows of metres, x, y, height.
+py::array profile(const OpenStore& open, const Array<double>& line, std::optional<double> step,
+                  const std::string& method, unsigned level, std::optional<double> max_edge,
+                  const py::tuple& how) {
+  const stream::Store& store = open.get();
+  terrain::ProfileRequest request;
+  request.sampler = sampler_of(method, level, max_edge);
+  const auto places = rows_of<2>(line, "line");
+  request.line.assign(places.begin(), places.end());
+  if (step && !(*step > 0)) throw py::value_error("`step` must be above 0");
+  request.step = step;
+  return to_array(Job(how).run([&](const terrain::Context& context) {
+    std::vector<std::array<double, 4>> rows;
+    terrain::profile(
+        store, request,
+        [&](std::span<const terrain::ProfilePoint> points) {
+          for (const terrain::ProfilePoint& p : points) {
+            rows.push_back({p.metres, p.place[0], p.place[1], p.height});
+          }
+        },
+        context);
+    return rows;
+  }));
+}
+
+py::str contours(const OpenStore& open, double interval, unsigned level,
+                 std::optional<double> max_edge, const py::object& region, const py::tuple& how) {
+  const stream::Store& store = open.get();
+  if (!(interval > 0)) throw py::value_error("`interval` must be above 0");
+  const terrain::ContourRequest request{
+      .interval = interval, .level = level, .max_edge = max_edge, .region = region_of(region)};
+  const std::string text = Job(how).run([&](const terrain::Context& context) {
+    std::string lines;
+    write_contours(
+        store, request, [&](std::string_view more) { lines += more; }, context);
+    return lines;
+  });
+  return text;
+}
+
+void write_raster(const OpenStore& open, const std::string& path, const std::string& value,
+                  std::optional<double> cell, const py::object& region, const std::string& crs,
+                  const std::string& method, unsigned level, std::optional<double> max_edge,
+                  bool replace, const py::tuple& how) {
+  const stream::Store& store = open.get();
+  using terrain::RasterValue;
+  terrain::RasterRequest request{
+      .value = named<RasterValue>(value, "value",
+                                  {{"height", RasterValue::height},
+                                   {"slope", RasterValue::slope},
+                                   {"aspect", RasterValue::aspect},
+                                   {"hillshade", RasterValue::hillshade}}),
+      .sampler = sampler_of(method, level, max_edge),
+      .cell = cell,
+      .region = region_of(region),
+      .output = path,
+      .replace = replace};
+  if (cell && !(*cell > 0)) throw py::value_error("`cell` must be above 0");
+  Job(how).run([&](const terrain::Context& context) {
+    request.to = change_to(store, crs);
+    terrain::write_raster(store, request, context);
+  });
+}
+
+/// What names the CRS for CoordinateSystem::parse(); empty if there is none.
+std::string name_of_crs(const stream::Crs& crs, const std::string& file) {
+  if (crs.epsg != 0) return "EPSG:" + std::to_string(crs.epsg);
+  const auto system = terrain::CoordinateSystem::of(crs, file);
+  return system ? system->crs().wkt : std::string();
+}
+
+/// A GeoTIFF: samples, which of them are valid, transform to the centres, CRS.
+py::tuple read_geotiff(const std::string& path) {
+  const std::unique_ptr<stream::Raster> raster =
+      released([&] { return stream::open_geotiff(path); });
+  const stream::RasterInfo& info = raster->info();
+  const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(info.rows),
+                                       static_cast<py::ssize_t>(info.columns)};
+  py::array samples(py::dtype(type_name(info.sample.type)), shape);
+  py::array_t<std::uint8_t> valid(shape);
+  std::fill_n(valid.mutable_data(), valid.size(), std::uint8_t{0});
+  std::fill_n(static_cast<std::byte*>(samples.mutable_data()), samples.nbytes(), std::byte{0});
+  const stream::CellBuffer out{.samples = static_cast<std::byte*>(samples.mutable_data()),
+                               .valid = valid.mutable_data(),
+                               .stride = info.columns};
+  released([&] {
+    raster->read_over({.column = 0, .row = 0, .columns = info.columns, .rows = info.rows}, out);
+  });
+  return py::make_tuple(samples, valid, py::cast(info.world.xy), name_of_crs(info.crs, path));
+}
+
+}  // namespace
+
+void bind_heights(py::module_& module) {
+  module.def("sample", &sample);
+  module.def("profile", &profile);
+  module.def("contours", &contours);
+  module.def("write_raster", &write_raster);
+  module.def("read_geotiff", &read_geotiff);
+}
+
+}  // namespace terrace::python

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string>
+#include <utility>
+
+#include <pybind11/stl.h>
+#include <terrace/stream/mesh_reader.hpp>
+#include <terrace/terrain/bounded_mesh.hpp>
+#include <terrace/terrain/detail_mesh.hpp>
+
+#include "arrays.hpp"
+#include "call.hpp"
+#include "store.hpp"
+
+namespace terrace::python {
+namespace {
+
+/// (vertices, triangles, levels)
+py::tuple arrays_of(terrain::TriangleMesh&& mesh) {
+  py::object levels = py::none();
+  if (!mesh.levels.empty()) levels = to_array(std::move(mesh.levels));
+  return py::make_tuple(to_array(std::move(mesh.positions)), to_array(std::move(mesh.triangles)),
+                        levels);
+}
+
+py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
+               const py::list& focuses, const std::string& where, const std::string& metric,
+               const std::string& crs, const py::tuple& how) {
+  const stream::Store& store = open.get();
+  const terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  terrain::DetailMeshOptions options;
+  options.metric = terrain::MetricChoice::parse(metric);
+  return arrays_of(Job(how).run([&](const terrain::Context& context) {
+    terrain::TriangleMesh made = detail_mesh(store, detail, options, context);
+    if (const auto to = change_to(store, crs)) {
+      const terrain::PlaceConversion places(*to);
+      places(made.positions);
+    }
+    return made;
+  }));
+}
+
+py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
+                      const py::tuple& how) {
+  const stream::Store& store = open.get();
+  terrain::BoundedMeshOptions options;
+  options.path = path;
+  const auto set = [&]<class T>(const char* name, T& to) {
+    if (given.contains(name)) to = given[name].cast<T>();
+  };
+  set("max_error", options.max_error);
+  set("max_points", options.max_points);
+  set("replace", options.writer.replace);
+  options.region = region_of(given["region"]);
+  if (const auto where = given["where"].cast<std::string>(); !where.empty()) {
+    options.where.emplace(where, store.schema());
+  }
+  using tri::PointDuplicates, tri::TinQuality, terrain::Fill;
+  options.quality = named<TinQuality>(given["quality"].cast<std::string>(), "quality",
+                                      {{"greedy", TinQuality::kGreedy},
+                                       {"removal", TinQuality::kRemoval},
+                                       {"fitted", TinQuality::kFitted}});
+  options.duplicates = named<PointDuplicates>(given["duplicates"].cast<std::string>(), "duplicates",
+                                              {{"all", PointDuplicates::kAll},
+                                               {"min", PointDuplicates::kMin},
+                                               {"max", PointDuplicates::kMax},
+                                               {"mean", PointDuplicates::kMean},
+                                               {"first", PointDuplicates::kFirst},
+                                               {"error", PointDuplicates::kError}});
+  options.fill =
+      named<Fill>(given["fill"].cast<std::string>(), "fill",
+                  {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}});
+  const terrain::BoundedMeshResult outcome = Job(how).run(
+      [&](const terrain::Context& context) { return write_bounded_mesh(store, options, context); });
+  py::dict result;
+  result["max_error"] = outcome.max_error;
+  result["rms_error"] = outcome.rms_error;
+  result["samples"] = outcome.samples;
+  result["uncovered"] = outcome.uncovered;
+  return result;
+}
+
+}  // namespace
+
+void bind_mesh(py::module_& module) {
+  module.def("mesh", &mesh);
+  module.def("bounded_mesh", &bounded_mesh);
+  module.def("read_mesh", [](const std::string& path) {
+    auto file = released([&] { return stream::read_mesh(path); });
+    if (!file) throw py::value_error(path + " is not a mesh");
+    return arrays_of(terrain::triangle_mesh_of(std::move(*file)));
+  });
+  module.def("write_mesh", [](const std::string& path, const Array<double>& vertices,
+                              const Array<std::uint32_t>& triangles, bool replace) {
+    terrain::TriangleMesh mesh;
+    const auto positions = rows_of<3>(vertices, "vertices");
+    const auto corners = rows_of<3>(triangles, "triangles");
+    mesh.positions.assign(positions.begin(), positions.end());
+    mesh.triangles.assign(corners.begin(), corners.end());
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      for (const std::uint32_t corner : corners[i]) {
+        if (corner >= positions.size()) {
+          throw py::value_error("triangle " + std::to_string(i) + " has a corner " +
+                                std::to_string(corner) + ", but there are " +
+                                std::to_string(positions.size()) + " vertices");
+        }
+      }
+    }
+    released([&] { terrain::write_mesh(path, mesh, {.replace = replace}); });
+  });
+  module.def("level_within", [](const OpenStore& open, std::uint64_t most) {
+    return terrain::level_within(open.get(), most);
+  });
+}
+
+}  // namespace terrace::python

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "store.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+#include <terrace/stream/where.hpp>
+#include <terrace/terrain/near_points.hpp>
+
+#include "arrays.hpp"
+#include "call.hpp"
+
+namespace terrace::python {
+namespace {
+
+py::dict info_of(const OpenStore& open) {
+  const stream::Store& store = open.get();
+  const stream::StoreSchema& schema = store.schema();
+  const stream::Box3 box = world_box(schema, store.bounds());
+  py::dict info;
+  info["path"] = store.path().string();
+  info["points"] = store.points();
+  info["bytes"] = store.bytes();
+  info["format"] = schema.format;
+  info["grid"] = schema.grid;
+  info["columns"] = schema.columns;
+  info["rows"] = schema.rows;
+  info["nodata"] = schema.nodata;
+  info["bounds"] =
+      py::make_tuple(box.min[0], box.min[1], box.min[2], box.max[0], box.max[1], box.max[2]);
+  const stream::Channel& z = schema.coordinates[2];
+  info["mean_height"] = store.mean_height() * z.scale + z.offset;
+  info["vertical"] = schema.vertical;
+  info["transform"] = py::cast(schema.world.xy);
+  py::dict crs;
+  crs["epsg"] = schema.crs.epsg;
+  crs["vertical_epsg"] = schema.crs.vertical_epsg;
+  crs["name"] = schema.crs.name;
+  crs["wkt"] = schema.crs.wkt;
+  crs["geographic"] = schema.crs.geographic;
+  crs["unit"] = schema.crs.horizontal_unit;
+  crs["vertical_unit"] = schema.crs.vertical_unit;
+  info["crs"] = crs;
+  py::list attributes;
+  const py::list fields = record_type(schema).attr("names");
+  for (std::size_t i = 0; i < schema.attributes.size(); ++i) {
+    const stream::Channel& channel = schema.attributes[i];
+    py::dict attribute;
+    attribute["name"] = fields[3 + i];
+    attribute["dtype"] = type_name(channel.type);
+    attribute["scale"] = channel.scale;
+    attribute["offset"] = channel.offset;
+    attribute["unit"] = channel.unit;
+    attributes.append(attribute);
+  }
+  info["attributes"] = attributes;
+  info["top"] = store.top();
+  py::list levels;
+  for (const stream::LevelInfo& of : store.levels()) {
+    py::dict level;
+    level["level"] = of.level;
+    level["points"] = of.points;
+    level["clusters"] = of.clusters;
+    level["bytes"] = of.bytes;
+    levels.append(level);
+  }
+  info["levels"] = levels;
+  info["parameters"] = py::cast(schema.parameters);
+  info["checksum"] = store.checksum();
+  return info;
+}
+
+/// Appends numbers and bytes to packed records.
+void append(std::vector<std::byte>& to, std::span<const double> numbers,
+            std::span<const std::byte> bytes) {
+  const auto begin = std::as_bytes(numbers);
+  to.insert(to.end(), begin.begin(), begin.end());
+  to.insert(to.end(), bytes.begin(), bytes.end());
+}
+
+py::array points(const OpenStore& open, unsigned level, const py::object& region,
+                 const py::list& focuses, const std::string& where, const std::string& crs,
+                 const py::tuple& how) {
+  const stream::Store& store = open.get();
+  const terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  const std::size_t payload = store.schema().payload_size();
+  std::vector<std::byte> records = Job(how).run([&](const terrain::Context& context) {
+    const auto to = change_to(store, crs);
+    std::vector<std::byte> bytes;
+    // Known beforehand where everything is wanted.
+    if (!detail.region && detail.focuses.empty() && !detail.where) {
+      bytes.reserve(store.levels()[level].points * (sizeof(stream::Point3) + payload));
+    }
+    for_each_wanted_point(store.with_stop(context.stop), detail,
+                          [&](stream::ClusterId, const stream::ClusterPoints& of, std::size_t i,
+                              const stream::Point3& place) {
+                            stream::Point3 p = place;
+                            if (to) {
+                              terrain::Point2 there{p[0], p[1]};
+                              to->forward({&there, 1});
+                              p = {there[0], there[1], p[2]};
+                            }
+                            append(bytes, p, std::span(of.payload).subspan(i * payload, payload));
+                          });
+    return bytes;
+  });
+  return to_records(std::move(records), record_type(store.schema()));
+}
+
+/// Records of found points, with their distance at the end.
+std::vector<std::byte> records_of(const stream::Store& store,
+                                  const std::vector<stream::FoundPoint>& found) {
+  const std::size_t payload = store.schema().payload_size();
+  const std::size_t record = sizeof(stream::Point3) + payload + sizeof(double);
+  std::vector<std::byte> bytes(found.size() * record);
+  std::vector<std::size_t> by_cluster(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    by_cluster[i] = i;
+    const stream::Point3 place = world_point(store.schema(), found[i].position);
+    std::memcpy(bytes.data() + i * record, place.data(), sizeof place);
+    std::memcpy(bytes.data() + (i + 1) * record - sizeof(double), &found[i].distance,
+                sizeof(double));
+  }
+  if (payload == 0) return bytes;
+  std::sort(by_cluster.begin(), by_cluster.end(),
+            [&](std::size_t a, std::size_t b) { return found[a].cluster < found[b].cluster; });
+  stream::ClusterPoints points;
+  std::optional<stream::ClusterId> read;
+  for (const std::size_t i : by_cluster) {
+    if (read != found[i].cluster) store.read(found[i].cluster, points);
+    read = found[i].cluster;
+    std::memcpy(bytes.data() + i * record + sizeof(stream::Point3),
+                points.payload.data() + found[i].member * payload, payload);
+  }
+  return bytes;
+}
+
+py::array near(const OpenStore& open, const std::vector<double>& place,
+               std::optional<std::size_t> count, std::optional<double> radius, unsigned level) {
+  const stream::Store& store = open.get();
+  if (place.size() != 2 && place.size() != 3)
+    throw py::value_error("`near` has two or three numbers");
+  terrain::NearPlace wanted{.xy = {place[0], place[1]}};
+  if (place.size() == 3) wanted.z = place[2];
+  std::vector<std::byte> records = released([&] {
+    stream::StoreQuery query(store);
+    return records_of(store, count ? nearest_points(query, wanted, *count, level)
+                                   : points_within(query, wanted, radius.value(), level));
+  });
+  return to_records(std::move(records), record_type(store.schema(), {"distance"}));
+}
+
+}  // namespace
+
+terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
+                          const py::list& focuses, const std::string& where) {
+  const auto check = [&](unsigned wanted) {
+    if (wanted <= store.top()) return;
+    throw py::value_error("the store has no level " + std::to_string(wanted) +
+                          ": its top is level " + std::to_string(store.top()));
+  };
+  terrain::Detail detail;
+  check(level);
+  detail.level = level;
+  detail.region = region_of(region);
+  for (const py::handle focus : focuses) {
+    const auto pair = focus.cast<py::tuple>();
+    detail.focuses.push_back({region_of(pair[0]).value(), pair[1].cast<unsigned>()});
+    check(detail.focuses.back().level);
+  }
+  if (!where.empty()) detail.where.emplace(where, store.schema());
+  return detail;
+}
+
+std::optional<terrain::Transformation> change_to(const stream::Store& store,
+                                                 const std::string& crs) {
+  if (crs.empty()) return std::nullopt;
+  return terrain::transformation_to(store, crs);
+}
+
+void bind_store(py::module_& module) {
+  py::class_<OpenStore>(module, "OpenStore")
+      .def(py::init<const std::string&>())
+      .def("close", &OpenStore::close)
+      .def("closed", &OpenStore::closed)
+      .def("info", &info_of)
+      .def("points", &points)
+      .def("near", &near)
+      .def("verify", [](const OpenStore& open, const py::tuple& how) {
+        const stream::Store& store = open.get();
+        return Job(how).run([&](const terrain::Context& context) {
+          std::vector<std::string> faults;
+          store.with_stop(context.stop).verify([&](const stream::Problem& problem) {
+            faults.push_back(problem.file + ": byte " + std::to_string(problem.offset) + ": " +
+                             problem.what);
+          });
+          return faults;
+        });
+      });
+}
+
+}  // namespace terrace::python

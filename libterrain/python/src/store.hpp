@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
+#include <terrace/terrain/crs.hpp>
+#include <terrace/terrain/detail.hpp>
+
+#include "core.hpp"
+
+namespace terrace::python {
+
+/// A store as Python holds it: open until it is closed.
+class OpenStore {
+ public:
+  explicit OpenStore(const std::string& path) : store_(stream::Store::open(path)) {}
+
+  /// Throws: ValueError once it is closed.
+  [[nodiscard]] const stream::Store& get() const {
+    if (!store_) throw py::value_error("the store is closed");
+    return *store_;
+  }
+  /// Work under way goes on with the files that it has.
+  void close() { store_.reset(); }
+  [[nodiscard]] bool closed() const { return !store_; }
+
+ private:
+  std::optional<stream::Store> store_;
+};
+
+/// level, region, focuses (pairs of region and level) and condition.
+/// Throws: ValueError for a level that the store does not have; terrace.Error for a bad condition.
+terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
+                          const py::list& focuses, const std::string& where);
+
+/// To the CRS of that name; nullopt for an empty one.
+std::optional<terrain::Transformation> change_to(const stream::Store& store,
+                                                 const std::string& crs);
+
+}  // namespace terrace::python

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Terrain, scans and point sets larger than memory, from numpy.
+
+``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters. From
+a ``Store`` come points, meshes, heights, contours, tiles and live views at any level of detail. Beside
+it stand the methods that it is made of: ``Delaunay2`` and ``Delaunay3``, ``linkage``, ``kmeans``,
+``cluster``, ``assignment`` and ``matching``.
+
+Long calls release the interpreter's lock, use all cores unless ``threads`` says otherwise, and end soon
+after Ctrl-C. Results depend on the input and the options alone, not on threads or machine.
+
+Errors: ``ValueError`` for arguments that make no sense, ``TypeError`` for objects that cannot be used,
+``OSError`` (``FileNotFoundError`` and the like) where the system refused, ``MemoryError``, and
+``terrace.Error`` for what is wrong with data: one line with file, place, cause and remedy.
+
+>>> import numpy as np, tempfile, terrace
+>>> y, x = np.mgrid[0:60, 0:80]
+>>> heights = 100 + 20 * np.sin(x / 9) * np.cos(y / 7)
+>>> folder = tempfile.TemporaryDirectory()
+>>> store = terrace.build(heights, folder.name + '/hills', transform=(10, 0, 500000, 0, -10, 5000000))
+>>> store
+<terrace.Store 'hills': 4800 points, 1 level, raster of 80 x 60>
+>>> float(store.heights([[500005, 4999995]])[0])
+100.0
+>>> mesh = store.bounded_mesh(max_error=1.0)
+>>> bool(mesh.max_error <= 1.0), bool(len(mesh.triangles) < 1500)
+(True, True)
+"""
+
+from ._clustering import Clusters, KMeans, cluster, flat_clusters, kmeans, linkage
+from ._core import Error
+from ._delaunay import Delaunay2, Delaunay3
+from ._matching import Assignment, Matching, assignment, matching
+from ._mesh import BoundedMesh, Mesh
+from ._raster import Raster
+from ._store import FeatureCollection, Store, build, xyz
+from ._view import View, ViewDelta
+
+__version__ = '0.1.0'
+__all__ = [
+    'Assignment', 'BoundedMesh', 'Clusters', 'Delaunay2', 'Delaunay3', 'Error', 'FeatureCollection', 'KMeans',
+    'Matching', 'Mesh', 'Raster', 'Store', 'View', 'ViewDelta', 'assignment', 'build', 'cluster',
+    'flat_clusters', 'kmeans', 'linkage', 'matching', 'xyz',
+]

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays as users hold them, as numpy's."""
+
+import numpy as np
+
+
+def as_array(given, what):
+    """An array of whatever has the array, buffer or DLPack protocol."""
+    if isinstance(given, np.ndarray):
+        return given
+    if hasattr(given, '__dlpack__') and not hasattr(given, '__array__') and not hasattr(given, '__array_interface__'):
+        return np.from_dlpack(given)
+    array = np.asarray(given)
+    if array.dtype.kind == 'O':
+        raise TypeError(f'{what} is no array of numbers')
+    return array
+
+
+def as_numbers(given, what):
+    """The same as contiguous doubles. Raises: TypeError for what is not real numbers."""
+    array = as_array(given, what)
+    if array.dtype.kind not in 'iufb':
+        raise TypeError(f'{what} has the type {array.dtype}; real numbers are needed')
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def as_rows(given, what, widths=(2, 3)):
+    """Points in rows. An empty list is no points."""
+    array = as_numbers(given, what)
+    if array.size == 0 and array.ndim == 1:
+        array = array.reshape(0, widths[0])
+    if array.ndim != 2 or array.shape[1] not in widths:
+        shapes = ' or '.join(f'(n, {width})' for width in widths)
+        raise ValueError(f'{what} must have the shape {shapes}, not {array.shape}')
+    return array
+
+
+def as_native(array, what):
+    """An array of a type that the library knows, without a copy where that is possible."""
+    if array.dtype.kind == 'b':
+        return array.view(np.uint8)
+    if array.dtype == np.float16:
+        return array.astype(np.float32)
+    if array.dtype.kind not in 'iuf' or array.dtype.itemsize > 8:
+        raise TypeError(f'{what} has the type {array.dtype}; integers and floats of up to 64 bits are needed')
+    return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder('='))
+
+
+def whole(value, what, least=0):
+    """A whole number. Raises: TypeError, ValueError."""
+    try:
+        number = value.__index__()
+    except AttributeError:
+        raise TypeError(f'`{what}` is a whole number, not {value!r}') from None
+    if number < least:
+        raise ValueError(f'`{what}` is at least {least}, not {number}')
+    return number

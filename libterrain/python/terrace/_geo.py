@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Regions and GeoJSON."""
+
+import json
+import math
+import os
+
+import numpy as np
+
+
+class FeatureCollection(dict):
+    """A GeoJSON FeatureCollection, as shapely, geopandas and others take it by ``__geo_interface__``."""
+
+    @property
+    def __geo_interface__(self):
+        return dict(self)
+
+    def __repr__(self):
+        return f'<terrace.FeatureCollection of {len(self["features"])} features>'
+
+
+def _rings(polygon):
+    return [np.ascontiguousarray([place[:2] for place in ring], dtype=np.float64).reshape(-1, 2) for ring in polygon]
+
+
+def _polygons(geometry):
+    kind = geometry.get('type')
+    if kind == 'Polygon':
+        return [_rings(geometry['coordinates'])]
+    if kind == 'MultiPolygon':
+        return [_rings(polygon) for polygon in geometry['coordinates']]
+    if kind == 'Feature':
+        return _polygons(geometry['geometry'])
+    parts = {'GeometryCollection': 'geometries', 'FeatureCollection': 'features'}.get(kind)
+    if parts is None:
+        raise ValueError(f'`region` is a box or polygons, not a {kind}')
+    return [polygon for part in geometry[parts] for polygon in _polygons(part)]
+
+
+def region(given):
+    """A box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]); an object with
+    ``__geo_interface__``, a GeoJSON dict or the name of a GeoJSON file, of polygons. In the CRS of the
+    store or source. None: everywhere."""
+    if given is None:
+        return None
+    if isinstance(given, (str, os.PathLike)):
+        with open(given, encoding='utf-8') as file:
+            given = json.load(file)
+    if hasattr(given, '__geo_interface__'):
+        given = given.__geo_interface__
+    if isinstance(given, dict):
+        polygons = _polygons(given)
+        if not polygons:
+            raise ValueError('`region` has no polygons')
+        return polygons
+    try:
+        numbers = [float(number) for number in given]
+    except TypeError:
+        raise TypeError('`region` is a box of four or six numbers, or polygons') from None
+    if len(numbers) not in (4, 6):
+        raise ValueError(f'`region` is a box of four or six numbers, not {len(numbers)}')
+    half = len(numbers) // 2
+    if any(not low <= high for low, high in zip(numbers, numbers[half:])):
+        raise ValueError('`region` is a box whose least coordinates come first')
+    if half == 2:
+        return (*numbers[:2], -math.inf, *numbers[2:], math.inf)
+    return tuple(numbers)

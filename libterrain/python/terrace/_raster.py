@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rasters that a store gives."""
+
+import numpy as np
+
+from . import _core
+from ._pictures import grey_png
+
+
+class Raster:
+    """Samples on a grid, NaN where there are none.
+
+    values: float32, as the GeoTIFF has them, or uint8 (hillshade); shape (rows, columns). transform: six numbers a, b, c, d, e, f from
+    columns and rows of the cells' *corners* to x and y, as rasterio's and GDAL's affine transforms. crs: 'EPSG:n' or WKT, None if it is
+    not known.
+    """
+
+    def __init__(self, values, transform, crs):
+        self.values, self.transform, self.crs = values, transform, crs
+
+    @property
+    def shape(self):
+        """Rows and columns."""
+        return self.values.shape
+
+    @property
+    def bounds(self):
+        """min x, min y, max x, max y of the corners."""
+        a, b, c, d, e, f = self.transform
+        rows, columns = self.shape
+        x = [c + a * i + b * j for i in (0, columns) for j in (0, rows)]
+        y = [f + d * i + e * j for i in (0, columns) for j in (0, rows)]
+        return min(x), min(y), max(x), max(y)
+
+    def __array__(self, dtype=None):
+        return self.values if dtype is None else self.values.astype(dtype)
+
+    def __repr__(self):
+        return f'<terrace.Raster: {self.shape[1]} x {self.shape[0]} cells>'
+
+    def _repr_png_(self):
+        return grey_png(self.values)
+
+
+def read_raster(path):
+    samples, valid, centres, crs = _core.read_geotiff(path)
+    if samples.dtype.kind == 'f':
+        samples[valid == 0] = np.nan
+    a, b, c, d, e, f = centres
+    return Raster(samples, (a, b, c - (a + b) / 2, d, e, f - (d + e) / 2), crs or None)

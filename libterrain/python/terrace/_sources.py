@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What can be built into a store: files, and arrays as other packages hold them."""
+
+import os
+
+import numpy as np
+
+from ._arrays import as_array, as_native
+
+
+def crs_text(crs):
+    """What a CRS object or text of another package says: a name, code or WKT; None if nothing."""
+    if crs is None or isinstance(crs, str):
+        return crs or None
+    if isinstance(crs, (int, np.integer)):
+        return f'EPSG:{crs}'
+    if hasattr(crs, 'to_wkt'):
+        return crs.to_wkt() or None
+    raise TypeError(f'`crs` is a text such as EPSG:32632, or has to_wkt(), unlike {crs!r}')
+
+
+def _centred(transform):
+    """From columns and rows of corners, as rasterio's and GDAL's transforms, to those of centres."""
+    if transform is None:
+        return (1.0, 0.0, 0.0, 0.0, -1.0, 0.0)
+    numbers = [float(number) for number in tuple(transform)[:6]]
+    if len(numbers) != 6 or not np.all(np.isfinite(numbers)) or numbers[0] * numbers[4] == numbers[1] * numbers[3]:
+        raise ValueError('`transform` is six numbers a, b, c, d, e, f with x = a * column + b * row + c and '
+                         'y = d * column + e * row + f')
+    a, b, c, d, e, f = numbers
+    return (a, b, c + (a + b) / 2, d, e, f + (d + e) / 2)
+
+
+def _raster(samples, transform, nodata, name, scale=1.0, offset=0.0):
+    samples = as_native(samples, 'the raster')
+    if samples.ndim == 3 and samples.shape[0] == 1:
+        samples = samples[0]
+    if samples.ndim != 2:
+        raise ValueError(f'a raster has two dimensions, not {samples.ndim}')
+    if samples.size == 0:
+        raise ValueError('the raster is empty')
+    return {'name': name, 'samples': samples, 'transform': _centred(transform),
+            'nodata': None if nodata is None else float(nodata), 'scale': float(scale), 'offset': float(offset)}
+
+
+def _column(name, array, scale=1.0, offset=0.0):
+    return {'name': name, 'array': as_native(array, f'"{name}"'), 'scale': float(scale), 'offset': float(offset)}
+
+
+def _points(columns, attributes, name):
+    sizes = {column['array'].shape for column in columns + attributes}
+    if len(sizes) != 1 or len(next(iter(sizes))) != 1:
+        raise ValueError('the columns of points must have one dimension and the same length')
+    if next(iter(sizes)) == (0,):
+        raise ValueError('there is not one point')
+    return {'name': name, 'columns': columns, 'attributes': attributes}
+
+
+def _structured(array, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
+    """Records with x, y and z, or with X, Y and Z as LAS stores them (with scales and offsets)."""
+    fields = array.dtype.names
+    for axes in (('x', 'y', 'z'), ('X', 'Y', 'Z')):
+        if all(axis in fields for axis in axes):
+            break
+    else:
+        raise ValueError(f'points have fields x, y and z, or X, Y and Z, not {", ".join(fields)}')
+    if axes[0] == 'x':
+        scales, offsets = (1, 1, 1), (0, 0, 0)
+    columns = [_column(axis.lower(), array[axis], scales[i], offsets[i]) for i, axis in enumerate(axes)]
+    attributes = [_column(field, array[field]) for field in fields
+                  if field not in axes and array.dtype[field].shape == ()]
+    return _points(columns, attributes, name)
+
+
+def _xarray(array, transform, crs, nodata):
+    """An xarray.DataArray: rioxarray's accessor, else the CF attributes that it keeps, else the coordinates."""
+    if hasattr(array, 'rio'):
+        return array.rio.transform(), array.rio.crs, array.rio.nodata
+    grid = array.coords.get('spatial_ref')
+    described = dict(grid.attrs) if grid is not None else {}
+    crs = crs or described.get('crs_wkt') or described.get('spatial_ref') or array.attrs.get('crs')
+    if transform is None and 'GeoTransform' in described:
+        c, a, b, f, d, e = (float(number) for number in described['GeoTransform'].split())
+        transform = (a, b, c, d, e, f)
+    if transform is None and 'transform' in array.attrs:
+        transform = tuple(array.attrs['transform'])[:6]
+    if transform is None:
+        rows, columns = array.dims[-2:]
+        x, y = (np.asarray(array.coords[name], dtype=np.float64) for name in (columns, rows))
+        if len(x) < 2 or len(y) < 2:
+            raise ValueError('a raster of one row or column needs `transform`')
+        steps = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
+        for places, step in zip((x, y), steps):
+            if not np.allclose(np.diff(places), step, rtol=1e-6, atol=0):
+                raise ValueError('the coordinates of the raster are not at equal distances')
+        transform = (steps[0], 0, x[0] - steps[0] / 2, 0, steps[1], y[0] - steps[1] / 2)
+    if nodata is None:
+        nodata = array.attrs.get('_FillValue', array.attrs.get('nodata'))
+    return transform, crs, nodata
+
+
+def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
+    """(what the compiled half takes, the CRS as text or None)"""
+    if isinstance(given, (str, os.PathLike)):
+        given = [given]
+    if isinstance(given, (list, tuple)) and given and all(isinstance(name, (str, os.PathLike)) for name in given):
+        if transform is not None or nodata is not None or attributes is not None:
+            raise ValueError('`transform`, `nodata` and `attributes` are for arrays: files have their own')
+        return [os.fspath(name) for name in given], crs_text(crs)
+    if hasattr(given, 'header') and hasattr(given, 'points') and hasattr(given.points, 'array'):  # laspy.LasData
+        header = given.header
+        if crs is None and hasattr(header, 'parse_crs'):
+            crs = header.parse_crs()
+        return _structured(given.points.array, '<laspy>', header.scales, header.offsets), crs_text(crs)
+    if hasattr(given, 'read') and hasattr(given, 'transform') and hasattr(given, 'nodata'):  # rasterio's datasets
+        samples = as_array(given.read(1), 'the raster')
+        nodata = given.nodata if nodata is None else nodata
+        crs = crs if crs is not None else getattr(given, 'crs', None)
+        return _raster(samples, transform or given.transform, nodata, getattr(given, 'name', '<raster>')), crs_text(crs)
+    if hasattr(given, 'dims') and hasattr(given, 'coords') and hasattr(given, 'values'):  # xarray.DataArray
+        transform, crs, nodata = _xarray(given, transform, crs, nodata)
+        return _raster(np.asarray(given.values), transform, nodata, '<xarray>'), crs_text(crs)
+    if isinstance(given, dict):
+        wrong = [axis for axis in 'xyz' if axis not in given]
+        if wrong:
+            raise ValueError(f'points have x, y and z: {", ".join(wrong)} is missing')
+        arrays = {name: as_array(column, f'"{name}"') for name, column in given.items()}
+        return _points([_column(axis, arrays[axis]) for axis in 'xyz'],
+                       [_column(name, column) for name, column in arrays.items() if name not in ('x', 'y', 'z')],
+                       '<dict>'), crs_text(crs)
+    array = as_array(given, 'the source')
+    if isinstance(array, np.ma.MaskedArray):
+        if array.dtype.kind != 'f':
+            array = array.astype(np.float64)
+        array = array.filled(np.nan)
+    if array.dtype.names:
+        if transform is not None or nodata is not None or attributes is not None:
+            raise ValueError('`transform`, `nodata` and `attributes` are not for structured arrays')
+        return _structured(array.reshape(-1), '<array>'), crs_text(crs)
+    if array.ndim not in (2, 3):
+        raise ValueError(f'a source array has the shape (n, 3): points, or (rows, columns): a raster, not {array.shape}')
+    if array.ndim == 2 and array.shape[1] == 3 and transform is None:
+        more = [] if attributes is None else [
+            _column(name, as_array(column, f'"{name}"')) for name, column in attributes.items()]
+        return _points([_column(axis, array[:, i]) for i, axis in enumerate('xyz')], more, '<array>'), crs_text(crs)
+    if attributes is not None:
+        raise ValueError('`attributes` are for points: a raster has none')
+    return _raster(array, transform, nodata, '<array>'), crs_text(crs)

@@ -1,0 +1,374 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stores: built from files and arrays, and asked for what they hold."""
+
+import errno
+import json
+import math
+import os
+import tempfile
+
+import numpy as np
+
+from . import _core
+from ._arrays import as_rows, whole
+from ._geo import FeatureCollection, region as as_region
+from ._job import job
+from ._mesh import BoundedMesh, Mesh
+from ._raster import read_raster
+from ._sources import crs_text, source_of
+
+_BUILD_OPTIONS = {
+    'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
+    'outlier_price', 'band', 'cell', 'seed', 'datum_shift', 'where', 'keep', 'drop', 'resolution', 'metric',
+    'region', 'effort', 'order', 'entities',
+}
+_TILE_OPTIONS = {
+    'name', 'max_error', 'geoid', 'flat_height', 'water', 'water_height', 'normals', 'metadata', 'gzip', 'resume',
+    'replace', 'quality', 'vertical', 'fill',
+}
+
+
+def _checked(options, known, function):
+    for name in options:
+        if name not in known:
+            raise TypeError(f'{function}() has no option {name!r}; it has {", ".join(sorted(known))}')
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def xyz(points):
+    """The coordinates of a structured array of points as an array of shape (n, 3), without a copy."""
+    if points.dtype.names is None or points.dtype.names[:3] != ('x', 'y', 'z'):
+        raise ValueError('points have the fields x, y and z first')
+    return np.ndarray((len(points), 3), np.float64, points, strides=(points.strides[0], 8))
+
+
+def _real_values(records, info):
+    """Attributes that are stored with a scale or offset, as real values (float64), like files written of them."""
+    scaled = {a['name']: a for a in info['attributes'] if a['scale'] != 1 or a['offset'] != 0}
+    if not scaled:
+        return records
+    kind = [(name, 'f8' if name in scaled else records.dtype[name]) for name in records.dtype.names]
+    real = np.empty(records.shape, kind)
+    for name in records.dtype.names:
+        real[name] = records[name]
+        if name in scaled:
+            real[name] *= scaled[name]['scale']
+            real[name] += scaled[name]['offset']
+    return real
+
+
+def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=None, progress=None, threads=None,
+          memory=None, **options):
+    """Streams points or rasters once into a store, in constant memory, and opens it.
+
+    sources: the name of a file or several (GeoTIFF, LAS, LAZ, COPC, PLY, text and others; several rasters form
+    a mosaic), or what is in memory:
+
+    - an array of shape (n, 3): points, with ``attributes`` (a dict of columns) beside them;
+    - a structured array with fields x, y, z (or LAS's X, Y, Z) and further ones, a dict of columns, a
+      ``laspy.LasData``;
+    - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f from
+      columns and rows of corners to x and y, as rasterio's) and ``nodata``. An array of three columns is a
+      raster if ``transform`` is given;
+    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio;
+    - anything else with numpy's array interface, the buffer protocol or DLPack.
+
+    Arrays are read in place. Coordinates that are not finite are refused; samples that are not are nodata.
+
+    store: the folder to make; it appears when it is whole. crs: of the source, in place of what it says: 'EPSG:n',
+    a name, WKT, or an object with to_wkt().
+
+    Options: ``replace`` an existing store; ``where`` ('classification == 2'), ``region`` (box, polygons), ``keep``,
+    ``drop`` (names of attributes) say what is read; ``block_points`` (10000) are clustered together, at
+    ``facility_cost`` (3.0, times a block's diagonal), with ``effort`` 'fast', 'default', 'fine' or 'full',
+    ``z_weight`` of heights, a ``metric`` ('euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'), ``channels``
+    (pairs of an attribute and metres per unit) and ``outlier_price``; ``order`` 'auto', 'stream' or 'spatial';
+    ``vertical`` 'ellipsoidal' or 'orthometric'; ``seed``; of files ``input_format``, ``entities``, ``skip_damaged``,
+    ``band``, ``cell``, ``resolution``, ``datum_shift``.
+
+    progress: None, True for a bar (tqdm's where it is), or a function called as progress(what, count, fraction,
+    ended). threads: all cores unless given. memory: bytes, 256 MiB unless given. The store depends on the source,
+    the options and the seed alone.
+
+    Returns: the opened Store. Raises: Error for bad data, OSError, ValueError, TypeError; KeyboardInterrupt on
+    Ctrl-C. No store stands then. Notes of what was assumed go to ``logging.getLogger('terrace')``.
+
+    Source: J. Skala, Algorithms for manipulating large geometric data, chapter 7.
+
+    >>> import tempfile
+    >>> points = np.random.default_rng(1).random((2000, 3))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with build(points, folder + '/cube', attributes={'class': np.arange(2000) % 5}) as store:
+    ...         print(len(store.points(where='class == 3')))
+    400
+    """
+    given = _checked(options, _BUILD_OPTIONS, 'build')
+    if 'region' in given:
+        given['region'] = as_region(given['region'])
+    source, text = source_of(sources, transform, crs, nodata, attributes)
+    if text is not None:
+        given['crs'] = text
+    path = os.fspath(store)
+    if os.path.lexists(path) and not given.get('replace'):
+        raise FileExistsError(errno.EEXIST, 'exists already; give another name or replace=True', path)
+    _core.build(source, path, given, job(progress, threads, memory))
+    return Store.open(path)
+
+
+class Store:
+    """A store opened for reading. Any number of threads may use it at once; a fork of the process may too.
+
+    Close it, or use it as a context manager; a closed store raises ValueError.
+    """
+
+    def __init__(self, core):
+        self._core = core
+        self._info = core.info()
+
+    @classmethod
+    def open(cls, path):
+        """Opens the store in a folder. Raises: FileNotFoundError; Error if it is damaged or of a newer version."""
+        path = os.fspath(path)
+        try:
+            return cls(_core.OpenStore(path))
+        except _core.Error as error:
+            if not os.path.lexists(path):
+                raise FileNotFoundError(errno.ENOENT, 'there is no store here', path) from error
+            raise
+
+    def close(self):
+        """Work that other threads are at goes on to its end."""
+        self._core.close()
+
+    @property
+    def closed(self):
+        """Whether close() has been called."""
+        return self._core.closed()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def __len__(self):
+        return self._info['points']
+
+    def __repr__(self):
+        info, name = self._info, os.path.basename(os.path.normpath(self._info['path']))
+        levels = info['top'] + 1
+        kind = f'raster of {info["columns"]} x {info["rows"]}' if info['grid'] else 'points'
+        if info['crs']['epsg']:
+            kind += f', EPSG:{info["crs"]["epsg"]}'
+        return (f'<terrace.Store {name!r}: {info["points"]} points, {levels} level{"s" if levels > 1 else ""}, {kind}'
+                f'{", closed" if self.closed else ""}>')
+
+    def _repr_svg_(self):
+        if self.closed:
+            return None
+        try:
+            return self.mesh(level=self.level_within(4000))._repr_svg_()
+        except _core.Error:
+            return None
+
+    @property
+    def info(self):
+        """A dict: points, bytes, bounds (six numbers in the CRS, least first), crs, vertical, attributes, levels
+        (level 0 first; points are those of that level and above), top, grid, columns and rows, transform (to the
+        centres of cells), nodata (cells left out), parameters, checksum."""
+        return json.loads(json.dumps(self._info))
+
+    @property
+    def bounds(self):
+        """(min x, min y, min z, max x, max y, max z) in the CRS."""
+        return tuple(self._info['bounds'])
+
+    @property
+    def top(self):
+        """The coarsest level; level 0 has all points."""
+        return self._info['top']
+
+    def level_within(self, most_points):
+        """The finest level of at most so many points; the top if none has so few."""
+        return _core.level_within(self._core, whole(most_points, 'most_points'))
+
+    def points(self, region=None, level=0, where=None, *, focus=(), crs=None, progress=None, threads=None):
+        """The points of a level and above, inside a region, that meet a condition.
+
+        region: a box of four or six numbers in the store's CRS, polygons (an object with ``__geo_interface__``, a
+        GeoJSON dict or file), or None. where: a condition on attributes, x, y and z, such as 'classification == 2 &&
+        z < 100'. focus: pairs (region, level) with finer levels. crs: that the coordinates are wanted in.
+
+        Returns: a structured array: x, y, z (float64), then the attributes with their types (float64 where they have
+        a scale). ``xyz()`` gives its coordinates as an array (n, 3). Order: coarser levels first.
+        """
+        records = self._core.points(whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
+                                    (crs_text(crs) or ''), job(progress, threads))
+        return _real_values(records, self._info)
+
+    @staticmethod
+    def _focuses(focus):
+        return [(as_region(place), whole(level, 'level')) for place, level in focus]
+
+    def query(self, *, box=None, near=None, k=None, radius=None, level=0):
+        """The points in a box, or near a place: the ``k`` nearest, or all within a ``radius`` in metres.
+
+        near: (x, y) or (x, y, z) in the store's CRS; without z heights do not count in distances, which are in metres
+        on the ground. Returns: a structured array as points() does; near a place the nearest first, with a field
+        ``distance``.
+        """
+        if (box is None) == (near is None):
+            raise ValueError('query() needs either `box` or `near`')
+        level = whole(level, 'level')
+        if box is not None:
+            if k is not None or radius is not None:
+                raise ValueError('`k` and `radius` go with `near`')
+            return self.points(region=box, level=level)
+        if (k is None) == (radius is None):
+            raise ValueError('`near` needs either `k` or `radius`')
+        place = [float(number) for number in near]
+        if k is not None:
+            k = whole(k, 'k')
+        return _real_values(self._core.near(place, k, radius, level), self._info)
+
+    def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):
+        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, whole(level, 'level'), max_edge, (crs_text(crs) or ''),
+                            job(progress, threads, memory))
+
+    def heights(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
+                memory=None):
+        """Heights of the surface at places.
+
+        xy: shape (n, 2), in the store's CRS or in ``crs``. method: 'linear' on the triangulated samples or the Delaunay
+        triangulation of the points, 'natural' neighbours (Sibson), or 'nearest'. level: of the points that count.
+        max_edge: metres; triangles with a longer side do not count (not for rasters at level 0).
+
+        Returns: float64, shape (n,), in the store's vertical unit; NaN where there is no surface. Give many places
+        at once: about a microsecond each, and the parts of the store around them are read.
+        """
+        return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 0]
+
+    def gradients(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
+                  memory=None):
+        """Gradients of the surface at places, as heights(): float64, shape (n, 2), metres of height gained per metre
+        on the ground going east and north (of the store's CRS)."""
+        return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 1:]
+
+    def raster(self, value='height', *, cell=None, region=None, crs=None, method='linear', level=0, max_edge=None,
+               path=None, replace=False, progress=None, threads=None, memory=None):
+        """The surface on a grid: 'height', 'slope' (degrees), 'aspect' (degrees clockwise from north, downhill) or
+        'hillshade' (1 to 255, 0 where there is none).
+
+        cell: side of a cell in units of the output's CRS; by default a raster's own. region: box or polygons. crs: of the
+        output. path: where to write it as a Cloud Optimized GeoTIFF, with ``replace`` over what is there.
+
+        Returns: a Raster: ``values``, ``transform``, ``crs``.
+        """
+        def make(name):
+            _core.write_raster(self._core, name, value, cell, as_region(region), (crs_text(crs) or ''), method,
+                               whole(level, 'level'), max_edge, replace, job(progress, threads, memory))
+            return read_raster(name)
+
+        if path is not None:
+            return make(os.fspath(path))
+        with tempfile.TemporaryDirectory() as folder:
+            return make(os.path.join(folder, 'raster.tif'))
+
+    def profile(self, line, step=None, *, method='linear', level=0, max_edge=None, progress=None, threads=None):
+        """The surface along a line.
+
+        line: shape (n, 2), in the store's CRS, or an object with ``__geo_interface__`` of a LineString. step: metres;
+        without it the line's own places and every place where the linear surface bends.
+
+        Returns: float64, shape (m, 4): metres from the line's begin (geodesic where the CRS is known), x, y, height
+        (NaN where there is none).
+        """
+        if hasattr(line, '__geo_interface__'):
+            line = np.asarray([place[:2] for place in line.__geo_interface__['coordinates']])
+        return _core.profile(self._core, as_rows(line, 'line', (2,)), step, method, whole(level, 'level'), max_edge,
+                             job(progress, threads))
+
+    def contours(self, interval, *, level=0, max_edge=None, region=None, progress=None, threads=None, memory=None):
+        """Lines of equal height, every ``interval`` in the store's vertical unit.
+
+        Returns: a FeatureCollection (a dict, with ``__geo_interface__``) of LineStrings in longitude and latitude,
+        each with its height as the property ``elev``; higher ground is on a line's right. Raises: Error for a store
+        without a CRS.
+        """
+        return FeatureCollection(json.loads(_core.contours(
+            self._core, float(interval), whole(level, 'level'), max_edge, as_region(region),
+            job(progress, threads, memory))))
+
+    def mesh(self, level=None, region=None, *, focus=(), where=None, metric='euclidean', crs=None, max_points=None,
+             progress=None, threads=None, memory=None):
+        """The Delaunay triangulation of a level, with finer detail in focuses.
+
+        level: by default the finest of at most ``max_points`` (100,000). region, focus, where, crs: as points(); the
+        triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow it.
+
+        Returns: a Mesh, which unpacks as (vertices, triangles).
+        """
+        if level is None:
+            level = self.level_within(100_000 if max_points is None else max_points)
+        elif max_points is not None:
+            raise ValueError('mesh() takes either `level` or `max_points`')
+        return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
+                                metric, (crs_text(crs) or ''), job(progress, threads, memory)))
+
+    def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
+                     region=None, where=None, path=None, replace=False, progress=None, threads=None, memory=None):
+        """The mesh with the fewest triangles that is within ``max_error`` metres of every sample, verified on each,
+        or the best of at most ``max_points`` vertices.
+
+        quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time. duplicates: which of samples
+        at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. fill: of a raster's cells without data:
+        'none' leaves holes, 'flat', 'interpolate'. path: where to write it (.ply, .obj, .glb, .vtk).
+
+        Returns: a BoundedMesh: ``vertices``, ``triangles``, ``max_error``, ``rms_error``. It is made window by window
+        in constant memory, but for the arrays.
+        """
+        if (max_error is None) == (max_points is None):
+            raise ValueError('bounded_mesh() needs either `max_error` or `max_points`')
+        options = {'quality': quality, 'duplicates': duplicates, 'fill': fill, 'region': as_region(region),
+                   'where': where or '', 'replace': replace}
+        if max_error is not None:
+            max_error = float(max_error)
+            if not 0 <= max_error < math.inf:
+                raise ValueError(f'`max_error` is a number of metres, not {max_error}')
+            options['max_error'] = max_error
+        else:
+            options['max_points'] = whole(max_points, 'max_points', 3)
+        how = job(progress, threads, memory)
+        with tempfile.TemporaryDirectory() as folder:
+            name = os.path.join(folder, 'mesh.ply')
+            measured = _core.bounded_mesh(self._core, name, options, how)
+            vertices, triangles, _ = _core.read_mesh(name)
+        mesh = BoundedMesh(vertices, triangles, measured)
+        if path is not None:
+            mesh.save(path, replace)
+        return mesh
+
+    def tiles(self, folder, zooms=None, *, progress=None, threads=None, memory=None, **options):
+        """Writes quantized-mesh tiles for web globes, and layer.json.
+
+        zooms: (first, last); by default from 0 to the zoom that shows every sample. Options: ``max_error`` (metres at
+        the deepest zoom), ``quality``, ``vertical`` ('recorded', 'ellipsoidal', 'orthometric', 'ignore'), ``geoid`` (a
+        file), ``fill`` ('interpolate', 'flat' with ``flat_height``), ``water``, ``water_height``, ``normals``,
+        ``metadata``, ``gzip``, ``name``, ``resume`` (keep what is up to date), ``replace``.
+
+        Returns: a dict: tiles, bytes, made, kept, removed, zooms (zoom, tiles, max_error).
+        """
+        given = _checked(options, _TILE_OPTIONS, 'tiles')
+        if zooms is not None:
+            given['first_zoom'], given['last_zoom'] = (whole(zoom, 'zooms') for zoom in zooms)
+        return _core.write_tiles(self._core, os.fspath(folder), given, job(progress, threads, memory))
+
+    def verify(self, *, progress=None, threads=None):
+        """Checks every byte and invariant. Returns: a list of faults, empty if the store is sound."""
+        return self._core.verify(job(progress, threads))
+
+    @property
+    def __geo_interface__(self):
+        """The bounds in the CRS as a GeoJSON Polygon."""
+        x0, y0, _, x1, y1, _ = self.bounds
+        return {'type': 'Polygon', 'coordinates': (((x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)),)}

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Triangulations: SciPy's, the law of empty circles, and removal as if never inserted."""
+
+import threading
+import unittest
+
+import numpy as np
+
+import terrace
+
+try:
+    from hypothesis import given, settings, strategies as st
+    from hypothesis.extra import numpy as arrays
+    from scipy.spatial import Delaunay
+except ImportError as missing:
+    raise unittest.SkipTest(f'{missing.name} is missing')
+
+
+def corner_sets(points, simplices):
+    return {tuple(sorted(map(tuple, points[corners]))) for corners in simplices}
+
+
+def few_places(width):
+    """Points on a small lattice, so that equal, collinear and cocircular ones are common."""
+    return arrays.arrays(np.float64, st.tuples(st.integers(0, 40), st.just(width)),
+                         elements=st.integers(0, 6).map(float))
+
+
+class Triangulations(unittest.TestCase):
+    def test_as_scipy(self):
+        for kind, width, count in ((terrace.Delaunay2, 2, 20000), (terrace.Delaunay3, 3, 3000)):
+            points = np.random.default_rng(5).random((count, width))
+            made = kind(points)
+            expected = Delaunay(points)
+            self.assertEqual(corner_sets(made.points, made.simplices), corner_sets(points, expected.simplices))
+            np.testing.assert_array_equal(made.points[made.ids], points)
+            asked = np.random.default_rng(6).random((500, width)) * 1.2 - 0.1
+            rows, theirs = made.find_simplex(asked), expected.find_simplex(asked)
+            np.testing.assert_array_equal(rows >= 0, theirs >= 0)
+            for row, other in zip(rows[rows >= 0], theirs[rows >= 0]):
+                self.assertEqual(corner_sets(made.points, made.simplices[[row]]),
+                                 corner_sets(points, expected.simplices[[other]]))
+
+    def test_neighbours_share_a_side(self):
+        for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3)):
+            made = kind(np.random.default_rng(8).random((300, width)))
+            simplices, neighbors = made.simplices, made.neighbors
+            for row, around in zip(simplices, neighbors):
+                for corner, other in enumerate(around):
+                    if other >= 0:
+                        side = set(np.delete(row, corner))
+                        self.assertTrue(side <= set(simplices[other]))
+                        self.assertNotIn(row[corner], simplices[other])
+
+    @settings(max_examples=60, deadline=None, derandomize=True)
+    @given(few_places(2), st.integers(0, 40), st.randoms(use_true_random=False))
+    def test_removal_is_as_if_never_inserted_2(self, points, kept, random):
+        self.check_removal(terrace.Delaunay2, points, kept, random)
+
+    @settings(max_examples=40, deadline=None, derandomize=True)
+    @given(few_places(3), st.integers(0, 40), st.randoms(use_true_random=False))
+    def test_removal_is_as_if_never_inserted_3(self, points, kept, random):
+        self.check_removal(terrace.Delaunay3, points, kept, random)
+
+    def check_removal(self, kind, points, kept, random):
+        points = np.unique(points, axis=0)
+        order = list(range(len(points)))
+        random.shuffle(order)
+        points = points[order]
+        kept = min(kept, len(points))
+        only = kind(points[:kept])
+        both = kind(points[:kept])
+        added = both.insert(points[kept:])
+        self.assertEqual(len(both), len(points))
+        self.assertEqual(both.digest(), kind(points[::-1]).digest())
+        both.remove(added)
+        self.assertEqual(both.digest(), only.digest())
+        self.assertEqual(len(both), kept)
+
+    def test_equal_points_are_one_vertex(self):
+        made = terrace.Delaunay2([[0, 0], [1, 0], [0, 0], [0, 1], [-0.0, 1]])
+        self.assertEqual(len(made), 3)
+        self.assertEqual(made.ids[0], made.ids[2])
+        self.assertEqual(made.insert([[1, 0]])[0], made.ids[1])
+
+    def test_nearest(self):
+        points = np.random.default_rng(9).random((1000, 2))
+        asked = np.random.default_rng(10).random((300, 2)) * 2 - 0.5
+        made = terrace.Delaunay2(points)
+        closest = np.argmin(((asked[:, None] - points) ** 2).sum(axis=2), axis=1)
+        np.testing.assert_array_equal(made.nearest(asked), made.ids[closest])
+        self.assertEqual(terrace.Delaunay2().nearest([[0, 0]])[0], -1)
+
+    def test_misuse(self):
+        made = terrace.Delaunay2(np.random.default_rng(1).random((50, 2)))
+        before = made.digest()
+        for wrong, kind in (([[np.nan, 0]], ValueError), ([[np.inf, 0]], ValueError), ([[1, 2, 3]], ValueError),
+                            ([1, 2], ValueError), ('ab', TypeError), (np.zeros((2, 2), complex), TypeError)):
+            with self.assertRaises(kind):
+                made.insert(wrong)
+        for wrong, kind in (([made.ids[0], made.ids[0]], ValueError), ([-1], ValueError), ([10 ** 6], ValueError),
+                            ([2 ** 40], ValueError), ([0.5], TypeError)):
+            with self.assertRaises(kind):
+                made.remove(wrong)
+        self.assertEqual(made.digest(), before)
+        made.remove([])
+        made.remove(made.vertices)
+        self.assertEqual((len(made), made.simplices.shape), (0, (0, 3)))
+        self.assertEqual(terrace.Delaunay3().simplices.shape, (0, 4))
+        self.assertEqual(made.find_simplex([[0, 0], [np.nan, 1]]).tolist(), [-1, -1])
+        self.assertIn('polygon', terrace.Delaunay2([[0, 0], [1, 0], [0, 1]])._repr_svg_())
+
+    def test_threads_share_one(self):
+        made = terrace.Delaunay2(np.random.default_rng(1).random((5000, 2)))
+        failures = []
+
+        def change(seed):
+            random = np.random.default_rng(seed)
+            try:
+                for _ in range(20):
+                    ids = np.unique(made.insert(random.random((300, 2)) + seed))
+                    self.assertLess(made.simplices.max(), len(made.points) + 10 ** 6)
+                    made.remove(ids)
+            except Exception as error:
+                failures.append(error)
+
+        threads = [threading.Thread(target=change, args=(seed,)) for seed in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(failures, [])
+        self.assertEqual(made.digest(), terrace.Delaunay2(np.random.default_rng(1).random((5000, 2))).digest())
+
+
+if __name__ == '__main__':
+    unittest.main()

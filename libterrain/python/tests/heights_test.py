@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Heights, gradients, rasters, profiles and contours, against SciPy, laws and the function sampled."""
+
+import math
+import os
+import re
+import shutil
+import tempfile
+import unittest
+
+import numpy as np
+
+import terrace
+from python_case import ALPS, TRANSFORM, StoreCase, cell_centres
+
+try:
+    from scipy.interpolate import LinearNDInterpolator, RegularGridInterpolator
+    from scipy.spatial import Delaunay, cKDTree
+except ImportError:
+    LinearNDInterpolator = None
+
+
+def places(count, seed=3):
+    random = np.random.default_rng(seed)
+    return random.random((count, 2)) * [1400, 1100] + [500050, 4998850]
+
+
+class Heights(StoreCase):
+    def test_samples_have_their_heights(self):
+        centres = cell_centres(*self.samples.shape).reshape(-1, 2)
+        for method in ('linear', 'natural', 'nearest'):
+            np.testing.assert_allclose(self.raster.heights(centres, method), self.samples.ravel(), rtol=0, atol=1e-9)
+        np.testing.assert_array_equal(self.scan.heights(self.points[:500, :2]), self.points[:500, 2])
+
+    @unittest.skipIf(LinearNDInterpolator is None, 'SciPy is missing')
+    def test_linear_heights_of_points_are_scipys(self):
+        random = np.random.default_rng(7)
+        xy = random.random((5000, 2)) * [1100, 900] + [299950, 5199950]
+        origin = self.points[:, :2].min(axis=0)  # SciPy loses digits far from the origin
+        expected = LinearNDInterpolator(Delaunay(self.points[:, :2] - origin), self.points[:, 2])(xy - origin)
+        got = self.scan.heights(xy)
+        both = ~np.isnan(expected) & ~np.isnan(got)
+        self.assertGreater(both.sum(), 4000)
+        self.assertLess((np.isnan(expected) != np.isnan(got)).sum(), 5)  # places on the hull's rim
+        np.testing.assert_allclose(got[both], expected[both], rtol=0, atol=1e-7)
+
+    @unittest.skipIf(LinearNDInterpolator is None, 'SciPy is missing')
+    def test_nearest_is_scipys(self):
+        xy = places(500) + [-199700, 201700]
+        origin = self.points[:, :2].min(axis=0)
+        _, order = cKDTree(self.points[:, :2] - origin).query(xy - origin)
+        np.testing.assert_array_equal(self.scan.heights(xy, 'nearest'), self.points[order, 2])
+
+    def test_a_plane_has_its_gradient(self):
+        rows, columns = 60, 70
+        centres = cell_centres(rows, columns)
+        plane = 0.25 * (centres[..., 0] - 500000) - 0.5 * (centres[..., 1] - 5000000)
+        store = terrace.build(plane, self.path('plane'), transform=TRANSFORM)
+        xy = places(200)[:, :] * 0 + np.random.default_rng(1).random((200, 2)) * [500, -400] + [500100, 4999900]
+        np.testing.assert_allclose(store.gradients(xy), np.tile([0.25, -0.5], (200, 1)), rtol=0, atol=1e-9)
+        expected = 0.25 * (xy[:, 0] - 500000) - 0.5 * (xy[:, 1] - 5000000)
+        np.testing.assert_allclose(store.heights(xy), expected, rtol=0, atol=1e-9)
+
+    def test_no_surface_is_nan(self):
+        outside = [[0, 0], [math.nan, 5000000], [math.inf, 0]]
+        for store in (self.raster, self.scan):
+            self.assertTrue(np.isnan(store.heights(outside)).all())
+            self.assertTrue(np.isnan(store.gradients(outside)).all())
+            self.assertEqual(store.heights([]).shape, (0,))
+
+    def test_places_of_another_reference_system(self):
+        here = places(50)
+        there = self.raster.points(crs='EPSG:4326')
+        lonlat = np.column_stack((there['x'], there['y']))[:200]
+        np.testing.assert_allclose(self.raster.heights(lonlat, crs='EPSG:4326'), there['z'][:200], rtol=0, atol=1e-4)
+        self.assertFalse(np.isnan(self.raster.heights(here)).any())
+
+    def test_threads_and_memory_change_nothing(self):
+        xy = places(2000)
+        expected = self.raster.heights(xy)
+        for threads in (1, 3):
+            np.testing.assert_array_equal(self.raster.heights(xy, threads=threads, memory=1 << 26), expected)
+
+    def test_wrong_places(self):
+        for wrong, kind in (([1, 2, 3], ValueError), ([[1, 2, 3]], ValueError), (['a'], TypeError),
+                            (np.zeros((2, 2), complex), TypeError), ([[1, [2]]], ValueError)):
+            with self.assertRaises(kind):
+                self.raster.heights(wrong)
+        with self.assertRaisesRegex(ValueError, 'linear, natural, nearest'):
+            self.raster.heights([[0, 0]], 'cubic')
+        with self.assertRaisesRegex(ValueError, 'max_edge'):
+            self.raster.heights([[0, 0]], max_edge=3.0)
+
+
+class Rasters(StoreCase):
+    def test_a_rasters_own_grid_comes_back(self):
+        got = self.raster.raster()
+        np.testing.assert_array_equal(got.values, self.samples.astype(got.values.dtype))
+        np.testing.assert_allclose(got.transform, TRANSFORM, rtol=0, atol=1e-6)
+        self.assertEqual(got.crs, 'EPSG:32632')
+        self.assertEqual(np.asarray(got).shape, self.samples.shape)
+        self.assertTrue(got._repr_png_().startswith(b'\x89PNG'))
+        # And may be built again.
+        again = terrace.build(got.values, self.path('again'), transform=got.transform, crs=got.crs)
+        np.testing.assert_allclose(again.bounds, self.raster.bounds, rtol=1e-7)
+
+    def test_grids_of_points(self):
+        path = self.path('scan.tif')
+        got = self.scan.raster(cell=25, region=(300200, 5200200, 300700, 5200600), path=path)
+        self.assertTrue(os.path.exists(path))
+        self.assertEqual(got.shape, (16, 20))
+        a, b, c, d, e, f = got.transform
+        x, y = np.meshgrid(c + a * (np.arange(20) + 0.5), f + e * (np.arange(16) + 0.5))
+        heights = self.scan.heights(np.column_stack((x.ravel(), y.ravel())))
+        np.testing.assert_allclose(got.values.ravel(), heights, rtol=1e-6)
+        with self.assertRaises(terrace.Error):
+            self.scan.raster(cell=25, path=path)
+        self.scan.raster(cell=25, path=path, replace=True)
+        shade = self.scan.raster('hillshade', cell=25)
+        self.assertEqual(shade.values.dtype, np.uint8)
+        with self.assertRaises(ValueError):
+            self.scan.raster(cell=-1)
+
+
+class Lines(StoreCase):
+    def test_profile(self):
+        line = [[500050, 4999500], [501400, 4999100]]
+        got = self.raster.profile(line, step=25)
+        self.assertEqual(got.shape[1], 4)
+        np.testing.assert_allclose(np.diff(got[:-1, 0]), 25, rtol=0, atol=1e-6)
+        self.assertAlmostEqual(got[-1, 0], math.hypot(1350, 400), delta=1.0)
+        np.testing.assert_allclose(self.raster.heights(got[:, 1:3]), got[:, 3], rtol=0, atol=1e-6)
+        exact = self.raster.profile(line)
+        middle = (exact[1:, 1:] + exact[:-1, 1:]) / 2  # straight between the rows
+        np.testing.assert_allclose(self.raster.heights(middle[:, :2]), middle[:, 2], rtol=0, atol=1e-6)
+        with self.assertRaises(ValueError):
+            self.raster.profile([[0, 0]])
+        with self.assertRaises(ValueError):
+            self.raster.profile(line, step=0)
+
+    def test_contours_lie_at_their_height(self):
+        lines = self.raster.contours(20)
+        self.assertEqual(lines.__geo_interface__['type'], 'FeatureCollection')
+        self.assertGreater(len(lines['features']), 5)
+        for feature in lines['features']:
+            elev = feature['properties']['elev']
+            self.assertEqual(elev % 20, 0)
+            heights = self.raster.heights(feature['geometry']['coordinates'], crs='EPSG:4326')
+            # On the rim rounding may lead outside.
+            np.testing.assert_allclose(heights[~np.isnan(heights)], elev, rtol=0, atol=1e-3)
+
+    def test_contours_are_shapelys_too(self):
+        try:
+            from shapely.geometry import shape
+        except ImportError:
+            self.skipTest('shapely is missing')
+        lines = self.scan.contours(10, region=(300200, 5200200, 300800, 5200600))
+        for feature in lines['features']:
+            self.assertTrue(shape(feature['geometry']).is_valid)
+        area = shape(self.scan)
+        self.assertAlmostEqual(area.area, 1000 * 800, delta=1000)
+        part = area.buffer(-200)
+        self.assertEqual(len(self.scan.points(region=part)),
+                         sum(part.contains(point) or part.touches(point) for point in self.shapely_points()))
+
+    def shapely_points(self):
+        from shapely.geometry import Point
+        return [Point(*xy) for xy in self.points[:, :2]]
+
+
+class RealTerrain(unittest.TestCase):
+    def test_the_first_lines_of_the_readme(self):
+        with open(os.path.join(os.path.dirname(__file__), '..', 'README.md'), encoding='utf-8') as file:
+            code = re.search(r'```python\n(.*?)```', file.read(), re.DOTALL)[1]
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copy(ALPS, folder)
+            before = os.getcwd()
+            os.chdir(folder)
+            try:
+                names = {}
+                exec(code, names)
+            finally:
+                os.chdir(before)
+        self.assertFalse(np.isnan(names['heights']).any())
+        self.assertLessEqual(names['mesh'].max_error, 50)
+        self.assertGreater(len(names['lines']['features']), 3)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Progress, Ctrl-C, threads: how long calls behave."""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import terrace
+from python_case import ALPS, TRANSFORM, StoreCase
+
+
+class Jobs(StoreCase):
+    def test_progress(self):
+        seen = []
+        terrace.build(ALPS, self.path('alps'), progress=lambda *at: seen.append(at))
+        self.assertTrue(all(at[0] == 'points' for at in seen))
+        self.assertTrue(seen[-1][3])
+        counts = [at[1] for at in seen if not at[3]]
+        self.assertEqual(counts, sorted(counts))
+        with self.assertRaises(TypeError):
+            terrace.build(ALPS, self.path('alps2'), progress=3)
+
+    def test_what_progress_raises_ends_the_job(self):
+        class Enough(Exception):
+            pass
+
+        def stop(*at):
+            raise Enough
+
+        with self.assertRaises(Enough):
+            terrace.build(ALPS, self.path('stopped'), progress=stop)
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('stopped')], [])
+
+    def test_ctrl_c_ends_a_build_soon_and_leaves_nothing(self):
+        code = textwrap.dedent('''
+            import sys, time, numpy as np, terrace
+            def tell(*at):
+                print('working', flush=True)
+            try:
+                terrace.build(np.random.default_rng(1).random((6_000_000, 3)), sys.argv[1], progress=tell)
+            except KeyboardInterrupt:
+                print('interrupted', flush=True)
+                sys.exit(7)
+        ''')
+        store = self.path('interrupted')
+        with subprocess.Popen([sys.executable, '-c', code, store], stdout=subprocess.PIPE, text=True) as child:
+            child.stdout.readline()
+            began = time.monotonic()
+            child.send_signal(signal.SIGINT)
+            self.assertIn('interrupted', child.stdout.read())
+            self.assertEqual(child.wait(), 7)
+            self.assertLess(time.monotonic() - began, 10)
+        self.assertEqual([name for name in os.listdir(self.folder) if 'interrupted' in name], [])
+
+    def test_other_threads_go_on(self):
+        turns, stop = [0], threading.Event()
+
+        def count():
+            while not stop.is_set():
+                turns[0] += 1
+                time.sleep(0.0005)
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        began = time.monotonic()
+        terrace.build(np.random.default_rng(1).random((400_000, 3)), self.path('busy'))
+        lasted = time.monotonic() - began
+        stop.set()
+        thread.join()
+        self.assertGreater(turns[0], lasted * 100)
+
+    def test_notes_are_logged(self):
+        with self.assertLogs('terrace', logging.INFO) as logs:
+            terrace.build(np.random.default_rng(1).random((300_000, 3)), self.path('shuffled'))
+        self.assertIn('spatial order', ' '.join(logs.output))
+
+    def test_threads_change_no_byte(self):
+        one = terrace.build(self.points, self.path('one'), threads=1)
+        many = terrace.build(self.points, self.path('many'), threads=5)
+        self.assertEqual(one.info['checksum'], many.info['checksum'])
+        with self.assertRaises(ValueError):
+            terrace.build(self.points, self.path('none'), threads=0)
+        with self.assertRaises(terrace.Error):
+            terrace.build(self.points, self.path('little'), memory=1000)
+
+    def test_a_line_of_progress(self):
+        code = f'import terrace; terrace.build({ALPS!r}, {self.path("shown")!r}, progress=True)'
+        told = subprocess.run([sys.executable, '-c', code], stderr=subprocess.PIPE, text=True, check=True).stderr
+        self.assertIn('points', told)
+
+    def test_import_is_quick_and_needs_numpy_alone(self):
+        code = ('import sys, time, numpy; before = set(sys.modules); began = time.perf_counter(); import terrace; '
+                'print(time.perf_counter() - began, *{name.split(".")[0] for name in set(sys.modules) - before})')
+        best = min((subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True,
+                                   check=True).stdout.split() for _ in range(3)), key=lambda row: float(row[0]))
+        self.assertLess(float(best[0]), 0.2)
+        others = set(best[1:]) - set(sys.stdlib_module_names) - {'terrace', 'numpy'}
+        self.assertEqual({name for name in others if not name.startswith('_')}, set())
+
+
+if __name__ == '__main__':
+    unittest.main()

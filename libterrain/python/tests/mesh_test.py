@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes: laws of triangulations, SciPy's, and verified bounds."""
+
+import os
+import unittest
+
+import numpy as np
+
+import terrace
+from python_case import StoreCase, sorted_rows
+
+try:
+    from scipy.spatial import ConvexHull, Delaunay
+except ImportError:
+    Delaunay = None
+
+
+def triangle_set(vertices, triangles):
+    return {tuple(sorted(map(tuple, vertices[three, :2]))) for three in triangles}
+
+
+class Meshes(StoreCase):
+    def test_the_whole_of_a_cloud(self):
+        vertices, triangles = mesh = self.scan.mesh(level=0)
+        np.testing.assert_array_equal(sorted_rows(vertices), sorted_rows(self.points))
+        a, b, c = (vertices[triangles[:, i], :2] for i in range(3))
+        turns = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        self.assertTrue((turns > 0).all())
+        if Delaunay is not None:
+            hull = ConvexHull(self.points[:, :2])
+            self.assertEqual(len(triangles), 2 * len(vertices) - 2 - len(hull.vertices))
+            origin = self.points[:, :2].min(axis=0)
+            same = Delaunay(vertices[:, :2] - origin)
+            common = triangle_set(vertices, triangles) & triangle_set(vertices, same.simplices)
+            self.assertGreater(len(common), 0.999 * len(triangles))
+        self.assertEqual(len(mesh.levels), len(vertices))
+        self.assertIn('<polygon', mesh._repr_svg_())
+        self.assertEqual(len(mesh.__geo_interface__['coordinates']), len(triangles))
+
+    def test_levels_regions_focuses(self):
+        coarse = self.scan.mesh(max_points=1000)
+        self.assertLessEqual(len(coarse.vertices), 1000)
+        box = (300300, 5200300, 300500, 5200500)
+        focused = self.scan.mesh(level=self.scan.top, focus=[(box, 0)])
+        x, y = self.points[:, 0], self.points[:, 1]
+        inside = (x >= box[0]) & (x <= box[2]) & (y >= box[1]) & (y <= box[3])
+        have = {tuple(p) for p in focused.vertices}
+        self.assertTrue(all(tuple(p) in have for p in self.points[inside]))
+        part = self.scan.mesh(level=0, region=box)
+        self.assertLess(len(part.triangles), 4 * inside.sum())
+        with self.assertRaises(ValueError):
+            self.scan.mesh(level=0, max_points=10)
+
+    def test_bounds_are_kept(self):
+        for store, points in ((self.raster, None), (self.scan, self.points)):
+            last = None
+            for bound in (0.5, 2.0, 8.0):
+                mesh = store.bounded_mesh(bound)
+                self.assertLessEqual(mesh.max_error, bound)
+                self.assertLessEqual(mesh.rms_error, mesh.max_error)
+                self.assertEqual(mesh.samples, len(store))
+                if last is not None:
+                    self.assertLess(len(mesh.triangles), last)
+                last = len(mesh.triangles)
+        by_points = self.raster.bounded_mesh(max_points=300)
+        self.assertLessEqual(len(by_points.vertices), 300)
+        with self.assertRaises(ValueError):
+            self.raster.bounded_mesh()
+        with self.assertRaises(ValueError):
+            self.raster.bounded_mesh(max_error=-1)
+        with self.assertRaises(ValueError):
+            self.raster.bounded_mesh(1, quality='superb')
+
+    @unittest.skipIf(Delaunay is None, 'SciPy is missing')
+    def test_the_bound_holds_at_every_sample_as_scipy_interpolates(self):
+        from scipy.interpolate import LinearNDInterpolator
+        mesh = self.raster.bounded_mesh(1.0)
+        samples = terrace.xyz(self.raster.points())
+        error = np.full(len(samples), np.inf)
+        # Each triangle answers for the samples in it.
+        a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+        for i in range(len(mesh.triangles)):
+            corners = np.vstack((a[i], b[i], c[i]))
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            near = np.flatnonzero(((samples[:, :2] >= low[:2] - 1e-6) & (samples[:, :2] <= high[:2] + 1e-6)).all(axis=1))
+            plane = np.linalg.solve(np.column_stack((corners[:, :2] - low[:2], np.ones(3))), np.eye(3))
+            weights = np.column_stack((samples[near, :2] - low[:2], np.ones(len(near)))) @ plane
+            held = (weights >= -1e-9).all(axis=1)
+            error[near[held]] = np.minimum(error[near[held]], abs(weights[held] @ corners[:, 2] - samples[near[held], 2]))
+        self.assertLessEqual(error.max(), 1.0 + 1e-6)
+
+    def test_files(self):
+        mesh = self.raster.bounded_mesh(4, path=self.path('hills.ply'))
+        from terrace import _core
+        vertices, triangles, _ = _core.read_mesh(self.path('hills.ply'))
+        np.testing.assert_array_equal(vertices, mesh.vertices)
+        np.testing.assert_array_equal(triangles, mesh.triangles)
+        with self.assertRaises(terrace.Error):
+            mesh.save(self.path('hills.ply'))
+        mesh.save(self.path('hills.ply'), replace=True)
+        mesh.save(self.path('hills.glb'))
+        self.assertGreater(os.path.getsize(self.path('hills.glb')), 1000)
+        with self.assertRaises(ValueError):
+            terrace.Mesh(np.zeros((3, 3)), np.array([[0, 1, 3]])).save(self.path('wrong.ply'))
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stores that several tests ask."""
+
+import os
+import shutil
+import tempfile
+import unittest
+
+import numpy as np
+
+import terrace
+
+ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', '..'))
+ALPS = os.path.join(ROOT, 'libterrain', 'examples', 'alps.tif')
+TRANSFORM = (10, 0, 500000, 0, -10, 5000000)  # corners of cells, UTM zone 32
+
+
+def hills(rows=120, columns=150):
+    """Samples of a smooth function; the place of sample (row, column) is that of cell_centres()."""
+    y, x = np.mgrid[0:rows, 0:columns]
+    return 400 + 60 * np.sin(x / 11) * np.cos(y / 13) + 0.2 * x
+
+
+def cell_centres(rows, columns):
+    a, _, c, _, e, f = TRANSFORM
+    y, x = np.mgrid[0:rows, 0:columns]
+    return np.stack((c + a * (x + 0.5), f + e * (y + 0.5)), axis=-1)
+
+
+def cloud(count=20000, seed=1):
+    """Points of a function of x and y, with classes: (x, y, z), class."""
+    random = np.random.default_rng(seed)
+    xy = random.random((count, 2)) * [1000, 800] + [300000, 5200000]
+    z = 50 + 10 * np.sin(xy[:, 0] / 90) + (xy[:, 1] - 5200000) / 40
+    return np.column_stack((xy, z)), (np.arange(count) % 7).astype(np.uint8)
+
+
+class StoreCase(unittest.TestCase):
+    """A folder, a store of hills() and one of cloud(), both in UTM zone 32."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix='terrace-python-')
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.samples = hills()
+        cls.raster = terrace.build(cls.samples, cls.path('hills'), transform=TRANSFORM, crs='EPSG:32632')
+        cls.points, cls.classes = cloud()
+        cls.scan = terrace.build(cls.points, cls.path('cloud'), crs='EPSG:32632', attributes={'class': cls.classes},
+                                 block_points=2000)
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder, name)
+
+
+def sorted_rows(array):
+    return array[np.lexsort(array.T[::-1])]

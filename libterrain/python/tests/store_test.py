@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stores: what goes in comes out, whole or in part."""
+
+import errno
+import os
+import threading
+import unittest
+
+import numpy as np
+
+import terrace
+from python_case import ALPS, TRANSFORM, StoreCase, cell_centres, cloud, hills, sorted_rows
+
+
+class Stores(StoreCase):
+    def test_every_point_comes_back(self):
+        got = self.scan.points()
+        self.assertEqual(got.dtype.names, ('x', 'y', 'z', 'class'))
+        self.assertEqual(got.dtype['class'], np.uint8)
+        both = np.column_stack((self.points, self.classes))
+        np.testing.assert_array_equal(sorted_rows(np.column_stack((terrace.xyz(got), got['class']))), sorted_rows(both))
+        view = terrace.xyz(got)
+        self.assertTrue(np.shares_memory(view, got))
+
+    def test_every_sample_comes_back_at_the_middle_of_its_cell(self):
+        got = terrace.xyz(self.raster.points())
+        expected = np.column_stack((cell_centres(*self.samples.shape).reshape(-1, 2), self.samples.ravel()))
+        np.testing.assert_array_equal(sorted_rows(got), sorted_rows(expected))
+
+    def test_info(self):
+        info = self.raster.info
+        self.assertEqual((info['points'], info['columns'], info['rows']), (self.samples.size, 150, 120))
+        self.assertEqual(info['crs']['epsg'], 32632)
+        self.assertEqual(info['levels'][0]['points'], self.samples.size)
+        self.assertEqual(len(self.raster), self.samples.size)
+        low = cell_centres(*self.samples.shape)
+        self.assertEqual(self.raster.bounds[:2], (low[..., 0].min(), low[..., 1].min()))
+        self.assertEqual(self.raster.bounds[5], self.samples.max())
+        self.assertIn('20000 points', repr(self.scan))
+        self.assertIn('EPSG:32632', repr(self.scan))
+        self.assertIn('<polygon', self.scan._repr_svg_())
+        self.assertEqual(self.scan.verify(), [])
+
+    def test_regions_levels_and_conditions(self):
+        box = (300100, 5200100, 300400, 5200300)
+        x, y = self.points[:, 0], self.points[:, 1]
+        inside = (x >= box[0]) & (x <= box[2]) & (y >= box[1]) & (y <= box[3])
+        for got in (self.scan.points(region=box), self.scan.query(box=box)):
+            np.testing.assert_array_equal(sorted_rows(terrace.xyz(got)), sorted_rows(self.points[inside]))
+        both = inside & (self.classes == 3)
+        self.assertEqual(len(self.scan.points(region=box, where='class == 3')), both.sum())
+        for level in self.scan.info['levels']:
+            self.assertEqual(len(self.scan.points(level=level['level'])), level['points'])
+        # A triangle, as GeoJSON says it.
+        corners = [[300000, 5200000], [301000, 5200000], [300000, 5200800], [300000, 5200000]]
+        got = self.scan.points(region={'type': 'Polygon', 'coordinates': [corners]})
+        self.assertEqual(len(got), ((x - 300000) / 1000 + (y - 5200000) / 800 <= 1).sum())
+        focused = self.scan.points(level=self.scan.top, focus=[(box, 0)])
+        self.assertGreaterEqual(len(focused), inside.sum())
+        self.assertLess(len(focused), len(self.points))
+
+    def test_nearest(self):
+        place = (300500.0, 5200400.0)
+        distances = np.hypot(*(self.points[:, :2] - place).T)
+        got = self.scan.query(near=place, k=25)
+        order = np.argsort(distances)[:25]
+        np.testing.assert_array_equal(terrace.xyz(got), self.points[order])
+        np.testing.assert_array_equal(got['class'], self.classes[order])
+        # On the ground: the map's scale is within a thousandth.
+        np.testing.assert_allclose(got['distance'], distances[order], rtol=1e-3)
+        self.assertEqual(len(self.scan.query(near=place, k=10 ** 6)), len(self.points))
+        within = self.scan.query(near=place, radius=50.0)
+        self.assertTrue((within['distance'] <= 50).all())
+        self.assertAlmostEqual(len(within), (distances <= 50).sum(), delta=2)
+
+    def test_other_reference_systems(self):
+        got = self.scan.points(crs='EPSG:4326')
+        self.assertTrue(((got['x'] > 6) & (got['x'] < 7)).all())
+        self.assertTrue(((got['y'] > 46) & (got['y'] < 48)).all())
+
+    def test_closed_and_missing(self):
+        with terrace.Store.open(self.path('cloud')) as store:
+            self.assertFalse(store.closed)
+        self.assertTrue(store.closed)
+        self.assertIn('closed', repr(store))
+        for use in (store.points, store.mesh, lambda: store.heights([[0, 0]]), lambda: store.query(near=(0, 0), k=1),
+                    lambda: terrace.View(store)):
+            with self.assertRaisesRegex(ValueError, 'the store is closed'):
+                use()
+        with self.assertRaises(FileNotFoundError):
+            terrace.Store.open(self.path('nowhere'))
+        with self.assertRaises(FileNotFoundError) as caught:
+            terrace.build(self.path('nowhere.tif'), self.path('new'))
+        self.assertEqual(caught.exception.errno, errno.ENOENT)
+        self.assertIn('nowhere.tif', str(caught.exception))
+        with self.assertRaises(FileExistsError):
+            terrace.build(self.points, self.path('cloud'))
+        with self.assertRaises(terrace.Error):
+            terrace.Store.open(self.folder)
+
+    def test_damage_is_told(self):
+        store = terrace.build(self.points, self.path('damaged'))
+        files = [os.path.join(root, name) for root, _, names in os.walk(self.path('damaged')) for name in names]
+        largest = max(files, key=os.path.getsize)
+        with open(largest, 'r+b') as file:
+            file.seek(os.path.getsize(largest) // 2)
+            byte = file.read(1)
+            file.seek(-1, os.SEEK_CUR)
+            file.write(bytes([byte[0] ^ 0xff]))
+        self.assertNotEqual(store.verify(), [])
+        with self.assertRaisesRegex(terrace.Error, os.path.basename(largest)):
+            store.points()
+
+    def test_unknown_names_are_refused(self):
+        with self.assertRaisesRegex(TypeError, 'no option .blok_points'):
+            terrace.build(self.points, self.path('new'), blok_points=3)
+        with self.assertRaisesRegex(ValueError, 'effort.*fast, default, fine, full'):
+            terrace.build(self.points, self.path('new'), effort='best')
+        with self.assertRaisesRegex(terrace.Error, 'nonsense'):
+            self.scan.points(where='nonsense == 1')
+        with self.assertRaisesRegex(ValueError, 'no level 99'):
+            self.scan.points(level=99)
+        with self.assertRaises(ValueError):
+            self.scan.points(region=(1, 2, 3))
+        with self.assertRaises(ValueError):
+            self.scan.points(region=(3, 3, 1, 1))
+        with self.assertRaises(ValueError):
+            terrace.build(self.points, self.path('new'), crs='EPSG:999999')
+
+    def test_a_store_may_be_asked_by_many_threads_and_by_a_fork(self):
+        expected = self.scan.query(near=(300500, 5200400), k=9)
+        failures = []
+
+        def ask():
+            for _ in range(10):
+                if not np.array_equal(self.scan.query(near=(300500, 5200400), k=9), expected):
+                    failures.append('other points')
+
+        threads = [threading.Thread(target=ask) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(failures, [])
+        child = os.fork()
+        if child == 0:
+            os._exit(0 if np.array_equal(self.scan.query(near=(300500, 5200400), k=9), expected) else 1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+
+
+class Sources(StoreCase):
+    """The same points and samples in whatever form make the same store."""
+
+    def built(self, source, **options):
+        self.count = getattr(self, 'count', 0) + 1
+        return terrace.build(source, self.path(f'{self.id()}-{self.count}'), **options)
+
+    def assert_same(self, source, reference, **options):
+        self.assertEqual(self.built(source, **options).info['checksum'], reference.info['checksum'])
+
+    def test_points(self):
+        options = {'crs': 'EPSG:32632', 'block_points': 2000}
+        kind = [('class', 'u1'), ('x', 'f8'), ('y', 'f8'), ('z', 'f8')]
+        records = np.empty(len(self.points), kind)
+        records['class'], (records['x'], records['y'], records['z']) = self.classes, self.points.T
+        self.assert_same(records, self.scan, **options)
+        columns = dict(zip('xyz', self.points.T), **{'class': self.classes})
+        self.assert_same(columns, self.scan, **options)
+        wide = np.zeros((2 * len(self.points), 5))
+        wide[::2, 1:4] = self.points
+        more = {'class': self.classes}
+        self.assert_same(wide[::2, 1:4], self.scan, attributes=more, **options)  # neither contiguous nor aligned
+        self.assert_same(self.points[::-1][::-1], self.scan, attributes=more, **options)
+        self.assert_same(np.asfortranarray(self.points), self.scan, attributes=more, **options)
+        self.assert_same(self.points.astype('>f8'), self.scan, attributes=more, **options)
+        self.assert_same(memoryview(self.points), self.scan, attributes=more, **options)
+        self.assert_same(self.points.tolist(), self.scan, attributes=more, **options)
+
+        class Interface:
+            __array_interface__ = self.points.__array_interface__
+
+        class Capsule:
+            def __dlpack__(_, **how):
+                return self.points.__dlpack__(**how)
+
+            def __dlpack_device__(_):
+                return self.points.__dlpack_device__()
+
+        self.assert_same(Interface(), self.scan, attributes=more, **options)
+        self.assert_same(Capsule(), self.scan, attributes=more, **options)
+
+    def test_laspy_records(self):
+        scales, offsets = np.array([0.01, 0.01, 0.001]), np.array([300000.0, 5200000.0, 0.0])
+        raw = np.round((self.points - offsets) / scales).astype(np.int32)
+        records = np.empty(len(raw), [('X', 'i4'), ('Y', 'i4'), ('Z', 'i4'), ('intensity', 'u2')])
+        records['X'], records['Y'], records['Z'] = raw.T
+        records['intensity'] = np.arange(len(raw)) % 1000
+
+        class Header:
+            pass
+
+        class Data:  # as laspy.LasData
+            header, points = Header(), Header()
+
+        Data.header.scales, Data.header.offsets, Data.points.array = scales, offsets, records
+        store = self.built(Data(), crs='EPSG:32632')
+        got = store.points()
+        np.testing.assert_allclose(sorted_rows(terrace.xyz(got)), sorted_rows(raw * scales + offsets), rtol=0, atol=1e-9)
+        self.assertEqual(got.dtype['intensity'], np.uint16)
+        self.assertEqual(store.info['format'], 'array')
+
+    def test_rasters(self):
+        options = {'transform': TRANSFORM, 'crs': 'EPSG:32632'}
+        wide = np.full((121, 300), np.nan)
+        wide[1:, ::2] = self.samples
+        self.assert_same(wide[1:, ::2], self.raster, **options)
+        self.assert_same(np.ma.masked_array(self.samples, np.zeros(self.samples.shape, bool)), self.raster, **options)
+
+        class Dataset:  # as rasterio's
+            transform, crs, nodata, name = TRANSFORM, 'EPSG:32632', None, 'hills'
+
+            @staticmethod
+            def read(band):
+                return self.samples if band == 1 else None
+
+        self.assert_same(Dataset(), self.raster)
+        with_holes = self.samples.copy()
+        with_holes[20:40, 30:60] = -9999
+        store = self.built(with_holes, nodata=-9999, **options)
+        self.assertEqual(len(store), self.samples.size - 600)
+        self.assertEqual(store.info['nodata'], 600)
+        masked = np.ma.masked_equal(with_holes, -9999)
+        self.assertEqual(len(self.built(masked, **options)), self.samples.size - 600)
+
+    def test_xarray(self):
+        try:
+            import xarray
+        except ImportError:
+            self.skipTest('xarray is missing')
+        centres = cell_centres(*self.samples.shape)
+        array = xarray.DataArray(self.samples, dims=('y', 'x'),
+                                 coords={'y': centres[:, 0, 1], 'x': centres[0, :, 0]})
+        self.assert_same(array, self.raster, crs='EPSG:32632')
+        grid = xarray.DataArray(0, attrs={'crs_wkt': self.raster.info['crs']['wkt'],
+                                          'GeoTransform': '500000 10 0 5000000 0 -10'})
+        described = xarray.DataArray(self.samples, dims=('y', 'x'), coords={'spatial_ref': grid})
+        self.assertEqual(self.built(described).bounds, self.raster.bounds)
+
+    def test_types_of_samples(self):
+        for kind in ('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'i8', 'u8', 'f2', 'f4', 'f8', '>i2', '>f4', '?'):
+            with self.subTest(kind):
+                samples = (np.arange(48 * 41).reshape(48, 41) % 100).astype(kind)
+                store = self.built(samples, transform=TRANSFORM)
+                got = terrace.xyz(store.points())
+                expected = np.column_stack((cell_centres(48, 41).reshape(-1, 2), samples.ravel().astype(float)))
+                np.testing.assert_array_equal(sorted_rows(got), sorted_rows(expected))
+
+    def test_what_cannot_be_a_source(self):
+        for wrong, kind in ((np.zeros((4, 3), complex), TypeError), (np.zeros((2, 2, 2)), ValueError),
+                            (np.zeros(5), ValueError), (np.zeros((0, 3)), ValueError), (object(), TypeError),
+                            (np.array([['a', 'b', 'c']]), TypeError), ({'x': [1.0], 'y': [2.0]}, ValueError),
+                            ({'x': [1.0], 'y': [2.0], 'z': [3.0, 4.0]}, ValueError), ([], ValueError),
+                            (np.zeros(3, [('a', 'f8')]), ValueError), (np.zeros((0, 7)), ValueError)):
+            with self.subTest(repr(wrong)):
+                with self.assertRaises(kind):
+                    self.built(wrong)
+        with self.assertRaisesRegex(terrace.Error, 'point 17: its y is not finite'):
+            points = self.points.copy()
+            points[17, 1] = np.nan
+            self.built(points)
+        with self.assertRaisesRegex(terrace.Error, 'not one point with data'):
+            self.built(np.full((5, 5), np.nan))
+        with self.assertRaises(ValueError):
+            self.built(hills(), transform=(1, 2, 3))
+        with self.assertRaises(ValueError):
+            self.built(hills(), transform=(0, 0, 0, 0, 0, 0))
+        self.assertEqual([name for name in os.listdir(self.folder) if 'cannot' in name], [])
+
+    def test_files(self):
+        store = terrace.build(ALPS, self.path('alps'))
+        self.assertGreater(len(store), 10 ** 6)
+        self.assertEqual(store.info['format'], 'geotiff')
+        text = self.path('points.xyz')
+        np.savetxt(text, cloud(500)[0])
+        self.assertEqual(len(terrace.build([text], self.path('text'))), 500)
+
+
+if __name__ == '__main__':
+    unittest.main()

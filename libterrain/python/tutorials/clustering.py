@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+# %% [markdown]
+# # Clustering, matching, triangulations: the methods alone
+#
+# The methods of J. Skala's thesis work on arrays, without a store.
+
+# %%
+import numpy as np
+import terrace
+
+random = np.random.default_rng(3)
+middles = random.random((12, 2)) * 100
+points = np.concatenate([middle + 2 * random.standard_normal((400, 2)) for middle in middles])
+
+# %% [markdown]
+# Facility location needs no number of clusters but what one costs. Its representatives are points of the input.
+
+# %%
+for cost in (0.02, 0.1, 0.5):
+    print(f'facility cost {cost}:', terrace.cluster(points, cost))
+found = terrace.cluster(points, 0.1)
+exact = terrace.cluster(points[::20], 0.1, method='jain-vazirani')
+print(f'every 20th point: cost {exact.cost:.0f}, no solution below {exact.lower_bound:.0f}')
+
+# %% [markdown]
+# Linkage gives SciPy's rows, so SciPy's dendrograms draw them; k-means takes the representatives as its start.
+
+# %%
+rows = terrace.linkage(points, 'complete')
+labels = terrace.flat_clusters(rows, count=12)
+print('complete linkage:', np.bincount(labels))
+print('k-means:', terrace.kmeans(points, 12), 'from representatives:', terrace.kmeans(points, points[found.facilities]))
+
+# %% [markdown]
+# Pairs: a matching of least total distance with the proof of it, and the assignment of one set to another.
+
+# %%
+pairs = terrace.matching(points)
+print(pairs, f'no matching below {pairs.bound:.3f}')
+moved = points + random.standard_normal(points.shape)
+chosen = terrace.assignment(points, moved)
+print(chosen, f'{(chosen.columns == np.arange(len(points))).mean():.0%} of the points get their own copy')
+
+# %% [markdown]
+# A triangulation that changes: what is inserted and removed again leaves no trace.
+
+# %%
+triangulation = terrace.Delaunay2(points)
+before = triangulation.digest()
+added = triangulation.insert(random.random((1000, 2)) * 100)
+print(triangulation)
+triangulation.remove(np.unique(added))
+assert triangulation.digest() == before
+triangulation  # a notebook shows its picture
