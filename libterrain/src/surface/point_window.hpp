@@ -34,14 +34,6 @@ namespace terrace::terrain {
 /// One object per thread; any number of them share a Store.
 class PointWindow {
  public:
-  /// What shall be known besides the triangles that meet the box.
-  enum class Reach : std::uint8_t {
-    kTriangles,
-    /// Also all triangles whose closed circumcircles meet the box, and their neighbours: the
-    /// natural neighbours and, within the hull, the nearest vertex of any place in the box.
-    kCircles,
-  };
-
   /// What load() throws where memory_bytes do not suffice. It says what would be needed.
   class NoRoom : public stream::Error {
     using Error::Error;
@@ -68,7 +60,7 @@ class PointWindow {
   ///
   /// Throws: NoRoom where memory_bytes do not suffice; stream::Error on a damaged store;
   /// stream::Stopped. After that it can only be loaded again or destroyed.
-  void load(const StoredBox& box, Reach reach = Reach::kTriangles);
+  void load(const StoredBox& box);
 
   /// As it was loaded last. Vertices have no other order or number than this one gives them.
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
@@ -179,8 +171,7 @@ class PointWindow {
   TooLong too_long_;
   ClusterFrontier frontier_;
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
-  Reach reach_ = Reach::kTriangles;
-  bool is_whole_ = false;  ///< all points of the store are inserted
+  bool is_whole_ = false;      ///< all points of the store are inserted
   Triangulation triangulation_;
   std::vector<double> heights_;               ///< by slot of vertex
   std::vector<Origin> origins_;               ///< by slot of vertex
