@@ -45,9 +45,11 @@ struct Layout {
         grid(schema.grid),
         level(of_level),
         payload_size(schema.payload_size()) {
+    std::size_t offset = 0;
     for (const Channel& channel : schema.attributes) {
       attributes.push_back(channel.type);
-      offsets.push_back(schema.attribute_offset(offsets.size()));
+      offsets.push_back(offset);
+      offset += size_of(channel.type);
     }
   }
   /// Maximum points of a cluster: their coordinates, attributes and children fit into

@@ -14,7 +14,7 @@ namespace {
 
 /// At most so many of the blocks held back are used to choose how columns are coded.
 constexpr std::size_t kTrialBlocks = 8;
-/// At most so many attributes are tried as guides.
+/// The first attributes of 64 bits are tried as guides.
 constexpr std::size_t kMostGuides = 2;
 /// At least one in so many differences of a guide begins a line, and as many do not.
 constexpr std::uint64_t kLeastShare = 50;
@@ -115,28 +115,40 @@ LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence,
                (held_.size() + kTrialBlocks - 1) / kTrialBlocks);
 }
 
-/// Takes for jumps what lies beyond the sizes of differences that are rarest, if some lie on either
-/// side. Points of scanners are microseconds apart, their lines milliseconds.
-Guide LevelWriter::find_guide(unsigned attribute) {
-  std::array<std::uint64_t, 65> widths{};
+/// Attributes that may tell scan lines: times are doubles or long integers. Takes for jumps what
+/// lies beyond the sizes of differences that are rarest, if some lie on either side: points of
+/// scanners are microseconds apart, their lines milliseconds.
+std::vector<Guide> LevelWriter::find_guides() {
+  std::vector<unsigned> attributes;
+  for (unsigned a = 0; a < layout_.attributes.size() && attributes.size() < kMostGuides; ++a) {
+    if (size_of(layout_.attributes[a]) == sizeof(double)) attributes.push_back(a);
+  }
+  std::vector<std::array<std::uint64_t, 65>> widths(attributes.size());
   const std::size_t step = (held_.size() + kTrialBlocks - 1) / kTrialBlocks;
-  for (std::size_t b = 0; b < held_.size(); b += step) {
+  for (std::size_t b = 0; b < held_.size() && !attributes.empty(); b += step) {
     const ClusteredBlock view = held_[b].view();
     encoders_.front().load(layout_, view);
-    encoders_.front().count_differences(attribute, widths);
+    for (std::size_t i = 0; i < attributes.size(); ++i) {
+      encoders_.front().count_differences(attributes[i], widths[i]);
+    }
   }
-  const std::uint64_t all = std::accumulate(widths.begin() + 1, widths.end(), std::uint64_t{0});
-  Guide guide;
-  std::uint64_t below = 0, least = UINT64_MAX;
-  for (unsigned width = 1; width < 63; ++width) {
-    below += widths[width];
-    const std::uint64_t near = widths[width] + widths[width + 1];
-    const bool divides = below >= all / kLeastShare && all - below >= all / kLeastShare;
-    if (!divides || below == 0 || below == all || near >= least) continue;
-    least = near;
-    guide = {attribute, std::uint64_t{1} << width};
+  std::vector<Guide> guides;
+  for (std::size_t i = 0; i < attributes.size(); ++i) {
+    const std::uint64_t all =
+        std::accumulate(widths[i].begin() + 1, widths[i].end(), std::uint64_t{0});
+    std::uint64_t below = 0, least = UINT64_MAX;
+    Guide guide;
+    for (unsigned width = 1; width < 63; ++width) {
+      below += widths[i][width];
+      const std::uint64_t near = widths[i][width] + widths[i][width + 1];
+      const bool divides = below >= all / kLeastShare && all - below >= all / kLeastShare;
+      if (!divides || below == 0 || below == all || near >= least) continue;
+      least = near;
+      guide = {attributes[i], std::uint64_t{1} << width};
+    }
+    if (guide.exists()) guides.push_back(guide);
   }
-  return guide;
+  return guides;
 }
 
 /// The kind of each column that takes the fewest bits, with the guide that saves the most; the
@@ -148,13 +160,8 @@ void LevelWriter::choose_columns(Tables& tables) {
     return;
   }
   std::array<std::optional<Trial>, kColumnKinds> trials;
-  std::vector<Guide> guides(1);
-  for (unsigned a = 0; a < layout_.attributes.size(); ++a) {
-    // Times are doubles or long integers.
-    if (size_of(layout_.attributes[a]) < sizeof(double)) continue;
-    if (const Guide guide = find_guide(a); guide.exists()) guides.push_back(guide);
-    if (guides.size() > kMostGuides) break;
-  }
+  std::vector<Guide> guides = find_guides();
+  guides.emplace(guides.begin());
   const std::vector<bool> orders = sequence_      ? std::vector<bool>{*sequence_}
                                    : layout_.grid ? std::vector<bool>{false}
                                                   : std::vector<bool>{false, true};

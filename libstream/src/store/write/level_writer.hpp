@@ -75,7 +75,7 @@ class LevelWriter {
   Trial count(const Predictor& predictor, const Columns& columns, std::size_t step);
   Trial trial(const Predictor& predictor, bool sequence, const Guide& guide, ColumnKind kind);
   [[nodiscard]] bool possible(ColumnKind kind, unsigned column, const Guide& guide) const;
-  Guide find_guide(unsigned attribute);
+  std::vector<Guide> find_guides();
   void choose_columns(Tables& tables);
   void train();
   void write(const PreparedBlock& block);
