@@ -31,8 +31,6 @@ constexpr double kPartsPerThread = 4;
 /// it, which costs per point half of that.
 constexpr double kPointsPerPlace = 4000;
 constexpr double kReadShare = 0.5;
-/// Clusters overlap if those whose boxes hold a place have so many points.
-constexpr double kOverlapping = 10000;
 /// Where places are too few, what lies around those that fall into a box so many times smaller
 /// than a window, to each side, is loaded.
 constexpr double kParts = 8;
@@ -147,7 +145,7 @@ class PointSampler final : public HeightSampler {
                   std::max(65536.0, whole / (kPartsPerThread * static_cast<double>(threads)))});
     const double met = points_met_by_a_place(store, options.level);
     points_per_place_ = kPointsPerPlace + kReadShare * met;
-    takes_whole_ = met > kOverlapping && whole * kBytesPerExpected <= static_cast<double>(memory_);
+    takes_whole_ = whole * kBytesPerExpected <= static_cast<double>(memory_);
     if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
   }
 
@@ -224,7 +222,8 @@ class PointSampler final : public HeightSampler {
     return static_cast<double>(places) * points_per_place_ >= part.points;
   }
 
-  /// Clusters that overlap would be read for many windows each: rather once for all.
+  /// Clusters that overlap would be read for many windows each, and circles in voids reach beyond
+  /// windows: rather once for all.
   void take_whole() {
     auto cells = std::make_unique<PointCells>();
     stream::StoreQuery query(store_);

@@ -23,6 +23,7 @@ void PointCells::clear() {
   places_.clear();
   heights_.clear();
   begin_.assign(2, 0);
+  sums_.assign(4, 0);
 }
 
 bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
@@ -88,6 +89,15 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
   std::copy_backward(begin_.begin(), begin_.end() - 2, begin_.end() - 1);
   begin_.front() = 0;
   drop_duplicates();
+  const std::size_t side = std::size_t{columns_} + 1;
+  sums_.assign(side * (std::size_t{rows_} + 1), 0);
+  for (std::size_t row = 0; row < rows_; ++row) {
+    const std::size_t first = row * columns_;
+    for (std::size_t column = 1; column < side; ++column) {
+      sums_[(row + 1) * side + column] =
+          sums_[row * side + column] + begin_[first + column] - begin_[first];
+    }
+  }
 
   for (std::size_t k = 0; k < 2; ++k) {
     known_.min[k] = box.min[k] <= store.bounds().min[k] ? -kFar : box.min[k];

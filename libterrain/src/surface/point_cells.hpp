@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <terrace/stream/store_query.hpp>
@@ -22,7 +23,7 @@ namespace terrace::terrain {
 class PointCells {
  public:
   /// Peak bytes per point.
-  static constexpr std::uint64_t kBytesPerPoint = 56;
+  static constexpr std::uint64_t kBytesPerPoint = 58;
 
   /// Replaces what is held by the points of `level` and above in the box. False if there are more
   /// than most_points, or if they crowd in few of the cells and `may_crowd` is not set: nothing is
@@ -94,16 +95,17 @@ class PointCells {
       }
     }
   }
-  /// Calls visit(point) for all in the cover, which may shrink meanwhile, and some around.
+  /// Calls visit(point) for all in the cover, which may shrink meanwhile, and some around, roughly
+  /// from near to far as seen from a place. Cells without points cost nothing, however many.
   template <class Visit>
-  void in(const CircleCover& cover, const Visit& visit) const {
+  void in(const CircleCover& cover, const Point2& from, const Visit& visit) const {
     const Range range = cells_of(cover.bounds());
     // Few cells are visited without asking.
     constexpr std::size_t kFewCells = 36;
     if (range.count() <= kFewCells) {
       visit_cells(range, visit);
     } else {
-      visit_meeting(range, cover, visit);
+      visit_meeting(range, cover, cells_of({from, from}), visit);
     }
   }
   /// The sides of a cell.
@@ -123,19 +125,34 @@ class PointCells {
   [[nodiscard]] StoredBox box_of(const Range& range) const;
   void drop_duplicates();
 
+  /// Whether there is a point in a range of cells.
+  [[nodiscard]] bool has_points(const Range& range) const {
+    const std::size_t side = std::size_t{columns_} + 1;
+    const auto sum = [&](std::uint32_t column, std::uint32_t row) {
+      return sums_[row * side + column];
+    };
+    return sum(range.end_column, range.end_row) - sum(range.column, range.end_row) -
+               sum(range.end_column, range.row) + sum(range.column, range.row) !=
+           0;
+  }
   template <class Visit>
-  void visit_meeting(const Range& range, const CircleCover& cover, const Visit& visit) const {
-    if (!cover.meets(box_of(range))) return;
+  void visit_meeting(const Range& range, const CircleCover& cover, const Range& from,
+                     const Visit& visit) const {
+    if (!has_points(range) || !cover.meets(box_of(range))) return;
     constexpr std::size_t kFewCells = 4;
     if (range.count() <= kFewCells) return visit_cells(range, visit);
-    Range first = range, second = range;
+    Range near = range, far = range;
+    bool is_first_near;
     if (range.end_column - range.column >= range.end_row - range.row) {
-      first.end_column = second.column = range.column + (range.end_column - range.column) / 2;
+      near.end_column = far.column = range.column + (range.end_column - range.column) / 2;
+      is_first_near = from.column < far.column;
     } else {
-      first.end_row = second.row = range.row + (range.end_row - range.row) / 2;
+      near.end_row = far.row = range.row + (range.end_row - range.row) / 2;
+      is_first_near = from.row < far.row;
     }
-    visit_meeting(first, cover, visit);
-    visit_meeting(second, cover, visit);
+    if (!is_first_near) std::swap(near, far);
+    visit_meeting(near, cover, from, visit);
+    visit_meeting(far, cover, from, visit);
   }
 
   StoredBox box_{}, known_{};
@@ -144,6 +161,8 @@ class PointCells {
   std::vector<Point2> places_;        ///< by cells, row by row
   std::vector<double> heights_;       ///< of places_
   std::vector<std::uint32_t> begin_;  ///< in places_, by cell; at last their number
+  /// Points in the cells left of and above each corner of the grid, row by row.
+  std::vector<std::uint32_t> sums_;
 };
 
 }  // namespace terrace::terrain

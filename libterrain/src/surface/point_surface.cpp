@@ -17,6 +17,8 @@ constexpr double kFarAway = std::numeric_limits<double>::infinity();
 constexpr double kDoubt = 8 * std::numeric_limits<double>::epsilon();
 /// Cells around that are looked at without regard to the circle, at most.
 constexpr std::uint32_t kFarthest = 8;
+/// Where circles have more cells they are searched one by one, as they shrink.
+constexpr std::size_t kManyCells = 128;
 /// Decoded clusters to keep, for circles that reach beyond what is loaded.
 constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
 
@@ -170,10 +172,32 @@ void PointSurface::find_triangle(const Target& target) {
   }
   do {
     changed = false;
-    cells_->in(cover, offer);
+    cells_->in(cover, target.place, offer);
     if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, target.place, offer);
   } while (changed);
   triangle_ = t;
+}
+
+/// Finds the triangle that the star has at the first neighbour whose circle was not searched, by
+/// the points in memory. That circle only becomes less on the side of the triangle. Points on the
+/// other side lie in the directions of other triangles, whose circles hold them as well.
+void PointSurface::narrow_first(const Point2& centre) {
+  std::size_t first = 0;
+  while (star_.mark(first) != kNone) ++first;
+  const Point2 neighbour = star_.neighbour(first);
+  Point2 next = star_.next_neighbour(first);
+  CircleCover cover = star_.circle(first);
+  cells_->in(cover, centre, [&](const Point2& p) {
+    if (!cover.meets(StoredBox{p, p}) || p == centre || p == neighbour || p == next) return;
+    if (!(tri::orientation(centre, neighbour, p) > 0)) return;
+    if (!tri::inside_circle(centre, neighbour, next, p)) return;
+    next = p;
+    cover = CircleCover::of_triangle(centre, neighbour, next);
+  });
+  star_.offer(next);
+  for (std::size_t i = 0; i < star_.triangles(); ++i) {
+    if (star_.neighbour(i) == neighbour) star_.set_mark(i, kMemory);
+  }
 }
 
 void PointSurface::find_star(const Point2& centre) {
@@ -182,8 +206,6 @@ void PointSurface::find_star(const Point2& centre) {
   const auto offer = [&](const Point2& p) {
     if (square_of(p[0] - centre[0], p[1] - centre[1]) <= limit) star_.offer(p);
   };
-  // Circles in which all points in memory, or all, have been offered.
-  enum Mark : std::uint8_t { kNone, kMemory, kAll };
   PointCells::Range seen, wanted;
   std::size_t cells = 0;
   // The circles that points in memory may lie in yet.
@@ -219,6 +241,10 @@ void PointSurface::find_star(const Point2& centre) {
   }
   while (true) {
     for (find_open(); !covers_.empty(); find_open()) {
+      if (cells > kManyCells) {
+        narrow_first(centre);
+        continue;
+      }
       for (std::size_t i = 0; i < star_.triangles(); ++i) {
         if (star_.mark(i) == kNone) star_.set_mark(i, kMemory);
       }
@@ -227,7 +253,7 @@ void PointSurface::find_star(const Point2& centre) {
         cells_->visit_cells(wanted, seen, offer);
         seen = wanted;
       } else {
-        for (const CircleCover& cover : covers_) cells_->in(cover, offer);
+        for (const CircleCover& cover : covers_) cells_->in(cover, centre, offer);
       }
     }
     for (std::size_t i = 0; i < star_.triangles(); ++i) {
@@ -367,7 +393,7 @@ Point2 PointSurface::nearest(const Point2& place) {
     for (const Point2& corner : hull_.corners()) offer(corner);
   }
   const CircleCover cover = disk(place, bound);
-  cells_->in(cover, offer);
+  cells_->in(cover, place, offer);
   if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, place, offer);
   return best;
 }

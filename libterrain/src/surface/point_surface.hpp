@@ -84,6 +84,7 @@ class PointSurface {
   /// Lets star_ be that of a place among all points, which may be one of them. Requires that it is
   /// not outside the hull.
   void find_star(const Point2& centre);
+  void narrow_first(const Point2& centre);
   /// Calls visit(point) at least for all points in the covers that are not held in memory.
   template <class Visit>
   void read_in(std::span<const CircleCover> covers, const Point2& from, const Visit& visit);
@@ -97,6 +98,9 @@ class PointSurface {
   const PointHull& hull_;
   TooLong too_long_;
   stream::StoreQuery query_;
+  /// Of a triangle of star_: in its circle all points in memory, or all, were offered.
+  enum Mark : std::uint8_t { kNone, kMemory, kAll };
+
   PointCells own_;
   const PointCells* cells_ = &own_;
   std::optional<Corners> triangle_;  ///< one of the triangulation of all points
