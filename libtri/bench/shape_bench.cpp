@@ -124,21 +124,6 @@ constexpr Scan kScans[] = {
     {"armadillo_tm.ply", "armadillo 2"},
 };
 
-Surface read_scan(const std::filesystem::path& path) {
-  if (path.extension() == ".gz") {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(
-        popen(("gzip -dc '" + path.string() + "'").c_str(), "r"), pclose);
-    std::string text;
-    std::vector<char> block(1 << 16);
-    for (std::size_t n; pipe && (n = std::fread(block.data(), 1, block.size(), pipe.get())) > 0;)
-      text.append(block.data(), n);
-    std::istringstream in(text);
-    return read_ply(in);
-  }
-  std::ifstream in(path, std::ios::binary);
-  return path.extension() == ".obj" ? read_obj(in) : read_ply(in);
-}
-
 void print_row(const char* name, const char* how, double build, double shape_time,
                const SurfaceMeasures& m, std::size_t lost, std::size_t rescued, double scale,
                const SurfaceMeasures& original, double volume) {

@@ -23,14 +23,15 @@ inline constexpr double kPoleWeight = 2.0;
 /// O(n log n); memory 60 bytes per tetrahedron, freed at the end.
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads);
 
-/// The second step: flips tetrahedra whose facets contradict their label by more than they support
-/// it, the strongest first. No vertex loses its last tetrahedron of a label.
-void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside);
-
-/// The third step: gives vertices that all tetrahedra around them call inside, or outside, a facet
-/// of the surface. Each flips a tetrahedron whose facet opposite to the vertex is on the surface,
-/// the one with the least defect first; this changes neither the topology of the surface nor the
-/// vertices on it otherwise.
-void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside);
+/// The second and the third step.
+///
+/// 2. Flips tetrahedra whose facets contradict their label by more than they support it, the
+/// strongest first. No vertex loses its last tetrahedron of a label.
+///
+/// 3. Gives vertices that all tetrahedra around them call inside, or outside, a facet of the
+/// surface. Each flips a tetrahedron whose facet opposite to the vertex is on the surface, the one
+/// with the least defect first; this changes neither the topology of the surface nor the vertices
+/// on it otherwise.
+void smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside);
 
 }  // namespace terrace::tri::shape

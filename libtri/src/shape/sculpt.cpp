@@ -67,9 +67,7 @@ double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
   return terms[0] + terms[1] + terms[2] + terms[3];
 }
 
-}  // namespace
-
-void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+void smooth(const Spheres& spheres, Labels& labels) {
   struct Candidate {
     double gain;
     Ranks corners;
@@ -79,7 +77,6 @@ void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
     }
   };
   const auto tetrahedra = spheres.tetrahedra();
-  Labels labels(spheres, inside);
   std::priority_queue<Candidate> next;
   const auto consider = [&](std::uint32_t t) {
     if (!spheres.finite(t)) return;
@@ -101,7 +98,7 @@ void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
   }
 }
 
-void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+void sculpt(const Spheres& spheres, Labels& labels) {
   struct Candidate {
     double defect;
     std::uint32_t vertex_rank;
@@ -114,7 +111,6 @@ void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
     }
   };
   const auto tetrahedra = spheres.tetrahedra();
-  Labels labels(spheres, inside);
   const auto vertex_of = [&](spatial::Side side) {
     return tetrahedra[spatial::tetrahedron_of(side)].corner[spatial::index_of(side)];
   };
@@ -142,6 +138,14 @@ void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
     labels.flip(t);
     for (const spatial::Side beyond : tetrahedra[t].mate) consider(beyond);
   }
+}
+
+}  // namespace
+
+void smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+  Labels labels(spheres, inside);
+  smooth(spheres, labels);
+  sculpt(spheres, labels);
 }
 
 }  // namespace terrace::tri::shape

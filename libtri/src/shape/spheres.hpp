@@ -111,7 +111,6 @@ class Spheres {
   /// From a vertex of the finite tetrahedron t to its circumcentre.
   [[nodiscard]] Vector3 to_centre(std::uint32_t t, std::uint32_t vertex) const {
     const Sphere& s = sphere_[t];
-    if (s.first == vertex) return s.centre;
     const Vector3 shift = minus(places_[s.first].at, places_[vertex].at);
     return {shift[0] + s.centre[0], shift[1] + s.centre[1], shift[2] + s.centre[2]};
   }

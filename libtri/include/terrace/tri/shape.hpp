@@ -190,7 +190,7 @@ class BasicShape3 {
   [[nodiscard]] ShapeSurface surface(const Triangulation& triangulation) const;
   /// surface(), but of an open scan without its lids: the faces by which the poles rule closes what
   /// has not been scanned. A face is a lid if one of its edges is more than 10 times as long as the
-  /// spacing at each of its corners, which is the sixth shortest edge of the triangulation there.
+  /// spacing at each of its corners, which is the third shortest edge of the triangulation there.
   /// If lids are more than a tenth of the area, the scan is open and they are left out; otherwise
   /// nothing is. Lengths and areas are those of the metric. O(slots).
   [[nodiscard]] ShapeSurface surface_without_lids(const Triangulation& triangulation) const;
