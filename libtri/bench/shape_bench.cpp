@@ -77,7 +77,7 @@ template <class Coord>
 void update(benchmark::State& state) {
   Torus<Coord> torus;
   auto& triangulation = torus.triangulation;
-  Shape3<Coord> shape;
+  Shape3<Coord> shape({.rule = ShapeRule::kFlood});
   triangulation.start_journal();
   shape.restore(triangulation);
   // The points nearest to one of them, breadth-first.
@@ -119,8 +119,13 @@ struct Scan {
   const char* name;
 };
 constexpr Scan kScans[] = {
-    {"bun_zipper.ply", "bunny"},           {"armadillo_libigl.obj", "armadillo"},
-    {"dragon_vrip_res2.ply.gz", "dragon"}, {"lucy_100k.ply", "Lucy"},
+    {"bun_zipper.ply", "bunny"},
+    {"armadillo_libigl.obj", "armadillo"},
+    {"dragon_vrip_res2.ply.gz", "dragon"},
+    {"lucy_100k.ply", "Lucy"},
+    {"horse.ply", "horse"},
+    {"igea.ply", "igea"},
+    {"fandisk.obj", "fandisk"},
     {"armadillo_tm.ply", "armadillo 2"},
 };
 
@@ -152,17 +157,23 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     const char* name;
     ShapeOptions options;
   };
-  Way ways[] = {{"flood", {}}, {"no guard", {}}, {"published", {}}};
-  ways[1].options.keep_vertices = false;
-  ways[2].options.rule = ShapeRule::kPublished;
+  Way ways[] = {{"poles", {}}, {"flood", {}}, {"no guard", {}}, {"published", {}}};
+  for (Way* flood : {&ways[1], &ways[2]}) flood->options.rule = ShapeRule::kFlood;
+  ways[2].options.keep_vertices = false;
+  ways[3].options.rule = ShapeRule::kPublished;
   for (const Way& way : ways) {
     Shape3<Coord> shape(way.options);
     double time = 1e9;
     for (int round = 0; round < 3; ++round)
       time = std::min(time, seconds([&] { shape.restore(triangulation); }));
     const std::string how = std::string(way.name) + (std::is_same_v<Coord, double> ? " d" : " i");
-    print_row(name, how.c_str(), build, time, measure(shape.surface(triangulation).surface),
-              shape.lost_vertices().size(), shape.rescued_count(), step, measures, volume);
+    const ShapeSurface surface = shape.surface(triangulation);
+    SurfaceMeasures found = measure(surface.surface);
+    const ShapeParts parts = shape.parts(triangulation, surface);
+    found.components = parts.components;
+    found.euler_characteristic = parts.euler_characteristic;
+    print_row(name, how.c_str(), build, time, found, shape.lost_vertices().size(),
+              shape.rescued_count(), step, measures, volume);
   }
 }
 
@@ -193,7 +204,8 @@ void print_table(const std::filesystem::path& folder) {
 int main(int argc, char** argv) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data != nullptr && !kSmall) print_table(std::filesystem::path(data) / "scan");
-  ShapeOptions no_guard, published, edges;
+  ShapeOptions flood, no_guard, published, edges;
+  flood.rule = no_guard.rule = edges.rule = ShapeRule::kFlood;
   no_guard.keep_vertices = false;
   published.rule = ShapeRule::kPublished;
   edges.criterion = ShapeCriterion::kEdgeLength;
@@ -201,13 +213,15 @@ int main(int argc, char** argv) {
   const auto add = [](const char* name, auto function) {
     benchmark::RegisterBenchmark(name, function)->Unit(benchmark::kMillisecond);
   };
-  add("flood/integers", [](auto& state) { restore<std::int32_t>(state, {}); });
-  add("flood/doubles", [](auto& state) { restore<double>(state, {}); });
+  add("poles/integers", [](auto& state) { restore<std::int32_t>(state, {}); });
+  add("poles/doubles", [](auto& state) { restore<double>(state, {}); });
+  add("flood/integers", [=](auto& state) { restore<std::int32_t>(state, flood); });
+  add("flood/doubles", [=](auto& state) { restore<double>(state, flood); });
   add("flood/no guard", [=](auto& state) { restore<std::int32_t>(state, no_guard); });
   add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
   add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
-  add("update/integers", update<std::int32_t>);
-  add("update/doubles", update<double>);
+  add("flood/update/integers", update<std::int32_t>);
+  add("flood/update/doubles", update<double>);
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;
