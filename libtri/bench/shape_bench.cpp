@@ -74,10 +74,10 @@ void restore(benchmark::State& state, const ShapeOptions& options) {
 }
 
 template <class Coord>
-void update(benchmark::State& state) {
+void update(benchmark::State& state, const ShapeOptions& options) {
   Torus<Coord> torus;
   auto& triangulation = torus.triangulation;
-  Shape3<Coord> shape({.rule = ShapeRule::kFlood});
+  Shape3<Coord> shape(options);
   triangulation.start_journal();
   shape.restore(triangulation);
   // The points nearest to one of them, breadth-first.
@@ -97,13 +97,13 @@ void update(benchmark::State& state) {
     triangulation.remove(cluster);
     triangulation.take_changes(changes);
     state.ResumeTiming();
-    shape.update(triangulation, changes);
+    shape.update_nearby(triangulation, changes);
     state.PauseTiming();
     triangulation.insert(points, inserted);
     for (std::size_t i = 0; i < cluster.size(); ++i) cluster[i] = inserted[i].vertex;
     triangulation.take_changes(changes);
     state.ResumeTiming();
-    shape.update(triangulation, changes);
+    shape.update_nearby(triangulation, changes);
   }
   state.SetItemsProcessed(2 * state.iterations());  // changes
 }
@@ -220,8 +220,10 @@ int main(int argc, char** argv) {
   add("flood/no guard", [=](auto& state) { restore<std::int32_t>(state, no_guard); });
   add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
   add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
-  add("flood/update/integers", update<std::int32_t>);
-  add("flood/update/doubles", update<double>);
+  add("poles/update/integers", [](auto& state) { update<std::int32_t>(state, {}); });
+  add("poles/update/doubles", [](auto& state) { update<double>(state, {}); });
+  add("flood/update/integers", [=](auto& state) { update<std::int32_t>(state, flood); });
+  add("flood/update/doubles", [=](auto& state) { update<double>(state, flood); });
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;

@@ -9,6 +9,7 @@
 #include "shape/criterion.hpp"
 #include "shape/flood.hpp"
 #include "shape/lids.hpp"
+#include "shape/nearby.hpp"
 #include "shape/outside.hpp"
 #include "shape/poles.hpp"
 #include "shape/published.hpp"
@@ -62,6 +63,7 @@ void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, uns
   if (impl_->options.rule == ShapeRule::kPoles) {
     const shape::Spheres spheres = impl_->spheres(triangulation, threads);
     std::vector<std::uint8_t> inside = shape::signed_forest(spheres, threads);
+    state.forest = inside;
     shape::smooth_and_sculpt(spheres, inside);
     return shape::set_labels(mesh, state, inside);
   }
@@ -85,6 +87,19 @@ void BasicShape3<Triangulation>::update(const Triangulation& triangulation,
     shape::update_flood(mesh, impl_->state, criterion, changes);
     if (impl_->options.keep_vertices) shape::rescue(mesh, impl_->state);
   });
+}
+
+template <class Triangulation>
+void BasicShape3<Triangulation>::update_nearby(const Triangulation& triangulation,
+                                               const typename Triangulation::Changes& changes) {
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  if (impl_->options.rule != ShapeRule::kPoles) return update(triangulation, changes);
+  const std::size_t tetrahedra = triangulation.tetrahedron_count();
+  // From scratch if most of it is new.
+  if (impl_->state.forest.empty() || 2 * changes.added_tetrahedra.size() >= tetrahedra)
+    return restore(triangulation);
+  [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+  shape::update_nearby(mesh, impl_->state, changes);
 }
 
 template <class Triangulation>
@@ -165,7 +180,8 @@ std::size_t BasicShape3<Triangulation>::memory_bytes() const {
   const shape::State& s = impl_->state;
   std::size_t words = s.degree.capacity() + s.lost.capacity() + s.rescued.capacity() +
                       s.queue.capacity() + s.pending.capacity() + s.touched.capacity();
-  return sizeof(Impl) + s.of.capacity() + words * sizeof(std::uint32_t);
+  words += s.local_tetrahedron.capacity() + s.local_vertex.capacity();
+  return sizeof(Impl) + s.of.capacity() + s.forest.capacity() + words * sizeof(std::uint32_t);
 }
 
 template class BasicShape3<Delaunay3<std::int32_t>>;

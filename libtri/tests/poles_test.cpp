@@ -237,6 +237,94 @@ TEST(PolesTest, AnyNumberOfThreadsGivesTheSame) {
   }
 }
 
+TEST(PolesTest, NearbyUpdatesFollowChanges) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Delaunay3<double> triangulation;
+    triangulation.build(ball(6000, 1.0, {}, 0.02, seed));
+    Shape3<double> shape;
+    triangulation.start_journal();
+    shape.restore(triangulation);
+    std::mt19937_64 random(seed);
+    Delaunay3<double>::Changes changes;
+    std::size_t wrong = 0, compared = 0;
+    for (int step = 0; step < 20; ++step) {
+      // A cap of the ball goes, or comes back denser.
+      const Point3 on = ball(1000, 1.0, {}, 0.0, 0)[random() % 1000];
+      std::vector<VertexId> near;
+      for (const VertexId v : triangulation.all_vertices()) {
+        const Point3 p = triangulation.point(v);
+        if (p[0] * on[0] + p[1] * on[1] + p[2] * on[2] > 0.97) near.push_back(v);
+      }
+      if (step % 3 != 2) triangulation.remove(near);
+      if (step % 3 != 0) {
+        Points more = ball(9000, 1.0, {}, 0.02, seed + 100 + random() % 100);
+        std::erase_if(more, [&](const Point3& p) {
+          return p[0] * on[0] + p[1] * on[1] + p[2] * on[2] < 0.975;
+        });
+        triangulation.insert(more, {});
+      }
+      triangulation.take_changes(changes);
+      shape.update_nearby(triangulation, changes);
+      Shape3<double> again;
+      again.restore(triangulation);
+      std::size_t kept = 0;
+      for (const TetrahedronId t : triangulation.all_tetrahedra()) {
+        wrong += shape.kept(t) != again.kept(t);
+        kept += shape.kept(t);
+        ++compared;
+      }
+      ASSERT_EQ(kept, shape.kept_count());
+      const ShapeSurface surface = shape.surface(triangulation);
+      ASSERT_TRUE(measure(surface.surface).closed);
+      ASSERT_EQ(surface.vertices.size() + shape.lost_vertices().size(),
+                triangulation.vertex_count());
+    }
+    EXPECT_LE(wrong, compared / 1000);
+    // From time to time all of it.
+    Shape3<double> again;
+    again.restore(triangulation);
+    shape.restore(triangulation);
+    EXPECT_EQ(shape.kept_tetrahedra(), again.kept_tetrahedra());
+  }
+}
+
+TEST(PolesTest, NearbyUpdatesOfSetsThatComeAndGoAltogether) {
+  for (const PointSet3 kind : kPointSets3) {
+    SCOPED_TRACE(name(kind));
+    Delaunay3<double> triangulation;
+    triangulation.start_journal();
+    Shape3<double> shape;
+    shape.restore(triangulation);
+    std::mt19937_64 random(6);
+    Delaunay3<double>::Changes changes;
+    const auto points = make_points3<double>(kind, kind == PointSet3::kCurves ? 40 : 250, 6);
+    for (int step = 0; step < 40; ++step) {
+      if (random() % 2 == 0) {
+        const std::size_t begin = random() % points.size();
+        triangulation.insert(
+            std::span(points).subspan(begin, std::min<std::size_t>(30, points.size() - begin)), {});
+      } else {
+        std::vector<VertexId> some;
+        for (const VertexId v : triangulation.all_vertices())
+          if (random() % 8 == 0 || step % 20 == 19) some.push_back(v);
+        triangulation.remove(some);
+      }
+      triangulation.take_changes(changes);
+      shape.update_nearby(triangulation, changes);
+      std::size_t kept = 0;
+      for (const TetrahedronId t : triangulation.all_tetrahedra()) kept += shape.kept(t);
+      ASSERT_EQ(kept, shape.kept_count());
+      const ShapeSurface surface = shape.surface(triangulation);
+      ASSERT_TRUE(measure(surface.surface).closed);
+      if (triangulation.tetrahedron_count() > 0) {
+        ASSERT_EQ(surface.vertices.size() + shape.lost_vertices().size(),
+                  triangulation.vertex_count());
+      }
+    }
+  }
+}
+
 TEST(PolesTest, ScalingByPowersOfTwoChangesNothing) {
   const Points points = ball(1500, 1.0, {3, 0, 0}, 0.02, 9);
   const RestoredSurface usual = restore_surface(points);

@@ -143,5 +143,50 @@ TEST_F(ShapeDataTest, OpenScansAreFoundAndLeftOpen) {
   }
 }
 
+TEST_F(ShapeDataTest, NearbyUpdatesOfClustersOfAHundredPoints) {
+  // Lucy has pockets whose side a distant angle decides.
+  for (const auto& [file, at_most] :
+       {std::pair{"bun_zipper.ply", 10}, {"armadillo_libigl.obj", 10}, {"lucy_100k.ply", 400}}) {
+    SCOPED_TRACE(file);
+    Delaunay3<double> triangulation;
+    triangulation.build(scan(file).points);
+    triangulation.start_journal();
+    Shape3<double> shape;
+    shape.restore(triangulation);
+    Delaunay3<double>::Changes changes;
+    std::mt19937_64 random(1);
+    std::size_t wrong = 0;
+    std::vector<VertexId> all;
+    for (const VertexId v : triangulation.all_vertices()) all.push_back(v);
+    for (int cluster = 0; cluster < 8; ++cluster) {
+      std::vector<VertexId> near{all[random() % all.size()]}, around;
+      while (!triangulation.alive(near[0])) near[0] = all[random() % all.size()];
+      for (std::size_t i = 0; near.size() < 100; ++i) {
+        triangulation.adjacent(near[i], around);
+        for (const VertexId v : around)
+          if (near.size() < 100 && std::find(near.begin(), near.end(), v) == near.end())
+            near.push_back(v);
+      }
+      std::vector<Point3> points;
+      for (const VertexId v : near) points.push_back(triangulation.point(v));
+      for (const bool expand : {false, true}) {
+        if (expand) {
+          triangulation.insert(points, {});
+        } else {
+          triangulation.remove(near);
+        }
+        triangulation.take_changes(changes);
+        shape.update_nearby(triangulation, changes);
+        Shape3<double> again;
+        again.restore(triangulation, 2);
+        for (const TetrahedronId t : triangulation.all_tetrahedra())
+          wrong += shape.kept(t) != again.kept(t);
+      }
+    }
+    EXPECT_LE(wrong, static_cast<std::size_t>(at_most));
+    RecordProperty(file, static_cast<int>(wrong));
+  }
+}
+
 }  // namespace
 }  // namespace terrace::tri

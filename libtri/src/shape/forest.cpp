@@ -41,8 +41,12 @@ struct Poles {
 /// Poles by vertex slot.
 class PoleFinder {
  public:
-  explicit PoleFinder(const Spheres& spheres)
-      : spheres_(spheres), poles_(spheres.places().size()), to_first_(spheres.places().size()) {}
+  /// Right at whole vertices.
+  PoleFinder(const Spheres& spheres, const Part& part)
+      : spheres_(spheres),
+        part_(part),
+        poles_(spheres.places().size()),
+        to_first_(spheres.places().size()) {}
 
   std::vector<Poles> find() {
     const auto tetrahedra = spheres_.tetrahedra();
@@ -105,8 +109,13 @@ class PoleFinder {
       for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
         if (spheres_.finite(spatial::tetrahedron_of(tetrahedra[t].mate[i]))) continue;
         const spatial::Side side = spatial::make_side(t, i);
+        const auto facet = spatial::facet_of(tetrahedra[t], i);
+        if (!part_.whole.empty() && std::none_of(facet.begin(), facet.end(), [&](std::uint32_t v) {
+              return part_.whole[v] != 0;
+            }))
+          continue;
         const Vector3 normal = spheres_.hull_normal(side);
-        for (const std::uint32_t v : spatial::facet_of(tetrahedra[t], i))
+        for (const std::uint32_t v : facet)
           normals.push_back({v, spheres_.facet_ranks(side), normal});
       }
     }
@@ -124,6 +133,7 @@ class PoleFinder {
   }
 
   const Spheres& spheres_;
+  const Part& part_;
   std::vector<Poles> poles_;
   std::vector<Vector3> to_first_;
 };
@@ -162,32 +172,48 @@ class SignedSets {
 
 class Forest {
  public:
-  Forest(const Spheres& spheres, unsigned threads)
+  Forest(const Spheres& spheres, unsigned threads, const Part& part)
       : spheres_(spheres),
         threads_(threads),
+        part_(part),
         beyond_(static_cast<std::uint32_t>(spheres.tetrahedra().size())) {}
 
   std::vector<std::uint8_t> labels() {
-    poles_ = PoleFinder(spheres_).find();
+    poles_ = PoleFinder(spheres_, part_).find();
     state_all();
     SignedSets sets(std::size_t{beyond_} + 1);
     std::vector<std::uint32_t> roots;
     for (std::uint32_t t = 0; t < beyond_; ++t)
-      if (spheres_.finite(t)) roots.push_back(t);
+      if (node(t) == 2 * t) roots.push_back(t);
     roots.push_back(beyond_);
     while (!list_.empty()) join_best(sets, roots);
     const std::uint32_t outside = sets.find(beyond_);
     std::vector<std::uint8_t> inside(beyond_);
     for (std::uint32_t t = 0; t < beyond_; ++t)
-      if (spheres_.finite(t)) inside[t] = static_cast<std::uint8_t>((sets.find(t) ^ outside) & 1);
+      inside[t] = static_cast<std::uint8_t>((sets.find(node(t) >> 1) ^ node(t) ^ outside) & 1);
     return inside;
   }
 
  private:
-  /// Whether this side of a finite tetrahedron stands for its facet.
+  /// The set that t belongs to from the start, doubled, plus 1 if t is known to be inside.
+  [[nodiscard]] std::uint32_t node(std::uint32_t t) const {
+    if (!spheres_.finite(t)) return 2 * beyond_;
+    if (part_.label.empty() || part_.label[t] == 0) return 2 * t;
+    return 2 * beyond_ + (part_.label[t] == 2);
+  }
+  /// Whether this side of a finite tetrahedron stands for its facet, about which it says something
+  /// new.
   [[nodiscard]] bool stands(std::uint32_t t, spatial::Side mate) const {
     const std::uint32_t other = spatial::tetrahedron_of(mate);
-    return t < other || !spheres_.finite(other);
+    if (!(t < other || !spheres_.finite(other))) return false;
+    return part_.label.empty() || node(t) >> 1 != node(other) >> 1;
+  }
+
+  /// `other` may be kNone: beyond the hull.
+  [[nodiscard]] Statement make(std::uint32_t key, std::uint32_t what, std::uint32_t one,
+                               std::uint32_t other, std::uint32_t unlike) const {
+    const std::uint32_t a = node(one), b = other == spatial::kNone ? 2 * beyond_ : node(other);
+    return {key, what, a >> 1, b ^ (a & 1) ^ unlike};
   }
 
   void state_all() {
@@ -225,17 +251,17 @@ class Forest {
                    const std::uint32_t t = spatial::tetrahedron_of(s.what);
                    const std::uint32_t other =
                        spatial::tetrahedron_of(tetrahedra[t].mate[spatial::index_of(s.what)]);
-                   s = {key_of(spheres_.facet_defect(s.what), false), s.what, t,
-                        2 * (spheres_.finite(other) ? other : beyond_)};
+                   s = make(key_of(spheres_.facet_defect(s.what), false), s.what, t, other, 0);
                  }
                });
     Statement* to = list_.data() + start.back();
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
       const Poles& poles = poles_[v];
       if (poles.second == spatial::kNone) continue;
-      *to++ = {key_of(poles.defect, true), v, poles.second,
-               2 * (poles.first == spatial::kNone ? beyond_ : poles.first) + 1};
+      *to = make(key_of(poles.defect, true), v, poles.second, poles.first, 1);
+      to += to->one != to->other >> 1;  // else both are known
     }
+    list_.resize(static_cast<std::size_t>(to - list_.data()));
   }
 
   /// One of Boruvka's rounds: every set is joined with another by the best statement about it, and
@@ -295,6 +321,7 @@ class Forest {
 
   const Spheres& spheres_;
   unsigned threads_;
+  const Part& part_;
   std::uint32_t beyond_;
   std::vector<Poles> poles_;
   std::vector<Statement> list_;
@@ -305,8 +332,9 @@ class Forest {
 
 }  // namespace
 
-std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads) {
-  return Forest(spheres, threads).labels();
+std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
+                                        const Part& part) {
+  return Forest(spheres, threads, part).labels();
 }
 
 }  // namespace terrace::tri::shape

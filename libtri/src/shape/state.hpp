@@ -30,10 +30,13 @@ struct State {
   std::vector<std::uint32_t> lost;     ///< living vertices of degree 0 while there are tetrahedra
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
   std::size_t kept_count = 0;          ///< in state kKept
+  std::vector<std::uint8_t> forest;    ///< poles rule: labels of its first step, by slot
   // Scratch memory, kept between calls.
   std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
   std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
+  /// Local numbers by slot, see nearby.hpp; kNone between two calls.
+  std::vector<std::uint32_t> local_tetrahedron, local_vertex;
 
   template <class Mesh>
   void keep(const Mesh& mesh, std::uint32_t t) {

@@ -170,6 +170,14 @@ class BasicShape3 {
   /// Poles and published rule: from scratch.
   void update(const Triangulation& triangulation, const typename Triangulation::Changes& changes);
 
+  /// As update(), but by the poles rule at a cost that depends on the changes, for interaction. The
+  /// first step is repeated for the new tetrahedra and their neighbours alone, the other two for
+  /// those between their corners; all others keep their labels. That is exact unless the change
+  /// decides about tetrahedra farther away, which happens in weakly determined pockets: restore()
+  /// tells from time to time, or before saving. Other rules: update().
+  void update_nearby(const Triangulation& triangulation,
+                     const typename Triangulation::Changes& changes);
+
   /// Accepts any handle; false for those not in use.
   [[nodiscard]] bool kept(TetrahedronId tetrahedron) const;
   /// Number of kept tetrahedra. O(1).
