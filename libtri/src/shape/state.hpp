@@ -80,13 +80,20 @@ void find_lost(const Mesh& mesh, State& state) {
 /// not on the surface.
 template <class Mesh>
 void set_labels(const Mesh& mesh, State& state, const std::vector<std::uint8_t>& inside) {
-  keep_all(mesh, state);
+  state.of.assign(mesh.tetrahedron.size(), kAbsent);
+  state.degree.assign(mesh.vertex.size(), 0);
+  state.rescued.clear();
+  state.kept_count = 0;
   std::vector<std::uint8_t> outside(mesh.vertex.size());
   for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
     const auto& corner = mesh.tetrahedron[t].corner;
-    if (corner[0] == spatial::kFreeCorner || inside[t] != 0) continue;
+    if (corner[0] == spatial::kFreeCorner) continue;
+    if (inside[t] != 0) {
+      state.keep(mesh, t);
+      continue;
+    }
     for (const std::uint32_t v : corner) outside[v] = 1;
-    if (state.of[t] == kKept) state.remove(mesh, t, 0);
+    if (!spatial::has_ghost(corner)) state.of[t] = 0;
   }
   find_lost(mesh, state);
   if (mesh.flat) return;
