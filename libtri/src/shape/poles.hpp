@@ -24,7 +24,8 @@ struct Part {
 /// finite tetrahedra, and one for all space beyond the hull. A facet says that both of its sides
 /// are alike, the more credibly the less its defect; a vertex says that its two poles (the largest
 /// circumspheres on either side, N. Amenta, M. Bern, doi:10.1007/PL00009475) are of different
-/// sides. Of these statements a spanning forest of least defect is believed (Kruskal).
+/// sides. Of these statements a spanning forest of least defect is believed (found by Boruvka's
+/// rounds).
 ///
 /// In a part the vertices of unknown tetrahedra are whole. If the known labels are those of the
 /// whole forest, so are the others: joining tetrahedra by their right labels in advance closes no
