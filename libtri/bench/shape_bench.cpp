@@ -74,10 +74,10 @@ void restore(benchmark::State& state, const ShapeOptions& options) {
 }
 
 template <class Coord>
-void update(benchmark::State& state) {
+void update(benchmark::State& state, const ShapeOptions& options) {
   Torus<Coord> torus;
   auto& triangulation = torus.triangulation;
-  Shape3<Coord> shape;
+  Shape3<Coord> shape(options);
   triangulation.start_journal();
   shape.restore(triangulation);
   // The points nearest to one of them, breadth-first.
@@ -97,13 +97,13 @@ void update(benchmark::State& state) {
     triangulation.remove(cluster);
     triangulation.take_changes(changes);
     state.ResumeTiming();
-    shape.update(triangulation, changes);
+    shape.update_nearby(triangulation, changes);
     state.PauseTiming();
     triangulation.insert(points, inserted);
     for (std::size_t i = 0; i < cluster.size(); ++i) cluster[i] = inserted[i].vertex;
     triangulation.take_changes(changes);
     state.ResumeTiming();
-    shape.update(triangulation, changes);
+    shape.update_nearby(triangulation, changes);
   }
   state.SetItemsProcessed(2 * state.iterations());  // changes
 }
@@ -119,25 +119,15 @@ struct Scan {
   const char* name;
 };
 constexpr Scan kScans[] = {
-    {"bun_zipper.ply", "bunny"},           {"armadillo_libigl.obj", "armadillo"},
-    {"dragon_vrip_res2.ply.gz", "dragon"}, {"lucy_100k.ply", "Lucy"},
+    {"bun_zipper.ply", "bunny"},
+    {"armadillo_libigl.obj", "armadillo"},
+    {"dragon_vrip_res2.ply.gz", "dragon"},
+    {"lucy_100k.ply", "Lucy"},
+    {"horse.ply", "horse"},
+    {"igea.ply", "igea"},
+    {"fandisk.obj", "fandisk"},
     {"armadillo_tm.ply", "armadillo 2"},
 };
-
-Surface read_scan(const std::filesystem::path& path) {
-  if (path.extension() == ".gz") {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(
-        popen(("gzip -dc '" + path.string() + "'").c_str(), "r"), pclose);
-    std::string text;
-    std::vector<char> block(1 << 16);
-    for (std::size_t n; pipe && (n = std::fread(block.data(), 1, block.size(), pipe.get())) > 0;)
-      text.append(block.data(), n);
-    std::istringstream in(text);
-    return read_ply(in);
-  }
-  std::ifstream in(path, std::ios::binary);
-  return path.extension() == ".obj" ? read_obj(in) : read_ply(in);
-}
 
 void print_row(const char* name, const char* how, double build, double shape_time,
                const SurfaceMeasures& m, std::size_t lost, std::size_t rescued, double scale,
@@ -167,17 +157,23 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     const char* name;
     ShapeOptions options;
   };
-  Way ways[] = {{"flood", {}}, {"no guard", {}}, {"published", {}}};
-  ways[1].options.keep_vertices = false;
-  ways[2].options.rule = ShapeRule::kPublished;
+  Way ways[] = {{"poles", {}}, {"flood", {}}, {"no guard", {}}, {"published", {}}};
+  for (Way* flood : {&ways[1], &ways[2]}) flood->options.rule = ShapeRule::kFlood;
+  ways[2].options.keep_vertices = false;
+  ways[3].options.rule = ShapeRule::kPublished;
   for (const Way& way : ways) {
     Shape3<Coord> shape(way.options);
     double time = 1e9;
     for (int round = 0; round < 3; ++round)
       time = std::min(time, seconds([&] { shape.restore(triangulation); }));
     const std::string how = std::string(way.name) + (std::is_same_v<Coord, double> ? " d" : " i");
-    print_row(name, how.c_str(), build, time, measure(shape.surface(triangulation).surface),
-              shape.lost_vertices().size(), shape.rescued_count(), step, measures, volume);
+    const ShapeSurface surface = shape.surface(triangulation);
+    SurfaceMeasures found = measure(surface.surface);
+    const ShapeParts parts = shape.parts(triangulation, surface);
+    found.components = parts.components;
+    found.euler_characteristic = parts.euler_characteristic;
+    print_row(name, how.c_str(), build, time, found, shape.lost_vertices().size(),
+              shape.rescued_count(), step, measures, volume);
   }
 }
 
@@ -208,7 +204,8 @@ void print_table(const std::filesystem::path& folder) {
 int main(int argc, char** argv) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data != nullptr && !kSmall) print_table(std::filesystem::path(data) / "scan");
-  ShapeOptions no_guard, published, edges;
+  ShapeOptions flood, no_guard, published, edges;
+  flood.rule = no_guard.rule = edges.rule = ShapeRule::kFlood;
   no_guard.keep_vertices = false;
   published.rule = ShapeRule::kPublished;
   edges.criterion = ShapeCriterion::kEdgeLength;
@@ -216,13 +213,17 @@ int main(int argc, char** argv) {
   const auto add = [](const char* name, auto function) {
     benchmark::RegisterBenchmark(name, function)->Unit(benchmark::kMillisecond);
   };
-  add("flood/integers", [](auto& state) { restore<std::int32_t>(state, {}); });
-  add("flood/doubles", [](auto& state) { restore<double>(state, {}); });
+  add("poles/integers", [](auto& state) { restore<std::int32_t>(state, {}); });
+  add("poles/doubles", [](auto& state) { restore<double>(state, {}); });
+  add("flood/integers", [=](auto& state) { restore<std::int32_t>(state, flood); });
+  add("flood/doubles", [=](auto& state) { restore<double>(state, flood); });
   add("flood/no guard", [=](auto& state) { restore<std::int32_t>(state, no_guard); });
   add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
   add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
-  add("update/integers", update<std::int32_t>);
-  add("update/doubles", update<double>);
+  add("poles/update/integers", [](auto& state) { update<std::int32_t>(state, {}); });
+  add("poles/update/doubles", [](auto& state) { update<double>(state, {}); });
+  add("flood/update/integers", [=](auto& state) { update<std::int32_t>(state, flood); });
+  add("flood/update/doubles", [=](auto& state) { update<double>(state, flood); });
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;

@@ -41,9 +41,9 @@ int main() {
   shape.update(triangulation, changes);
 
   const tri::ShapeSurface finer = shape.surface(triangulation);
-  std::printf("with detail: %zu faces, %zu of %zu tetrahedra kept, %zu vertices put back\n",
+  std::printf("with detail: %zu faces, %zu of %zu tetrahedra kept, %zu vertices not on it\n",
               finer.surface.faces.size(), shape.kept_count(), triangulation.tetrahedron_count(),
-              shape.rescued_count());
+              shape.lost_vertices().size());
   const tri::SurfaceMeasures measured = tri::measure(finer.surface);
   return coarse.closed && coarse.euler_characteristic == 2 && measured.closed ? 0 : 1;
 }

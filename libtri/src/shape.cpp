@@ -9,11 +9,12 @@
 #include "shape/criterion.hpp"
 #include "shape/flood.hpp"
 #include "shape/lids.hpp"
+#include "shape/nearby.hpp"
+#include "shape/outside.hpp"
 #include "shape/poles.hpp"
 #include "shape/published.hpp"
 #include "shape/rescue.hpp"
 #include "shape/state.hpp"
-#include "shape/touching.hpp"
 
 namespace terrace::tri {
 template <class Triangulation>
@@ -62,8 +63,8 @@ void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, uns
   if (impl_->options.rule == ShapeRule::kPoles) {
     const shape::Spheres spheres = impl_->spheres(triangulation, threads);
     std::vector<std::uint8_t> inside = shape::signed_forest(spheres, threads);
-    shape::smooth(spheres, inside);
-    shape::sculpt(spheres, inside);
+    state.forest = inside;
+    shape::smooth_and_sculpt(spheres, inside);
     return shape::set_labels(mesh, state, inside);
   }
   const bool keep_vertices = impl_->options.keep_vertices;
@@ -86,6 +87,19 @@ void BasicShape3<Triangulation>::update(const Triangulation& triangulation,
     shape::update_flood(mesh, impl_->state, criterion, changes);
     if (impl_->options.keep_vertices) shape::rescue(mesh, impl_->state);
   });
+}
+
+template <class Triangulation>
+void BasicShape3<Triangulation>::update_nearby(const Triangulation& triangulation,
+                                               const typename Triangulation::Changes& changes) {
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  if (impl_->options.rule != ShapeRule::kPoles) return update(triangulation, changes);
+  const std::size_t tetrahedra = triangulation.tetrahedron_count();
+  // From scratch if most of it is new.
+  if (impl_->state.forest.empty() || 2 * changes.added_tetrahedra.size() >= tetrahedra)
+    return restore(triangulation);
+  [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+  shape::update_nearby(mesh, impl_->state, changes);
 }
 
 template <class Triangulation>
@@ -122,32 +136,7 @@ std::vector<TetrahedronId> BasicShape3<Triangulation>::kept_tetrahedra() const {
 
 template <class Triangulation>
 ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulation) const {
-  const auto& mesh = Delaunay3Access::mesh(triangulation);
-  const auto& of = impl_->state.of;
-  ShapeSurface result;
-  std::vector<std::array<std::uint32_t, 3>>& faces = result.surface.faces;
-  constexpr std::uint32_t kUnused = spatial::kNone;
-  std::vector<std::uint32_t> number(mesh.vertex.size(), kUnused);
-  for (std::uint32_t t = 0; t < of.size(); ++t) {
-    if (!shape::is_kept(of[t])) continue;
-    const spatial::Tetrahedron& tetrahedron = mesh.tetrahedron[t];
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      if (shape::is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
-      // In order with the corner first, so counter-clockwise when seen from the other side.
-      faces.push_back(spatial::facet_of(tetrahedron, i));
-      result.behind.push_back(TetrahedronId{t});
-      for (const std::uint32_t v : faces.back()) number[v] = 0;
-    }
-  }
-  for (std::uint32_t v = 0; v < number.size(); ++v) {
-    if (number[v] == kUnused) continue;
-    number[v] = static_cast<std::uint32_t>(result.vertices.size());
-    result.vertices.push_back(VertexId{v});
-    result.surface.points.push_back(shape::to_doubles(mesh.vertex[v].point));
-  }
-  for (auto& face : faces)
-    for (std::uint32_t& v : face) v = number[v];
-  return result;
+  return shape::surface_of(Delaunay3Access::mesh(triangulation), impl_->state);
 }
 
 template <class Triangulation>
@@ -191,7 +180,8 @@ std::size_t BasicShape3<Triangulation>::memory_bytes() const {
   const shape::State& s = impl_->state;
   std::size_t words = s.degree.capacity() + s.lost.capacity() + s.rescued.capacity() +
                       s.queue.capacity() + s.pending.capacity() + s.touched.capacity();
-  return sizeof(Impl) + s.of.capacity() + words * sizeof(std::uint32_t);
+  words += s.local_tetrahedron.capacity() + s.local_vertex.capacity();
+  return sizeof(Impl) + s.of.capacity() + s.forest.capacity() + words * sizeof(std::uint32_t);
 }
 
 template class BasicShape3<Delaunay3<std::int32_t>>;

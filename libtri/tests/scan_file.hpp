@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -133,6 +136,22 @@ inline Surface read_obj(std::istream& in) {
   }
   if (surface.points.empty()) throw std::runtime_error("not an OBJ file");
   return surface;
+}
+
+/// By its ending: .obj, .ply, .ply.gz (by gzip).
+inline Surface read_scan(const std::filesystem::path& path) {
+  if (path.extension() == ".gz") {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(
+        popen(("gzip -dc '" + path.string() + "'").c_str(), "r"), pclose);
+    std::string text;
+    std::vector<char> block(1 << 16);
+    for (std::size_t n; pipe && (n = std::fread(block.data(), 1, block.size(), pipe.get())) > 0;)
+      text.append(block.data(), n);
+    std::istringstream in(text);
+    return read_ply(in);
+  }
+  std::ifstream in(path, std::ios::binary);
+  return path.extension() == ".obj" ? read_obj(in) : read_ply(in);
 }
 
 /// Closes each opening (a connected set of edges in one face) by a fan to its centre, so that the

@@ -12,7 +12,7 @@
 namespace terrace::tri {
 namespace {
 
-std::vector<ShapeOptions> all_options() {
+std::vector<ShapeOptions> peeling_options() {
   std::vector<ShapeOptions> result;
   for (const auto criterion : {ShapeCriterion::kGabriel, ShapeCriterion::kEdgeLength})
     for (const auto rule : {ShapeRule::kFlood, ShapeRule::kPublished})
@@ -21,7 +21,14 @@ std::vector<ShapeOptions> all_options() {
   return result;
 }
 
+std::vector<ShapeOptions> all_options() {
+  std::vector<ShapeOptions> result = peeling_options();
+  result.push_back({});  // the poles rule; its definition is tested in poles_test.cpp
+  return result;
+}
+
 std::string name(const ShapeOptions& options) {
+  if (options.rule == ShapeRule::kPoles) return "poles";
   return std::string(options.criterion == ShapeCriterion::kGabriel ? "Gabriel" : "edge length") +
          (options.rule == ShapeRule::kFlood ? ", flood" : ", published") +
          (options.keep_vertices ? ", no vertex lost" : "");
@@ -45,7 +52,7 @@ TYPED_TEST(ShapeLawTest, EqualsTheDefinition) {
       if (kind == PointSet3::kCurves && count > 20) continue;
       Delaunay3<TypeParam> triangulation;
       triangulation.build(make_points3<TypeParam>(kind, count, 5 + count));
-      for (const ShapeOptions& options : all_options()) {
+      for (const ShapeOptions& options : peeling_options()) {
         if (!comparable(kind, options)) continue;
         SCOPED_TRACE(terrace::tri::name(kind) + " " + std::to_string(count) + ", " + name(options));
         const ShapeOracle oracle(triangulation, options);
@@ -65,7 +72,7 @@ TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
     Delaunay3<TypeParam> triangulation;
     triangulation.build(make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 60 : 1000, 8));
     if (triangulation.tetrahedron_count() == 0) continue;
-    for (ShapeOptions options : all_options()) {
+    for (ShapeOptions options : peeling_options()) {
       // With such a small factor only the guard keeps anything.
       options.edge_factor = 1e-12;
       SCOPED_TRACE(terrace::tri::name(kind) + ", " + name(options));

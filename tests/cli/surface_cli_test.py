@@ -86,6 +86,24 @@ class SurfaceTest(unittest.TestCase):
         self.assertAlmostEqual(volume, 4 / 3 * math.pi * RADIUS ** 3, delta=40)
         self.assertAlmostEqual(volume, summary['volume'], places=6)
 
+    def test_an_open_scan_is_left_open_and_the_summary_says_so(self):
+        with open(self.path('bowl.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {z}\n' for x, y, z in sphere(6000) if z < 3)
+        store = self.path('bowl.terrace')
+        result = terrace('build', self.path('bowl.xyz'), '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = terrace('surface', store, '-o', self.path('bowl.obj'), '--json')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        summary = json.loads(result.stdout)
+        self.assertEqual((summary['open_scan'], summary['closed']), (True, False))
+        self.assertEqual((summary['components'], summary['euler_characteristic']), (1, 1))
+        self.assertLess(summary['samples_off'], 10)
+        self.assertAlmostEqual(summary['area'], 2 * math.pi * RADIUS * 13, delta=20)
+        result = terrace('surface', store, '-o', self.path('bowl.obj'), '--force')
+        self.assertIn('open, 1 part, without the faces over the gaps of the scan', result.stderr)
+        closed, _ = self.surface('ball.obj')
+        self.assertEqual((closed['open_scan'], closed['samples_off']), (False, 0))
+
     def test_coarse_with_a_fine_part(self):
         coarse, _ = self.surface('coarse.ply', '--level', 'top')
         mixed, _ = self.surface('mixed.ply', '--level', 'top', '--focus', '0,0,0,11,11,11:0')

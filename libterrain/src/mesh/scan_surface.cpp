@@ -17,6 +17,8 @@ namespace {
 /// Peak bytes per point: tetrahedra and their vertices, the shape, positions in the CRS and on the
 /// ground, and the surface.
 constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
+/// Spheres and statements of the poles rule, in place of the surface.
+constexpr std::uint64_t kPolesBytesPerPoint = 420;
 
 void check_surface_memory(const stream::Store& store, const Detail& detail,
                           std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
@@ -119,8 +121,10 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     throw UsageError("a surface by another method has no tetrahedra");
   }
   const stream::Store source = store.with_stop(context.stop);
+  const bool poles = options.restore.shape.rule == tri::ShapeRule::kPoles;
   check_surface_memory(source, detail,
-                       options.method ? options.method->bytes_per_point : kSurfaceBytesPerPoint,
+                       options.method ? options.method->bytes_per_point
+                                      : kSurfaceBytesPerPoint + (poles ? kPolesBytesPerPoint : 0),
                        context.memory_or(0));
   TriangleMesh points = detail_points(source, detail);
   const std::vector<stream::Point3> ground = on_ground(points.positions, source.schema());

@@ -15,19 +15,21 @@ namespace {
 
 constexpr std::size_t kForestBlock = std::size_t{1} << 14;
 
-/// A statement about two tetrahedra: across a facet that they are alike, at a vertex that its poles
-/// differ.
+/// A statement about two sets of tetrahedra: across a facet that they are alike, at a vertex that
+/// its poles differ.
 struct Statement {
   /// The bits of the defect as a float (so in order of size, rounded), then whether of a vertex.
   std::uint32_t key;
   std::uint32_t what;  ///< a side or a vertex
+  /// The sets, by their roots; the second doubled, plus 1 if the roots are said to be unlike.
+  std::uint32_t one, other;
 
   [[nodiscard]] bool of_vertex() const { return (key & 1) != 0; }
 };
 
-Statement statement(double defect, bool of_vertex, std::uint32_t what) {
+std::uint32_t key_of(double defect, bool of_vertex) {
   const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(defect));
-  return {bits << 1 | static_cast<std::uint32_t>(of_vertex), what};
+  return bits << 1 | static_cast<std::uint32_t>(of_vertex);
 }
 
 struct Poles {
@@ -39,37 +41,37 @@ struct Poles {
 /// Poles by vertex slot.
 class PoleFinder {
  public:
-  explicit PoleFinder(const Spheres& spheres)
-      : spheres_(spheres), poles_(spheres.places().size()), to_first_(spheres.places().size()) {}
+  /// Right at whole vertices.
+  PoleFinder(const Spheres& spheres, const Part& part)
+      : spheres_(spheres),
+        part_(part),
+        poles_(spheres.places().size()),
+        to_first_(spheres.places().size()) {}
 
   std::vector<Poles> find() {
     const auto tetrahedra = spheres_.tetrahedra();
-    std::vector<double> radius2(poles_.size(), -1.0);
+    std::vector<Largest> largest(poles_.size());
+    // Flat tetrahedra have no radius: no comparison with NaN is true.
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-      if (!spheres_.finite(t) || spheres_.flat(t)) continue;
+      if (!spheres_.finite(t)) continue;
       const double r2 = spheres_.radius2(t);
-      for (const std::uint32_t v : tetrahedra[t].corner) {
-        if (larger(r2, t, radius2[v], poles_[v].first)) {
-          radius2[v] = r2;
-          poles_[v].first = t;
-        }
-      }
+      for (const std::uint32_t v : tetrahedra[t].corner)
+        if (larger(r2, t, largest[v])) largest[v] = {r2, t};
     }
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
+      poles_[v].first = largest[v].tetrahedron;
       if (poles_[v].first != spatial::kNone) to_first_[v] = spheres_.to_centre(poles_[v].first, v);
+      largest[v] = {};
     }
     add_hull();
-    std::fill(radius2.begin(), radius2.end(), -1.0);
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-      if (!spheres_.finite(t) || spheres_.flat(t)) continue;
+      if (!spheres_.finite(t)) continue;
       const double r2 = spheres_.radius2(t);
-      for (const std::uint32_t v : tetrahedra[t].corner) {
-        if (!larger(r2, t, radius2[v], poles_[v].second)) continue;
-        if (!(dot(spheres_.to_centre(t, v), to_first_[v]) < 0.0)) continue;
-        radius2[v] = r2;
-        poles_[v].second = t;
-      }
+      for (const std::uint32_t v : tetrahedra[t].corner)
+        if (larger(r2, t, largest[v]) && dot(spheres_.to_centre(t, v), to_first_[v]) < 0.0)
+          largest[v] = {r2, t};
     }
+    for (std::uint32_t v = 1; v < poles_.size(); ++v) poles_[v].second = largest[v].tetrahedron;
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
       Poles& pole = poles_[v];
       if (pole.second == spatial::kNone) continue;
@@ -81,10 +83,15 @@ class PoleFinder {
   }
 
  private:
+  struct Largest {
+    double radius2 = -1.0;
+    std::uint32_t tetrahedron = spatial::kNone;
+  };
   /// Of two equal radii the tetrahedron with the lexicographically first corners is the pole.
-  [[nodiscard]] bool larger(double r2, std::uint32_t t, double best, std::uint32_t held) const {
-    if (r2 != best) return r2 > best;
-    return held != t && spheres_.ranks_of(t) < spheres_.ranks_of(held);
+  [[nodiscard]] bool larger(double r2, std::uint32_t t, const Largest& held) const {
+    if (r2 != held.radius2) [[likely]]
+      return r2 > held.radius2;
+    return spheres_.ranks_of(t) < spheres_.ranks_of(held.tetrahedron);
   }
 
   /// Vertices on the hull have their first pole beyond it, in the direction of the sum of the
@@ -102,8 +109,13 @@ class PoleFinder {
       for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
         if (spheres_.finite(spatial::tetrahedron_of(tetrahedra[t].mate[i]))) continue;
         const spatial::Side side = spatial::make_side(t, i);
+        const auto facet = spatial::facet_of(tetrahedra[t], i);
+        if (!part_.whole.empty() && std::none_of(facet.begin(), facet.end(), [&](std::uint32_t v) {
+              return part_.whole[v] != 0;
+            }))
+          continue;
         const Vector3 normal = spheres_.hull_normal(side);
-        for (const std::uint32_t v : spatial::facet_of(tetrahedra[t], i))
+        for (const std::uint32_t v : facet)
           normals.push_back({v, spheres_.facet_ranks(side), normal});
       }
     }
@@ -121,25 +133,10 @@ class PoleFinder {
   }
 
   const Spheres& spheres_;
+  const Part& part_;
   std::vector<Poles> poles_;
   std::vector<Vector3> to_first_;
 };
-
-/// By ascending keys; `spare` has the same size.
-void radix_sort(std::vector<Statement>& list, std::vector<Statement>& spare) {
-  constexpr unsigned kBits = 11;
-  constexpr std::size_t kBins = std::size_t{1} << kBits;
-  std::vector<std::size_t> start(3 * kBins);
-  for (const Statement& s : list)
-    for (unsigned pass = 0; pass < 3; ++pass)
-      ++start[pass * kBins + (s.key >> (pass * kBits) & (kBins - 1))];
-  for (unsigned pass = 0; pass < 3; ++pass) {
-    std::size_t* bin = start.data() + pass * kBins;
-    std::exclusive_scan(bin, bin + kBins, bin, std::size_t{0});
-    for (const Statement& s : list) spare[bin[s.key >> (pass * kBits) & (kBins - 1)]++] = s;
-    std::swap(list, spare);
-  }
-}
 
 /// Disjoint sets of tetrahedra, each known to be alike or unlike its set's root.
 class SignedSets {
@@ -159,11 +156,12 @@ class SignedSets {
       x = next >> 1;
     }
   }
+  /// If they are in different sets; `unlike` is 0 or 1.
   void join(std::uint32_t a, std::uint32_t b, std::uint32_t unlike) {
     const std::uint32_t root_a = find(a), root_b = find(b);
     if (root_a >> 1 == root_b >> 1) return;
     const std::uint32_t sign = (root_a ^ root_b ^ unlike) & 1;
-    // The larger number below the smaller: about as good as by size, as numbers are mixed.
+    // The smaller number is the root, so that roots stay in spatial order as their tetrahedra are.
     const std::uint32_t low = std::min(root_a, root_b) >> 1, high = std::max(root_a, root_b) >> 1;
     parent_[high] = 2 * low | sign;
   }
@@ -174,40 +172,48 @@ class SignedSets {
 
 class Forest {
  public:
-  Forest(const Spheres& spheres, unsigned threads)
+  Forest(const Spheres& spheres, unsigned threads, const Part& part)
       : spheres_(spheres),
         threads_(threads),
+        part_(part),
         beyond_(static_cast<std::uint32_t>(spheres.tetrahedra().size())) {}
 
   std::vector<std::uint8_t> labels() {
-    poles_ = PoleFinder(spheres_).find();
+    poles_ = PoleFinder(spheres_, part_).find();
     state_all();
-    {
-      std::vector<Statement> spare(list_.size());
-      radix_sort(list_, spare);
-    }
     SignedSets sets(std::size_t{beyond_} + 1);
-    for (std::size_t begin = 0, end = 0; begin < list_.size(); begin = end) {
-      for (end = begin + 1; end < list_.size() && list_[end].key >> 1 == list_[begin].key >> 1;)
-        ++end;
-      if (end - begin > 1) order_exactly({list_.data() + begin, end - begin});
-      for (std::size_t i = begin; i < end; ++i) believe(sets, list_[i]);
-    }
+    std::vector<std::uint32_t> roots;
+    for (std::uint32_t t = 0; t < beyond_; ++t)
+      if (node(t) == 2 * t) roots.push_back(t);
+    roots.push_back(beyond_);
+    while (!list_.empty()) join_best(sets, roots);
     const std::uint32_t outside = sets.find(beyond_);
     std::vector<std::uint8_t> inside(beyond_);
     for (std::uint32_t t = 0; t < beyond_; ++t)
-      if (spheres_.finite(t)) inside[t] = static_cast<std::uint8_t>((sets.find(t) ^ outside) & 1);
+      inside[t] = static_cast<std::uint8_t>((sets.find(node(t) >> 1) ^ node(t) ^ outside) & 1);
     return inside;
   }
 
  private:
+  /// The set that t belongs to from the start, doubled, plus 1 if t is known to be inside.
   [[nodiscard]] std::uint32_t node(std::uint32_t t) const {
-    return spheres_.finite(t) ? t : beyond_;
+    if (!spheres_.finite(t)) return 2 * beyond_;
+    if (part_.label.empty() || part_.label[t] == 0) return 2 * t;
+    return 2 * beyond_ + (part_.label[t] == 2);
   }
-  /// Whether this side of a finite tetrahedron stands for its facet.
+  /// Whether this side of a finite tetrahedron stands for its facet, about which it says something
+  /// new.
   [[nodiscard]] bool stands(std::uint32_t t, spatial::Side mate) const {
     const std::uint32_t other = spatial::tetrahedron_of(mate);
-    return t < other || !spheres_.finite(other);
+    if (!(t < other || !spheres_.finite(other))) return false;
+    return part_.label.empty() || node(t) >> 1 != node(other) >> 1;
+  }
+
+  /// `other` may be kNone: beyond the hull.
+  [[nodiscard]] Statement make(std::uint32_t key, std::uint32_t what, std::uint32_t one,
+                               std::uint32_t other, std::uint32_t unlike) const {
+    const std::uint32_t a = node(one), b = other == spatial::kNone ? 2 * beyond_ : node(other);
+    return {key, what, a >> 1, b ^ (a & 1) ^ unlike};
   }
 
   void state_all() {
@@ -231,67 +237,104 @@ class Forest {
     list_.resize(start.back() + at_vertices);
     for_blocks(tetrahedra.size(), kForestBlock, threads_, none,
                [&](std::size_t begin, std::size_t end, int) {
-                 Statement* to = list_.data() + start[begin / kForestBlock];
+                 const std::span to{list_.data() + start[begin / kForestBlock],
+                                    list_.data() + start[begin / kForestBlock + 1]};
+                 // First the facets alone, so that the branch is not mixed with the arithmetic.
+                 std::size_t count = 0;
                  for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
                    if (!spheres_.finite(t)) continue;
-                   for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
-                     if (!stands(t, tetrahedra[t].mate[i])) continue;
-                     const spatial::Side side = spatial::make_side(t, i);
-                     *to++ = statement(spheres_.facet_defect(side), false, side);
-                   }
+                   for (const std::uint32_t i : {0u, 1u, 2u, 3u})
+                     if (stands(t, tetrahedra[t].mate[i]))
+                       to[count++].what = spatial::make_side(t, i);
+                 }
+                 for (Statement& s : to) {
+                   const std::uint32_t t = spatial::tetrahedron_of(s.what);
+                   const std::uint32_t other =
+                       spatial::tetrahedron_of(tetrahedra[t].mate[spatial::index_of(s.what)]);
+                   s = make(key_of(spheres_.facet_defect(s.what), false), s.what, t, other, 0);
                  }
                });
     Statement* to = list_.data() + start.back();
-    for (std::uint32_t v = 1; v < poles_.size(); ++v)
-      if (poles_[v].second != spatial::kNone) *to++ = statement(poles_[v].defect, true, v);
+    for (std::uint32_t v = 1; v < poles_.size(); ++v) {
+      const Poles& poles = poles_[v];
+      if (poles.second == spatial::kNone) continue;
+      *to = make(key_of(poles.defect, true), v, poles.second, poles.first, 1);
+      to += to->one != to->other >> 1;  // else both are known
+    }
+    list_.resize(static_cast<std::size_t>(to - list_.data()));
   }
 
-  /// Statements whose defects are the same when rounded: by defect, corners, facets first.
-  void order_exactly(std::span<Statement> run) {
-    struct Full {
-      double defect;
-      Ranks corners;
-      Statement statement;
-    };
-    std::vector<Full> full;
-    full.reserve(run.size());
-    constexpr std::uint32_t kNoCorner = 0xFFFFFFFFu;
-    for (const Statement& s : run) {
-      if (s.of_vertex()) {
-        const std::uint32_t rank = spheres_.places()[s.what].rank;
-        full.push_back({poles_[s.what].defect, {rank, kNoCorner, kNoCorner, kNoCorner}, s});
-      } else {
-        full.push_back({spheres_.facet_defect(s.what), spheres_.facet_ranks(s.what), s});
+  /// One of Boruvka's rounds: every set is joined with another by the best statement about it, and
+  /// statements within one set are dropped.
+  void join_best(SignedSets& sets, std::vector<std::uint32_t>& roots) {
+    if (best_.empty()) best_.resize(std::size_t{beyond_} + 1);
+    for (const std::uint32_t root : roots) best_[root] = kNoBest;
+    for (std::uint32_t i = 0; i < list_.size(); ++i) {
+      const Statement& s = list_[i];
+      const std::uint64_t best = std::uint64_t{s.key >> 1} << 32 | i;
+      for (std::uint64_t* held : {&best_[s.one], &best_[s.other >> 1]}) {
+        if (*held >> 32 == best >> 32) [[unlikely]] {
+          if (before(s, list_[static_cast<std::uint32_t>(*held)])) *held = best;
+        } else {
+          *held = std::min(*held, best);
+        }
       }
     }
-    std::sort(full.begin(), full.end(), [](const Full& a, const Full& b) {
-      return a.defect != b.defect ? a.defect < b.defect : a.corners < b.corners;
-    });
-    for (std::size_t i = 0; i < run.size(); ++i) run[i] = full[i].statement;
+    for (const std::uint32_t root : roots) {
+      if (best_[root] == kNoBest) continue;
+      const Statement& s = list_[static_cast<std::uint32_t>(best_[root])];
+      sets.join(s.one, s.other >> 1, s.other & 1);
+    }
+    std::size_t count = 0;
+    for (const std::uint32_t root : roots) {
+      const std::uint32_t up = sets.find(root);
+      best_[root] = up;
+      if (up >> 1 == root) roots[count++] = root;
+    }
+    roots.resize(count);
+    count = 0;
+    for (const Statement& s : list_) {
+      const auto one = static_cast<std::uint32_t>(best_[s.one]);
+      const auto other = static_cast<std::uint32_t>(best_[s.other >> 1]);
+      list_[count] = {s.key, s.what, one >> 1, other ^ ((one ^ s.other) & 1)};
+      count += one >> 1 != other >> 1;
+    }
+    list_.resize(count);
   }
 
-  void believe(SignedSets& sets, const Statement& s) const {
-    if (s.of_vertex()) {
-      const Poles& poles = poles_[s.what];
-      sets.join(poles.first == spatial::kNone ? beyond_ : poles.first, poles.second, 1);
-    } else {
-      const std::uint32_t t = spatial::tetrahedron_of(s.what);
-      const spatial::Side mate = spheres_.tetrahedra()[t].mate[spatial::index_of(s.what)];
-      sets.join(t, node(spatial::tetrahedron_of(mate)), 0);
-    }
+  /// Decides between defects that are the same when rounded: by defect, corners, facets first.
+  [[nodiscard]] bool before(const Statement& a, const Statement& b) const {
+    const double defect_a = defect_of(a), defect_b = defect_of(b);
+    if (defect_a != defect_b) return defect_a < defect_b;
+    return corners_of(a) < corners_of(b);
   }
+  [[nodiscard]] double defect_of(const Statement& s) const {
+    return s.of_vertex() ? poles_[s.what].defect : spheres_.facet_defect(s.what);
+  }
+  [[nodiscard]] Ranks corners_of(const Statement& s) const {
+    constexpr std::uint32_t kNoCorner = 0xFFFFFFFFu;
+    if (!s.of_vertex()) return spheres_.facet_ranks(s.what);
+    return {spheres_.places()[s.what].rank, kNoCorner, kNoCorner, kNoCorner};
+  }
+
+  static constexpr std::uint64_t kNoBest = ~std::uint64_t{0};
 
   const Spheres& spheres_;
   unsigned threads_;
+  const Part& part_;
   std::uint32_t beyond_;
   std::vector<Poles> poles_;
   std::vector<Statement> list_;
+  /// By root: the rounded defect of the best statement about the set, above its number; after the
+  /// joining the new root, doubled, plus 1 if unlike.
+  std::vector<std::uint64_t> best_;
 };
 
 }  // namespace
 
-std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads) {
-  return Forest(spheres, threads).labels();
+std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
+                                        const Part& part) {
+  return Forest(spheres, threads, part).labels();
 }
 
 }  // namespace terrace::tri::shape

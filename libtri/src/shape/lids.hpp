@@ -17,7 +17,8 @@
 namespace terrace::tri::shape {
 
 inline constexpr double kLidSpacings = 10.0;
-inline constexpr std::size_t kSpacingRank = 6;
+/// Samples at the border of an open scan have few neighbours beside those across its gaps.
+inline constexpr std::size_t kSpacingRank = 3;
 inline constexpr double kLidShare = 0.1;
 
 template <class Mesh>
@@ -62,7 +63,7 @@ class LidFinder {
     const Vector3 d = minus(places_[a].at, places_[b].at);
     return dot(d, d);
   }
-  /// The square of the sixth shortest Delaunay edge at the vertex, or of the longest of fewer.
+  /// The square of the third shortest Delaunay edge at the vertex, or of the longest of fewer.
   double spacing2(std::uint32_t v) {
     if (spacing2_[v] >= 0.0) return spacing2_[v];
     std::vector<std::uint32_t> others;

@@ -11,8 +11,9 @@ namespace {
 /// as one tetrahedron outside at every vertex of the hull.
 class Labels {
  public:
-  Labels(const Spheres& spheres, std::vector<std::uint8_t>& inside)
-      : spheres_(spheres), inside_(inside), count_(spheres.places().size()) {
+  Labels(const Spheres& spheres, std::vector<std::uint8_t>& inside,
+         std::span<const std::uint8_t> whole)
+      : spheres_(spheres), inside_(inside), whole_(whole), count_(spheres.places().size()) {
     const auto tetrahedra = spheres.tetrahedra();
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
       if (!spheres.finite(t)) continue;
@@ -31,6 +32,13 @@ class Labels {
   [[nodiscard]] std::uint32_t vertex_slots() const {
     return static_cast<std::uint32_t>(count_.size());
   }
+  /// Whether t is finite and all tetrahedra at its corners are there.
+  [[nodiscard]] bool changeable(std::uint32_t t) const {
+    if (!spheres_.finite(t)) return false;
+    const auto& corner = spheres_.tetrahedra()[t].corner;
+    return whole_.empty() || std::all_of(corner.begin(), corner.end(),
+                                         [&](std::uint32_t v) { return whole_[v] != 0; });
+  }
   void flip(std::uint32_t t) {
     for (const std::uint32_t v : spheres_.tetrahedra()[t].corner) {
       --count_[v][inside_[t]];
@@ -42,6 +50,7 @@ class Labels {
  private:
   const Spheres& spheres_;
   std::vector<std::uint8_t>& inside_;
+  std::span<const std::uint8_t> whole_;
   std::vector<std::array<std::uint32_t, 2>> count_;
 };
 
@@ -67,9 +76,7 @@ double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
   return terms[0] + terms[1] + terms[2] + terms[3];
 }
 
-}  // namespace
-
-void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+void smooth(const Spheres& spheres, Labels& labels) {
   struct Candidate {
     double gain;
     Ranks corners;
@@ -79,10 +86,9 @@ void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
     }
   };
   const auto tetrahedra = spheres.tetrahedra();
-  Labels labels(spheres, inside);
   std::priority_queue<Candidate> next;
   const auto consider = [&](std::uint32_t t) {
-    if (!spheres.finite(t)) return;
+    if (!labels.changeable(t)) return;
     const double gain = gain_of(spheres, labels, t);
     if (gain > kLeastGain) next.push({gain, spheres.ranks_of(t), t});
   };
@@ -101,7 +107,7 @@ void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
   }
 }
 
-void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+void sculpt(const Spheres& spheres, Labels& labels) {
   struct Candidate {
     double defect;
     std::uint32_t vertex_rank;
@@ -114,7 +120,6 @@ void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
     }
   };
   const auto tetrahedra = spheres.tetrahedra();
-  Labels labels(spheres, inside);
   const auto vertex_of = [&](spatial::Side side) {
     return tetrahedra[spatial::tetrahedron_of(side)].corner[spatial::index_of(side)];
   };
@@ -124,7 +129,7 @@ void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
   std::priority_queue<Candidate> next;
   const auto consider = [&](spatial::Side side) {
     const std::uint32_t t = spatial::tetrahedron_of(side);
-    if (!spheres.finite(t) || !buried(vertex_of(side))) return;
+    if (!spheres.finite(t) || !buried(vertex_of(side)) || !labels.changeable(t)) return;
     const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
     if (labels.at(spatial::tetrahedron_of(mate)) == labels.at(t)) return;
     next.push({spheres.facet_defect(side), spheres.places()[vertex_of(side)].rank,
@@ -142,6 +147,15 @@ void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
     labels.flip(t);
     for (const spatial::Side beyond : tetrahedra[t].mate) consider(beyond);
   }
+}
+
+}  // namespace
+
+void smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
+                       const Part& part) {
+  Labels labels(spheres, inside, part.whole);
+  smooth(spheres, labels);
+  sculpt(spheres, labels);
 }
 
 }  // namespace terrace::tri::shape

@@ -73,9 +73,10 @@ double Spheres::facet_defect(Side side) const {
   const std::uint32_t t = spatial::tetrahedron_of(side);
   const std::uint32_t other = spatial::tetrahedron_of(tetrahedra_[t].mate[spatial::index_of(side)]);
   const auto f = spatial::facet_of(tetrahedra_[t], spatial::index_of(side));
-  std::uint32_t first = f[0];
-  if (places_[f[1]].rank < places_[first].rank) first = f[1];
-  if (places_[f[2]].rank < places_[first].rank) first = f[2];
+  // No branches that the processor could not predict.
+  const std::uint32_t r0 = places_[f[0]].rank, r1 = places_[f[1]].rank, r2 = places_[f[2]].rank;
+  std::uint32_t first = r1 < r0 ? f[1] : f[0];
+  first = r2 < std::min(r0, r1) ? f[2] : first;
   const Vector3 u = to_centre(t, first);
   return defect_between(u, finite(other) ? to_centre(other, first) : hull_normal(side));
 }

@@ -58,32 +58,40 @@ inline double scale_to_one(double size) {
   return std::ldexp(1.0, std::clamp(-exponent, -1022, 1022));
 }
 
-/// By vertex slot. Requires a scope of the metric.
+/// Of vertices in lexicographic order, which become ranks 0, 1 and so on. Requires a scope of the
+/// metric.
 template <class Mesh>
-std::vector<Place> places_of(const Mesh& mesh) {
-  std::vector<Place> places(mesh.vertex.size(), Place{{}, 0});
-  const std::vector<std::uint32_t> order = sorted_vertices(mesh);
-  for (std::uint32_t i = 0; i < order.size(); ++i) places[order[i]].rank = i;
+std::vector<Place> places_of(const Mesh& mesh, std::span<const std::uint32_t> sorted) {
+  std::vector<Place> places(sorted.size());
   double size = 0.0;
-  for (const std::uint32_t v : order) {
-    places[v].at = to_doubles(mesh.vertex[v].point);
-    size = std::max(size, largest(places[v].at));
+  for (std::uint32_t i = 0; i < sorted.size(); ++i) {
+    places[i] = {to_doubles(mesh.vertex[sorted[i]].point), i};
+    size = std::max(size, largest(places[i].at));
   }
   // First so that differences cannot overflow, then once more for points that lie together.
   const auto rescale = [&](double by) {
-    for (const std::uint32_t v : order)
-      for (double& c : places[v].at) c *= by;
+    for (Place& place : places)
+      for (double& c : place.at) c *= by;
   };
   rescale(scale_to_one(size));
-  if (order.empty()) return places;
-  const Vector3 origin = places[order.front()].at;
+  if (places.empty()) return places;
+  const Vector3 origin = places.front().at;
   size = 0.0;
-  for (const std::uint32_t v : order) {
-    if constexpr (is_elliptical<Mesh>) places[v].at = edge(mesh, origin, places[v].at);
-    const Vector3 difference = minus(places[v].at, places[order.front()].at);
-    size = std::max(size, largest(difference));
+  for (Place& place : places) {
+    if constexpr (is_elliptical<Mesh>) place.at = edge(mesh, origin, place.at);
+    size = std::max(size, largest(minus(place.at, places.front().at)));
   }
   rescale(scale_to_one(size));
+  return places;
+}
+
+/// Of all vertices, by slot.
+template <class Mesh>
+std::vector<Place> places_of(const Mesh& mesh) {
+  const std::vector<std::uint32_t> sorted = sorted_vertices(mesh);
+  const std::vector<Place> in_order = places_of(mesh, sorted);
+  std::vector<Place> places(mesh.vertex.size(), Place{{}, 0});
+  for (std::size_t i = 0; i < sorted.size(); ++i) places[sorted[i]] = in_order[i];
   return places;
 }
 
@@ -111,7 +119,6 @@ class Spheres {
   /// From a vertex of the finite tetrahedron t to its circumcentre.
   [[nodiscard]] Vector3 to_centre(std::uint32_t t, std::uint32_t vertex) const {
     const Sphere& s = sphere_[t];
-    if (s.first == vertex) return s.centre;
     const Vector3 shift = minus(places_[s.first].at, places_[vertex].at);
     return {shift[0] + s.centre[0], shift[1] + s.centre[1], shift[2] + s.centre[2]};
   }

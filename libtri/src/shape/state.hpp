@@ -30,10 +30,13 @@ struct State {
   std::vector<std::uint32_t> lost;     ///< living vertices of degree 0 while there are tetrahedra
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
   std::size_t kept_count = 0;          ///< in state kKept
+  std::vector<std::uint8_t> forest;    ///< poles rule: labels of its first step, by slot
   // Scratch memory, kept between calls.
   std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
   std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
+  /// Local numbers by slot, see nearby.hpp; kNone between two calls.
+  std::vector<std::uint32_t> local_tetrahedron, local_vertex;
 
   template <class Mesh>
   void keep(const Mesh& mesh, std::uint32_t t) {
@@ -77,13 +80,20 @@ void find_lost(const Mesh& mesh, State& state) {
 /// not on the surface.
 template <class Mesh>
 void set_labels(const Mesh& mesh, State& state, const std::vector<std::uint8_t>& inside) {
-  keep_all(mesh, state);
+  state.of.assign(mesh.tetrahedron.size(), kAbsent);
+  state.degree.assign(mesh.vertex.size(), 0);
+  state.rescued.clear();
+  state.kept_count = 0;
   std::vector<std::uint8_t> outside(mesh.vertex.size());
   for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
     const auto& corner = mesh.tetrahedron[t].corner;
-    if (corner[0] == spatial::kFreeCorner || inside[t] != 0) continue;
+    if (corner[0] == spatial::kFreeCorner) continue;
+    if (inside[t] != 0) {
+      state.keep(mesh, t);
+      continue;
+    }
     for (const std::uint32_t v : corner) outside[v] = 1;
-    if (state.of[t] == kKept) state.remove(mesh, t, 0);
+    if (!spatial::has_ghost(corner)) state.of[t] = 0;
   }
   find_lost(mesh, state);
   if (mesh.flat) return;

@@ -96,7 +96,7 @@ class SurfaceCommand final : public Command {
                       (measures.closed ? "closed, " : "open, ") + with_commas(measures.components) +
                       (measures.components == 1 ? " part" : " parts");
     }
-    if (surface.open) summary.text += ", an open scan: the faces over its gaps are left out";
+    if (surface.open) summary.text += ", without the faces over the gaps of the scan";
     if (surface.samples_off.value_or(0) > 0) {
       summary.text += ", " + with_commas(*surface.samples_off) +
                       (*surface.samples_off == 1 ? " sample" : " samples") + " not on it";

@@ -170,6 +170,14 @@ class BasicShape3 {
   /// Poles and published rule: from scratch.
   void update(const Triangulation& triangulation, const typename Triangulation::Changes& changes);
 
+  /// As update(), but by the poles rule at a cost that depends on the changes, for interaction. The
+  /// first step is repeated for the new tetrahedra and their neighbours alone, the other two for
+  /// those between their corners; all others keep their labels. That is exact unless the change
+  /// decides about tetrahedra farther away, which happens in weakly determined pockets: restore()
+  /// tells from time to time, or before saving. Other rules: update().
+  void update_nearby(const Triangulation& triangulation,
+                     const typename Triangulation::Changes& changes);
+
   /// Accepts any handle; false for those not in use.
   [[nodiscard]] bool kept(TetrahedronId tetrahedron) const;
   /// Number of kept tetrahedra. O(1).
@@ -190,7 +198,7 @@ class BasicShape3 {
   [[nodiscard]] ShapeSurface surface(const Triangulation& triangulation) const;
   /// surface(), but of an open scan without its lids: the faces by which the poles rule closes what
   /// has not been scanned. A face is a lid if one of its edges is more than 10 times as long as the
-  /// spacing at each of its corners, which is the sixth shortest edge of the triangulation there.
+  /// spacing at each of its corners, which is the third shortest edge of the triangulation there.
   /// If lids are more than a tenth of the area, the scan is open and they are left out; otherwise
   /// nothing is. Lengths and areas are those of the metric. O(slots).
   [[nodiscard]] ShapeSurface surface_without_lids(const Triangulation& triangulation) const;

@@ -7,11 +7,42 @@
 #include <numeric>
 #include <vector>
 
+#include "gabriel.hpp"
 #include "state.hpp"
 
-/// Parts of a surface that touch: told apart by the tetrahedra inside.
+/// The surface of the kept tetrahedra, and its parts, told apart by the tetrahedra inside.
 
 namespace terrace::tri::shape {
+
+/// See BasicShape3::surface().
+template <class Mesh>
+ShapeSurface surface_of(const Mesh& mesh, const State& state) {
+  const auto& of = state.of;
+  ShapeSurface result;
+  std::vector<std::array<std::uint32_t, 3>>& faces = result.surface.faces;
+  constexpr std::uint32_t kUnused = spatial::kNone;
+  std::vector<std::uint32_t> number(mesh.vertex.size(), kUnused);
+  for (std::uint32_t t = 0; t < of.size(); ++t) {
+    if (!is_kept(of[t])) continue;
+    const spatial::Tetrahedron& tetrahedron = mesh.tetrahedron[t];
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      if (is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
+      // In order with the corner first, so counter-clockwise when seen from the other side.
+      faces.push_back(spatial::facet_of(tetrahedron, i));
+      result.behind.push_back(TetrahedronId{t});
+      for (const std::uint32_t v : faces.back()) number[v] = 0;
+    }
+  }
+  for (std::uint32_t v = 0; v < number.size(); ++v) {
+    if (number[v] == kUnused) continue;
+    number[v] = static_cast<std::uint32_t>(result.vertices.size());
+    result.vertices.push_back(VertexId{v});
+    result.surface.points.push_back(to_doubles(mesh.vertex[v].point));
+  }
+  for (auto& face : faces)
+    for (std::uint32_t& v : face) v = number[v];
+  return result;
+}
 
 class DisjointSets {
  public:

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "poles.hpp"
+#include "state.hpp"
+
+/// The poles rule after a local change, see BasicShape3::update_nearby().
+
+namespace terrace::tri::shape {
+
+/// The tetrahedra around a change as a triangulation of their own, in local numbers: new ones and
+/// their neighbours, whose labels are sought, and all others that have a vertex with one of them,
+/// whose labels are known.
+template <class Mesh>
+class Nearby {
+ public:
+  Nearby(const Mesh& mesh, State& state) : mesh_(mesh), state_(state) {
+    state.local_tetrahedron.resize(mesh.tetrahedron.size(), spatial::kNone);
+    state.local_vertex.resize(mesh.vertex.size(), spatial::kNone);
+  }
+  ~Nearby() {
+    for (const std::uint32_t t : slots_) state_.local_tetrahedron[t] = spatial::kNone;
+    for (const std::uint32_t v : vertices_) state_.local_vertex[v] = spatial::kNone;
+  }
+  Nearby(const Nearby&) = delete;
+  Nearby& operator=(const Nearby&) = delete;
+
+  template <class Changes>
+  void relabel(const Changes& changes) {
+    collect(changes);
+    number_vertices();
+    const std::vector<spatial::Tetrahedron> tetrahedra = local_tetrahedra();
+    const Spheres spheres(tetrahedra, local_places(), 1);
+    std::vector<std::uint8_t> known(tetrahedra.size());
+    for (std::size_t i = sought_; i < slots_.size(); ++i)
+      known[i] = static_cast<std::uint8_t>(1 + state_.forest[slots_[i]]);
+    const Part part{known, whole_};
+    std::vector<std::uint8_t> inside = signed_forest(spheres, 1, part);
+    for (std::uint32_t i = 0; i < slots_.size(); ++i) {
+      if (i < sought_) state_.forest[slots_[i]] = inside[i];
+      // Where nothing will be flipped, the labels after the flips are kept.
+      if (!between_whole(tetrahedra[i])) inside[i] = state_.of[slots_[i]] == kKept;
+    }
+    smooth_and_sculpt(spheres, inside, part);
+    write(tetrahedra, inside);
+  }
+
+ private:
+  void take(std::uint32_t t) {
+    if (state_.local_tetrahedron[t] != spatial::kNone) return;
+    state_.local_tetrahedron[t] = static_cast<std::uint32_t>(slots_.size());
+    slots_.push_back(t);
+  }
+  template <class Changes>
+  void collect(const Changes& changes) {
+    const auto finite = [&](std::uint32_t t) {
+      return spatial::is_finite(mesh_.tetrahedron[t].corner);
+    };
+    for (const TetrahedronId id : changes.added_tetrahedra) take(slot(id));
+    const std::size_t fresh = slots_.size();
+    for (std::size_t i = 0; i < fresh; ++i)
+      for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate)
+        if (finite(spatial::tetrahedron_of(mate))) take(spatial::tetrahedron_of(mate));
+    sought_ = slots_.size();
+    const auto add = [&](std::uint32_t v) {
+      if (state_.local_vertex[v] != spatial::kNone) return;
+      state_.local_vertex[v] = static_cast<std::uint32_t>(vertices_.size());
+      vertices_.push_back(v);
+    };
+    for (std::size_t i = 0; i < sought_; ++i)
+      for (const std::uint32_t v : mesh_.tetrahedron[slots_[i]].corner) add(v);
+    // Vertices may have lost tetrahedra and gained none, at the hull.
+    for (const auto& corners : changes.removed_corners) {
+      for (const VertexId v : corners) {
+        if (!mesh_.vertex_alive(slot(v))) continue;
+        add(slot(v));
+        take(mesh_.vertex[slot(v)].incident);
+      }
+    }
+    // All tetrahedra at their corners, ghosts too: joined to them by facets with such a corner.
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate) {
+        const auto& corner = mesh_.tetrahedron[spatial::tetrahedron_of(mate)].corner;
+        if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
+              return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
+            }))
+          take(spatial::tetrahedron_of(mate));
+      }
+    }
+  }
+  /// In lexicographic order, from 1.
+  void number_vertices() {
+    const std::size_t whole = vertices_.size();
+    for (const std::uint32_t t : slots_) {
+      for (const std::uint32_t v : mesh_.tetrahedron[t].corner) {
+        if (v == spatial::kGhost || state_.local_vertex[v] != spatial::kNone) continue;
+        state_.local_vertex[v] = static_cast<std::uint32_t>(vertices_.size());
+        vertices_.push_back(v);
+      }
+    }
+    std::vector<std::uint32_t> order = vertices_;
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return spatial::lexicographically_less(mesh_.vertex[a].point, mesh_.vertex[b].point);
+    });
+    whole_.assign(order.size() + 1, 0);
+    for (std::uint32_t i = 0; i < order.size(); ++i) {
+      whole_[i + 1] = state_.local_vertex[order[i]] < whole;
+      state_.local_vertex[order[i]] = i + 1;
+    }
+    vertices_ = std::move(order);
+  }
+  std::vector<Place> local_places() const {
+    std::vector<Place> places = places_of(mesh_, std::span<const std::uint32_t>(vertices_));
+    places.insert(places.begin(), Place{{}, 0});
+    return places;
+  }
+  /// Behind the last one a slot that is not finite, the neighbour of what is not here.
+  std::vector<spatial::Tetrahedron> local_tetrahedra() const {
+    const auto nowhere = static_cast<std::uint32_t>(slots_.size());
+    std::vector<spatial::Tetrahedron> result(slots_.size() + 1);
+    result.back().corner.fill(spatial::kFreeCorner);
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      const spatial::Tetrahedron& t = mesh_.tetrahedron[slots_[i]];
+      for (std::size_t k = 0; k < 4; ++k) {
+        result[i].corner[k] =
+            t.corner[k] == spatial::kGhost ? spatial::kGhost : state_.local_vertex[t.corner[k]];
+        const std::uint32_t n = state_.local_tetrahedron[spatial::tetrahedron_of(t.mate[k])];
+        result[i].mate[k] =
+            spatial::make_side(n == spatial::kNone ? nowhere : n, spatial::index_of(t.mate[k]));
+      }
+    }
+    return result;
+  }
+  [[nodiscard]] bool between_whole(const spatial::Tetrahedron& t) const {
+    return spatial::is_finite(t.corner) &&
+           std::all_of(t.corner.begin(), t.corner.end(),
+                       [&](std::uint32_t v) { return whole_[v] != 0; });
+  }
+
+  void write(const std::vector<spatial::Tetrahedron>& tetrahedra,
+             const std::vector<std::uint8_t>& inside) {
+    std::vector<std::array<bool, 2>> has(whole_.size());  // tetrahedra outside, inside
+    for (std::uint32_t i = 0; i < slots_.size(); ++i) {
+      for (const std::uint32_t v : tetrahedra[i].corner) has[v][inside[i]] = true;
+      if (!spatial::is_finite(tetrahedra[i].corner)) continue;
+      const bool was = state_.of[slots_[i]] == kKept;
+      if (inside[i] != 0 && !was) state_.keep(mesh_, slots_[i]);
+      if (inside[i] == 0 && was) state_.remove(mesh_, slots_[i], 0);
+      if (inside[i] == 0) state_.of[slots_[i]] = 0;
+    }
+    std::erase_if(state_.lost, [&](std::uint32_t v) {
+      const std::uint32_t local = state_.local_vertex[v];
+      return !mesh_.vertex_alive(v) || (local != spatial::kNone && whole_[local] != 0);
+    });
+    for (std::uint32_t i = 0; i < vertices_.size(); ++i)
+      if (whole_[i + 1] != 0 && !(has[i + 1][0] && has[i + 1][1]))
+        state_.lost.push_back(vertices_[i]);
+    std::sort(state_.lost.begin(), state_.lost.end());
+  }
+
+  const Mesh& mesh_;
+  State& state_;
+  std::vector<std::uint32_t> slots_;     ///< of tetrahedra, by local number
+  std::size_t sought_ = 0;               ///< how many of these, from the first, are sought
+  std::vector<std::uint32_t> vertices_;  ///< slots, by local number - 1
+  std::vector<std::uint8_t> whole_;      ///< by local vertex: all tetrahedra at it are here
+};
+
+/// The state of the poles rule after changes; `forest` has the labels before.
+template <class Changes, class Mesh>
+void update_nearby(const Mesh& mesh, State& state, const Changes& changes) {
+  for (std::size_t k = 0; k < changes.removed_tetrahedra.size(); ++k) {
+    const std::uint32_t t = slot(changes.removed_tetrahedra[k]);
+    if (state.of[t] == kKept) {
+      --state.kept_count;
+      for (const VertexId v : changes.removed_corners[k]) --state.degree[slot(v)];
+    }
+    state.of[t] = kAbsent;
+  }
+  state.of.resize(std::max<std::size_t>(state.of.size(), mesh.tetrahedron.size()), kAbsent);
+  state.forest.resize(state.of.size());
+  state.degree.resize(std::max<std::size_t>(state.degree.size(), mesh.vertex.size()));
+  Nearby<Mesh>(mesh, state).relabel(changes);
+}
+
+}  // namespace terrace::tri::shape
