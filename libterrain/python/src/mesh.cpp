@@ -44,9 +44,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   const stream::Store& store = open.get();
   terrain::BoundedMeshOptions options;
   options.path = path;
-  const auto set = [&]<class T>(const char* name, T& to) {
-    if (given.contains(name)) to = given[name].cast<T>();
-  };
+  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
   set("max_error", options.max_error);
   set("max_points", options.max_points);
   set("replace", options.writer.replace);
