@@ -51,7 +51,7 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
 void bind_tiles(py::module_& module) {
   module.def("write_tiles", [](const OpenStore& open, const std::string& folder,
                                const py::dict& given, const py::tuple& how) {
-    const stream::Store& store = open.get();
+    const stream::Store store = open.get();
     const terrain::TilesRequest request = tiles_request(folder, given);
     const terrain::TilesOutcome outcome = Job(how).run([&](const terrain::Context& context) {
       return terrain::write_tiles(store, request, context);

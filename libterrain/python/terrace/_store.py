@@ -39,9 +39,10 @@ def xyz(points):
     """The coordinates of a structured array of points as an array of shape (n, 3), without a copy."""
     if not isinstance(points, np.ndarray):
         raise TypeError('points are a structured array')
-    if points.dtype.names is None or points.dtype.names[:3] != ('x', 'y', 'z'):
-        raise ValueError('points have the fields x, y and z first')
-    return np.ndarray((len(points), 3), np.float64, points, strides=(points.strides[0], 8))
+    fields = points.dtype.fields or {}
+    if points.ndim != 1 or any(fields.get(axis, ())[:2] != (np.dtype(np.float64), 8 * i) for i, axis in enumerate('xyz')):
+        raise ValueError('points have one dimension and the fields x, y and z, of float64, first')
+    return np.lib.stride_tricks.as_strided(points['x'], (len(points), 3), (points.strides[0], 8))
 
 
 def _real_values(records, info):

@@ -33,7 +33,7 @@ class Tiles(StoreCase):
         again = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal', resume=True)
         self.assertEqual((again['made'], again['kept']), (0, told['tiles']))
         if COMMAND:
-            subprocess.run([COMMAND, 'verify', folder, '--store', self.path('hills'), '-q'], check=True)
+            subprocess.run([COMMAND, 'verify', folder, '--store', self.path('hills'), '--vertical', 'ellipsoidal', '-q'], check=True)
             other = self.path('tiles-of-command')
             subprocess.run([COMMAND, 'tile', self.path('hills'), '-o', other, '--zoom', '0-12', '--vertical',
                             'ellipsoidal', '-q'], check=True)
