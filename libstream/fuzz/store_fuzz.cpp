@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,8 +39,11 @@ StoreSchema schema_for(bool grid, int version) {
 /// have the same contexts.
 Tables even_tables(const Layout& layout, ColumnKind kind) {
   Tables tables;
+  if (layout.version > 2) tables.guide.attribute = 0;
   for (unsigned c = 0; layout.version > 1 && c < layout.columns(); ++c) {
-    const bool possible = kind != ColumnKind::beside || layout.may_lie_beside(c);
+    const bool possible = c == tables.guide.attribute
+                              ? kind == ColumnKind::recent
+                              : along_line(kind) != ColumnKind::beside || layout.may_lie_beside(c);
     tables.kinds.push_back(possible ? kind : ColumnKind::plain);
   }
   std::array<std::uint32_t, kSymbols> counts{};
@@ -49,13 +53,11 @@ Tables even_tables(const Layout& layout, ColumnKind kind) {
 }
 
 const DecodingTables& tables_of(int version, ColumnKind kind) {
-  const auto made = [](int of_version, ColumnKind of_kind) {
-    return even_tables(Layout(schema_for(false, of_version), 0, of_version), of_kind);
-  };
-  static const DecodingTables old(made(1, ColumnKind::plain)), plain(made(2, ColumnKind::plain)),
-      recent(made(2, ColumnKind::recent)), beside(made(2, ColumnKind::beside));
-  if (version == 1) return old;
-  return kind == ColumnKind::plain ? plain : kind == ColumnKind::recent ? recent : beside;
+  static std::map<std::pair<int, ColumnKind>, DecodingTables> made;
+  return made
+      .try_emplace({version, kind},
+                   even_tables(Layout(schema_for(false, version), 0, version), kind))
+      .first->second;
 }
 
 void decode_cluster(ByteReader in, bool grid, unsigned level, int version = 1,
@@ -102,8 +104,9 @@ void read_tables(ByteReader in, int version) {
   const Tables tables = Tables::read(in.take(in.left()), layout);
   const DecodingTables decoding(tables);
   Bytes again;
-  tables.write(again);
+  tables.write(again, version);
   const Tables second = Tables::read(again, layout);
+  require(second.guide.attribute == tables.guide.attribute);
   require(second.kinds == tables.kinds);
   require(second.frequencies == tables.frequencies);
   require(second.predictor.coefficients == tables.predictor.coefficients);
@@ -124,7 +127,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   try {
     const ByteReader rest({data + 1, size - 1});
-    switch (data[0] % 11) {
+    switch (data[0] % 17) {
       case 0:
         decode_cluster(rest, true, 0);
         break;
@@ -154,6 +157,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         break;
       case 10:
         read_tables(rest, 2);
+        break;
+      case 11:
+        decode_cluster(rest, false, 0, 3, ColumnKind::plain);
+        break;
+      case 12:
+        decode_cluster(rest, false, 0, 3, ColumnKind::line_recent);
+        break;
+      case 13:
+        decode_cluster(rest, false, 1, 3, ColumnKind::line_beside);
+        break;
+      case 14:
+        decode_cluster(rest, false, 0, 3, ColumnKind::line_trend);
+        break;
+      case 15:
+        decode_cluster(rest, false, 0, 3, ColumnKind::line_median);
+        break;
+      case 16:
+        read_tables(rest, 3);
         break;
       default: {
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);

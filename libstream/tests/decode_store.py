@@ -92,7 +92,8 @@ class Bytes:
 class Tables:
     def __init__(self, data, schema, version):
         columns = len(schema) + (3 if version > 1 else 0)
-        contexts = 148 + 10 * columns
+        self.per_column = 18 if version > 2 else 10
+        contexts = 148 + self.per_column * columns
         source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
         given = source.number(8)
         self.coefficients = {}
@@ -105,10 +106,14 @@ class Tables:
                 self.coefficients[pattern] = {0: 256, 1: 256, 2: -256}
             elif pattern:
                 self.coefficients[pattern] = {neighbours[0]: 256}
+        self.guide = source.varint() - 1 if version > 2 else -1
+        require(self.guide < len(schema), "guide")
         self.kinds = [source.number(1) for _ in range(columns)] if version > 1 else None
         integers = [not channel['type'].startswith('float') for channel in schema]
         for k, kind in enumerate(self.kinds or []):
-            require(kind < 2 or kind == 2 and 0 < k < len(schema) and integers[k] and integers[k - 1], "kind")
+            possible = (10 if k != self.guide else 2) if self.guide >= 0 else 3
+            beside = 0 < k < len(schema) and integers[k] and integers[k - 1]
+            require(kind < possible and (kind % 5 != 2 or beside), "kind")
         self.symbols = []  # per context: the (symbol, start, frequency) of every slot
         for _ in range(contexts):
             slots, symbol = [], 0
@@ -262,36 +267,87 @@ def attribute(source, context, count, kind):
     return typed(kind, form, values)
 
 
-def column(source, number, count, floating, before):
-    """The number form (None except for floats) and the integers of a column of version 2."""
-    c, kind = 148 + 10 * number, source.tables.kinds[number]
-    head = source.symbol(c)
-    form = head % 22 if floating else None
-    head = head // 22 if floating else head
-    require(head < 3, "head")
+class Recent:
+    """Differences that are often one of the last ones."""
+
+    def __init__(self, source, context, count):
+        self.source, self.context, self.count = source, context, count
+        self.list, self.place, self.last = [0, 1, -1, 2, -2, 3, -3][:count], 0, 0
+
+    def difference(self):
+        self.place = self.source.symbol(self.context + 2 + min(3, self.place))
+        require(self.place <= self.count, "place")
+        if self.place == self.count:
+            number, self.last = self.source.number(self.context + 6 + step_of(self.last) // 2)
+            self.list.append(unzigzag(number))
+        difference = self.list.pop(self.place)
+        self.list = [difference] + self.list[:self.count - 1]
+        return difference
+
+
+def head(source, c, floating):
+    """Number form (None except for floats), whether there are several values, the first, its class, the divisor."""
+    symbol = source.symbol(c)
+    form = symbol % 22 if floating else None
+    symbol = symbol // 22 if floating else symbol
+    require(symbol < 3, "head")
     first, last = source.number(c + 1)
-    values, divisor = [signed(unzigzag(first))], 1
-    if head == 2:
-        divisor = source.number(c + 1)[0]
-        require(divisor > 1, "divisor")
-    recent, place, last = [0, 1, -1], 0, 0 if kind == 1 else last
+    divisor = source.number(c + 1)[0] if symbol == 2 else 1
+    require(symbol < 2 or divisor > 1, "divisor")
+    return form, symbol > 0, signed(unzigzag(first)), last, divisor
+
+
+ALONG, SAME, BEGINS = range(3)
+
+
+def guide(source, number, count, floating):
+    """The number form and the integers of the guide, and how each point follows the one before it."""
+    c = 148 + source.tables.per_column * number
+    form, several, value, last, divisor = head(source, c, floating)
+    values, steps = [value], [BEGINS]
+    recent = Recent(source, c, 7) if source.tables.kinds[number] == 1 else None
+    step, jump, jump_class = ALONG, 0, 0
+    for _ in range(1, count):
+        difference = 0
+        step = source.symbol(c + 14 + step) if several else SAME
+        require(step < 3, "step")
+        if step == BEGINS:
+            residual, jump_class = source.number(c + 10 + step_of(jump_class) // 2)
+            difference = jump = jump + unzigzag(residual)
+        elif step == ALONG and recent:
+            difference = recent.difference()
+        elif step == ALONG:
+            residual, last = source.number(c + 2 + step_of(last))
+            difference = unzigzag(residual)
+        values.append(signed(values[-1] + difference * divisor))
+        steps.append(step)
+    return form, values, steps
+
+
+def column(source, number, count, floating, before, steps=None):
+    """The number form (None except for floats) and the integers of a column from version 2 on. `steps`: of the guide."""
+    c, kind = 148 + source.tables.per_column * number, source.tables.kinds[number]
+    form, several, value, last, divisor = head(source, c, floating)
+    values, recent = [value], Recent(source, c, 3)
+    line, along = 0, [0, 0, 0]
     for k in range(1, count):
-        if head == 0:
+        if not several:
             values.append(values[0])
             continue
-        if kind == 1:
-            place = source.symbol(c + 2 + place)
-            require(place < 4, "place")
-            if place == 3:
-                number, last = source.number(c + 6 + step_of(last) // 2)
-                recent.append(unzigzag(number))
-            difference = recent.pop(place)
-            recent = [difference] + recent[:2]
+        step = steps[k] if steps else ALONG
+        if kind % 5 == 1 and step == ALONG:
+            difference = recent.difference()
         else:
-            number, last = source.number(c + 2 + step_of(last))
-            difference = unzigzag(number)
-        expected = before[k] - before[k - 1] if kind == 2 else 0
-        values.append(signed(values[-1] + expected + difference * divisor))
+            context = c + 2 + step_of(last) if step == ALONG else c + (14 if step == SAME else 10) + step_of(last) // 2
+            difference, last = source.number(context)
+            difference = unzigzag(difference)
+        if kind % 5 in (3, 4) and step == ALONG:
+            difference += along[0] if kind % 5 == 3 else sorted(along)[1]
+            along = [signed(difference)] + along[:2]
+        origin = line if kind >= 5 and step == BEGINS else k - 1
+        expected = before[k] - before[origin] if kind % 5 == 2 else 0
+        values.append(signed(values[origin] + expected + difference * divisor))
+        line = k if step == BEGINS else line
     return form, values
 
 
@@ -302,10 +358,14 @@ def typed(kind, form, values):
     return [value % (1 << bits) if kind.startswith("u") else signed(value, bits) for value in values]
 
 
-def columns(source, count, schema):
+def columns(source, count, schema, guided):
     out, before = [], None
     for a, channel in enumerate(schema):
-        form, before = column(source, a, count, channel["type"].startswith("float"), before)
+        if guided and a == source.tables.guide:
+            form, before, _ = guided
+        else:
+            steps = guided[2] if guided else None
+            form, before = column(source, a, count, channel["type"].startswith("float"), before, steps)
         out.append(typed(channel["type"], form, before))
     return out
 
@@ -346,12 +406,14 @@ class Cluster:
                 low[axis] += inside[0]
                 size[axis] -= sum(inside)
                 require(size[axis] > 0, "own box")
+        guided, follow = None, lambda: guide(source, tables.guide, count, schema[tables.guide]["type"].startswith("float"))
         if form & 1:
             places = []
             split(source, (0, 0, 0), size, count, places)
         elif not grid:
             require(tables.kinds is not None, "columns in version 1")
-            distances = [column(source, len(schema) + axis, count, False, None)[1] for axis in range(3)]
+            guided = follow() if tables.guide >= 0 else None
+            distances = [column(source, len(schema) + axis, count, False, None, guided and guided[2])[1] for axis in range(3)]
             places = [tuple(value % WORD for value in place) for place in zip(*distances)]
         else:
             cells = rows(source, size)
@@ -363,7 +425,8 @@ class Cluster:
         if tables.kinds is None:
             self.attributes = [attribute(source, 148 + 10 * a, count, channel["type"]) for a, channel in enumerate(schema)]
         else:
-            self.attributes = columns(source, count, schema)
+            guided = guided or (follow() if tables.guide >= 0 else None)
+            self.attributes = columns(source, count, schema, guided)
         for (lowest, highest), channel, values in zip(entry["ranges"], schema, self.attributes):
             require(all(lowest <= key(channel["type"], value) <= highest for value in values), "range")
         self.children = [ordinals(source, below == level - 1, count) for below in reversed(range(level))]
@@ -439,7 +502,7 @@ class Store:
         folder = pathlib.Path(folder)
         text = (folder / "manifest.json").read_bytes()
         self.manifest = json.loads(text)
-        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2), "not a store")
+        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2, 3), "not a store")
         self.checksum = self.manifest["checksum"]
         require(text[-12:] == b"%s\"\n}\n" % self.checksum.encode(), "end of the manifest")
         self.checksum = int(self.checksum, 16)

@@ -17,6 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "stand_in_hierarchy.hpp"
+#include "store/codec/column_codec.hpp"
 #include "store/codec/split_codec.hpp"
 #include "store/codec/tables.hpp"
 #include "store/write/side_by_side.hpp"
@@ -183,6 +184,53 @@ TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
     }
     std::sort(order.begin(), order.end());
     for (std::uint32_t i = 0; i < n; ++i) ASSERT_EQ(order[i], i);
+  }
+}
+
+/// Columns along the lines of a guide come back in every kind, with differences that wrap, that are
+/// multiples of something, or none.
+TEST(StoreCodec, ColumnsAlongLinesComeBackInEveryKind) {
+  Random random(9);
+  const BothTables tables(some_frequencies(random, 2 * context::kPerAttribute));
+  constexpr unsigned kOther = context::kPerAttribute;
+  for (int round = 0; round < 3000; ++round) {
+    SCOPED_TRACE(round);
+    const auto n = static_cast<std::uint32_t>(1 + random() % 60);
+    const auto kind = static_cast<ColumnKind>(random() % kColumnKinds);
+    const auto guide_kind = random() % 2 == 0 ? ColumnKind::plain : ColumnKind::recent;
+    const unsigned wide = random() % 2 == 0 ? 64 : 20;
+    const auto multiple = static_cast<std::int64_t>(random() % 3 == 0 ? 257 : 1);
+    std::vector<std::int64_t> guide(n), before(n), values(n);
+    std::int64_t time = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint64_t step = random() % 4;
+      const std::uint64_t by = step == 0 ? 0 : step < 3 ? any_number(random, 6) : random() >> 20;
+      time = wrapped_sum(time, static_cast<std::int64_t>(random() % 3 == 0 ? 0 - by : by));
+      guide[i] = time;
+      const auto any = [&] { return static_cast<std::int64_t>(any_number(random, wide)); };
+      before[i] = any();
+      values[i] = wrapped_product(random() % 2 == 0 && i > 0 ? values[i - 1] : any(), multiple);
+    }
+    SymbolEncoder encoder(tables.encode);
+    encoder.start();
+    Lines lines;
+    std::vector<std::int64_t> scratch(n), guide_in = guide, values_in = values;
+    code_guide(encoder, 0, guide_kind, nullptr, lines, 100, guide_in.data(), scratch.data(), n);
+    code_column(encoder, kOther, kind, nullptr, &lines, before.data(), values_in.data(),
+                scratch.data(), n);
+    Bytes bytes;
+    encoder.finish(7, bytes);
+    const Bytes room = padded(bytes);
+    SymbolDecoder decoder(tables.pointers, inside(room));
+    Lines found;
+    std::vector<std::int64_t> guide_out(n), values_out(n);
+    code_guide(decoder, 0, guide_kind, nullptr, found, 0, guide_out.data(), nullptr, n);
+    code_column(decoder, kOther, kind, nullptr, &found, before.data(), values_out.data(), nullptr,
+                n);
+    EXPECT_EQ(decoder.finish(), 7u);
+    ASSERT_EQ(guide_out, guide);
+    ASSERT_EQ(values_out, values);
+    for (std::uint32_t i = 1; i < n; ++i) ASSERT_EQ(found[i], lines[i]);
   }
 }
 

@@ -136,7 +136,7 @@ TEST(StoreDamage, NewerVersionAsksForAnUpdate) {
   std::string text = bytes_of(path / "manifest.json");
   const std::size_t at = text.find("\"version\": ");
   ASSERT_NE(at, std::string::npos);
-  write_bytes(path / "manifest.json", text.replace(at, 12, "\"version\": 3"));
+  write_bytes(path / "manifest.json", text.replace(at, 12, "\"version\": 9"));
   const std::string words = error_of([&] { Store::open(path); });
   EXPECT_TRUE(contains(words, "newer terrace")) << words;
   EXPECT_TRUE(contains(words, "update")) << words;

@@ -662,13 +662,28 @@ TEST(StoreInvariants, KindsOfColumnsThatDoNotExistAreNotRead) {
     store::Tables tables = even_tables(layout, store::ColumnKind::plain);
     tables.kinds[column] = store::ColumnKind::beside;
     store::Bytes bytes;
-    tables.write(bytes);
+    tables.write(bytes, layout.version);
     if (column == 3) {
       EXPECT_EQ(store::Tables::read(bytes, layout).kinds, tables.kinds);
     } else {
       EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
     }
-    bytes[8 + column] = 3;
+    const std::size_t kind = 9 + column, guide = 8;
+    bytes[kind] = 3;
+    EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
+    // With a guide more kinds exist, but not for the guide itself.
+    bytes[guide] = 4;
+    if (column == 3) {
+      EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage);
+      bytes[kind] = 2;
+      EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage);
+      bytes[kind] = 1;
+    }
+    EXPECT_EQ(store::Tables::read(bytes, layout).guide.attribute, 3u);
+    bytes[kind] = 10;
+    EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
+    bytes[kind] = 0;
+    bytes[guide] = 5;
     EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
   }
 }

@@ -334,7 +334,8 @@ TEST(Store, GoldenStoresAreSound) {
         {"uint64", 1, 432},
         {"cloud", 1, 1200},
         {"empty", 1, 0},
-        {"survey", 2, 1500}}) {
+        {"survey", 2, 1500},
+        {"lines", 3, 2236}}) {
     SCOPED_TRACE(name);
     const Store store = Store::open(folder / name);
     EXPECT_EQ(store.version(), version);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/point_cells.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +7,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "mesh/bounded/point_mesh_cells.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bytes of a store are a function of input and options: not of the compiler or its
 // optimisation.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
@@ -108,6 +109,64 @@ TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
   visit(read, met);
   EXPECT_EQ(read, 0u);
   EXPECT_EQ(met, 0u);
+}
+
+// Every point of a level and above belongs to one cluster of each level that is not finer.
+TEST(StoreBuild, TheClustersOfALevelPartThePointsOfEveryFinerOne) {
+  const tests::TemporaryFolder folder;
+  const fs::path points = folder.path() / "points.csv";
+  {
+    std::ofstream file(points);
+    file << "x,y,z,number\n";
+    for (int i = 0; i < 20000; ++i) {
+      file << i * 7919 % 10007 << ',' << i * 104729 % 10009 << ',' << i % 97 << ',' << i << '\n';
+    }
+  }
+  BuildRequest request;
+  request.inputs = {points.string()};
+  request.store = folder.path() / "store";
+  request.block_points = 50;
+  build_store(request);
+  const stream::Store store = stream::Store::open(request.store);
+  ASSERT_GE(store.top(), 2u);
+  const auto numbers_of = [&](const Detail& detail) {
+    std::vector<double> numbers;
+    for_each_wanted_point(store, detail,
+                          [&](stream::ClusterId, const stream::ClusterPoints& of, std::size_t i,
+                              const stream::Point3& place) {
+                            numbers.push_back(store.schema().view<double>(of.payload, 0)[i]);
+                            EXPECT_EQ(place[2], static_cast<int>(numbers.back()) % 97);
+                          });
+    return numbers;
+  };
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    for (unsigned finer = 0; finer <= level; ++finer) {
+      SCOPED_TRACE(std::to_string(level) + " of " + std::to_string(finer));
+      std::vector<double> expected = numbers_of({.level = finer}), met;
+      std::uint64_t records = 0;
+      for (std::uint64_t c = 0; c < store.levels()[level].clusters; ++c) {
+        const stream::ClusterId id = stream::cluster_id(level, c);
+        const Detail detail{.level = finer, .cluster = id};
+        const std::vector<double> of = numbers_of(detail);
+        if (finer == 0) {
+          EXPECT_EQ(of.size(), store.record(id).summary.descendants);
+        }
+        met.insert(met.end(), of.begin(), of.end());
+        for_each_wanted_record(store, detail,
+                               [&](stream::ClusterId, const stream::ClusterRecord& record) {
+                                 records += record.points;
+                               });
+      }
+      // All but the representatives, which are members of coarser clusters.
+      EXPECT_EQ(records + (level < store.top() ? store.levels()[level].clusters : 0), met.size());
+      std::sort(expected.begin(), expected.end());
+      std::sort(met.begin(), met.end());
+      EXPECT_EQ(met, expected);
+    }
+  }
+  EXPECT_THROW(numbers_of({.cluster = stream::cluster_id(store.top(), 1)}), UsageError);
+  EXPECT_THROW(numbers_of({.cluster = stream::cluster_id(store.top() + 1, 0)}), UsageError);
+  EXPECT_THROW(numbers_of({.level = 1, .cluster = stream::cluster_id(0, 0)}), UsageError);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 
 #include <algorithm>
 #include <cmath>

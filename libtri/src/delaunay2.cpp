@@ -73,7 +73,12 @@ VertexId Delaunay2<Coord, Metric>::build_grid(
   if (rows > 0 && columns > kMaxVertices / rows) check_count(0, std::size_t{columns} * rows);
   const std::vector<Coord> xs = grid_lines<Kernel>(x0, step, columns, "x");
   const std::vector<Coord> ys = grid_lines<Kernel>(y0, step, rows, "y");
-  return VertexId{planar::build_grid<Kernel>(impl_->mesh, xs, ys)};
+  // Clang 14 instantiates members whose constraints are not met, too.
+  if constexpr (std::is_same_v<Metric, Euclidean>) {
+    return VertexId{planar::build_grid<Kernel>(impl_->mesh, xs, ys)};
+  } else {
+    return kNoVertex;
+  }
 }
 
 template <class Coord, class Metric>

@@ -8,15 +8,25 @@
 #include "delaunay3/access.hpp"
 #include "shape/criterion.hpp"
 #include "shape/flood.hpp"
+#include "shape/lids.hpp"
+#include "shape/poles.hpp"
 #include "shape/published.hpp"
 #include "shape/rescue.hpp"
 #include "shape/state.hpp"
+#include "shape/touching.hpp"
 
 namespace terrace::tri {
 template <class Triangulation>
 struct BasicShape3<Triangulation>::Impl {
   ShapeOptions options;
   shape::State state;
+
+  static shape::Spheres spheres(const Triangulation& triangulation, unsigned threads) {
+    [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+    const auto& mesh = Delaunay3Access::mesh(triangulation);
+    return {std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()), shape::places_of(mesh),
+            threads};
+  }
 
   template <class Work>
   void with_criterion(const Triangulation& triangulation, const Work& work) const {
@@ -46,9 +56,16 @@ template <class Triangulation>
 BasicShape3<Triangulation>& BasicShape3<Triangulation>::operator=(BasicShape3&&) noexcept = default;
 
 template <class Triangulation>
-void BasicShape3<Triangulation>::restore(const Triangulation& triangulation) {
+void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, unsigned threads) {
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   shape::State& state = impl_->state;
+  if (impl_->options.rule == ShapeRule::kPoles) {
+    const shape::Spheres spheres = impl_->spheres(triangulation, threads);
+    std::vector<std::uint8_t> inside = shape::signed_forest(spheres, threads);
+    shape::smooth(spheres, inside);
+    shape::sculpt(spheres, inside);
+    return shape::set_labels(mesh, state, inside);
+  }
   const bool keep_vertices = impl_->options.keep_vertices;
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
     if (impl_->options.rule == ShapeRule::kFlood) {
@@ -118,6 +135,7 @@ ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulat
       if (shape::is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
       // In order with the corner first, so counter-clockwise when seen from the other side.
       faces.push_back(spatial::facet_of(tetrahedron, i));
+      result.behind.push_back(TetrahedronId{t});
       for (const std::uint32_t v : faces.back()) number[v] = 0;
     }
   }
@@ -130,6 +148,22 @@ ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulat
   for (auto& face : faces)
     for (std::uint32_t& v : face) v = number[v];
   return result;
+}
+
+template <class Triangulation>
+ShapeSurface BasicShape3<Triangulation>::surface_without_lids(
+    const Triangulation& triangulation) const {
+  ShapeSurface result = surface(triangulation);
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+  shape::leave_out_lids(mesh, shape::places_of(mesh), result);
+  return result;
+}
+
+template <class Triangulation>
+ShapeParts BasicShape3<Triangulation>::parts(const Triangulation& triangulation,
+                                             const ShapeSurface& surface) const {
+  return shape::parts_apart(Delaunay3Access::mesh(triangulation), impl_->state, surface);
 }
 
 template <class Triangulation>

@@ -32,11 +32,11 @@ std::vector<Space> ellipsoid(std::size_t count, const Space& radii) {
 }
 
 std::vector<ShapeOptions> all_options() {
-  std::vector<ShapeOptions> result;
+  std::vector<ShapeOptions> result{{}};
   for (const auto criterion : {ShapeCriterion::kGabriel, ShapeCriterion::kEdgeLength}) {
     for (const auto rule : {ShapeRule::kFlood, ShapeRule::kPublished}) {
       for (const bool keep : {true, false}) {
-        result.push_back({criterion, rule, 0.7, keep});
+        result.push_back({rule, criterion, 0.7, keep});
       }
     }
   }
@@ -126,7 +126,7 @@ TEST(EllipticalShape, AnEllipsoidOfStretchedSamplesComesBack) {
   EXPECT_EQ(measures.euler_characteristic, 2);
   EXPECT_NEAR(measures.volume, 4.0 / 3 * 3.141592653589793 * 40, 1.5);
   // Edge lengths: with 1, which restores uniform samples (see ShapeOptions).
-  options.shape = {ShapeCriterion::kEdgeLength, ShapeRule::kFlood, 1.0, true};
+  options.shape = {ShapeRule::kFlood, ShapeCriterion::kEdgeLength, 1.0, true};
   EXPECT_EQ(measure(restore_surface(points, options).surface).faces, 3996u);
 
   options.quantise_bits = 20;

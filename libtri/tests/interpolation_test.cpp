@@ -357,6 +357,30 @@ TEST(Interpolation, ManyNeighboursOfOneQuery) {
   for (const auto& [vertex, weight] : weights) ASSERT_NEAR(weight, 1.0 / kCorners, 1e-11);
 }
 
+TEST(Interpolation, ManyNearlyCocircularNeighboursReproducePlanes) {
+  // Doubles do not suffice, and sums of exact quotients would have as many digits as neighbours.
+  std::vector<std::array<double, 2>> points;
+  for (int i = 0; i < 400; ++i) {
+    points.push_back({1000 * std::cos(i * 0.1), 1000 * std::sin(i * 0.1)});
+  }
+  Delaunay2<double> triangulation;
+  const std::vector<VertexId> vertices = triangulation.build(points);
+  std::vector<double> heights(triangulation.vertex_slots());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    heights[slot(vertices[i])] = 3 + 0.25 * points[i][0] - 0.5 * points[i][1];
+  }
+  const std::vector<std::array<double, 2>> queries{{1, 2}, {300, -400}};
+  const std::vector<double> at =
+      heights_at(triangulation, heights, queries, Interpolation::kNaturalNeighbour, 1);
+  const std::vector<Gradient> gradients =
+      gradients_at(triangulation, heights, queries, GradientFrom::kNaturalNeighbours, 1);
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    EXPECT_NEAR(at[i], 3 + 0.25 * queries[i][0] - 0.5 * queries[i][1], 1e-8);
+    EXPECT_NEAR(gradients[i].x, 0.25, 1e-9);
+    EXPECT_NEAR(gradients[i].y, -0.5, 1e-9);
+  }
+}
+
 TEST(Interpolation, SlopeAndAspect) {
   EXPECT_DOUBLE_EQ(slope_degrees({1, 0}), 45);
   EXPECT_DOUBLE_EQ(slope_degrees({0, 0}), 0);

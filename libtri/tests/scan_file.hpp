@@ -17,8 +17,8 @@
 
 #include "terrace/tri/shape.hpp"
 
-/// Scans for tests and benchmarks: PLY (ASCII and little-endian binary, points first, then faces
-/// with one list as their first property) and OBJ with triangles.
+/// Scans for tests and benchmarks: PLY (ASCII and binary, points first, then faces with one list as
+/// their first property) and OBJ; polygons as fans of triangles.
 
 namespace terrace::tri {
 
@@ -31,16 +31,19 @@ inline std::size_t size_of(const std::string& type) {
   return 4;
 }
 
-/// One number, from text or little-endian bytes.
-inline double read_number(std::istream& in, const std::string& type, bool ascii) {
+enum class Format { ascii, little_endian, big_endian };
+
+/// One number, from text or bytes.
+inline double read_number(std::istream& in, const std::string& type, Format format) {
   double value = std::numeric_limits<double>::quiet_NaN();
-  if (ascii) {
+  if (format == Format::ascii) {
     in >> value;
     return value;
   }
   static_assert(std::endian::native == std::endian::little);
   char bytes[8] = {};
   in.read(bytes, static_cast<std::streamsize>(size_of(type)));
+  if (format == Format::big_endian) std::reverse(bytes, bytes + size_of(type));
   const auto as = [&](auto number) {
     std::memcpy(&number, bytes, sizeof number);
     return static_cast<double>(number);
@@ -65,7 +68,7 @@ inline Surface read_ply(std::istream& in) {
     std::vector<std::vector<std::string>> properties;  // the words after "property"
   };
   std::vector<Element> elements;
-  bool ascii = true;
+  auto format = scan_file::Format::ascii;
   std::string line;
   while (std::getline(in, line) && line.rfind("end_header", 0) != 0) {
     std::istringstream words(line);
@@ -73,7 +76,8 @@ inline Surface read_ply(std::istream& in) {
     words >> word;
     if (word == "format") {
       words >> word;
-      ascii = word == "ascii";
+      if (word == "binary_little_endian") format = scan_file::Format::little_endian;
+      if (word == "binary_big_endian") format = scan_file::Format::big_endian;
     } else if (word == "element") {
       elements.emplace_back();
       words >> elements.back().name >> elements.back().count;
@@ -88,15 +92,15 @@ inline Surface read_ply(std::istream& in) {
       std::array<double, 3> point{};
       for (const auto& property : element.properties) {
         if (property[0] != "list") {
-          const double value = read_number(in, property[0], ascii);
+          const double value = read_number(in, property[0], format);
           const std::size_t axis = std::string("xyz").find(property[1]);
           if (property[1].size() == 1 && axis < 3) point[axis] = value;
           continue;
         }
         std::vector<std::uint32_t> corners(
-            static_cast<std::size_t>(read_number(in, property[1], ascii)));
+            static_cast<std::size_t>(read_number(in, property[1], format)));
         for (auto& corner : corners)
-          corner = static_cast<std::uint32_t>(read_number(in, property[2], ascii));
+          corner = static_cast<std::uint32_t>(read_number(in, property[2], format));
         if (element.name != "face") continue;
         for (std::size_t i = 2; i < corners.size(); ++i)
           surface.faces.push_back({corners[0], corners[i - 1], corners[i]});
@@ -120,13 +124,11 @@ inline Surface read_obj(std::istream& in) {
       words >> point[0] >> point[1] >> point[2];
       surface.points.push_back(point);
     } else if (kind == "f") {
-      std::array<std::uint32_t, 3> face{};
-      for (auto& corner : face) {
-        std::string word;
-        words >> word;
-        corner = static_cast<std::uint32_t>(std::stoul(word) - 1);
-      }
-      surface.faces.push_back(face);
+      std::vector<std::uint32_t> corners;
+      for (std::string word; words >> word;)
+        corners.push_back(static_cast<std::uint32_t>(std::stoul(word) - 1));
+      for (std::size_t i = 2; i < corners.size(); ++i)
+        surface.faces.push_back({corners[0], corners[i - 1], corners[i]});
     }
   }
   if (surface.points.empty()) throw std::runtime_error("not an OBJ file");

@@ -17,7 +17,7 @@ std::vector<ShapeOptions> all_options() {
   for (const auto criterion : {ShapeCriterion::kGabriel, ShapeCriterion::kEdgeLength})
     for (const auto rule : {ShapeRule::kFlood, ShapeRule::kPublished})
       for (const bool keep_vertices : {false, true})
-        result.push_back({criterion, rule, 0.55, keep_vertices});
+        result.push_back({rule, criterion, 0.55, keep_vertices});
   return result;
 }
 

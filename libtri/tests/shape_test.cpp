@@ -143,6 +143,7 @@ TEST(ShapeTest, Cup) {
 TEST(ShapeTest, SphereByEdgeLength) {
   Noise noise{std::mt19937_64(7), 0.001};
   ShapeOptions options;
+  options.rule = ShapeRule::kFlood;
   options.criterion = ShapeCriterion::kEdgeLength;
   options.edge_factor = 1.0;
   const SurfaceMeasures measured = restored(sphere(1.0, {0, 0, 0}, 0.1, noise), options);
@@ -158,6 +159,7 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
   Delaunay3<double> triangulation;
   triangulation.build(points);
   ShapeOptions options;
+  options.rule = ShapeRule::kFlood;
   options.keep_vertices = false;
   Shape3<double> flood(options);
   flood.restore(triangulation);
@@ -178,7 +180,9 @@ TEST(ShapeTest, AGridStaysWhole) {
   const auto points = make_points3<std::int32_t>(PointSet3::kGrid, 512, 0);
   Delaunay3<std::int32_t> triangulation;
   triangulation.build(points);
-  Shape3<std::int32_t> shape;
+  ShapeOptions options;
+  options.rule = ShapeRule::kFlood;
+  Shape3<std::int32_t> shape(options);
   shape.restore(triangulation);
   const SurfaceMeasures measured = measure(shape.surface(triangulation).surface);
   EXPECT_EQ(shape.kept_count(), triangulation.tetrahedron_count());

@@ -63,7 +63,7 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
       for (const auto& [id, d] : demands) {
         const std::size_t members = world.source.at(id).positions.size();
         if (d.want <= 1.0 || !control.model().can_expand(id)) continue;
-        if (ViewCache::bytes_of(level_of(id), members) >
+        if (ViewCache({}).bytes_of(level_of(id), members) >
             static_cast<double>(options.max_cached_bytes)) {
           continue;
         }

@@ -145,6 +145,21 @@ class FrameTest(CommandTest):
                 self.assert_one_line_error(terrace(*args, cwd=self.folder), 2)
         self.assertEqual(os.listdir(self.folder), [])
 
+    def test_names_of_formats_that_do_not_exist_are_2(self):
+        self.assertEqual(terrace('synth', 'surface', '--points', '100', '-o', 's.ply', cwd=self.folder).returncode, 0)
+        self.assertEqual(terrace('build', 's.ply', '-o', 's.store', cwd=self.folder).returncode, 0)
+        before = sorted(os.listdir(self.folder))
+        for args in (['build', 's.ply', '-o', 'z', '--input-format', 'foo'], ['convert', 's.ply', '-o', 'y', '--format', 'foo'],
+                     ['convert', 's.ply', '-o', 'y.xyz', '--input-format', 'foo'], ['points', 's.store', '-o', 'y', '--format', 'foo'],
+                     ['mesh', 's.store', '-o', 'y', '--format', 'foo'], ['surface', 's.store', '-o', 'y', '--format', 'foo'],
+                     ['cluster', 's.ply', '-o', 'y.xyz', '--format', 'foo'],
+                     ['match', 's.ply', '-o', 'y.csv', '--input-format', 'foo']):
+            with self.subTest(args=args):
+                result = terrace(*args, cwd=self.folder)
+                self.assert_one_line_error(result, 2)
+                self.assertIn('known are', result.stderr)
+        self.assertEqual(sorted(os.listdir(self.folder)), before)
+
     def test_refused_verbs_and_flags_are_2_and_hidden(self):
         refused = [['surface', 's', '-o', 'x'], ['mesh', 's', '-o', 'x', '--max-error', '1'],
                    ['mesh', 's', '-o', 'x', '--base'], ['build', 'a', '-o', 's', '--resume'],

@@ -203,6 +203,21 @@ class StoreTest(unittest.TestCase):
                       ['--near', f'{x},{y}', '-k', 2, '--region', '0,0,1,1']):
             self.expect_error(2, 'points', self.store, '-o', '-', *wrong)
 
+    def test_points_of_clusters(self):
+        def lines(*args):
+            return sorted(self.run_ok('points', self.store, '-o', '-', *args).splitlines())
+
+        level = json.loads(self.run_ok('info', self.store, '--json'))['levels'][1]
+        clusters = [lines('--cluster', f'1:{n}') for n in range(level['clusters'])]
+        self.assertEqual(sorted(sum(clusters, [])), lines('--level', 1))
+        below = lines('--cluster', '1:0', '--level', 0)
+        self.assertLess(set(clusters[0]), set(below))
+        self.assertLess(set(below), set(lines()))
+        for wrong in ('1', '1:x', 'x:1', '1:-1', '1:2:3', f'1:{level["clusters"]}', '77:0', '300:0'):
+            self.expect_error(2, 'points', self.store, '-o', '-', '--cluster', wrong)
+        self.expect_error(2, 'points', self.store, '-o', '-', '--cluster', '0:0', '--level', 1)
+        self.expect_error(2, 'points', self.store, '-o', '-', '--cluster', '0:0', '--region', '0,0,1,1')
+
     def test_mesh_in_every_format(self):
         for ending in ('ply', 'obj', 'glb'):
             out = self.path(f'mesh.{ending}')

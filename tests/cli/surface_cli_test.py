@@ -94,7 +94,7 @@ class SurfaceTest(unittest.TestCase):
         self.assertLess(mixed['vertices'], fine['vertices'])
 
     def test_the_other_criteria(self):
-        for criterion in ('edge:1', 'advancing-front', 'alpha-wrap', 'alpha-wrap:2'):
+        for criterion in ('gabriel', 'edge:1', 'advancing-front', 'alpha-wrap', 'alpha-wrap:2'):
             summary, _ = self.surface('other.ply', '--criterion', criterion)
             self.assertGreater(summary['triangles'], 100)
             self.assertAlmostEqual(summary['area'], 4 * math.pi * RADIUS ** 2, delta=300)
@@ -146,7 +146,7 @@ class SurfaceTest(unittest.TestCase):
         by_rotation = self.write_metric('rotation.json', semi_axes=[1, 1, stretch],
                                         rotation=[[c, s, 0], [0, 0, 1], [-s, c, 0]])
         for metric in (by_angle, by_rotation):
-            for options in ([], ['--criterion', 'edge:1'], ['--tetrahedra']):
+            for options in ([], ['--criterion', 'gabriel'], ['--tetrahedra']):
                 out = self.path('torus.vtk' if '--tetrahedra' in options else 'torus.obj')
                 result = terrace('surface', store, '-o', out, '--json', '--force', '--metric', metric,
                                  *options)

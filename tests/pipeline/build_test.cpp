@@ -105,9 +105,9 @@ TEST_F(Build, OneOfTwoAtOnceIsGivenUpAndTheOtherGoesOn) {
   const auto expected = files_of(request_.store);
   std::stop_source stop;
   bool given_up = false;
+  terrain::BuildRequest request = request_;
+  request.store = folder_.path() / "given_up";
   std::thread other([&] {
-    terrain::BuildRequest request = request_;
-    request.store = folder_.path() / "given_up";
     try {
       terrain::build_store(request, {.threads = 2,
                                      .stop = stop.get_token(),

@@ -21,7 +21,7 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/orientation.hpp"
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 #include "random.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"

@@ -77,8 +77,7 @@ void check_windows(const stream::Store& store, unsigned level, int boxes) {
   for (int i = 0; i < boxes; ++i) {
     SCOPED_TRACE("level " + std::to_string(level) + ", box " + std::to_string(i));
     const StoredBox box = random_box(store.bounds(), random, static_cast<std::uint64_t>(i));
-    const auto reach = i % 2 == 0 ? PointWindow::Reach::kTriangles : PointWindow::Reach::kCircles;
-    window.load(box, reach);
+    window.load(box);
     std::map<Triangle, std::array<double, 3>> certain;
     for (const tri::TriangleId t : window.triangulation().all_triangles()) {
       if (!window.is_certain(t)) continue;

@@ -167,6 +167,47 @@ test('a phone and a cloud', async () => {
   await close();
 });
 
+test('a cloud by its colours, classes and intensities', async () => {
+  const {page, errors, close} = await open('#s=cloud', {size: {width: 900, height: 600}});
+  const spots = Array.from({length: 400}, (_, i) => [0.3 + 0.4 * (i % 20) / 20, 0.4 + 0.25 * Math.floor(i / 20) / 20]);
+  const seen = async () => {
+    await page.waitForTimeout(400);
+    return pixels(page, spots);
+  };
+  const kinds = shown => {
+    const red = [], blue = [];
+    shown.forEach(([r, , b], i) => {
+      if (r > 150 && b < 60) red.push(spots[i][0]);
+      if (b > 150 && r < 60) blue.push(spots[i][0]);
+    });
+    return {red, blue};
+  };
+  // It comes in its own colours: red in the west, blue in the east.
+  assert.equal(await page.isChecked('input[value=rgb]'), true);
+  assert.ok(!await page.isVisible('#by-slope'));
+  const {red, blue} = kinds(await seen());
+  assert.ok(red.length > 20 && blue.length > 20, `${red.length} red, ${blue.length} blue`);
+  assert.ok(Math.max(...red) < Math.min(...blue) + 0.05);
+  await page.screenshot({path: join(packages, 'viewer-cloud.png')});
+  await page.click('text=Class');
+  assert.deepEqual(await page.$$eval('#classes li', items => items.map(item => item.textContent)), ['2 ground', '9 water']);
+  const classes = kinds(await seen());
+  assert.equal(classes.red.length, 0);
+  await page.click('text=Intensity');
+  const greys = await seen();
+  assert.ok(greys.filter(([r, g, b]) => Math.abs(r - g) < 12 && Math.abs(g - b) < 16 && r < 200).length > 40);
+  for (let x = 400; !await page.isVisible('#place'); x += 7) {
+    assert.ok(x < 600, 'no point is met');
+    await page.mouse.click(x, 320);
+    await page.waitForTimeout(100);
+  }
+  const rows = await page.$$eval('#place-text dt', dts => dts.map(dt => dt.textContent));
+  for (const name of ['red', 'green', 'blue', 'classification', 'intensity']) assert.ok(rows.includes(name), rows.join());
+  assert.match(page.url(), /c=intensity/);
+  assert.deepEqual(errors, []);
+  await close();
+});
+
 for (const [fault, expected] of Object.entries({
        whole: /whole files/, short: /does not answer|bytes came/, missing: /no such file/, replaced: /replaced/, damaged: /checksum|damaged/,
        error: /HTTP 500/, dead: /does not answer/

@@ -28,14 +28,16 @@ export class Sites {
     }
     writeFileSync(join(this.folder, 'flat.asc'), `${flat.join('\n')}\n`);
     this.terrace('build', 'flat.asc', '-o', 'flat.store', '--block', '1000', '-q');
-    let cloud = '', state = 12345;
+    let cloud = 'x,y,z,red,green,blue,classification,intensity\n', state = 12345;
     const random = () => (state = (state * 1103515245 + 12345) % 2147483648) / 2147483648;
     for (let i = 0; i < 40_000; ++i) {
       const x = 100 * random(), y = 80 * random();
-      cloud += `${x} ${y} ${3 * Math.sin(x / 9) + (i % 5 === 0 ? 4 * random() : 0)}\n`;
+      // Left of the middle it is red ground, right of it blue water.
+      const tree = i % 5 === 0, colours = x < 50 ? '60000,2570,0' : '0,2570,60000';
+      cloud += `${x},${y},${3 * Math.sin(x / 9) + (tree ? 4 * random() : 0)},${colours},${x < 50 ? 2 : 9},${i % 1000}\n`;
     }
-    writeFileSync(join(this.folder, 'cloud.xyz'), cloud);
-    this.terrace('build', 'cloud.xyz', '-o', 'cloud.store', '--block', '2000', '-q');
+    writeFileSync(join(this.folder, 'cloud.csv'), cloud);
+    this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
     this.terrace('publish', 'alps.store', 'flat.store', 'cloud.store', '-o', 'site', '-q');
   }
   flight(name, maxPoints = MAX_POINTS) {

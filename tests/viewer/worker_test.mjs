@@ -73,8 +73,8 @@ for (const name of ['alps', 'flat', 'cloud']) {
     const flight = sites.flight(name);
     assert.ok(new Set(flight.map(stop => stop.hash)).size >= 4, 'the flight does not change what is shown');
     const flyer = new Flyer(name);
-    const {triangles} = await flyer.opened();
-    assert.equal(triangles, name !== 'cloud');
+    const {scene} = await flyer.opened();
+    assert.equal(scene.triangles, name !== 'cloud');
     for (const [i, stop] of flight.entries()) {
       const state = await flyer.settle(stop);
       assert.deepEqual([i, state.points, state.expanded], [i, stop.points, stop.expanded]);

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <random>
 #include <set>
@@ -59,8 +61,9 @@ class Scenes : public testing::Test {
 };
 
 /// What a page has: arrays by slot, to which changes are applied.
-struct Mirror {
-  std::vector<SceneVertex> vertices;
+template <class Vertex>
+struct MirrorOf {
+  std::vector<Vertex> vertices;
   std::vector<SceneTriangle> triangles;
 
   void apply(const SceneChanges& changes) {
@@ -72,7 +75,9 @@ struct Mirror {
                     SceneChanges::kBlock, to.begin() + static_cast<std::ptrdiff_t>(begin));
       }
     };
-    put(changes.vertex_blocks, changes.vertices, vertices);
+    std::vector<Vertex> changed(changes.vertices.size() / sizeof(Vertex));
+    std::memcpy(changed.data(), changes.vertices.data(), changes.vertices.size());
+    put(changes.vertex_blocks, changed, vertices);
     put(changes.triangle_blocks, changes.triangles, triangles);
   }
   [[nodiscard]] std::array<int, 2> cell(std::uint32_t slot) const {
@@ -81,6 +86,7 @@ struct Mirror {
             static_cast<int>(std::lround((kRows - 1) / 2.0 - v.y / 10))};
   }
 };
+using Mirror = MirrorOf<SceneVertex>;
 
 tri::View looking(double east, double north, double above, double pixel_error) {
   tri::View view;
@@ -176,6 +182,65 @@ TEST_F(Scenes, ARayMeetsTheSurfaceWhereItsHeightIs) {
   }
   EXPECT_FALSE(scene->pick({0, 0, 5000}, {0, 0, 1}, 0.01));
   EXPECT_FALSE(scene->pick({1e5, 0, 5000}, {0, 0, -1}, 0.01));
+}
+
+// Attributes travel with the points: whatever came and went, each is drawn by its own.
+TEST_F(Scenes, PointsHaveTheirOwnColoursClassesAndIntensities) {
+  const std::filesystem::path file = folder_ / "cloud.csv", built = folder_ / "cloud";
+  const auto group_at = [](int x, int y) { return (x / 10 + y / 20) % 12; };
+  {
+    std::ofstream out(file);
+    out << "x,y,z,red,green,blue,classification,intensity\n";
+    for (int i = 0; i < 30000; ++i) {
+      const int x = i * 7919 % 1009, y = i * 10711 % 1013;
+      out << x << ',' << y << ',' << i % 37 << ',' << x * 60 << ',' << y * 60 << ',' << (x + y) * 30
+          << ',' << group_at(x, y) << ',' << 1000 + x << '\n';
+    }
+  }
+  terrain::BuildRequest request{.inputs = {file.string()}, .store = built};
+  request.block_points = 1000;
+  terrain::build_store(request);
+  const stream::Store cloud = stream::Store::open(built);
+  const stream::Box3 bounds = cloud.bounds();
+  const std::array<double, 2> middle{(bounds.min[0] + bounds.max[0]) / 2,
+                                     (bounds.min[1] + bounds.max[1]) / 2};
+  const auto scene = Scene::open(cloud, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1'000'000);
+  EXPECT_TRUE(scene->colours().has_rgb());
+  EXPECT_TRUE(scene->colours().has_intensity());
+  EXPECT_EQ(scene->colours().groups().size(), 12u);
+  MirrorOf<ScenePoint> mirror;
+  std::size_t shown = 0, most = 0;
+  ScenePoint last;
+  for (int flight = 0; flight < 12; ++flight) {
+    const tri::View view = looking(-400 + 80 * flight, 300 - 60 * flight, 150, 2);
+    SceneState state;
+    do {
+      state = scene->frame(view, 0.01, 0);
+      mirror.apply(scene->take_changes());
+    } while (!state.settled);
+    shown = 0;
+    for (const ScenePoint& p : mirror.vertices) {
+      if (p.level == SceneVertex::kNone) continue;
+      ++shown;
+      last = p;
+      const auto x = static_cast<int>(std::lround(p.x + middle[0]));
+      const auto y = static_cast<int>(std::lround(p.y + middle[1]));
+      ASSERT_EQ(p.rgb[0], x * 60 / 257) << x << ", " << y;
+      ASSERT_EQ(p.rgb[1], y * 60 / 257);
+      ASSERT_EQ(p.rgb[2], (x + y) * 30 / 257);
+      ASSERT_EQ(p.group, group_at(x, y));
+      // Stretched over most of 1000 ... 2008.
+      ASSERT_NEAR(p.intensity, std::clamp(255 * (x - 20) / 968.0, 0.0, 255.0), 8);
+    }
+    EXPECT_EQ(shown, state.points);
+    most = std::max(most, shown);
+  }
+  EXPECT_GT(most, 2000u);
+  const auto hit = scene->pick({last.x, last.y, 500}, {0, 0, -1}, 1e-4);
+  ASSERT_TRUE(hit);
+  ASSERT_EQ(hit->attributes.size(), 5u);
+  EXPECT_EQ(hit->attributes[0], 60 * hit->stored[0]);
+  EXPECT_EQ(hit->attributes[4], 1000 + hit->stored[0]);
 }
 
 TEST_F(Scenes, ClustersExpandAndCollapseByHand) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cassert>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -76,10 +77,8 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
     for (const Format& format : formats()) {
       if (format.name == options.format) return format;
     }
-    throw Error({.file = {},
-                 .where = {},
-                 .cause = "unknown input format '" + options.format + "'",
-                 .remedy = "known are " + known_formats()});
+    throw std::invalid_argument("unknown input format '" + options.format + "'; known are " +
+                                known_formats());
   }
   const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
   const auto bytes = std::as_bytes(std::span(head));

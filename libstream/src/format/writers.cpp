@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <stdexcept>
 
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -73,10 +74,8 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
     return i;
   }
   if (!options.format.empty()) {
-    throw Error({.file = path,
-                 .where = {},
-                 .cause = "unknown output format '" + options.format + "'",
-                 .remedy = "known are " + known(table)});
+    throw std::invalid_argument("unknown output format '" + options.format + "'; known are " +
+                                known(table));
   }
   throw Error({.file = path,
                .where = {},

@@ -5,9 +5,30 @@
 #include <cassert>
 #include <cstring>
 
+#include "terrace/stream/error.hpp"
 #include "with_type.hpp"
 
 namespace terrace::stream {
+namespace {
+
+/// Copies a few bytes, by words: inlined, unlike a call for a size that is not known.
+inline void copy_short(const std::byte* from, std::byte* to, std::size_t bytes) {
+  using Word = std::uint64_t;
+  if (bytes < sizeof(Word)) {
+    for (std::size_t i = 0; i < bytes; ++i) to[i] = from[i];
+    return;
+  }
+  const auto copy_at = [&](std::size_t at) {
+    Word word;
+    std::memcpy(&word, from + at, sizeof word);
+    std::memcpy(to + at, &word, sizeof word);
+  };
+  for (std::size_t at = 0; at + sizeof(Word) < bytes; at += sizeof(Word)) copy_at(at);
+  copy_at(bytes - sizeof(Word));
+}
+
+}  // namespace
+
 PackedPoints::PackedPoints(const Schema& schema) {
   std::size_t bytes = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -36,8 +57,8 @@ void PackedPoints::pack(const PointBlock& block, std::vector<std::byte>& records
   const std::size_t payload = payload_bytes();
   if (payload == 0) return;
   for (std::size_t i = 0; i < block.size(); ++i) {
-    std::memcpy(records.data() + i * record_bytes_ + payload_offset_,
-                block.payload.data() + i * payload, payload);
+    copy_short(block.payload.data() + i * payload,
+               records.data() + i * record_bytes_ + payload_offset_, payload);
   }
 }
 
@@ -73,8 +94,8 @@ void PackedPoints::unpack(std::span<const std::byte> records,
   block.payload.resize(numbers.size() * payload);
   if (payload == 0) return;
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    std::memcpy(block.payload.data() + i * payload,
-                records.data() + numbers[i] * record_bytes_ + payload_offset_, payload);
+    copy_short(records.data() + numbers[i] * record_bytes_ + payload_offset_,
+               block.payload.data() + i * payload, payload);
   }
 }
 
@@ -88,22 +109,52 @@ BucketFile::BucketFile(const std::string& name, const std::filesystem::path& fol
                        std::size_t record_bytes)
     : record_bytes_(record_bytes),
       chunk_bytes_(std::max<std::size_t>(kBucketBytes / record_bytes, 1) * record_bytes),
-      file_(name, folder) {}
+      file_(name, folder),
+      packer_(record_bytes) {}
 
 void BucketFile::append(Bucket& bucket, std::span<const std::byte> record) {
   if (bucket.tail.capacity() < chunk_bytes_) bucket.tail.reserve(chunk_bytes_);
   bucket.tail.insert(bucket.tail.end(), record.begin(), record.end());
-  if (bucket.tail.size() < chunk_bytes_) return;
-  std::uint32_t chunk = chunks_;
-  if (free_.empty()) {
-    ++chunks_;
-  } else {
-    chunk = free_.back();
-    free_.pop_back();
-  }
-  file_.write(std::uint64_t{chunk} * chunk_bytes_, bucket.tail);
+  if (bucket.tail.size() >= chunk_bytes_) write(bucket);
+}
+
+/// Moves the records in memory to the file.
+void BucketFile::write(Bucket& bucket) {
+  std::span<const std::byte> bytes = packer_.pack(bucket.tail);
+  if (bytes.size() >= chunk_bytes_) bytes = bucket.tail;
+  const Bucket::Chunk chunk = room_for(bytes.size());
+  file_.write(chunk.page * kPageBytes, bytes);
   bucket.chunks.push_back(chunk);
   bucket.tail.clear();
+}
+
+/// The smallest place that is free and large enough, or one at the end of the file.
+Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
+  const auto pages = static_cast<std::uint32_t>((bytes + kPageBytes - 1) / kPageBytes);
+  Bucket::Chunk chunk{.page = pages_, .pages = pages, .bytes = static_cast<std::uint32_t>(bytes)};
+  const auto place = free_.lower_bound(pages);
+  if (place == free_.end()) {
+    if (pages > UINT32_MAX - pages_) {
+      throw Error({.file = file_.name(),
+                   .where = {},
+                   .cause = "its points take more than 4 TiB of temporary disk",
+                   .remedy = "build from parts of them"});
+    }
+    pages_ += pages;
+    return chunk;
+  }
+  chunk.pages = place->first;
+  chunk.page = place->second.back();
+  place->second.pop_back();
+  if (place->second.empty()) free_.erase(place);
+  return chunk;
+}
+
+void BucketFile::read(const Bucket::Chunk& chunk, std::span<std::byte> records) {
+  const bool packed = chunk.bytes < chunk_bytes_;
+  packed_.resize(packed ? chunk.bytes : 0);
+  file_.read(chunk.page * kPageBytes, packed ? std::span(packed_) : records);
+  if (packed) packer_.unpack(packed_, records);
 }
 
 std::uint64_t BucketFile::records(const Bucket& bucket) const {
@@ -117,27 +168,25 @@ void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>
   out.reserve(chunks * chunk_bytes_ + bucket.tail.size());
   out.resize(chunks * chunk_bytes_);
   for (std::size_t i = 0; i < chunks; ++i) {
-    file_.read(std::uint64_t{bucket.chunks[i]} * chunk_bytes_,
-               std::span(out).subspan(i * chunk_bytes_, chunk_bytes_));
+    const Bucket::Chunk& chunk = bucket.chunks[i];
+    read(chunk, std::span(out).subspan(i * chunk_bytes_, chunk_bytes_));
+    free_[chunk.pages].push_back(chunk.page);
   }
-  const auto taken = bucket.chunks.begin() + static_cast<std::ptrdiff_t>(chunks);
-  free_.insert(free_.end(), bucket.chunks.begin(), taken);
-  bucket.chunks.erase(bucket.chunks.begin(), taken);
+  bucket.chunks.erase(bucket.chunks.begin(),
+                      bucket.chunks.begin() + static_cast<std::ptrdiff_t>(chunks));
   if (bucket.chunks.empty() && (out.size() + bucket.tail.size()) / record_bytes_ <= most) {
     out.insert(out.end(), bucket.tail.begin(), bucket.tail.end());
     bucket.tail = {};
   }
 }
 
-void BucketFile::sample(const Bucket& bucket, std::uint64_t most,
-                        std::vector<std::byte>& out) const {
+void BucketFile::sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
   const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
   const std::size_t count = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
   out.resize(count * chunk_bytes_);
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t chunk = bucket.chunks[i * bucket.chunks.size() / count];
-    file_.read(std::uint64_t{chunk} * chunk_bytes_,
-               std::span(out).subspan(i * chunk_bytes_, chunk_bytes_));
+    read(bucket.chunks[i * bucket.chunks.size() / count],
+         std::span(out).subspan(i * chunk_bytes_, chunk_bytes_));
   }
 }
 

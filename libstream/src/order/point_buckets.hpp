@@ -5,12 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "io/spool.hpp"
 #include "order/kd_cut.hpp"
+#include "order/record_packer.hpp"
 #include "terrace/stream/point.hpp"
 #include "terrace/stream/schema.hpp"
 #include "terrace/stream/source.hpp"
@@ -45,7 +47,13 @@ class PackedPoints {
 /// Records that belong together, in the order in which they came: full chunks in a file, the rest
 /// in memory.
 struct Bucket {
-  std::vector<std::uint32_t> chunks;
+  /// Records in the file.
+  struct Chunk {
+    std::uint32_t page, pages;  ///< its place, in pages of the file
+    std::uint32_t bytes;        ///< that are used; as many as in memory: not packed
+  };
+
+  std::vector<Chunk> chunks;
   std::vector<std::byte> tail;
 
   void append(Bucket&& next);
@@ -65,15 +73,24 @@ class BucketFile {
   /// Moves the first records of the bucket, whole chunks and at most about so many, to `out`.
   void take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
   /// Copies records of chunks throughout the bucket, at most so many, to `out`.
-  void sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) const;
+  void sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
   /// What the file takes.
   [[nodiscard]] std::uint64_t bytes() const { return file_.size(); }
 
  private:
-  std::size_t record_bytes_, chunk_bytes_;
+  /// Unit of places in the file: up to 4 TiB.
+  static constexpr std::uint64_t kPageBytes = 1024;
+
+  Bucket::Chunk room_for(std::size_t bytes);
+  void write(Bucket& bucket);
+  void read(const Bucket::Chunk& chunk, std::span<std::byte> records);
+
+  std::size_t record_bytes_, chunk_bytes_;  ///< of records that are not packed
   Spool file_;
-  std::uint32_t chunks_ = 0;         ///< in the file
-  std::vector<std::uint32_t> free_;  ///< of them
+  RecordPacker packer_;
+  std::vector<std::byte> packed_;
+  std::uint32_t pages_ = 0;                                   ///< in the file
+  std::map<std::uint32_t, std::vector<std::uint32_t>> free_;  ///< places, by their size
 };
 
 }  // namespace terrace::stream

@@ -79,13 +79,21 @@ std::vector<stream::Point3> from_ground(const std::vector<tri::Point3>& ground,
   return places;
 }
 
+void set_parts(const tri::ShapeParts& parts, ScanSurface& out) {
+  out.measures.components = parts.components;
+  out.measures.euler_characteristic = parts.euler_characteristic;
+}
+
 template <class Triangulation>
-void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::ShapeOptions& options,
+void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::RestoreOptions& options,
                      TriangleMesh points, Triangulation triangulation, ScanSurface& out) {
   const std::vector<tri::VertexId> vertices = triangulation.build(ground, 2);
-  tri::BasicShape3<Triangulation> shape(options);
-  shape.restore(triangulation);
-  out.measures = tri::measure(shape.surface(triangulation).surface);
+  tri::BasicShape3<Triangulation> shape(options.shape);
+  shape.restore(triangulation, options.threads);
+  const tri::ShapeSurface surface = shape.surface(triangulation);
+  out.measures = tri::measure(surface.surface);
+  set_parts(shape.parts(triangulation, surface), out);
+  out.samples_off = triangulation.vertex_count() - surface.vertices.size();
   // The first of several equal points stands for all.
   constexpr auto kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> number(triangulation.vertex_slots(), kUnused);
@@ -117,19 +125,27 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   TriangleMesh points = detail_points(source, detail);
   const std::vector<stream::Point3> ground = on_ground(points.positions, source.schema());
   ScanSurface out;
+  tri::RestoreOptions restore = options.restore;
+  restore.threads = context.threads;
   if (options.tetrahedra) {
-    if (options.restore.metric) {
-      keep_tetrahedra(ground, options.restore.shape, std::move(points),
-                      tri::Delaunay3<double, tri::EllipticalMetric3>(*options.restore.metric), out);
+    if (restore.metric) {
+      keep_tetrahedra(ground, restore, std::move(points),
+                      tri::Delaunay3<double, tri::EllipticalMetric3>(*restore.metric), out);
     } else {
-      keep_tetrahedra(ground, options.restore.shape, std::move(points), tri::Delaunay3<double>(),
-                      out);
+      keep_tetrahedra(ground, restore, std::move(points), tri::Delaunay3<double>(), out);
     }
     return out;
   }
-  tri::RestoredSurface surface = options.method ? options.method->restore(ground)
-                                                : tri::restore_surface(ground, options.restore);
+  tri::RestoredSurface surface =
+      options.method ? options.method->restore(ground) : tri::restore_surface(ground, restore);
   out.measures = tri::measure(surface.surface);
+  if (!options.method) {
+    set_parts(surface.parts, out);
+    out.samples_off = surface.points_off;
+    out.open = surface.open;
+  } else if (!surface.input.empty()) {
+    out.samples_off = ground.size() - surface.input.size();
+  }
   out.mesh.triangles = std::move(surface.surface.faces);
   if (surface.input.empty()) {
     out.mesh.positions = from_ground(surface.surface.points, points.positions, source.schema());

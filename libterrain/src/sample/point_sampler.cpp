@@ -5,15 +5,17 @@
 #include <memory>
 #include <numeric>
 #include <optional>
-#include <utility>
+#include <string>
 #include <vector>
 
+#include <terrace/stream/error.hpp>
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/parallel.hpp"
-#include "sample/nearest_point.hpp"
 #include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
+#include "surface/point_hull.hpp"
+#include "surface/point_surface.hpp"
 #include "surface/point_window.hpp"
 #include "surface/window_tree.hpp"
 
@@ -22,21 +24,26 @@ namespace {
 
 /// Windows of the tree. What is loaded at once are as many of them as pay.
 constexpr std::size_t kWindowPoints = 16384;
-/// Above this a triangulation gets slower per point, and threads wait for the last one.
+/// Above this threads would wait for the last one.
 constexpr double kMostPointsAtOnce = 1U << 21;
 constexpr double kPartsPerThread = 4;
-/// A place alone costs as much as to triangulate so many points, and to read all clusters whose
-/// boxes hold it, which costs per point a twelfth of that.
-constexpr double kPointsPerPlace = 2000;
-constexpr double kReadShare = 1.0 / 12;
+/// A place alone costs as much as to load so many points, and to read all clusters whose boxes hold
+/// it, which costs per point half of that.
+constexpr double kPointsPerPlace = 4000;
+constexpr double kReadShare = 0.5;
+/// Clusters overlap if those whose boxes hold a place have so many points.
+constexpr double kOverlapping = 10000;
 /// Where places are too few, what lies around those that fall into a box so many times smaller
 /// than a window, to each side, is loaded.
 constexpr double kParts = 8;
-constexpr std::uint64_t kCloudCacheBytes = std::uint64_t{4} << 20;
+/// So many mean distances of points around a box are loaded too: hardly a circle reaches farther.
+constexpr double kSampleMargin = 8;
 /// What a thread may need: a window of usual size where points crowd.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
-/// Points may be half as many again as expected, and others are read around.
-constexpr double kBytesPerExpected = 2.0 * PointWindow::kBytesPerPoint;
+/// For reading, beside the points.
+constexpr std::uint64_t kReadBytes = std::uint64_t{12} << 20;
+/// Points may be half as many again as expected, and others are loaded around.
+constexpr double kBytesPerExpected = 2.0 * PointCells::kBytesPerPoint;
 
 /// Along a curve through the box, so that the next place is near as a rule.
 std::uint64_t place_on_curve(const StoredBox& box, const Point2& place) {
@@ -72,71 +79,121 @@ double points_met_by_a_place(const stream::Store& store, unsigned level) {
   return static_cast<double>(info.points) * sum / static_cast<double>(count) / whole;
 }
 
+/// The surface of points on one line, or of one point. They are all triangulated.
+void sample_line(const stream::Store& store, const SamplerOptions& options, const TooLong& too_long,
+                 std::uint64_t memory_bytes, std::span<const Point2> places,
+                 std::span<SurfacePoint> out) {
+  PointWindow window(store, options.level, memory_bytes);
+  window.set_limit(too_long);
+  window.load(flat(store.bounds()));
+  const auto& points = window.triangulation();
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Point2& place = places[i];
+    if (!std::isfinite(place[0]) || !std::isfinite(place[1])) continue;
+    const SurfacePoint linear = window.at(place);
+    if (options.method == tri::Interpolation::kLinear) {
+      out[i] = linear;
+    } else if (too_long && std::isnan(linear.height)) {
+      continue;
+    } else if (options.method == tri::Interpolation::kNearest) {
+      out[i] = window.at(points.point(points.nearest(place)));
+    } else {
+      out[i].height =
+          tri::heights_at(points, window.heights(), std::span(&place, 1), options.method, 1)[0];
+    }
+  }
+}
+
 /// What one thread works with.
 struct CloudWorker {
-  PointWindow window;
-  std::optional<NearestPoint> nearest{};
-  std::vector<Point2> places{};
+  PointSurface surface;
   std::vector<std::uint64_t> along{};  ///< places on a curve, and their numbers
+  std::optional<StoredBox> loaded{};
 
-  /// Unless it is the last one anyhow.
-  void load(const StoredBox& box, PointWindow::Reach reach) {
-    if (loaded_ && loaded_->first.min == box.min && loaded_->first.max == box.max &&
-        loaded_->second == reach) {
-      return;
+  CloudWorker(const stream::Store& store, unsigned level, const PointHull& hull,
+              const TooLong& too_long)
+      : surface(store, level, hull, too_long) {}
+
+  /// Loads what lies in a box and `margin` around it, unless it is there. False: does not fit.
+  bool load(StoredBox box, double margin, std::size_t most_points, bool may_crowd) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      box.min[k] -= margin;
+      box.max[k] += margin;
     }
-    loaded_.reset();
-    window.load(box, reach);
-    loaded_ = {box, reach};
+    if (loaded && loaded->min == box.min && loaded->max == box.max) return true;
+    loaded.reset();
+    if (!surface.load(box, most_points, may_crowd)) return false;
+    loaded = box;
+    return true;
   }
-
-  CloudWorker(const stream::Store& store, unsigned level, std::uint64_t memory_bytes)
-      : window(store, level, memory_bytes) {}
-
- private:
-  std::optional<std::pair<StoredBox, PointWindow::Reach>> loaded_{};
 };
 
 class PointSampler final : public HeightSampler {
  public:
   PointSampler(const stream::Store& store, const SamplerOptions& options, const Context& context)
-      : store_(store), options_(options), tree_(store, options.level, kWindowPoints) {
-    const std::uint64_t memory = context.memory_or(0) / 2;
+      : store_(store),
+        options_(options),
+        memory_(context.memory_or(0) / 2),
+        hull_(store, options.level),
+        tree_(store, options.level, kWindowPoints) {
     const auto threads =
-        std::clamp<std::uint64_t>(memory / kThreadBytes, 1, std::max(1U, context.threads));
+        std::clamp<std::uint64_t>(memory_ / kThreadBytes, 1, std::max(1U, context.threads));
     workers_.resize(threads);
-    worker_bytes_ = memory / threads;
+    const std::uint64_t bytes = std::max(memory_ / threads, 2 * kReadBytes) - kReadBytes;
+    room_ = static_cast<std::size_t>(bytes / PointCells::kBytesPerPoint);
     const double whole = tree_.part(0).points;
     most_points_ =
-        std::min({static_cast<double>(worker_bytes_) / kBytesPerExpected, kMostPointsAtOnce,
+        std::min({static_cast<double>(bytes) / kBytesPerExpected, kMostPointsAtOnce,
                   std::max(65536.0, whole / (kPartsPerThread * static_cast<double>(threads)))});
-    points_per_place_ = kPointsPerPlace + kReadShare * points_met_by_a_place(store, options.level);
+    const double met = points_met_by_a_place(store, options.level);
+    points_per_place_ = kPointsPerPlace + kReadShare * met;
+    takes_whole_ = met > kOverlapping && whole * kBytesPerExpected <= static_cast<double>(memory_);
     if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
   }
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {
     std::fill(out.begin(), out.end(), SurfacePoint{});
-    if (options_.method != tri::Interpolation::kNearest) {
-      return answer(places, out, options_.method);
+    if (hull_.is_flat()) {
+      return sample_line(store_, options_, too_long_, memory_, places, out);
     }
-    if (too_long_) answer(places, out, tri::Interpolation::kLinear);
-    nearest_.assign(places.size(), Point2{NAN, NAN});
-    find_nearest(places, out);
-    std::fill(out.begin(), out.end(), SurfacePoint{});
-    answer(nearest_, out, tri::Interpolation::kLinear);
+    sort_by_window(places);
+    if (takes_whole_ && !whole_ && is_dense(tree_.part(0), order_.size())) take_whole();
+    std::vector<const WindowTree::Part*> parts;
+    const auto takes = [&](const WindowTree::Part& part) {
+      const std::size_t count = numbers_in(part).size();
+      return count == 0 || (part.points <= most_points_ && (whole_ || is_dense(part, count)));
+    };
+    tree_.for_each_part(takes, [&](const WindowTree::Part& part) {
+      if (!numbers_in(part).empty()) parts.push_back(&part);
+    });
+    parallel_for(
+        parts.size(), static_cast<unsigned>(workers_.size()), [&](unsigned thread, std::size_t i) {
+          std::unique_ptr<CloudWorker>& worker = workers_[thread];
+          if (worker == nullptr) {
+            worker = std::make_unique<CloudWorker>(store_, options_.level, hull_, too_long_);
+          }
+          if (whole_) {
+            worker->surface.share(*whole_);
+            return answer_along(*worker, parts[i]->box, numbers_in(*parts[i]), places, out);
+          }
+          work_on(*worker, *parts[i], places, out);
+        });
   }
 
  private:
   using Numbers = std::span<std::uint32_t>;
 
-  [[nodiscard]] bool inside(const Point2& p) const {
+  /// Whether a place may have an answer.
+  [[nodiscard]] bool counts(const Point2& p) const {
+    if (options_.method == tri::Interpolation::kNearest) {
+      return std::isfinite(p[0]) && std::isfinite(p[1]);
+    }
     const stream::Box3& all = store_.bounds();
     return p[0] >= all.min[0] && p[0] <= all.max[0] && p[1] >= all.min[1] && p[1] <= all.max[1];
   }
 
   /// Fills order_ with the numbers of the places that count, by windows, ascending within one.
-  template <class Counts>
-  void sort_by_window(std::span<const Point2> places, const Counts& counts) {
+  void sort_by_window(std::span<const Point2> places) {
     constexpr std::uint32_t kNone = 0xFFFFFFFF;
     keys_.assign(places.size(), kNone);
     constexpr std::size_t kPiece = 65536;
@@ -144,7 +201,7 @@ class PointSampler final : public HeightSampler {
                  [&](unsigned, std::size_t piece) {
                    const std::size_t end = std::min((piece + 1) * kPiece, places.size());
                    for (std::size_t i = piece * kPiece; i < end; ++i) {
-                     if (!counts(i)) continue;
+                     if (!counts(places[i])) continue;
                      keys_[i] = static_cast<std::uint32_t>(tree_.window_of(places[i]));
                    }
                  });
@@ -167,80 +224,69 @@ class PointSampler final : public HeightSampler {
     return static_cast<double>(places) * points_per_place_ >= part.points;
   }
 
-  /// Calls work(worker, part, numbers) for parts that fit into memory and have places enough to be
-  /// loaded as a whole, and for windows.
-  template <class Work>
-  void for_each_part(double most_points, const Work& work) {
-    std::vector<const WindowTree::Part*> parts;
-    const auto takes = [&](const WindowTree::Part& part) {
-      const std::size_t places = numbers_in(part).size();
-      return places == 0 || (part.points <= most_points && is_dense(part, places));
-    };
-    tree_.for_each_part(takes, [&](const WindowTree::Part& part) {
-      if (!numbers_in(part).empty()) parts.push_back(&part);
-    });
-    parallel_for(parts.size(), static_cast<unsigned>(workers_.size()),
-                 [&](unsigned thread, std::size_t i) {
-                   std::unique_ptr<CloudWorker>& worker = workers_[thread];
-                   if (worker == nullptr) {
-                     worker = std::make_unique<CloudWorker>(store_, options_.level, worker_bytes_);
-                     worker->window.set_limit(too_long_);
-                   }
-                   work_on(*worker, *parts[i], work);
-                 });
+  /// Clusters that overlap would be read for many windows each: rather once for all.
+  void take_whole() {
+    auto cells = std::make_unique<PointCells>();
+    stream::StoreQuery query(store_);
+    takes_whole_ =
+        cells->load(query, options_.level, flat(store_.bounds()),
+                    static_cast<std::size_t>(memory_ / PointCells::kBytesPerPoint), false);
+    if (takes_whole_) whole_ = std::move(cells);
   }
-  /// If it does not fit after all, its halves may.
-  template <class Work>
-  void work_on(CloudWorker& worker, const WindowTree::Part& part, const Work& work) {
+
+  /// If a part does not fit after all, its halves may.
+  void work_on(CloudWorker& worker, const WindowTree::Part& part, std::span<const Point2> places,
+               std::span<SurfacePoint> out) {
     const Numbers numbers = numbers_in(part);
     if (numbers.empty()) return;
-    if (part.is_window() || is_dense(part, numbers.size())) {
-      try {
-        return work(worker, part, numbers);
-      } catch (const PointWindow::NoRoom&) {
-        if (part.is_window()) throw;
+    const StoredBox& box = part.box;
+    const double area = (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]);
+    const double margin = kSampleMargin * std::sqrt(area / std::max(part.points, 1.0));
+    if (is_dense(part, numbers.size())) {
+      if (worker.load(box, margin, room_, part.is_window())) {
+        return answer_along(worker, box, numbers, places, out);
       }
+      // Points may crowd just outside a window.
+      if (part.is_window()) {
+        if (!worker.load(box, 0, room_, true)) throw_no_room(part);
+        return answer_along(worker, box, numbers, places, out);
+      }
+    } else if (part.is_window()) {
+      return answer_few(worker, part, margin, numbers, places, out);
     }
-    work_on(worker, tree_.part(part.below), work);
-    work_on(worker, tree_.part(part.above), work);
+    work_on(worker, tree_.part(part.below), places, out);
+    work_on(worker, tree_.part(part.above), places, out);
   }
 
-  void answer(std::span<const Point2> places, std::span<SurfacePoint> out,
-              tri::Interpolation method) {
-    sort_by_window(places, [&](std::size_t i) { return inside(places[i]); });
-    if (method == tri::Interpolation::kNaturalNeighbour) {
-      // Always by windows: the last bits depend on them.
-      for_each_part(0, [&](CloudWorker& worker, const WindowTree::Part& part, Numbers numbers) {
-        worker.load(part.box, PointWindow::Reach::kCircles);
-        answer_natural(worker, numbers, places, out);
-      });
-      return;
-    }
-    for_each_part(most_points_,
-                  [&](CloudWorker& worker, const WindowTree::Part& part, Numbers numbers) {
-                    if (!is_dense(part, numbers.size())) {
-                      return answer_few(worker, part.box, numbers, places, out);
-                    }
-                    worker.load(part.box, PointWindow::Reach::kTriangles);
-                    for_each_along(worker, part.box, numbers, places,
-                                   [&](std::uint32_t i) { out[i] = worker.window.at(places[i]); });
-                  });
+  [[noreturn]] void throw_no_room(const WindowTree::Part& part) const {
+    const double bytes =
+        static_cast<double>(kReadBytes) + part.points * static_cast<double>(kBytesPerExpected);
+    const std::uint64_t needed =
+        2 * std::max(memory_ + (std::uint64_t{1} << 20), static_cast<std::uint64_t>(bytes));
+    throw stream::Error({.file = store_.path().string(),
+                         .where = {},
+                         .cause = "more than " + std::to_string(room_) +
+                                  " points lie close together, too many for `memory_bytes`",
+                         .remedy = "give " + std::to_string((needed >> 20) + 1) +
+                                   "M of memory or more, or a coarser `level`"});
   }
 
-  /// Calls visit(number) for all numbers, along a curve.
-  template <class Visit>
-  static void for_each_along(CloudWorker& worker, const StoredBox& box, Numbers numbers,
-                             std::span<const Point2> places, const Visit& visit) {
+  void answer_along(CloudWorker& worker, const StoredBox& box, Numbers numbers,
+                    std::span<const Point2> places, std::span<SurfacePoint> out) {
     worker.along.clear();
     for (const std::uint32_t i : numbers) {
       worker.along.push_back(place_on_curve(box, places[i]) << 32 | i);
     }
     std::sort(worker.along.begin(), worker.along.end());
-    for (const std::uint64_t one : worker.along) visit(static_cast<std::uint32_t>(one));
+    for (const std::uint64_t one : worker.along) {
+      const auto i = static_cast<std::uint32_t>(one);
+      out[i] = answer(worker.surface, places[i]);
+    }
   }
 
-  static void answer_few(CloudWorker& worker, const StoredBox& box, Numbers numbers,
-                         std::span<const Point2> places, std::span<SurfacePoint> out) {
+  void answer_few(CloudWorker& worker, const WindowTree::Part& window, double margin,
+                  Numbers numbers, std::span<const Point2> places, std::span<SurfacePoint> out) {
+    const StoredBox& box = window.box;
     const auto part = [&](std::uint32_t i) {
       std::array<double, 2> at{};
       for (std::size_t k = 0; k < 2; ++k) {
@@ -259,66 +305,41 @@ class PointSampler final : public HeightSampler {
           around.max[k] = std::max(around.max[k], places[numbers[end]][k]);
         }
       }
-      worker.load(around, PointWindow::Reach::kTriangles);
-      for (std::size_t i = begin; i < end; ++i) {
-        out[numbers[i]] = worker.window.at(places[numbers[i]]);
+      if (!worker.load(around, margin, room_, true) && !worker.load(around, 0, room_, true)) {
+        throw_no_room(window);
       }
+      answer_along(worker, around, numbers.subspan(begin, end - begin), places, out);
     }
   }
 
-  void answer_natural(CloudWorker& worker, Numbers numbers, std::span<const Point2> places,
-                      std::span<SurfacePoint> out) const {
-    const PointWindow& window = worker.window;
-    const auto& triangulation = window.triangulation();
-    if (triangulation.vertex_count() == 0) return;
-    worker.places.clear();
-    for (const std::uint32_t i : numbers) worker.places.push_back(places[i]);
-    const auto heights = tri::heights_at(triangulation, window.heights(), worker.places,
-                                         tri::Interpolation::kNaturalNeighbour, 1);
-    const auto gradients = tri::gradients_at(triangulation, window.heights(), worker.places,
-                                             tri::GradientFrom::kNaturalNeighbours, 1);
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      const std::uint32_t i = numbers[k];
-      if (too_long_ && std::isnan(window.at(places[i]).height)) continue;
-      if (window.is_on_edge(places[i])) {
-        // Which of two triangles is found depends on where the search began, and with it the last
-        // bit: alone it always begins at the same.
-        const std::span<const Point2> one(&places[i], 1);
-        const double height = tri::heights_at(triangulation, window.heights(), one,
-                                              tri::Interpolation::kNaturalNeighbour, 1)[0];
-        const tri::Gradient gradient = tri::gradients_at(
-            triangulation, window.heights(), one, tri::GradientFrom::kNaturalNeighbours, 1)[0];
-        out[i] = {height, gradient.x, gradient.y};
-      } else {
-        out[i] = {heights[k], gradients[k].x, gradients[k].y};
-      }
+  SurfacePoint answer(PointSurface& surface, const Point2& place) const {
+    switch (options_.method) {
+      case tri::Interpolation::kLinear:
+        break;
+      case tri::Interpolation::kNaturalNeighbour:
+        return surface.natural(place);
+      case tri::Interpolation::kNearest:
+        if (too_long_ && std::isnan(surface.linear(place).height)) return {};
+        return options_.gradients ? surface.at_nearest(place)
+                                  : SurfacePoint{surface.height(surface.nearest(place))};
     }
-  }
-
-  /// nearest_ of all places, or of those that have an answer where there is a limit.
-  void find_nearest(std::span<const Point2> places, std::span<const SurfacePoint> answers) {
-    sort_by_window(places, [&](std::size_t i) {
-      return std::isfinite(places[i][0]) && std::isfinite(places[i][1]) &&
-             (!too_long_ || !std::isnan(answers[i].height));
-    });
-    for_each_part(0, [&](CloudWorker& worker, const WindowTree::Part& part, Numbers numbers) {
-      if (!worker.nearest) worker.nearest.emplace(store_, options_.level, kCloudCacheBytes);
-      for_each_along(worker, part.box, numbers, places,
-                     [&](std::uint32_t i) { nearest_[i] = (*worker.nearest)(places[i]); });
-    });
+    return surface.linear(place);
   }
 
   stream::Store store_;
   SamplerOptions options_;
+  std::uint64_t memory_;
+  PointHull hull_;
   WindowTree tree_;
-  PointWindow::TooLong too_long_;
+  TooLong too_long_;
   std::vector<std::unique_ptr<CloudWorker>> workers_;
-  std::uint64_t worker_bytes_ = 0;
+  std::size_t room_ = 0;         ///< points that a worker may hold
   double most_points_ = 0;       ///< of a part that is loaded as a whole
   double points_per_place_ = 0;  ///< for which it pays
+  bool takes_whole_ = false;     ///< if there are many places
+  std::unique_ptr<const PointCells> whole_;
   std::vector<std::uint32_t> keys_, order_;
   std::vector<std::size_t> begin_;  ///< in order_, by window; at last its size
-  std::vector<Point2> nearest_;
 };
 
 }  // namespace

@@ -75,6 +75,11 @@ stream::Crs crs_with_keys(const stream::Store& store) {
   return recorded;
 }
 
+SamplerOptions heights_only(SamplerOptions options) {
+  options.gradients = false;
+  return options;
+}
+
 class RasterRun {
  public:
   RasterRun(const stream::Store& store, const RasterRequest& request, const Context& context)
@@ -83,7 +88,7 @@ class RasterRun {
         grid_(raster_grid(store, request)),
         crs_(request.to ? request.to->to().crs_with_keys() : crs_with_keys(store)),
         ground_(store),
-        sampler_(make_sampler(store, request.sampler, context)),
+        sampler_(make_sampler(store, heights_only(request.sampler), context)),
         shader_(grid_, store.schema(), crs_, request.value),
         nodata_(nodata(store, request.value)) {}
 

@@ -106,7 +106,7 @@ void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begi
       if (side[p] == 0) add(corner[p].place, corner[p].height);
       if (side[p] * side[q] >= 0) continue;
       if (corner[q].place < corner[p].place) std::swap(p, q);
-      const PointWindow::Corner &c = corner[p], &d = corner[q];
+      const SurfaceCorner &c = corner[p], &d = corner[q];
       const double left = std::abs(off(c.place)), right = std::abs(off(d.place));
       const double share = left + right > 0 ? left / (left + right) : 0.5;
       const bool is_surface = !too_long_ || !too_long_(c.place, d.place);

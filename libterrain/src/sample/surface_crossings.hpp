@@ -38,7 +38,7 @@ class SurfaceCrossings {
 
   const stream::Store& store_;
   WindowTree tree_;
-  PointWindow::TooLong too_long_;
+  TooLong too_long_;
   PointWindow window_;
   std::vector<Crossing> found_;
 };

@@ -49,15 +49,36 @@ class Descent {
         visit_(visit),
         placement_(store.schema()),
         finest_(detail.finest()),
-        heads_(store.top()) {}
+        first_(detail.cluster.value_or(store.root())),
+        heads_(store.top()) {
+    const unsigned level = stream::level_of(first_);
+    if (level > store.top() || stream::ordinal_of(first_) >= store.levels()[level].clusters) {
+      throw UsageError("the store has no cluster " + std::to_string(level) + ":" +
+                       std::to_string(stream::ordinal_of(first_)));
+    }
+    if (level < finest_) {
+      throw UsageError("`cluster`: a cluster of level " + std::to_string(level) +
+                       " has no points of level " + std::to_string(finest_));
+    }
+  }
 
-  /// The root and the wanted clusters down to `lowest`; of level 0 those of which points may meet
+  /// Where the descent begins: the root or the one cluster that is wanted.
+  [[nodiscard]] stream::ClusterId first() const { return first_; }
+
+  /// The first and the wanted clusters down to `lowest`; of level 0 those of which points may meet
   /// the condition.
   void run(unsigned lowest) {
     stream::ClusterPoints points;
-    store_.read(store_.root(), points);
-    deliver(store_.root(), store_.record(store_.root()), points);
-    for (unsigned level = store_.top(); level-- > lowest;) {
+    store_.read(first_, points);
+    if (detail_.cluster && points.has_representative) {
+      points.positions.push_back(points.representative);
+      points.payload.insert(points.payload.end(), points.representative_payload.begin(),
+                            points.representative_payload.end());
+      points.children.insert(points.children.end(), points.representative_children.begin(),
+                             points.representative_children.end());
+    }
+    deliver(first_, store_.record(first_), points);
+    for (unsigned level = stream::level_of(first_); level-- > lowest;) {
       if (whole(level) && (level > 0 || !detail_.where)) {
         store_.for_each(level, [this](stream::ClusterId id, const stream::ClusterRecord& record,
                                       const stream::ClusterPoints& p) { deliver(id, record, p); });
@@ -89,7 +110,7 @@ class Descent {
 
   /// A level that is wanted everywhere needs no list of its clusters.
   [[nodiscard]] bool whole(unsigned level) const {
-    return level >= detail_.level && !detail_.region;
+    return level >= detail_.level && !detail_.region && !detail_.cluster;
   }
 
   /// The wanted clusters among those that points met so far head on `level`, in order.
@@ -124,6 +145,7 @@ class Descent {
   const Visit& visit_;
   stream::Placement placement_;
   unsigned finest_;
+  stream::ClusterId first_;
   std::vector<std::vector<std::uint64_t>> heads_;  // per level, ordinals met in higher levels
 };
 
@@ -167,7 +189,7 @@ void for_each_wanted_record(
                                       const stream::ClusterPoints&) { visit(id, record); };
   Descent descent(store, detail, all);
   const unsigned finest = detail.finest();
-  if (finest == store.top()) return descent.run(finest);
+  if (finest == stream::level_of(descent.first())) return descent.run(finest);
   // The finest level's clusters need not be read to be counted.
   descent.run(finest + 1);
   if (descent.whole(finest)) {

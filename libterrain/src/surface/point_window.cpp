@@ -180,10 +180,9 @@ StoredBox PointWindow::with_margin() const {
           {box_.max[0] + margin, box_.max[1] + margin}};
 }
 
-void PointWindow::load(const StoredBox& box, Reach reach) {
+void PointWindow::load(const StoredBox& box) {
   clear();
   box_ = inner_ = box;
-  reach_ = reach;
   const StoredBox bounds{{store_.bounds().min[0], store_.bounds().min[1]},
                          {store_.bounds().max[0], store_.bounds().max[1]}};
   if (box.meets(bounds)) {

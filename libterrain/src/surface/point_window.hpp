@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <utility>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "surface/cluster_frontier.hpp"
 #include "surface/lattice_surface.hpp"
 #include "surface/store_window.hpp"
+#include "surface/surface_corner.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -34,14 +34,6 @@ namespace terrace::terrain {
 /// One object per thread; any number of them share a Store.
 class PointWindow {
  public:
-  /// What shall be known besides the triangles that meet the box.
-  enum class Reach : std::uint8_t {
-    kTriangles,
-    /// Also all triangles whose closed circumcircles meet the box, and their neighbours: the
-    /// natural neighbours and, within the hull, the nearest vertex of any place in the box.
-    kCircles,
-  };
-
   /// What load() throws where memory_bytes do not suffice. It says what would be needed.
   class NoRoom : public stream::Error {
     using Error::Error;
@@ -68,7 +60,7 @@ class PointWindow {
   ///
   /// Throws: NoRoom where memory_bytes do not suffice; stream::Error on a damaged store;
   /// stream::Stopped. After that it can only be loaded again or destroyed.
-  void load(const StoredBox& box, Reach reach = Reach::kTriangles);
+  void load(const StoredBox& box);
 
   /// As it was loaded last. Vertices have no other order or number than this one gives them.
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
@@ -81,17 +73,10 @@ class PointWindow {
   /// By slot of vertex, as libtri wants them.
   [[nodiscard]] const std::vector<double>& heights() const { return heights_; }
 
-  /// A point of the surface.
-  struct Corner {
-    Point2 place;
-    double height = 0;
-  };
-  [[nodiscard]] Corner corner(tri::VertexId vertex) const;
+  [[nodiscard]] SurfaceCorner corner(tri::VertexId vertex) const;
   /// Counter-clockwise.
-  [[nodiscard]] std::array<Corner, 3> corners_with_heights(tri::TriangleId triangle) const;
+  [[nodiscard]] SurfaceTriangle corners_with_heights(tri::TriangleId triangle) const;
 
-  /// Whether an edge between two places is so long that triangles with it are no surface.
-  using TooLong = std::function<bool(const Point2&, const Point2&)>;
   void set_limit(TooLong too_long) { too_long_ = std::move(too_long); }
 
   /// The linear surface at a place of the box. On an edge and on a vertex the height comes from the
@@ -178,7 +163,6 @@ class PointWindow {
   [[nodiscard]] SurfacePoint at_edge(tri::TriangleId triangle, std::size_t edge,
                                      const Point2& place) const;
   [[nodiscard]] SurfacePoint at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const;
-  [[nodiscard]] bool is_surface(tri::TriangleId triangle) const;
   [[nodiscard]] std::array<Point2, 3> corners(tri::TriangleId triangle) const;
 
   const stream::Store& store_;
@@ -187,8 +171,7 @@ class PointWindow {
   TooLong too_long_;
   ClusterFrontier frontier_;
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
-  Reach reach_ = Reach::kTriangles;
-  bool is_whole_ = false;  ///< all points of the store are inserted
+  bool is_whole_ = false;      ///< all points of the store are inserted
   Triangulation triangulation_;
   std::vector<double> heights_;               ///< by slot of vertex
   std::vector<Origin> origins_;               ///< by slot of vertex

@@ -65,20 +65,7 @@ void PointWindow::examine(tri::TriangleId triangle) {
   if (std::find(next.begin(), next.end(), tri::kNoTriangle) != next.end()) {
     hull_.push_back(triangle);
   }
-  if (reach_ == Reach::kTriangles) {
-    if (meets(corners(triangle), box_)) consider(triangle, circle(triangle));
-    return;
-  }
-  const CircleCover cover = circle(triangle);
-  if (!cover.meets(box_)) {
-    if (meets(corners(triangle), box_)) consider(triangle, cover);
-    return;
-  }
-  consider(triangle, cover);
-  for (const tri::TriangleId t : next) {
-    if (t == tri::kNoTriangle || (states_[tri::slot(t)] & kTriangleState) != kUnknown) continue;
-    consider(t, circle(t));
-  }
+  if (meets(corners(triangle), box_)) consider(triangle, circle(triangle));
 }
 
 void PointWindow::settle() {
@@ -109,15 +96,6 @@ void PointWindow::examine_changes() {
     return (states_[tri::slot(suspect.triangle)] & kTriangleState) != kSuspect;
   });
   for (const tri::TriangleId t : changes_.added_triangles) examine(t);
-  // Neighbours of new triangles may have circles that meet the box, which makes these count too.
-  if (reach_ == Reach::kCircles) {
-    for (const tri::TriangleId t : changes_.added_triangles) {
-      if ((states_[tri::slot(t)] & kTriangleState) != kUnknown) continue;
-      for (const tri::TriangleId other : triangulation_.neighbours(t)) {
-        if (other != tri::kNoTriangle && circle(other).meets(box_)) consider(t, circle(t));
-      }
-    }
-  }
   suspect_triangles_ = suspects_.size();
   find_suspect_hull();
 }
@@ -136,7 +114,7 @@ void PointWindow::find_suspect_hull() {
     for (std::size_t i = 0; i < 3; ++i) {
       if (next[i] != tri::kNoTriangle || (states_[tri::slot(t)] & kHullEdge << i) != 0) continue;
       const CircleCover cover = CircleCover::of_plane(corner[(i + 1) % 3], corner[(i + 2) % 3]);
-      if (cover.meets(box_) || (reach_ == Reach::kCircles && circle(t).meets(box_))) {
+      if (cover.meets(box_)) {
         suspects_.push_back({cover, t, static_cast<std::uint8_t>(i)});
       }
     }

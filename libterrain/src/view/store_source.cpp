@@ -23,7 +23,7 @@ tri::ClusterRecord StoreSource::record(tri::ClusterId id) {
 
 tri::ClusterMembers StoreSource::read(tri::ClusterId id) {
   store_.read(stored(id), points_);
-  return {.positions = points_.positions, .children = points_.children};
+  return {.positions = points_.positions, .children = points_.children, .values = points_.payload};
 }
 
 }  // namespace terrace::terrain

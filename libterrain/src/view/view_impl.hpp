@@ -6,6 +6,7 @@
 #include <memory>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "terrace/terrain/store_view.hpp"
 #include "view/cluster_reader.hpp"
@@ -24,11 +25,16 @@ struct StoreView<Shown>::Impl {
       : store(given),
         frame(store, ground),
         source(store, frame),
-        control(source.counts(), source.load_root(), options),
+        control(source.counts(), load_root(), options),
         reader(make_reader(source)) {
     assert((!std::is_integral_v<Shown> || store.schema().grid));
   }
 
+  tri::GivenCluster load_root() {
+    tri::GivenCluster root = source.load_root();
+    root_values = root.values;
+    return root;
+  }
   static double now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
         .count();
@@ -37,6 +43,7 @@ struct StoreView<Shown>::Impl {
   stream::Store store;
   ViewFrame frame;
   FramedSource source;
+  std::vector<std::byte> root_values;
   Control control;
   bool settled = false;
   std::unique_ptr<ClusterReader> reader;
@@ -107,6 +114,18 @@ template <class Shown>
 stream::Point3 StoreView<Shown>::stored(tri::VertexId vertex) const {
   const auto p = model().triangulation().point(vertex);
   return {static_cast<double>(p[0]), static_cast<double>(p[1]), model().height(vertex)};
+}
+
+template <class Shown>
+std::span<const std::byte> StoreView<Shown>::attributes(tri::VertexId vertex) const {
+  const tri::PointId id = model().point_id(vertex);
+  const std::size_t bytes = impl_->store.schema().payload_size();
+  if (tri::level_of(id.cluster) == model().top()) {
+    return std::span(impl_->root_values).subspan(id.index * bytes, bytes);
+  }
+  const tri::GivenCluster* const given = control().given(id.cluster);
+  if (given == nullptr) return {};
+  return std::span(given->values).subspan(id.index * bytes, bytes);
 }
 
 template <class Shown>

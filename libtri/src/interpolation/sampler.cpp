@@ -2,8 +2,10 @@
 #include "sampler.hpp"
 
 #include <cmath>
+#include <cstdlib>
 
 #include <CGAL/Exact_rational.h>
+#include <boost/multiprecision/gmp.hpp>
 
 #include "triangle_values.hpp"
 
@@ -14,6 +16,19 @@ using Rational = CGAL::Exact_rational;
 template <>
 struct Rounded<Rational> {
   static double of(const Rational& value) { return CGAL::to_double(value); }
+  static Rational shortened(const Rational& value) {
+    using Integer = boost::multiprecision::mpz_int;
+    Integer above = numerator(value), below = denominator(value);
+    if (above == 0) return value;
+    const auto bits = [](const Integer& i) { return static_cast<int>(msb(abs(i))); };
+    if (bits(above) + bits(below) < 2 * kShortBits) return value;
+    const int shift = kShortBits + bits(below) - bits(above);
+    (shift > 0 ? above : below) <<= std::abs(shift);
+    Integer scale = 1;
+    scale <<= std::abs(shift);
+    const Integer quotient = above / below;
+    return shift > 0 ? Rational(quotient, scale) : Rational(Integer(quotient * scale));
+  }
 };
 
 template <class Kernel>

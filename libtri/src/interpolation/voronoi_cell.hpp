@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <type_traits>
 #include <vector>
 
@@ -27,13 +28,18 @@ inline constexpr double kRoundings = 4;
 inline constexpr double kLeastSquare = 1e-130;
 inline constexpr double kGreatestSquare = 1e130;
 
-/// Rounded to a double; specialised for rational numbers where they are used.
+/// Rounded to a double, or to a relative 2^-kShortBits; specialised for rational numbers where they
+/// are used.
+inline constexpr int kShortBits = 512;
 template <class Number>
 struct Rounded;
 template <>
 struct Rounded<double> {
   static double of(double value) { return value; }
+  static double shortened(double value) { return value; }
 };
+/// Sums of so many exact quotients get too long: their digits would grow with every term.
+inline constexpr std::size_t kLongSum = 32;
 
 /// Number = double, or exact rationals.
 template <class Number>
@@ -51,6 +57,8 @@ struct VoronoiCell {
   Number error = 0;
   Number extent = 0;  ///< for doubles: the sum of squares of `round`
 
+  /// With rationals exact, but for cells of more than kLongSum sides, whose corners are shortened
+  /// where the total keeps kShortBits / 2 certain bits.
   void measure(const Cavity& cavity, const Query& p);
   /// For doubles, after measure(): whether the weights will be accurate to kTolerance.
   [[nodiscard]] bool accurate() const;
@@ -66,7 +74,12 @@ struct VoronoiCell {
   static Number square(const Vector& a) { return a.x * a.x + a.y * a.y; }
   /// The point equidistant from the origin, b and c, which are counter-clockwise.
   Vector circumcentre(const Vector& b, const Vector& c);
+  void measure(const Cavity& cavity, const Query& p, bool shortens);
+  static Vector shortened(const Vector& a) {
+    return {Rounded<Number>::shortened(a.x), Rounded<Number>::shortened(a.y)};
+  }
 
+  bool shortens_ = false;
   std::vector<Vector> slope_;
 };
 
@@ -84,6 +97,22 @@ auto VoronoiCell<Number>::circumcentre(const Vector& b, const Vector& c) -> Vect
 
 template <class Number>
 void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
+  constexpr bool kExact = !std::is_same_v<Number, double>;
+  measure(cavity, p, kExact && cavity.rim.size() > kLongSum);
+  if constexpr (kExact) {
+    if (!shortens_) return;
+    // Each area that is added is wrong by less than 2^-kShortBits of the sum of all squares.
+    Number doubt = 0;
+    for (const Vector& v : round) doubt += square(v);
+    for (const Vector& v : centre) doubt += square(v);
+    for (int bits = 0; bits < kShortBits / 2; bits += 32) doubt *= Number(0x1p-32);
+    if (total < doubt) measure(cavity, p, false);
+  }
+}
+
+template <class Number>
+void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p, bool shortens) {
+  shortens_ = shortens;
   const auto number = [](double value) { return Number(value); };
   at.resize(cavity.corner.size());
   area.assign(cavity.corner.size(), Number(0));
@@ -107,10 +136,12 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
     const Vector u = circumcentre({number(b[0]) - ax, number(b[1]) - ay},
                                   {number(c[0]) - ax, number(c[1]) - ay});
     centre[i] = {at[ia].x + u.x, at[ia].y + u.y};
+    if (shortens) centre[i] = shortened(centre[i]);
   }
   for (std::size_t i = 0; i < round.size(); ++i) {
     round[i] = circumcentre(at[cavity.rim[i].from], at[cavity.rim[i].to]);
-    extent += square(round[i]);
+    if (shortens) round[i] = shortened(round[i]);
+    if constexpr (std::is_same_v<Number, double>) extent += square(round[i]);
   }
   const Vector* before = &round.back();
   for (std::size_t i = 0; i < round.size(); ++i) {
@@ -157,6 +188,7 @@ bool VoronoiCell<Number>::differentiate(const Cavity& cavity, bool on_vertex,
     const Vector& b = round[i];
     const Number ratio = ((b.y - a.y) * v.x - (b.x - a.x) * v.y) / (square(v) * total);
     slope_[corner] = {ratio * (a.x + b.x), ratio * (a.y + b.y)};
+    if (shortens_) slope_[corner] = shortened(slope_[corner]);
     sum.x += slope_[corner].x;
     sum.y += slope_[corner].y;
   }

@@ -5,31 +5,20 @@
 #include <array>
 #include <vector>
 
+#include "spheres.hpp"
 #include "state.hpp"
 
 /// The published rule, in rounds, see ShapeRule::kPublished.
 
 namespace terrace::tri::shape {
 
-/// By vertex slot: its rank among all vertices in lexicographic order.
-template <class Mesh>
-std::vector<std::uint32_t> rank_vertices(const Mesh& mesh) {
-  std::vector<std::uint32_t> order;
-  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
-    if (mesh.vertex_alive(v)) order.push_back(v);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return spatial::lexicographically_less(mesh.vertex[a].point, mesh.vertex[b].point);
-  });
-  std::vector<std::uint32_t> rank(mesh.vertex.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
-  return rank;
-}
-
 template <class Criterion, class Mesh>
 void peel_as_published(const Mesh& mesh, State& state, const Criterion& criterion,
                        bool keep_vertices) {
   keep_all(mesh, state);
-  const std::vector<std::uint32_t> rank = rank_vertices(mesh);
+  const std::vector<std::uint32_t> order = sorted_vertices(mesh);
+  std::vector<std::uint32_t> rank(mesh.vertex.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
   struct Candidate {
     std::array<std::uint32_t, 4> key;
     std::uint32_t tetrahedron;

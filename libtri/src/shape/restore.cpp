@@ -31,9 +31,9 @@ void check(std::span<const Point3> points, const RestoreOptions& options) {
     throw std::invalid_argument("a metric and quantise_bits are given; leave one of them out");
 }
 
-/// Drops points that are in no face.
-RestoredSurface compact(std::span<const Point3> points, std::vector<Face> faces) {
-  RestoredSurface result;
+/// Drops points that are in no face of the result, whose faces name input points.
+RestoredSurface compact(std::span<const Point3> points, RestoredSurface result) {
+  std::vector<Face>& faces = result.surface.faces;
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> number(points.size(), kUnused);
   for (const Face& face : faces)
@@ -46,24 +46,32 @@ RestoredSurface compact(std::span<const Point3> points, std::vector<Face> faces)
   }
   for (Face& face : faces)
     for (std::uint32_t& v : face) v = number[v];
-  result.surface.faces = std::move(faces);
   return result;
 }
 
+/// Without points; faces name the input's.
 template <class Triangulation>
-std::vector<Face> shape_faces(std::span<const typename Triangulation::Point> points,
-                              const ShapeOptions& options,
-                              Triangulation triangulation = Triangulation()) {
-  const std::vector<VertexId> vertices = triangulation.build(points);
+RestoredSurface shape_faces(std::span<const typename Triangulation::Point> points,
+                            const RestoreOptions& options,
+                            Triangulation triangulation = Triangulation()) {
+  const std::vector<VertexId> vertices =
+      triangulation.build(points, options.threads == 0 ? 2 : options.threads);
   std::vector<std::uint32_t> point_of(triangulation.vertex_slots());
   for (std::size_t i = vertices.size(); i-- > 0;)
     point_of[slot(vertices[i])] = static_cast<std::uint32_t>(i);
-  BasicShape3<Triangulation> shape(options);
-  shape.restore(triangulation);
-  ShapeSurface surface = shape.surface(triangulation);
-  for (Face& face : surface.surface.faces)
+  BasicShape3<Triangulation> shape(options.shape);
+  shape.restore(triangulation, options.threads);
+  ShapeSurface surface = options.shape.rule == ShapeRule::kPoles
+                             ? shape.surface_without_lids(triangulation)
+                             : shape.surface(triangulation);
+  RestoredSurface result;
+  result.parts = shape.parts(triangulation, surface);
+  result.surface.faces = std::move(surface.surface.faces);
+  for (Face& face : result.surface.faces)
     for (std::uint32_t& v : face) v = point_of[slot(surface.vertices[v])];
-  return std::move(surface.surface.faces);
+  result.points_off = triangulation.vertex_count() - surface.vertices.size();
+  result.open = surface.open;
+  return result;
 }
 
 std::vector<std::array<std::int32_t, 3>> quantised(std::span<const Point3> points, unsigned bits) {
@@ -92,12 +100,12 @@ std::vector<std::array<std::int32_t, 3>> quantised(std::span<const Point3> point
 RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOptions& options) {
   check(points, options);
   if (options.metric)
-    return compact(points, shape_faces(points, options.shape,
+    return compact(points, shape_faces(points, options,
                                        Delaunay3<double, EllipticalMetric3>(*options.metric)));
   if (options.quantise_bits == 0)
-    return compact(points, shape_faces<Delaunay3<double>>(points, options.shape));
+    return compact(points, shape_faces<Delaunay3<double>>(points, options));
   const auto integers = quantised(points, options.quantise_bits);
-  return compact(points, shape_faces<Delaunay3<std::int32_t>>(integers, options.shape));
+  return compact(points, shape_faces<Delaunay3<std::int32_t>>(integers, options));
 }
 
 }  // namespace terrace::tri

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -70,6 +71,25 @@ void find_lost(const Mesh& mesh, State& state) {
   if (mesh.flat) return;
   for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
     if (state.degree[v] == 0 && mesh.vertex_alive(v)) state.lost.push_back(v);
+}
+
+/// Sets the finite tetrahedra inside to kept, the others to removed. Lost are the vertices that are
+/// not on the surface.
+template <class Mesh>
+void set_labels(const Mesh& mesh, State& state, const std::vector<std::uint8_t>& inside) {
+  keep_all(mesh, state);
+  std::vector<std::uint8_t> outside(mesh.vertex.size());
+  for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
+    const auto& corner = mesh.tetrahedron[t].corner;
+    if (corner[0] == spatial::kFreeCorner || inside[t] != 0) continue;
+    for (const std::uint32_t v : corner) outside[v] = 1;
+    if (state.of[t] == kKept) state.remove(mesh, t, 0);
+  }
+  find_lost(mesh, state);
+  if (mesh.flat) return;
+  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
+    if (outside[v] == 0 && mesh.vertex_alive(v)) state.lost.push_back(v);
+  std::sort(state.lost.begin(), state.lost.end());
 }
 
 }  // namespace terrace::tri::shape

@@ -13,7 +13,7 @@ constexpr std::size_t kOverhead = sizeof(GivenCluster) + 64;
 
 std::size_t bytes_held(const GivenCluster& cluster) {
   return kOverhead + cluster.positions.capacity() * sizeof(Point3) +
-         cluster.children.capacity() * sizeof(std::uint64_t) +
+         cluster.children.capacity() * sizeof(std::uint64_t) + cluster.values.capacity() +
          cluster.child_records.capacity() * sizeof(ClusterRecord);
 }
 
@@ -25,6 +25,7 @@ GivenCluster load(ClusterSource& source, ClusterId id, const ClusterId* head_chi
   given.cluster = id;
   given.positions.assign(members.positions.begin(), members.positions.end());
   given.children.assign(members.children.begin(), members.children.end());
+  given.values.assign(members.values.begin(), members.values.end());
   if (level == 0) return given;
   if (given.children.size() != given.positions.size() * level) {
     throw HierarchyError(id, std::to_string(given.positions.size()) + " members of level " +
@@ -58,9 +59,10 @@ GivenCluster load_root(ClusterSource& source) {
   return load(source, cluster_id(source.top(), 0), nullptr);
 }
 
-double ViewCache::bytes_of(unsigned level, std::uint64_t members) {
+double ViewCache::bytes_of(unsigned level, std::uint64_t members) const {
   const double per_member = sizeof(Point3) + level * double{sizeof(std::uint64_t)} +
-                            (level > 0 ? sizeof(ClusterRecord) : 0);
+                            (level > 0 ? sizeof(ClusterRecord) : 0) +
+                            static_cast<double>(value_bytes_);
   return static_cast<double>(members) * per_member + sizeof(ClusterRecord) + kOverhead;
 }
 
@@ -69,6 +71,8 @@ bool ViewCache::give(GivenCluster cluster) {
   cluster.positions.shrink_to_fit();
   cluster.children.shrink_to_fit();
   cluster.child_records.shrink_to_fit();
+  cluster.values.shrink_to_fit();
+  if (!cluster.positions.empty()) value_bytes_ = cluster.values.size() / cluster.positions.size();
   const std::size_t bytes = bytes_held(cluster);
   if (bytes > max_bytes_) return false;
   while (bytes_ > max_bytes_ - bytes) erase(places_.find(clusters_.front().cluster));
@@ -84,6 +88,11 @@ const GivenCluster* ViewCache::find(ClusterId cluster, bool use) {
   if (at == places_.end()) return nullptr;
   if (use) clusters_.splice(clusters_.end(), clusters_, at->second);
   return &*at->second;
+}
+
+const GivenCluster* ViewCache::find(ClusterId cluster) const {
+  const auto at = places_.find(cluster);
+  return at == places_.end() ? nullptr : &*at->second;
 }
 
 void ViewCache::drop(ClusterId cluster) {
@@ -106,7 +115,7 @@ ClusterRecord ViewCache::record(ClusterId id) {
 ClusterMembers ViewCache::read(ClusterId id) {
   const auto at = places_.find(id);
   assert(at != places_.end());
-  return {at->second->positions, at->second->children};
+  return {at->second->positions, at->second->children, at->second->values};
 }
 
 }  // namespace terrace::tri

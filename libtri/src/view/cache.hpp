@@ -27,13 +27,14 @@ class ViewCache final : public ClusterSource {
   bool give(GivenCluster cluster);
   /// Null if it is not cached. `use`: marks it as most recently used.
   const GivenCluster* find(ClusterId cluster, bool use);
+  [[nodiscard]] const GivenCluster* find(ClusterId cluster) const;
   void drop(ClusterId cluster);
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t max_bytes() const { return max_bytes_; }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
-  /// Memory of a cluster with this many members.
-  [[nodiscard]] static double bytes_of(unsigned level, std::uint64_t members);
+  /// Memory of a cluster with this many members, each with as many values as in the last given.
+  [[nodiscard]] double bytes_of(unsigned level, std::uint64_t members) const;
 
   /// Provides the record that the model will request.
   void expect(ClusterId cluster, const ClusterRecord& record) {
@@ -53,7 +54,8 @@ class ViewCache final : public ClusterSource {
 
   std::vector<std::uint64_t> counts_;
   std::size_t max_bytes_ = std::numeric_limits<std::size_t>::max(), bytes_ = 0;
-  Places clusters_;  // least recently used first
+  std::size_t value_bytes_ = 0;  // per member
+  Places clusters_;              // least recently used first
   std::unordered_map<ClusterId, Places::iterator> places_;
   ClusterId expected_{};
   ClusterRecord record_;

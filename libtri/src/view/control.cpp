@@ -21,6 +21,11 @@ void check(const GivenCluster& cluster, unsigned top) {
                              " child ordinals, not " + std::to_string(size * level) +
                              "; the source is damaged, verify it");
   }
+  if (size == 0 ? !cluster.values.empty() : cluster.values.size() % size != 0) {
+    throw HierarchyError(cluster.cluster, std::to_string(cluster.values.size()) +
+                                              " bytes of values came for " + std::to_string(size) +
+                                              " members");
+  }
   const std::size_t records = level == 0 ? 0 : size + (level < top ? 1 : 0);
   if (cluster.child_records.size() != records) {
     throw HierarchyError(cluster.cluster, std::to_string(cluster.child_records.size()) +

@@ -145,7 +145,7 @@ void ViewControl<Triangulation>::Impl::expand_wanted() {
       if (room == Room::none) ++result_.blocked;
       if (room == Room::later) {
         claimed_ += given->positions.size();
-        claimed_bytes_ += ViewCache::bytes_of(level_of(candidate->id), candidate->members);
+        claimed_bytes_ += cache_.bytes_of(level_of(candidate->id), candidate->members);
       }
       if (room != Room::none) cache_.find(candidate->id, true);
     }
@@ -198,7 +198,7 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
   // Nothing is requested that could not be expanded, or kept until then.
   const std::size_t claims = claimed_ + members;
   const auto known = asked_.find(candidate.id);
-  const double bytes = ViewCache::bytes_of(level, members);
+  const double bytes = cache_.bytes_of(level, members);
   const double more = known == asked_.end() ? bytes : 0.0;
   if (!could_fit(candidate, members) || !could_fit(candidate, claims) ||
       claimed_bytes_ + more > static_cast<double>(cache_.max_bytes())) {
@@ -216,7 +216,7 @@ template <class Triangulation>
 void ViewControl<Triangulation>::Impl::ask_soon() {
   for (const Candidate& candidate : front_.soon()) {
     if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
-    const double bytes = ViewCache::bytes_of(level_of(candidate.id), candidate.members);
+    const double bytes = cache_.bytes_of(level_of(candidate.id), candidate.members);
     const bool known = asked_.count(candidate.id) != 0;
     if (!known && claimed_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
     if (!known) claimed_bytes_ += bytes;
@@ -301,6 +301,10 @@ bool ViewControl<Triangulation>::give(GivenCluster cluster) {
   impl_->asked_.erase(cluster.cluster);
   impl_->faulty_.erase(cluster.cluster);
   return impl_->cache_.give(std::move(cluster));
+}
+template <class Triangulation>
+const GivenCluster* ViewControl<Triangulation>::given(ClusterId cluster) const {
+  return std::as_const(impl_->cache_).find(cluster);
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::forget(ClusterId cluster) {

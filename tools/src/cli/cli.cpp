@@ -302,6 +302,9 @@ int run_command_line(int argc, const char* const* argv) {
   } catch (const UsageError& error) {
     print_message(with_option_names(error.what()));
     return kWrongUsage;
+  } catch (const std::invalid_argument& error) {  // what the libraries say of wrong parameters
+    print_message(with_option_names(error.what()));
+    return kWrongUsage;
   } catch (const Interrupted& error) {
     print_message(error.what());
     return kInterrupted;

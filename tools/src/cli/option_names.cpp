@@ -10,11 +10,12 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 35> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 36> kOptions{{
     {"band", "--band"},
     {"block_points", "--block"},
     {"cell", "--cell"},
     {"channel", "--channel"},
+    {"cluster", "--cluster"},
     {"crs", "--crs"},
     {"drop", "--drop"},
     {"duplicates", "--duplicates"},

@@ -139,6 +139,21 @@ std::optional<unsigned> parse_level(const std::string& text) {
   return level;
 }
 
+stream::ClusterId parse_cluster(const std::string& text) {
+  const char* const end = text.data() + text.size();
+  unsigned level = 0;
+  std::uint64_t number = 0;
+  const auto [colon, error] = std::from_chars(text.data(), end, level);
+  if (error == std::errc{} && colon != end && *colon == ':' && level < 256) {
+    const auto [rest, wrong] = std::from_chars(colon + 1, end, number);
+    if (wrong == std::errc{} && rest == end && number < std::uint64_t{1} << 56) {
+      return stream::cluster_id(level, number);
+    }
+  }
+  throw UsageError("--cluster '" + text +
+                   "': write L:N, its level and its number there, as in 1:42");
+}
+
 Focus parse_focus(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos) {

@@ -57,6 +57,9 @@ RasterValue parse_raster_value(const std::string& text);
 /// "facilities".
 cluster::FacilityStrategy parse_strategy(const std::string& text);
 
+/// "L:N", a cluster's level and its number there.
+stream::ClusterId parse_cluster(const std::string& text);
+
 /// "laplacian", "taubin" or "bilateral", and after a colon the number of steps (10 unless given, at
 /// most 10,000); nullopt for an empty text. The edge_height of "bilateral" stays 0: it depends on
 /// the data.

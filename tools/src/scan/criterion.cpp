@@ -32,9 +32,17 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
     value = positive_number(text.substr(colon + 1));
     if (!value) throw UsageError("--criterion: a positive number must follow '" + name + ":'");
   }
-  if (name == "edge") {
-    options.restore.shape.criterion = tri::ShapeCriterion::kEdgeLength;
-    if (value) options.restore.shape.edge_factor = *value;
+  tri::ShapeOptions& shape = options.restore.shape;
+  if (name == "poles" && !value) {
+    shape.rule = tri::ShapeRule::kPoles;
+  } else if (name == "gabriel" && !value) {
+    shape.rule = tri::ShapeRule::kFlood;
+    shape.criterion = tri::ShapeCriterion::kGabriel;
+  } else if (name == "edge") {
+    shape.rule = tri::ShapeRule::kPublished;
+    shape.criterion = tri::ShapeCriterion::kEdgeLength;
+    shape.keep_vertices = false;
+    if (value) shape.edge_factor = *value;
   } else if (name == "alpha-wrap") {
     options.method = {[alpha = value.value_or(0.0)](std::span<const tri::Point3> points) {
                         return tri::RestoredSurface{alpha_wrap_surface(points, alpha), {}};
@@ -42,9 +50,10 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
                       kCgalBytesPerPoint};
   } else if (name == "advancing-front" && !value) {
     options.method = {advancing_front_surface, kCgalBytesPerPoint};
-  } else if (name != "gabriel" || value) {
+  } else {
     throw UsageError(
-        "--criterion is edge[:FACTOR], gabriel, advancing-front or alpha-wrap[:METRES], not '" +
+        "--criterion is poles, gabriel, edge[:FACTOR], advancing-front or alpha-wrap[:METRES], "
+        "not '" +
         text + "'");
   }
   return options;
@@ -55,7 +64,7 @@ void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options) {
   if (metric.kind != MetricChoice::Kind::elliptical) {
     throw UsageError("a surface has the metric euclidean or elliptical:FILE, not " + metric.text);
   }
-  if (options.method) throw UsageError("--metric is for --criterion gabriel and edge");
+  if (options.method) throw UsageError("--metric is for --criterion poles, gabriel and edge");
   if (metric.has_boxes()) {
     throw UsageError("--metric: a surface has one ellipsoid, so its region has no \"box\"");
   }

@@ -10,7 +10,7 @@ namespace terrace::tools {
 
 using namespace terrain;
 
-/// The method that --criterion names: edge[:FACTOR], gabriel, advancing-front or
+/// The method that --criterion names: poles, gabriel, edge[:FACTOR], advancing-front or
 /// alpha-wrap[:METRES]. Throws: UsageError.
 ScanSurfaceOptions parse_criterion(const std::string& text);
 

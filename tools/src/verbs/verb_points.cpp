@@ -18,6 +18,7 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
 #include "cli/store_options.hpp"
@@ -137,11 +138,18 @@ class PointsCommand final : public Command {
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
         ->needs("--near")
         ->excludes("-k");
+    app.add_option("--cluster", cluster_,
+                   "L:N, the cluster N of level L: the points of --level (default: L) that it "
+                   "stands for, itself included")
+        ->excludes("--region")
+        ->excludes("--focus")
+        ->excludes("--near");
     add_where(app, where_);
     app.add_option("--overlay", overlay_,
                    "a file of mesh --save-overlay: its heights in place of the store's")
         ->type_name("FILE")
-        ->excludes("--near");
+        ->excludes("--near")
+        ->excludes("--cluster");
     not_yet(app, {"--max-points"});
   }
 
@@ -149,6 +157,10 @@ class PointsCommand final : public Command {
     const Stopwatch watch;
     const stream::Store store = open_store(part_.path);
     Detail detail = part_.detail(store, common);
+    if (!cluster_.empty()) {
+      detail.cluster = parse_cluster(cluster_);
+      if (part_.level.empty()) detail.level = stream::level_of(*detail.cluster);
+    }
     if (!where_.empty()) detail.where.emplace(where_, store.schema());
     if (!near_.empty() && detail.where) {
       throw UsageError("--near finds the nearest of all points: without --where");
@@ -264,7 +276,7 @@ class PointsCommand final : public Command {
   }
 
   PartOptions part_;
-  std::string output_, format_, overlay_, near_, where_;
+  std::string output_, format_, overlay_, near_, cluster_, where_;
   std::optional<std::size_t> count_;
   std::optional<double> radius_;
 };

@@ -28,15 +28,17 @@ class SurfaceCommand final : public Command {
     part_.define(app, "only points inside");
     add_output(app, output_, "the file to write: .ply, .obj, .glb; with --tetrahedra .vtk");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
-    app.add_option("--criterion", criterion_,
-                   "what lies on the surface: gabriel; edge[:FACTOR], facets whose edges are short "
-                   "beside the others (0.5), which does not restore scans yet: pieces or the hull; "
-                   "or CGAL's advancing-front, alpha-wrap[:METRES]")
+    app.add_option(
+           "--criterion", criterion_,
+           "how the inside is told: poles, by the angles between circumspheres; gabriel and "
+           "edge[:FACTOR] (0.5), which peel tetrahedra off the hull as J. Skala's thesis "
+           "does: gabriel may leave bridges and bury samples, edge leaves slivers many times "
+           "the surface's area; or CGAL's advancing-front, alpha-wrap[:METRES]")
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option(
            "--metric", metric_,
-           "of --criterion gabriel and edge: euclidean or elliptical:FILE, an ellipsoid for "
+           "of --criterion poles, gabriel and edge: euclidean or elliptical:FILE, an ellipsoid for "
            "samples that are denser in some directions than in others; see 'terrace cluster "
            "--help'")
         ->capture_default_str()
@@ -52,7 +54,7 @@ class SurfaceCommand final : public Command {
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     if (tetrahedra_ && options.method) {
-      throw UsageError("--tetrahedra is for --criterion gabriel and edge");
+      throw UsageError("--tetrahedra is for --criterion poles, gabriel and edge");
     }
     const stream::Store store = open_store(part_.path);
     const Detail detail = part_.detail(store, common);
@@ -80,7 +82,9 @@ class SurfaceCommand final : public Command {
                     {"volume", measures.volume},
                     {"components", measures.components},
                     {"euler_characteristic", measures.euler_characteristic},
-                    {"closed", measures.closed}};
+                    {"closed", measures.closed},
+                    {"open_scan", surface.open}};
+    if (surface.samples_off) summary.json["samples_off"] = *surface.samples_off;
     summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(surface.mesh.positions.size()) + " vertices, ";
     if (tetrahedra_) {
@@ -90,14 +94,19 @@ class SurfaceCommand final : public Command {
       summary.json["triangles"] = surface.mesh.triangles.size();
       summary.text += with_commas(surface.mesh.triangles.size()) + " triangles, " +
                       (measures.closed ? "closed, " : "open, ") + with_commas(measures.components) +
-                      (measures.components == 1 ? " component" : " components");
+                      (measures.components == 1 ? " part" : " parts");
+    }
+    if (surface.open) summary.text += ", an open scan: the faces over its gaps are left out";
+    if (surface.samples_off.value_or(0) > 0) {
+      summary.text += ", " + with_commas(*surface.samples_off) +
+                      (*surface.samples_off == 1 ? " sample" : " samples") + " not on it";
     }
     summary.text += " in " + readable_seconds(watch.seconds()) + "\n";
     return summary;
   }
 
   PartOptions part_;
-  std::string output_, format_, criterion_ = "gabriel", metric_ = "euclidean";
+  std::string output_, format_, criterion_ = "poles", metric_ = "euclidean";
   bool tetrahedra_ = false;
 };
 

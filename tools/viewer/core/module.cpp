@@ -108,7 +108,8 @@ TERRACE_EXPORT(forget) int terrace_forget(std::size_t name) {
 }
 
 /// input: the nine numbers of the map from stored coordinates to metres. numbers: the box of the
-/// scene; 1 for triangles, 0 for points; the store's checksum.
+/// scene; 1 for triangles, 0 for points; the store's checksum; of points whether they have colours,
+/// classes, intensities; how many classes, and these.
 TERRACE_EXPORT(open) int terrace_open(double max_points) {
   return guarded([&] {
     Module& m = module();
@@ -125,6 +126,12 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
                  box.max[2],
                  m.store->schema().grid ? 1.0 : 0.0,
                  static_cast<double>(m.store->checksum())};
+    const viewer::CloudColours& colours = m.scene->colours();
+    for (const bool has : {colours.has_rgb(), colours.has_group(), colours.has_intensity()}) {
+      m.numbers.push_back(has ? 1 : 0);
+    }
+    m.numbers.push_back(static_cast<double>(colours.groups().size()));
+    m.numbers.insert(m.numbers.end(), colours.groups().begin(), colours.groups().end());
     return kDone;
   });
 }
@@ -184,7 +191,7 @@ TERRACE_EXPORT(hash) int terrace_hash() {
 }
 
 /// input: origin, direction, the angle. numbers: nothing met (0) or 1; stored place; place in the
-/// view frame; level; level and ordinal of the cluster.
+/// view frame; level; level and ordinal of the cluster; how many attributes are known, and these.
 TERRACE_EXPORT(pick) int terrace_pick() {
   return guarded([&] {
     Module& m = module();
@@ -201,7 +208,9 @@ TERRACE_EXPORT(pick) int terrace_pick() {
                    m.hit->place[2],
                    static_cast<double>(m.hit->level),
                    static_cast<double>(tri::level_of(m.hit->cluster)),
-                   static_cast<double>(tri::ordinal_of(m.hit->cluster))};
+                   static_cast<double>(tri::ordinal_of(m.hit->cluster)),
+                   static_cast<double>(m.hit->attributes.size())};
+      m.numbers.insert(m.numbers.end(), m.hit->attributes.begin(), m.hit->attributes.end());
     }
     return kDone;
   });

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 #include <terrace/terrain/store_view.hpp>
 #include <terrace/tri/geomorph.hpp>
@@ -71,10 +72,19 @@ class SceneOf final : public Scene {
  public:
   using View = terrain::StoreView<Shown>;
   static constexpr bool kTriangles = std::is_integral_v<Shown>;
+  using Vertex = std::conditional_t<kTriangles, SceneVertex, ScenePoint>;
 
   SceneOf(const stream::Store& store, const stream::LinearMap& ground,
           const tri::ViewOptions& options)
-      : view_(store, ground, options), bounds_(store.bounds()) {
+      : store_(store), view_(store, ground, options), bounds_(store.bounds()) {
+    if constexpr (!kTriangles) {
+      std::vector<std::byte> records;
+      for (const tri::VertexId vertex : mesh().all_vertices()) {
+        const auto record = view_.attributes(vertex);
+        records.insert(records.end(), record.begin(), record.end());
+      }
+      colours_ = CloudColours(store.schema(), records);
+    }
     grow();
     for (const tri::VertexId vertex : mesh().all_vertices()) place(vertex);
     if constexpr (kTriangles) {
@@ -101,7 +111,8 @@ class SceneOf final : public Scene {
     return state;
   }
   const SceneChanges& take_changes() override {
-    vertices_.take(changes_.vertex_blocks, changes_.vertices);
+    vertices_.take(changes_.vertex_blocks, changed_vertices_);
+    changes_.vertices = std::as_bytes(std::span(changed_vertices_));
     triangles_.take(changes_.triangle_blocks, changes_.triangles);
     return changes_;
   }
@@ -130,6 +141,7 @@ class SceneOf final : public Scene {
     for (const tri::ClusterId id : pinned_) view_.unpin(id);
     pinned_.clear();
   }
+  [[nodiscard]] const CloudColours& colours() const override { return colours_; }
   [[nodiscard]] stream::Box3 box() const override {
     stream::Box3 box;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -150,13 +162,20 @@ class SceneOf final : public Scene {
   /// Without sliding.
   void place(tri::VertexId vertex) {
     const Point3 p = view_.in_view_frame(vertex);
-    SceneVertex& v = vertices_.change(slot(vertex));
+    Vertex& v = vertices_.change(slot(vertex));
     v.x = static_cast<float>(p[0]);
     v.y = static_cast<float>(p[1]);
     v.z = static_cast<float>(p[2]);
     v.level = static_cast<std::uint8_t>(view_.model().level(vertex));
-    v.start_z = v.z;
-    v.start_time = -1e9F;
+    if constexpr (kTriangles) {
+      v.start_z = v.z;
+      v.start_time = -1e9F;
+    } else {
+      const CloudColour colour = colours_(view_.attributes(vertex));
+      v.rgb = colour.rgb;
+      v.group = colour.group;
+      v.intensity = colour.intensity;
+    }
   }
   template <class Delta>
   void apply(const Delta& delta, double time);
@@ -185,9 +204,12 @@ class SceneOf final : public Scene {
     return {vertices_[slot].x, vertices_[slot].y, vertices_[slot].z};
   }
 
+  stream::Store store_;
   View view_;
   stream::Box3 bounds_;
-  Blocks<SceneVertex> vertices_;
+  CloudColours colours_;
+  Blocks<Vertex> vertices_;
+  std::vector<Vertex> changed_vertices_;
   Blocks<SceneTriangle> triangles_;
   SceneChanges changes_;
   std::vector<bool> listed_;  // in without_normal_, by slot
@@ -277,6 +299,12 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
            .place = place,
            .level = tri::level_of(id.cluster),
            .cluster = id.cluster};
+    const stream::StoreSchema& schema = store_.schema();
+    const auto record = view_.attributes(vertex);
+    for (std::size_t i = 0; i < schema.attributes.size() && !record.empty(); ++i) {
+      hit->attributes.push_back(
+          stream::to_double(schema.attributes[i].type, record.data() + schema.attribute_offset(i)));
+    }
   };
   if constexpr (kTriangles) {
     // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -13,6 +14,8 @@
 #include <terrace/stream/store_query.hpp>
 #include <terrace/tri/view.hpp>
 
+#include "cloud_colours.hpp"
+
 namespace terrace::viewer {
 
 /// A vertex as a graphics processor takes it: metres in the view frame of terrain::StoreView.
@@ -20,12 +23,22 @@ struct SceneVertex {
   static constexpr std::uint8_t kNone = 255;  ///< the level of a slot without a vertex
 
   float x = 0, y = 0, z = 0;
-  std::array<std::int8_t, 3> normal{};  ///< upward, times 127; null without triangles
+  std::array<std::int8_t, 3> normal{};  ///< upward, times 127
   std::uint8_t level = kNone;           ///< the highest of the point
   float start_z = 0;                    ///< where z slides from
   float start_time = -1e9F;             ///< and when it began, in the seconds of Scene::frame()
 };
 static_assert(sizeof(SceneVertex) == 24);
+
+/// The same of a cloud, whose points neither have a normal nor slide.
+struct ScenePoint {
+  float x = 0, y = 0, z = 0;
+  std::array<std::uint8_t, 3> rgb{};
+  std::uint8_t level = SceneVertex::kNone;
+  std::uint8_t group = 0, intensity = 0;
+  std::array<std::uint8_t, 6> unused{};
+};
+static_assert(sizeof(ScenePoint) == sizeof(SceneVertex));
 
 using SceneTriangle = std::array<std::uint32_t, 3>;  ///< slots of vertices; all 0: none
 
@@ -33,7 +46,8 @@ using SceneTriangle = std::array<std::uint32_t, 3>;  ///< slots of vertices; all
 struct SceneChanges {
   static constexpr std::size_t kBlock = 64;
   std::vector<std::uint32_t> vertex_blocks, triangle_blocks;
-  std::vector<SceneVertex> vertices;     ///< kBlock for each of vertex_blocks
+  std::span<const std::byte>
+      vertices;  ///< kBlock SceneVertex or ScenePoint for each of vertex_blocks
   std::vector<SceneTriangle> triangles;  ///< likewise
 };
 
@@ -46,10 +60,11 @@ struct SceneState {
 };
 
 struct SceneHit {
-  stream::Point3 stored{};   ///< on the surface, or the point itself, in stored coordinates
-  stream::Point3 place{};    ///< the same in the view frame
-  unsigned level = 0;        ///< of the nearest corner
-  tri::ClusterId cluster{};  ///< whose member that corner is
+  stream::Point3 stored{};           ///< on the surface, or the point itself, in stored coordinates
+  stream::Point3 place{};            ///< the same in the view frame
+  unsigned level = 0;                ///< of the nearest corner
+  tri::ClusterId cluster{};          ///< whose member that corner is
+  std::vector<double> attributes{};  ///< of that corner, stored values; empty if no longer kept
 };
 
 /// A store under a camera as arrays to draw: triangles of rasters, of other stores the points.
@@ -77,6 +92,8 @@ class Scene {
   /// cluster that it is a member of. They stay so until release().
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
+  /// Of points: what they can be drawn by.
+  [[nodiscard]] virtual const CloudColours& colours() const = 0;
   /// The box of all points in the view frame.
   [[nodiscard]] virtual stream::Box3 box() const = 0;
 };

@@ -44,6 +44,15 @@ export interface Hit {
   level: number;
   clusterLevel: number;
   clusterOrdinal: number;
+  attributes: number[];  ///< stored values, in the manifest's order; empty if unknown
+}
+
+/// The scene as a whole.
+export interface Opened {
+  box: number[];
+  triangles: boolean;
+  /// Of points: what they can be drawn by, and the classes that there are.
+  colours: {rgb: boolean, intensity: boolean, classes: number[]};
 }
 
 export const BLOCK = 64;
@@ -109,11 +118,15 @@ export class Core {
     this.check(this.wasm.forget(this.write(name)));
   }
   /// What is missing, or the box of the scene.
-  open(ground: number[], maxPoints: number): {missing: ByteRange[]}|{box: number[], triangles: boolean} {
+  open(ground: number[], maxPoints: number): {missing: ByteRange[]}|Opened {
     this.writeNumbers(ground);
     if (this.check(this.wasm.open(maxPoints)) === MISSING) return {missing: this.missing()};
-    const numbers = this.numbers(8);
-    return {box: numbers.slice(0, 6), triangles: numbers[6] === 1};
+    const n = this.numbers(12);
+    return {
+      box: n.slice(0, 6),
+      triangles: n[6] === 1,
+      colours: {rgb: n[8] === 1, intensity: n[10] === 1, classes: this.numbers(12 + n[11]).slice(12)}
+    };
   }
   /// Works for about `seconds`; `time` is that of the picture.
   frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[]} {
@@ -158,13 +171,14 @@ export class Core {
     this.writeNumbers([...origin, ...direction, angle]);
     this.check(this.wasm.pick());
     if (this.numbers(1)[0] === 0) return null;
-    const n = this.numbers(10);
+    const n = this.numbers(11);
     return {
       stored: n.slice(1, 4),
       place: n.slice(4, 7),
       level: n[7],
       clusterLevel: n[8],
-      clusterOrdinal: n[9]
+      clusterOrdinal: n[9],
+      attributes: this.numbers(11 + n[10]).slice(11)
     };
   }
   /// Of what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// What the page and the worker tell each other.
 
-import type {Camera, Changes, Hit, State} from './core';
+import type {Camera, Changes, Hit, Opened, State} from './core';
 import type {Stats} from './ranges';
 import type {Manifest} from './store';
 
@@ -16,7 +16,7 @@ export type ToWorker =
 
 export type FromWorker =
     |{type: 'progress', bytes: number}
-    |{type: 'opened', manifest: Manifest, box: number[], triangles: boolean}
+    |{type: 'opened', manifest: Manifest, scene: Opened}
     |{type: 'frame', serial: number, state: State, changes: Changes, stats: Stats, milliseconds: number, loading: boolean, time: number}
     |{type: 'picked', id: number, hit: Hit|null}
     |{type: 'hashed', id: number, hash: string}

@@ -4,7 +4,8 @@
 import {BLOCK, type Changes, type State, VERTEX_BYTES} from './core';
 import type {OrbitCamera} from './camera';
 
-export type Colour = 'height'|'slope'|'level';
+export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity'] as const;
+export type Colour = typeof COLOURS[number];
 
 export interface Look {
   colour: Colour;
@@ -20,6 +21,11 @@ const SLOPE = [[0, 250, 250, 245], [15, 250, 215, 110], [35, 205, 70, 45], [60, 
 /// From the coarsest level to level 0.
 const LEVELS = [[0, 68, 34, 112], [0.25, 49, 104, 142], [0.5, 53, 183, 121], [0.75, 180, 221, 44], [1, 253, 231, 80]];
 
+const GREYS = [[0, 28, 30, 34], [1, 245, 245, 240]];
+/// Of classes, again from the first after the last.
+export const CATEGORIES = [[68, 119, 170], [238, 153, 51], [51, 153, 85], [204, 68, 85], [136, 102, 187], [153, 119, 68],
+                           [221, 136, 187], [119, 119, 119], [170, 170, 51], [85, 187, 204], [34, 85, 51], [136, 34, 51]];
+
 const SLIDE_SECONDS = 0.45;
 
 const VERTEX = `#version 300 es
@@ -28,15 +34,25 @@ layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in float level;
 layout(location = 3) in vec2 start;
+layout(location = 4) in vec3 rgb;        // of points, in the bytes of the normal
+layout(location = 5) in vec2 attributes; // of points, in those of the start: class, intensity
 uniform mat4 matrix;
+uniform bool points;
 uniform float time, pointSize;
 out vec3 at;
 out vec3 up;
 out float levelOf;
+out vec3 own;
+out vec2 attributesOf;
 void main() {
-  float t = clamp((time - start.y) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0);
-  at = vec3(place.xy, mix(start.x, place.z, t * t * (3.0 - 2.0 * t)));
+  at = place;
+  if (!points) {
+    float t = clamp((time - start.y) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0);
+    at.z = mix(start.x, place.z, t * t * (3.0 - 2.0 * t));
+  }
   up = normal;
+  own = rgb;
+  attributesOf = attributes;
   levelOf = level * 255.0;
   gl_Position = levelOf > 254.0 ? vec4(2.0, 2.0, 2.0, 1.0) : matrix * vec4(at, 1.0);
   gl_PointSize = pointSize;
@@ -47,8 +63,10 @@ precision highp float;
 in vec3 at;
 in vec3 up;
 in float levelOf;
+in vec3 own;
+in vec2 attributesOf;
 uniform sampler2D ramp;
-uniform int mode;  // 0 height, 1 slope, 2 level, 3 wire
+uniform int mode;  // as in COLOURS; -1 for the wire
 uniform vec2 heights;
 uniform float top;
 uniform bool lit;
@@ -58,15 +76,17 @@ uniform vec3 eye;
 uniform float haze;
 out vec4 colour;
 void main() {
-  if (mode == 3) {
+  if (mode < 0) {
     colour = wire;
     return;
   }
   vec3 n = lit ? normalize(up) : vec3(0.0, 0.0, 1.0);
   float share = mode == 0 ? (at.z - heights.x) / max(heights.y - heights.x, 1e-6)
       : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
-      : 1.0 - levelOf / max(top, 1.0);
-  vec3 base = texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
+      : mode == 2 ? 1.0 - levelOf / max(top, 1.0)
+      : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
+      : attributesOf.y;
+  vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
   float light = 1.0;
   if (lit) {
     // From the north-west, as maps have it, and a little from the sky.
@@ -143,7 +163,15 @@ export class Renderer {
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
       throw new Error(`The graphics driver refuses the viewer's shaders: ${gl.getProgramInfoLog(this.program)}`);
     }
-    this.ramps = {height: this.ramp(LAND), slope: this.ramp(SLOPE), level: this.ramp(LEVELS)};
+    const categories = CATEGORIES.flatMap((c, i) => [[i, ...c], [i + 0.999, ...c]]);
+    this.ramps = {
+      height: this.ramp(LAND),
+      slope: this.ramp(SLOPE),
+      level: this.ramp(LEVELS),
+      rgb: this.ramp(GREYS),
+      class: this.ramp(categories),
+      intensity: this.ramp(GREYS)
+    };
     gl.enable(gl.DEPTH_TEST);
     this.clear();
   }
@@ -219,7 +247,8 @@ export class Renderer {
     gl.uniform1f(this.uniform('haze'), extent * 2.5);
     const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
     gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
-    gl.uniform1i(this.uniform('mode'), {height: 0, slope: 1, level: 2}[look.colour]);
+    gl.uniform1i(this.uniform('points'), this.asTriangles ? 0 : 1);
+    gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
     if (!this.asTriangles) {
       gl.bindVertexArray(this.surface);
@@ -236,7 +265,7 @@ export class Renderer {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
-    gl.uniform1i(this.uniform('mode'), 3);
+    gl.uniform1i(this.uniform('mode'), -1);
     gl.bindVertexArray(this.wires);
     gl.drawElements(gl.LINES, this.lineCount, gl.UNSIGNED_INT, 0);
     gl.depthMask(true);
@@ -273,7 +302,9 @@ export class Renderer {
     gl.vertexAttribPointer(1, 3, gl.BYTE, true, VERTEX_BYTES, 12);
     gl.vertexAttribPointer(2, 1, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 15);
     gl.vertexAttribPointer(3, 2, gl.FLOAT, false, VERTEX_BYTES, 16);
-    for (let i = 0; i < 4; ++i) gl.enableVertexAttribArray(i);
+    gl.vertexAttribPointer(4, 3, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 12);
+    gl.vertexAttribPointer(5, 2, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 16);
+    for (let i = 0; i < 6; ++i) gl.enableVertexAttribArray(i);
     gl.bindVertexArray(null);
     return array;
   }

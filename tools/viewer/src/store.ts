@@ -17,6 +17,7 @@ export interface Manifest {
   checksum: string;
   world: number[];
   coordinates: Channel[];
+  attributes: Channel[];
   crs: {epsg: number, name: string, geographic: boolean, horizontal_unit: string};
   levels: Array<{level: number, points: number}>;
   files: Map<string, number>;  ///< sizes by name

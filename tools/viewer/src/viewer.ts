@@ -2,9 +2,9 @@
 /// The page: what the user does goes to the camera and the worker, what comes back to the renderer.
 
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
-import type {Hit} from './core';
+import type {Hit, Opened} from './core';
 import type {FromWorker, ToWorker} from './messages';
-import {type Colour, type Look, Renderer} from './render';
+import {CATEGORIES, type Colour, COLOURS, type Look, Renderer} from './render';
 import {type Manifest, worldPoint} from './store';
 
 /// Of the stores that the page shows, from stores.json.
@@ -16,12 +16,17 @@ interface Listed {
 const phone = matchMedia('(max-width: 640px)').matches;
 /// Points at once: what phones draw without effort is less.
 const MOST_POINTS = phone ? 400_000 : 1_500_000;
-const LEGENDS: Record<Colour, string> = {
+const LEGENDS: Partial<Record<Colour, string>> = {
   height: 'rgb(96 145 92),rgb(150 178 110) 18%,rgb(212 201 140) 36%,rgb(196 160 105) 54%,rgb(160 122 92) 70%,' +
       'rgb(178 166 158) 85%,rgb(250 250 250)',
   slope: 'rgb(250 250 245),rgb(250 215 110) 25%,rgb(205 70 45) 58%,rgb(75 15 30)',
-  level: 'rgb(68 34 112),rgb(49 104 142) 25%,rgb(53 183 121) 50%,rgb(180 221 44) 75%,rgb(253 231 80)'
+  level: 'rgb(68 34 112),rgb(49 104 142) 25%,rgb(53 183 121) 50%,rgb(180 221 44) 75%,rgb(253 231 80)',
+  intensity: 'rgb(28 30 34),rgb(245 245 240)'
 };
+/// The standard classes of ASPRS LAS 1.4.
+const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation', 'medium vegetation', 'high vegetation',
+                 'building', 'low point', 'model key', 'water', 'rail', 'road', 'overlap', 'wire guard', 'wire conductor',
+                 'transmission tower', 'wire connector', 'bridge deck', 'high noise'];
 
 function element<T extends HTMLElement>(id: string): T {
   return document.getElementById(id) as T;
@@ -43,6 +48,7 @@ class Viewer {
   private manifest: Manifest|null = null;
   private box: number[] = [];
   private asTriangles = true;
+  private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
   private picks = new Map<number, (hit: Hit|null) => void>();
   private hashes = new Map<number, (hash: string) => void>();
   private next = 0;
@@ -56,6 +62,7 @@ class Viewer {
   private before: Hit|null = null;
   private linkTimer = 0;
   private pivotTimer = 0;
+  private pivoting = false;  ///< the ground in the middle of the picture is being looked for
 
   constructor() {
     this.renderer = new Renderer(this.canvas);
@@ -92,7 +99,8 @@ class Viewer {
     });
   }
   get settled(): boolean {
-    return !this.moved && this.status !== null && this.status.serial === this.serial && this.status.state.settled && !this.renderer.sliding(this.now);
+    if (this.moved || this.pivoting || this.status === null || this.status.serial !== this.serial) return false;
+    return this.status.state.settled && !this.renderer.sliding(this.now);
   }
   get state(): object {
     return {
@@ -122,6 +130,9 @@ class Viewer {
     this.store = name;
     this.manifest = null;
     this.status = null;
+    clearTimeout(this.pivotTimer);
+    this.pivotTimer = 0;
+    this.pivoting = false;
     this.closePlace();
     element<HTMLSelectElement>('store').value = name;
     element('progress').hidden = false;
@@ -149,20 +160,25 @@ class Viewer {
         break;
       case 'opened':
         this.manifest = message.manifest;
-        this.box = message.box;
-        this.asTriangles = message.triangles;
-        this.renderer.show(message.box, message.manifest.levels.length - 1, message.triangles);
-        this.camera.fit(message.box, this.aspect);
+        this.box = message.scene.box;
+        this.asTriangles = message.scene.triangles;
+        this.colours = message.scene.colours;
+        this.renderer.show(this.box, message.manifest.levels.length - 1, this.asTriangles);
+        this.camera.fit(this.box, this.aspect);
         if (first) this.applyLink();
-        for (const id of ['by-slope', 'with-wire']) element(id).hidden = !message.triangles;
-        element('with-size').hidden = message.triangles;
-        this.legend();
+        element('with-wire').hidden = !this.asTriangles;
+        element('with-size').hidden = this.asTriangles;
+        if (!this.offers(this.look.colour) || (this.colours.rgb && !this.link.has('c'))) {
+          this.look.colour = this.colours.rgb ? 'rgb' : 'height';
+        }
+        for (const colour of COLOURS) element(`by-${colour}`).hidden = !this.offers(colour);
+        this.showControls();
         this.sendView();
         break;
       case 'frame': {
         // The clock of the worker has another origin; slides count from now.
         const shift = this.now - message.time;
-        if (message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
+        if (this.asTriangles && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
         this.renderer.apply(message.state, message.changes, this.now);
         this.status = message;
         element('progress').hidden = true;
@@ -267,15 +283,31 @@ class Viewer {
     parts.push(s.state.settled ? (s.state.worst > 1 ? 'as fine as memory allows' : 'as fine as asked for') : 'refining');
     element('status').innerHTML = parts.join(' · ');
   }
+  /// Whether the store can be drawn by it.
+  private offers(colour: Colour): boolean {
+    const {rgb, intensity, classes} = this.colours;
+    return {height: true, slope: this.asTriangles, level: true, rgb, class: classes.length > 0, intensity}[colour];
+  }
   private legend(): void {
     if (!this.manifest) return;
-    const texts: Record<Colour, [string, string]> = {
+    const colour = this.look.colour, ramp = LEGENDS[colour];
+    element('legend').hidden = !ramp;
+    element('classes').hidden = colour !== 'class';
+    element('classes').replaceChildren(...this.colours.classes.map(group => {
+      const item = document.createElement('li'), swatch = document.createElement('i');
+      swatch.style.background = `rgb(${CATEGORIES[group % CATEGORIES.length].join(' ')})`;
+      item.append(swatch, `${group} ${CLASSES[group] ?? ''}`);
+      return item;
+    }));
+    if (!ramp) return;
+    const texts: Partial<Record<Colour, [string, string]>> = {
       height: [metres(this.box[2]), metres(this.box[5])],
       slope: ['0°', '60°'],
-      level: ['coarse', 'fine']
+      level: ['coarse', 'fine'],
+      intensity: ['weak', 'strong']
     };
-    [element('legend-low').textContent, element('legend-high').textContent] = texts[this.look.colour];
-    element('legend-ramp').style.background = `linear-gradient(90deg,${LEGENDS[this.look.colour]})`;
+    [element('legend-low').textContent, element('legend-high').textContent] = texts[colour]!;
+    element('legend-ramp').style.background = `linear-gradient(90deg,${ramp})`;
   }
 
   // ---- A place ---------------------------------------------------------------------------------
@@ -296,6 +328,12 @@ class Viewer {
       ['Cluster', `${hit.clusterLevel}/${hit.clusterOrdinal}`]
     ];
     if (crs.epsg) rows.push(['CRS', `EPSG:${crs.epsg}`]);
+    this.manifest.attributes.forEach((channel, i) => {
+      if (i >= hit.attributes.length) return;
+      const value = hit.attributes[i] * channel.scale + channel.offset;
+      const named = channel.name === 'classification' && CLASSES[value] ? ` ${CLASSES[value]}` : '';
+      rows.push([channel.name.replaceAll('_', ' '), `${Number(value.toPrecision(12))}${named}`]);
+    });
     if (this.before) {
       const way = add(hit.place as Vec3, this.before.place as Vec3, -1);
       rows.push(['From the last', `${metres(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${metres(Math.abs(way[2]))}`]);
@@ -335,7 +373,7 @@ class Viewer {
   private readLink(): void {
     this.link = new URLSearchParams(location.hash.slice(1));
     const colour = this.link.get('c');
-    if (colour === 'height' || colour === 'slope' || colour === 'level') this.look.colour = colour;
+    if (COLOURS.includes(colour as Colour)) this.look.colour = colour as Colour;
     this.look.wire = this.link.get('w') === '1';
     const error = Number(this.link.get('q'));
     if (error >= 0.5 && error <= 32) this.error = error;
@@ -375,15 +413,19 @@ class Viewer {
   }
   private change(): void {
     this.moved = true;
+    this.pivoting = true;
     clearTimeout(this.pivotTimer);
     this.pivotTimer = window.setTimeout(() => void this.turnAboutWhatIsSeen(), 250);
   }
   /// Once the camera rests: what it turns about is the ground in the middle of the picture.
   private async turnAboutWhatIsSeen(): Promise<void> {
+    const timer = this.pivotTimer;
     const eye = this.camera.eye, direction = this.camera.direction;
     const hit = await this.pickRay(eye, direction, 0.02);
-    if (!hit || length(add(this.camera.eye, eye, -1)) > 0) return;
-    this.camera.retarget(length(add(hit.place as Vec3, eye, -1)));
+    if (timer !== this.pivotTimer) return;
+    if (hit && length(add(this.camera.eye, eye, -1)) === 0) this.camera.retarget(length(add(hit.place as Vec3, eye, -1)));
+    this.pivoting = false;
+    this.writeLink();
   }
   private at(event: {clientX: number, clientY: number}): [number, number] {
     return [2 * event.clientX / this.canvas.clientWidth - 1, 1 - 2 * event.clientY / this.canvas.clientHeight];

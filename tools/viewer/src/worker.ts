@@ -8,6 +8,8 @@ import {type Manifest, parseManifest, parseStart} from './store';
 
 /// Of a frame in the worker, in milliseconds.
 const FRAME = 10;
+/// What it aims at, so that nearly all end within FRAME.
+const AIM = 0.85 * FRAME;
 /// Frames that the page may be behind.
 const AHEAD = 6;
 
@@ -154,7 +156,7 @@ class Session {
       return;
     }
     this.opened = true;
-    post({type: 'opened', manifest: this.manifest, box: result.box, triangles: result.triangles});
+    post({type: 'opened', manifest: this.manifest, scene: result});
     this.schedule();
   }
   private frame(): void {
@@ -164,7 +166,7 @@ class Session {
     const changes = this.core.changes();
     this.ranges.want(missing, this.serial, begin);
     const milliseconds = performance.now() - begin;
-    this.share = Math.min(0.9, Math.max(0.1, this.share * Math.min(1.1, Math.max(0.7, FRAME / milliseconds))));
+    this.share = Math.min(0.9, Math.max(0.1, this.share * Math.min(1.1, Math.max(0.7, AIM / milliseconds))));
     const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
     // What is missing wakes it again.
     this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);

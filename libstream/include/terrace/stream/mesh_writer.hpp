@@ -54,9 +54,9 @@ class MeshWriter {
 };
 
 /// A writer for `path`, by WriterOptions::format, otherwise by ending (.ply, .obj, .glb). "-" is
-/// standard output, for "obj" (also if no format is given) and "ply-ascii". Throws: Error if the
-/// format is unknown (names the known ones) or cannot hold such a large mesh, or if the file cannot
-/// be created.
+/// standard output, for "obj" (also if no format is given) and "ply-ascii". Throws:
+/// std::invalid_argument if the format is unknown (names the known ones); Error if it cannot hold
+/// such a large mesh, or if the file cannot be created.
 std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const MeshHeader& header,
                                              const WriterOptions& options = {});
 
@@ -64,7 +64,7 @@ std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const Mesh
 class MeshRounding {
  public:
   /// For the file that open_mesh_writer() writes with the same path and options, and `bounds` in
-  /// its header. Throws: Error for an unknown format, as open_mesh_writer() does.
+  /// its header. Throws: std::invalid_argument for an unknown format, as open_mesh_writer() does.
   MeshRounding(const std::string& path, const Box3& bounds, const WriterOptions& options = {});
 
   /// The position that a reader of the file gets back for `p`.

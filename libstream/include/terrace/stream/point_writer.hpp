@@ -74,8 +74,8 @@ struct WriterOptions {
 
 /// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".
 /// Numbers in text are the shortest that read back as the same value.
-/// Throws: Error if the format is unknown (names the known ones), if the file cannot be created, or
-/// if memory_bytes is too little for LAZ.
+/// Throws: std::invalid_argument if the format is unknown (names the known ones); Error if the file
+/// cannot be created, or if memory_bytes is too little for LAZ.
 std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,
                                                const WriterOptions& options = {});
 

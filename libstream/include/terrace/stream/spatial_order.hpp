@@ -49,10 +49,10 @@ class OrderedSource : public PointSource {
 /// every fourth after it: blocks that are not compact are more than twice as wide as those of a k-d
 /// tree over the window. If they are in the first window, all points are put in order; later, those
 /// that follow. They go into 256 buckets, the leaves of a k-d tree over the window, in a temporary
-/// file as large as their packed records; once all are there the buckets come back one after
-/// another, each cut by a k-d tree into blocks. A bucket of more than 262,144 points is first
-/// divided in turn, which takes no more disk as what has been read is written over. Cells of a
-/// raster stay as they are.
+/// file; once all are there the buckets come back one after another, each cut by a k-d tree into
+/// blocks. A bucket of more than 262,144 points is first divided in turn, which takes no more disk
+/// as what has been read is written over. The file holds chunks of 32 KiB of packed records, less
+/// the bytes that are the same in a whole chunk. Cells of a raster stay as they are.
 ///
 /// The order depends on nothing but the points, their order and the options. Memory, which
 /// reading_bytes() states with the source's: 262,144 points, of the window or of what comes next,

@@ -5,6 +5,8 @@
 #include <array>
 #include <cstdint>
 #include <numeric>
+#include <type_traits>
+#include <vector>
 
 #include "store/codec/coding.hpp"
 #include "store/codec/numbers.hpp"
@@ -50,7 +52,7 @@ unsigned code_difference(Coder& coder, unsigned context, std::int64_t previous,
 template <class Coder>
 void code_old_column(Coder& coder, unsigned attribute, bool floating, NumberForm& form,
                      std::int64_t* values, std::uint32_t n) {
-  const unsigned first = context::kAttribute + context::kPerAttribute * attribute;
+  const unsigned first = context::kAttribute + context::kPerAttributeBefore3 * attribute;
   if (floating) {
     unsigned symbol = form;
     code_symbol(coder, first, symbol);
@@ -66,27 +68,34 @@ void code_old_column(Coder& coder, unsigned attribute, bool floating, NumberForm
 }
 
 /// Differences that came last, the latest first: pulses of a scanner are a few intervals apart.
+template <unsigned kSize>
 class RecentDifferences {
  public:
-  static constexpr unsigned kCount = 3;
+  static constexpr unsigned kCount = kSize;
 
   [[nodiscard]] std::int64_t operator[](unsigned i) const { return recent_[i]; }
   /// Its place among them; kCount if it is none of them.
   [[nodiscard]] unsigned find(std::int64_t difference) const {
-    const unsigned last = recent_[2] == difference ? 2 : kCount;
-    const unsigned later = recent_[1] == difference ? 1 : last;
-    return recent_[0] == difference ? 0 : later;
+    unsigned place = kCount;
+    for (unsigned i = kCount; i-- > 0;) place = recent_[i] == difference ? i : place;
+    return place;
   }
   /// Moves the difference that lies at `place`, or a new one (kCount), to the front.
   void move_to_front(unsigned place, std::int64_t difference) {
-    recent_[2] = place >= 2 ? recent_[1] : recent_[2];
-    recent_[1] = place >= 1 ? recent_[0] : recent_[1];
+    for (unsigned i = kCount; i-- > 1;) recent_[i] = place >= i ? recent_[i - 1] : recent_[i];
     recent_[0] = difference;
   }
 
  private:
-  std::array<std::int64_t, kCount> recent_{0, 1, -1};
+  std::array<std::int64_t, kCount> recent_ = [] {
+    // 0, 1, -1, 2, -2, ...
+    std::array<std::int64_t, kCount> first{};
+    for (unsigned i = 1; i < kCount; ++i) first[i] = i % 2 == 1 ? 1 - first[i - 1] : -first[i - 1];
+    return first;
+  }();
 };
+/// Of the guide, and of other columns.
+inline constexpr unsigned kGuideRecent = 7, kColumnRecent = 3;
 
 constexpr std::int64_t wrapped_sum(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
@@ -136,24 +145,57 @@ inline bool find_differences(const std::int64_t* values, const std::int64_t* bes
   return several != 0;
 }
 
-/// A column of values: the first, then differences as `kind` says, divided by what is common to
-/// them.
-/// number: of the column, attributes first, then the axes. form: coded where it is not null.
-/// beside: the column before, for ColumnKind::beside alone. scratch: room for n differences.
+/// How the points of a cluster follow one another, as their guide tells: mostly the times of a
+/// scanner's pulses.
+class Lines {
+ public:
+  /// Further along the line; of the same pulse; at the beginning of a line.
+  enum Step : std::uint8_t { kAlong, kSame, kJump, kSteps };
+
+  /// From the differences of the guide, of which the first does not count.
+  void find_steps(const std::int64_t* differences, std::uint64_t least_jump, std::uint32_t n) {
+    steps_.resize(n);
+    for (std::uint32_t i = 1; i < n; ++i) {
+      const auto bits = static_cast<std::uint64_t>(differences[i]);
+      const std::uint64_t magnitude = differences[i] < 0 ? -bits : bits;
+      steps_[i] = magnitude >= least_jump ? kJump : magnitude == 0 ? kSame : kAlong;
+    }
+    find_references();
+  }
+  void resize(std::uint32_t n) { steps_.assign(n, kSame); }
+  void set_step(std::uint32_t i, unsigned step) { steps_[i] = static_cast<Step>(step); }
+  void find_references() {
+    references_.resize(steps_.size());
+    std::uint32_t start = 0;
+    for (std::uint32_t i = 1; i < steps_.size(); ++i) {
+      references_[i] = steps_[i] == kJump ? start : i - 1;
+      if (steps_[i] == kJump) start = i;
+    }
+  }
+
+  [[nodiscard]] Step operator[](std::uint32_t i) const { return steps_[i]; }
+  /// The point before; where a line begins, the first of the line before.
+  [[nodiscard]] std::uint32_t reference(std::uint32_t i) const { return references_[i]; }
+
+ private:
+  std::vector<Step> steps_;
+  std::vector<std::uint32_t> references_;
+};
+
+/// Contexts of numbers by Lines::Step, and how far their differences' step is shifted.
+inline constexpr std::array<unsigned, Lines::kSteps> kStepContexts{2, context::kWithinPulse,
+                                                                   context::kBetweenLines};
+inline constexpr std::array<unsigned, Lines::kSteps> kStepShifts{0, 1, 1};
+
+/// The head of a column and its first value. Returns false if that is the value of all.
+/// form: coded where it is not null. Writes the divisor of the differences, 1 if there is none.
 template <class Coder>
-void code_column(Coder& shared, unsigned number, ColumnKind kind, NumberForm* form,
-                 const std::int64_t* beside, std::int64_t* values, std::int64_t* scratch,
-                 std::uint32_t n) {
+bool code_head(Coder& coder, unsigned first, NumberForm* form, std::int64_t& value, bool several,
+               std::uint64_t& divisor, unsigned& number_class) {
   enum : unsigned { kOneValue, kSeveral, kMultiples, kHeads };
-  const unsigned first = context::kAttribute + context::kPerAttribute * number;
   const unsigned forms = form != nullptr ? kNumberForms : 1;
-  if (kind != ColumnKind::beside) beside = nullptr;
-  typename Coder::Local coder = shared;
-  unsigned head = kSeveral;
-  std::uint64_t divisor = 1;
+  unsigned head = 0;
   if constexpr (!Coder::kDecoding) {
-    const bool several = find_differences(values, beside, scratch, n);
-    if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
     head = !several ? kOneValue : divisor > 1 ? kMultiples : kSeveral;
     head = head * forms + (form != nullptr ? *form : 0);
   }
@@ -161,59 +203,212 @@ void code_column(Coder& shared, unsigned number, ColumnKind kind, NumberForm* fo
   if constexpr (Coder::kDecoding) {
     if (head >= kHeads * forms) throw Damage("a column has an unknown head");
     if (form != nullptr) *form = static_cast<NumberForm>(head % forms);
+    divisor = 1;
   }
-  unsigned number_class = code_signed(coder, first + 1, values[0]);
-  if (head / forms == kOneValue) {
+  number_class = code_signed(coder, first + 1, value);
+  if (head / forms == kMultiples) {
+    code_number(coder, first + 1, divisor);
+    if (divisor < 2) throw Damage("a column has differences that are multiples of nothing");
+  }
+  return head / forms != kOneValue;
+}
+
+/// A difference as one of those that came last, else as a number.
+template <class Coder, unsigned kCount>
+class RecentCoder {
+ public:
+  TERRACE_STORE_INLINE void code(Coder& coder, unsigned first, std::int64_t& difference) {
+    const unsigned context = first + 2 + std::min(place_, kColumnRecent);
+    if constexpr (!Coder::kDecoding) place_ = recent_.find(difference);
+    code_symbol(coder, context, place_);
+    if (place_ > kCount) throw Damage("a column has an unknown difference");
+    if (place_ == kCount) {
+      step_ = difference_step(code_signed(coder, first + 6 + step_ / 2, difference));
+    } else {
+      difference = recent_[place_];
+    }
+    recent_.move_to_front(place_, difference);
+  }
+
+ private:
+  RecentDifferences<kCount> recent_;
+  unsigned place_ = 0, step_ = 0;
+};
+
+/// What the next difference along a line is expected to be.
+class Trend {
+ public:
+  explicit Trend(ColumnKind kind) : kind_(along_line(kind)) {}
+
+  [[nodiscard]] bool exists() const {
+    return kind_ == ColumnKind::trend || kind_ == ColumnKind::median;
+  }
+  [[nodiscard]] std::int64_t expected() const {
+    const auto [a, b, c] = last_;
+    return kind_ == ColumnKind::trend ? a : std::max(std::min(a, b), std::min(std::max(a, b), c));
+  }
+  void add(std::int64_t difference) { last_ = {difference, last_[0], last_[1]}; }
+
+ private:
+  ColumnKind kind_;
+  std::array<std::int64_t, 3> last_{};  ///< the latest first
+};
+
+/// Makes differences of neighbours those that `kind` refers to the line.
+inline void refer_to_lines(const Lines& lines, ColumnKind kind, std::int64_t* differences,
+                           std::uint32_t n) {
+  Trend trend(kind);
+  if (!trend.exists() && !from_line(kind)) return;
+  std::int64_t since_start = 0;
+  for (std::uint32_t i = 1; i < n; ++i) {
+    const std::int64_t difference = differences[i];
+    since_start = wrapped_sum(since_start, difference);
+    if (lines[i] == Lines::kJump) {
+      if (from_line(kind)) differences[i] = since_start;
+      since_start = 0;
+    } else if (lines[i] == Lines::kAlong && trend.exists()) {
+      differences[i] = wrapped_difference(difference, trend.expected());
+      trend.add(difference);
+    }
+  }
+}
+
+/// The differences of a column, which code_column() describes.
+template <bool kLined, bool kRecent, class Coder>
+void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines* lines,
+                      const std::int64_t* beside, std::int64_t* values, const std::int64_t* scratch,
+                      std::uint32_t n, std::int64_t by, unsigned number_class) {
+  RecentCoder<Coder, kColumnRecent> recent;
+  Trend trend(kind);
+  for (std::uint32_t i = 1; i < n; ++i) {
+    Lines::Step step = Lines::kAlong;
+    if constexpr (kLined) step = (*lines)[i];
+    std::int64_t difference = 0;
+    if constexpr (!Coder::kDecoding) difference = scratch[i];
+    if (kRecent && step == Lines::kAlong) {
+      recent.code(coder, first, difference);
+    } else {
+      const unsigned shift = kLined ? kStepShifts[step] : 0;
+      const unsigned context = first + (kLined ? kStepContexts[step] : kStepContexts[0]);
+      number_class =
+          code_signed(coder, context + (difference_step(number_class) >> shift), difference);
+    }
+    if constexpr (Coder::kDecoding) {
+      const std::uint32_t from = kLined && from_line(kind) ? lines->reference(i) : i - 1;
+      const std::int64_t rise = beside != nullptr ? wrapped_difference(beside[i], beside[from]) : 0;
+      if constexpr (kLined) {
+        if (trend.exists() && step == Lines::kAlong) {
+          difference = wrapped_sum(difference, trend.expected());
+          trend.add(difference);
+        }
+      }
+      values[i] = wrapped_sum(wrapped_sum(values[from], rise), wrapped_product(difference, by));
+    }
+  }
+}
+
+/// A column of values: the first, then differences as `kind` says, divided by what is common to
+/// them.
+/// first: context. form: coded where it is not null. lines: null if there is no guide. beside: the
+/// column before, for kinds beside it alone. scratch: room for n differences.
+template <class Coder>
+void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form,
+                 const Lines* lines, const std::int64_t* beside, std::int64_t* values,
+                 std::int64_t* scratch, std::uint32_t n) {
+  if (along_line(kind) != ColumnKind::beside) beside = nullptr;
+  typename Coder::Local coder = shared;
+  bool several = false;
+  std::uint64_t divisor = 1;
+  if constexpr (!Coder::kDecoding) {
+    several = find_differences(values, beside, scratch, n);
+    if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
+  }
+  unsigned number_class = 0;
+  if (!code_head(coder, first, form, values[0], several, divisor, number_class)) {
     if constexpr (Coder::kDecoding) {
       std::fill_n(values + 1, n - 1, values[0]);
       shared = coder;
     }
     return;
   }
-  if (head / forms == kMultiples) {
-    code_number(coder, first + 1, divisor);
-    if (divisor < 2) throw Damage("a column has differences that are multiples of nothing");
-  }
   const auto by = static_cast<std::int64_t>(divisor);
   if constexpr (!Coder::kDecoding) {
     for (std::uint32_t i = 1; by != 1 && i < n; ++i) scratch[i] /= by;
+    if (lines != nullptr) refer_to_lines(*lines, kind, scratch, n);
   }
-  std::int64_t difference = 0;
-  const auto begin = [&](std::uint32_t i) {
-    if constexpr (!Coder::kDecoding) difference = scratch[i];
+  const auto code = [&](auto lined, auto is_recent) {
+    code_differences<decltype(lined)::value, decltype(is_recent)::value>(
+        coder, first, kind, lines, beside, values, scratch, n, by, number_class);
   };
-  const auto end = [&](std::uint32_t i) {
-    if constexpr (Coder::kDecoding) {
-      const std::int64_t rise =
-          beside != nullptr ? wrapped_difference(beside[i], beside[i - 1]) : 0;
-      values[i] = wrapped_sum(wrapped_sum(values[i - 1], rise), wrapped_product(difference, by));
-    }
-  };
-  if (kind == ColumnKind::recent) {
-    RecentDifferences recent;
-    unsigned place = 0, step = 0;
-    for (std::uint32_t i = 1; i < n; ++i) {
-      begin(i);
-      const unsigned context = first + 2 + place;
-      if constexpr (!Coder::kDecoding) place = recent.find(difference);
-      code_symbol(coder, context, place);
-      if (place > RecentDifferences::kCount) throw Damage("a column has an unknown difference");
-      if (place == RecentDifferences::kCount) {
-        step = difference_step(code_signed(coder, first + 6 + step / 2, difference));
-      } else {
-        difference = recent[place];
-      }
-      recent.move_to_front(place, difference);
-      end(i);
-    }
+  const bool is_recent = along_line(kind) == ColumnKind::recent;
+  if (lines != nullptr) {
+    is_recent ? code(std::true_type(), std::true_type())
+              : code(std::true_type(), std::false_type());
   } else {
-    for (std::uint32_t i = 1; i < n; ++i) {
-      begin(i);
-      number_class = code_signed(coder, first + 2 + difference_step(number_class), difference);
-      end(i);
-    }
+    is_recent ? code(std::false_type(), std::true_type())
+              : code(std::false_type(), std::false_type());
   }
   if constexpr (Coder::kDecoding) shared = coder;
+}
+
+/// The column of the guide: step by step, jumps less the jump before. `lines` become known by it.
+/// least_jump: for encoding alone.
+template <class Coder>
+void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form, Lines& lines,
+                std::uint64_t least_jump, std::int64_t* values, std::int64_t* scratch,
+                std::uint32_t n) {
+  typename Coder::Local coder = shared;
+  bool several = false;
+  std::uint64_t divisor = 1;
+  if constexpr (!Coder::kDecoding) {
+    several = find_differences(values, nullptr, scratch, n);
+    if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
+    lines.find_steps(scratch, least_jump, n);
+  } else {
+    lines.resize(n);
+  }
+  unsigned number_class = 0;
+  if (!code_head(coder, first, form, values[0], several, divisor, number_class)) {
+    if constexpr (Coder::kDecoding) {
+      std::fill_n(values + 1, n - 1, values[0]);
+      lines.find_references();
+      shared = coder;
+    }
+    return;
+  }
+  const auto by = static_cast<std::int64_t>(divisor);
+  RecentCoder<Coder, kGuideRecent> recent;
+  unsigned step = Lines::kAlong, jump_class = 0;
+  std::int64_t last_jump = 0;
+  for (std::uint32_t i = 1; i < n; ++i) {
+    std::int64_t difference = 0;
+    const unsigned context = first + context::kWithinPulse + step;
+    if constexpr (!Coder::kDecoding) {
+      step = lines[i];
+      difference = scratch[i] / by;
+    }
+    code_symbol(coder, context, step);
+    if (step >= Lines::kSteps) throw Damage("a guide has an unknown step");
+    if (step == Lines::kJump) {
+      std::int64_t residual = wrapped_difference(difference, last_jump);
+      jump_class = code_signed(
+          coder, first + context::kBetweenLines + difference_step(jump_class) / 2, residual);
+      if constexpr (Coder::kDecoding) difference = wrapped_sum(residual, last_jump);
+      last_jump = difference;
+    } else if (step == Lines::kAlong && kind == ColumnKind::recent) {
+      recent.code(coder, first, difference);
+    } else if (step == Lines::kAlong) {
+      number_class = code_signed(coder, first + 2 + difference_step(number_class), difference);
+    }
+    if constexpr (Coder::kDecoding) {
+      lines.set_step(i, step);
+      values[i] = wrapped_sum(values[i - 1], wrapped_product(difference, by));
+    }
+  }
+  if constexpr (Coder::kDecoding) {
+    lines.find_references();
+    shared = coder;
+  }
 }
 
 /// The ordinals that n points head on `level` levels, nearest level first: values[i + n * j] is

@@ -26,7 +26,7 @@ inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
 /// Stores of this version and earlier can be read. A raster without further attributes is written
 /// as version 1, which suffices for it.
-inline constexpr int kVersion = 2;
+inline constexpr int kVersion = 3;
 inline int version_to_write(const Schema& schema) {
   return schema.grid && schema.attributes.empty() ? 1 : kVersion;
 }
@@ -37,6 +37,7 @@ struct Layout {
   bool grid = false;
   unsigned level = 0;
   std::vector<ScalarType> attributes;
+  std::vector<std::size_t> offsets;  ///< of the attributes in the payload of a point
   std::size_t payload_size = 0;
 
   Layout(const Schema& schema, unsigned of_level, int of_version)
@@ -44,7 +45,10 @@ struct Layout {
         grid(schema.grid),
         level(of_level),
         payload_size(schema.payload_size()) {
-    for (const Channel& channel : schema.attributes) attributes.push_back(channel.type);
+    for (const Channel& channel : schema.attributes) {
+      attributes.push_back(channel.type);
+      offsets.push_back(schema.attribute_offset(offsets.size()));
+    }
   }
   /// Maximum points of a cluster: their coordinates, attributes and children fit into
   /// kMostDecodedBytes.
@@ -56,8 +60,11 @@ struct Layout {
   [[nodiscard]] unsigned columns() const {
     return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
   }
-  [[nodiscard]] unsigned contexts() const {
-    return context::kAttribute + context::kPerAttribute * columns();
+  [[nodiscard]] unsigned contexts() const { return first_context(columns()); }
+  /// Of those of a column.
+  [[nodiscard]] unsigned first_context(unsigned column) const {
+    return context::kAttribute +
+           column * (version > 2 ? context::kPerAttribute : context::kPerAttributeBefore3);
   }
   /// Whether the column may be coded beside the preceding one: both are attributes of integers.
   [[nodiscard]] bool may_lie_beside(unsigned column) const {

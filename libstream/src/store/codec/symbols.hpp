@@ -43,9 +43,29 @@ inline constexpr std::array<ClassRange, kSymbols> kClassRange = [] {
 }();
 
 /// How the differences of a column are coded: as they are; as one of those that came last, else as
-/// they are; less that of the column before (colours change together).
-enum class ColumnKind : std::uint8_t { plain, recent, beside };
-inline constexpr unsigned kColumnKinds = 3;
+/// they are; less that of the column before (colours change together); less the one before it along
+/// the line; less the median of the three before it. The latter five also: from the beginning of
+/// the last line where a line begins.
+enum class ColumnKind : std::uint8_t {
+  plain,
+  recent,
+  beside,
+  trend,
+  median,
+  line,
+  line_recent,
+  line_beside,
+  line_trend,
+  line_median
+};
+inline constexpr unsigned kColumnKinds = 10;
+/// Those before version 3.
+inline constexpr unsigned kUnguidedKinds = 3;
+/// Where lines begin aside.
+constexpr ColumnKind along_line(ColumnKind kind) {
+  return static_cast<ColumnKind>(static_cast<unsigned>(kind) % 5);
+}
+constexpr bool from_line(ColumnKind kind) { return kind >= ColumnKind::line; }
 
 /// Contexts: each has a table of frequencies of its own. Attribute contexts follow the fixed ones.
 namespace context {
@@ -64,8 +84,13 @@ inline constexpr unsigned kHeight = kSplitWide + 24;
 inline constexpr unsigned kHeightSteps = 32;
 inline constexpr unsigned kAttribute = kHeight + 2 * kHeightSteps;
 /// Head (number form, several values or one), first value, eight by magnitude; of
-/// ColumnKind::recent four by place and four by magnitude.
-inline constexpr unsigned kPerAttribute = 10;
+/// ColumnKind::recent four by place and four by magnitude. From version 3 on four more for
+/// differences between lines and four for points of one pulse; of the guide, three of these for its
+/// steps.
+inline constexpr unsigned kPerAttribute = 18;
+inline constexpr unsigned kPerAttributeBefore3 = 10;
+inline constexpr unsigned kBetweenLines = 10;
+inline constexpr unsigned kWithinPulse = 14;
 }  // namespace context
 
 }  // namespace terrace::stream::store

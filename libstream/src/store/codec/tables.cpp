@@ -82,8 +82,9 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts) {
   return frequencies;
 }
 
-void Tables::write(Bytes& out) const {
+void Tables::write(Bytes& out, int version) const {
   predictor.write(out);
+  if (version > 2) put_varint(out, guide.exists() ? guide.attribute + std::uint64_t{1} : 0);
   for (const ColumnKind kind : kinds) out.push_back(static_cast<std::uint8_t>(kind));
   for (const Frequencies& context : frequencies) {
     const auto used = std::count_if(context.begin(), context.begin() + kClasses,
@@ -103,11 +104,20 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
   ByteReader in(bytes);
   Tables tables;
   tables.predictor = Predictor::read(in);
+  if (layout.version > 2) {
+    const std::uint64_t guide = in.varint();
+    if (guide > layout.attributes.size()) throw Damage("a table's guide does not exist");
+    if (guide > 0) tables.guide.attribute = static_cast<unsigned>(guide - 1);
+  }
   for (unsigned c = 0; layout.version > 1 && c < layout.columns(); ++c) {
     const unsigned kind = in.get<std::uint8_t>();
-    if (kind >= kColumnKinds) throw Damage("a table names a kind of columns that does not exist");
+    const bool lines = tables.guide.exists() && c != tables.guide.attribute;
+    if (kind >= (lines ? kColumnKinds : kUnguidedKinds)) {
+      throw Damage("a table names a kind of columns that does not exist");
+    }
     tables.kinds.push_back(static_cast<ColumnKind>(kind));
-    if (tables.kinds[c] == ColumnKind::beside && !layout.may_lie_beside(c)) {
+    if (along_line(tables.kinds[c]) == ColumnKind::beside &&
+        !(layout.may_lie_beside(c) && c != tables.guide.attribute)) {
       throw Damage("a table has a column beside one that is not of integers");
     }
   }
@@ -136,14 +146,16 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
   return tables;
 }
 
-EncodingTables::EncodingTables(const Tables& from) : predictor(from.predictor), kinds(from.kinds) {
+EncodingTables::EncodingTables(const Tables& from)
+    : predictor(from.predictor), guide(from.guide), kinds(from.kinds) {
   tables.reserve(from.frequencies.size());
   for (const Frequencies& frequencies : from.frequencies) {
     tables.push_back(encode_table(frequencies));
   }
 }
 
-DecodingTables::DecodingTables(const Tables& from) : predictor(from.predictor), kinds(from.kinds) {
+DecodingTables::DecodingTables(const Tables& from)
+    : predictor(from.predictor), guide(from.guide), kinds(from.kinds) {
   static const DecodeTable unseen = [] {
     DecodeTable table;
     fill_decode_table(escape_only(), table);

@@ -24,19 +24,30 @@ using Counts = std::vector<std::array<std::uint32_t, kSymbols>>;
 /// Frequencies for `counts` that keep every occurring symbol codable, and the escape.
 Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts);
 
+/// The attribute that tells where scan lines begin: the time of the pulses.
+struct Guide {
+  static constexpr unsigned kNone = UINT32_MAX;
+
+  unsigned attribute = kNone;
+  std::uint64_t least_jump = 0;  ///< a difference as large begins a line; not stored
+
+  [[nodiscard]] bool exists() const { return attribute != kNone; }
+};
+
 /// The tables of a segment of a level's clusters: height predictor and symbol frequencies.
 struct Tables {
   Predictor predictor;
+  Guide guide;                           ///< from version 3 on
   std::vector<ColumnKind> kinds;         ///< one per column; none in version 1
   std::vector<Frequencies> frequencies;  ///< one per context
 
-  void write(Bytes& out) const;
+  void write(Bytes& out, int version) const;
   /// Throws: Damage.
   static Tables read(ByteView bytes, const Layout& layout);
   /// Maximum bytes of tables.
   static std::uint64_t most_bytes(const Layout& layout) {
     constexpr std::uint64_t kVarint = 10;
-    return 8 + kVarint * kPatterns * kNeighbours + layout.columns() +
+    return 8 + kVarint * kPatterns * kNeighbours + kVarint + layout.columns() +
            std::uint64_t{layout.contexts()} * kVarint * (1 + 2 * kClasses);
   }
 };
@@ -44,6 +55,7 @@ struct Tables {
 /// Tables prepared for encoding.
 struct EncodingTables {
   Predictor predictor;
+  Guide guide;
   std::vector<ColumnKind> kinds;
   std::vector<EncodeTable> tables;
 
@@ -53,6 +65,7 @@ struct EncodingTables {
 /// Tables prepared for decoding; contexts without any symbols share one table.
 struct DecodingTables {
   Predictor predictor;
+  Guide guide;
   std::vector<ColumnKind> kinds;
   std::vector<const DecodeTable*> tables;
 

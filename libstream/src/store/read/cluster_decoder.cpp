@@ -74,24 +74,17 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   }
   if (n > layout.most_points()) throw Damage("a cluster has too many points");
   SymbolDecoder coder(tables.tables, bytes);
-  positions(coder, layout, tables, entry);
-
+  const bool placed = positions(coder, layout, tables, entry);
   payload_.resize(n * layout.payload_size);
-  std::size_t offset = 0;
+  if (tables.guide.exists()) attribute(coder, layout, tables, tables.guide.attribute, n);
+  if (!placed) sequence(coder, layout, tables, n);
   for (unsigned a = 0; a < layout.attributes.size(); ++a) {
-    const ScalarType type = layout.attributes[a];
-    const bool floating = type == ScalarType::f32 || type == ScalarType::f64;
-    NumberForm form = kIntegerForm;
     std::swap(column_, beside_);
-    column_.resize(n);
-    if (layout.version > 1) {
-      code_column(coder, a, tables.kinds[a], floating ? &form : nullptr, beside_.data(),
-                  column_.data(), nullptr, n);
+    if (a == tables.guide.attribute) {
+      column_ = guide_;
     } else {
-      code_old_column(coder, a, floating, form, column_.data(), n);
+      attribute(coder, layout, tables, a, n);
     }
-    scatter(type, form, column_, layout.payload_size, payload_.data() + offset);
-    offset += size_of(type);
   }
   children_.resize(std::size_t{n} * layout.level);
   if (layout.level > 0) code_children(coder, layout.level, children_.data(), n);
@@ -131,7 +124,28 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   }
 }
 
-void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
+void ClusterDecoder::attribute(SymbolDecoder& coder, const Layout& layout,
+                               const DecodingTables& tables, unsigned number, std::uint32_t n) {
+  const ScalarType type = layout.attributes[number];
+  const bool floating = type == ScalarType::f32 || type == ScalarType::f64;
+  NumberForm form = kIntegerForm;
+  NumberForm* const coded_form = floating ? &form : nullptr;
+  column_.resize(n);
+  if (layout.version == 1) {
+    code_old_column(coder, number, floating, form, column_.data(), n);
+  } else if (number == tables.guide.attribute) {
+    code_guide(coder, layout.first_context(number), tables.kinds[number], coded_form, lines_, 0,
+               column_.data(), nullptr, n);
+    guide_ = column_;
+  } else {
+    code_column(coder, layout.first_context(number), tables.kinds[number], coded_form,
+                tables.guide.exists() ? &lines_ : nullptr, beside_.data(), column_.data(), nullptr,
+                n);
+  }
+  scatter(type, form, column_, layout.payload_size, payload_.data() + layout.offsets[number]);
+}
+
+bool ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
                                const DecodingTables& tables, const Entry& entry) {
   const std::uint32_t n = entry.points;
   const unsigned form = coder.symbol(context::kForm);
@@ -145,9 +159,9 @@ void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
   if (form & kSplitForm) {
     split_.decode(coder, {{0, 0, 0}, box_.size},
                   {relative_[0].data(), relative_[1].data(), relative_[2].data()}, n);
-    return;
+    return true;
   }
-  if (!layout.grid && layout.version > 1) return sequence(coder, layout, tables, n);
+  if (!layout.grid && layout.version > 1) return false;
   if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
     throw Damage("a cluster's box does not suit its form");
   }
@@ -157,6 +171,7 @@ void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
   grid_.heights(coder, tables.predictor, box_.size[2], relative_[2].data());
   const std::uint64_t highest = *std::max_element(relative_[2].begin(), relative_[2].begin() + n);
   if (highest >= box_.size[2]) throw Damage("a height lies outside of its cluster's box");
+  return true;
 }
 
 void ClusterDecoder::sequence(SymbolDecoder& coder, const Layout& layout,
@@ -164,7 +179,8 @@ void ClusterDecoder::sequence(SymbolDecoder& coder, const Layout& layout,
   column_.resize(n);
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto number = static_cast<unsigned>(layout.attributes.size()) + axis;
-    code_column(coder, number, tables.kinds[number], nullptr, nullptr, column_.data(), nullptr, n);
+    code_column(coder, layout.first_context(number), tables.kinds[number], nullptr,
+                tables.guide.exists() ? &lines_ : nullptr, nullptr, column_.data(), nullptr, n);
     std::uint64_t highest = 0;
     for (std::uint32_t i = 0; i < n; ++i) {
       relative_[axis][i] = static_cast<std::uint64_t>(column_[i]);

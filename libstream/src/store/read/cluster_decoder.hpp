@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "store/codec/column_codec.hpp"
 #include "store/codec/grid_codec.hpp"
 #include "store/codec/layout.hpp"
 #include "store/codec/tables.hpp"
@@ -23,10 +24,14 @@ class ClusterDecoder {
   [[nodiscard]] std::uint32_t representative() const { return representative_; }
 
  private:
-  void positions(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
+  /// False if the points come in a sequence, whose coordinates follow.
+  bool positions(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
                  const Entry& entry);
   void sequence(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
                 std::uint32_t n);
+  /// Decodes an attribute into column_, or the guide into guide_.
+  void attribute(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
+                 unsigned number, std::uint32_t n);
   void deliver(const Entry& entry, std::uint32_t representative, ClusterPoints& out) const;
 
   std::uint32_t representative_ = 0;
@@ -34,7 +39,8 @@ class ClusterDecoder {
   std::array<std::vector<std::uint64_t>, 3> relative_;
   GridCodec grid_;
   SplitDecoder split_;
-  std::vector<std::int64_t> column_, beside_;
+  std::vector<std::int64_t> column_, beside_, guide_;
+  Lines lines_;
   std::vector<std::byte> payload_;
   std::vector<std::int64_t> children_;
 };

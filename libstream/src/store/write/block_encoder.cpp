@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "differing_bits.hpp"
 #include "store/codec/column_codec.hpp"
 #include "store/codec/form.hpp"
 #include "terrace/stream/error.hpp"
@@ -68,29 +69,6 @@ void gather_integers(ScalarType type, const std::byte* payload, std::size_t stri
     case ScalarType::u64:
       return gather_integers<std::uint64_t>(payload, stride, points, out);
   }
-}
-
-/// Byte by byte of a record, the bits in which the records of a payload differ.
-void find_differing_bits(std::span<const std::byte> payload, std::size_t stride,
-                         std::vector<std::byte>& differing) {
-  differing.assign(stride, std::byte{0});
-  const std::size_t count = stride == 0 ? 0 : payload.size() / stride;
-  const auto find = [&](std::size_t offset, auto word) {
-    using Word = decltype(word);
-    if (count == 0) return;
-    const std::byte* at = payload.data() + offset;
-    const Word first = load<Word>(reinterpret_cast<const std::uint8_t*>(at));
-    Word bits = 0;
-    for (std::size_t i = 0; i < count; ++i, at += stride) {
-      bits =
-          static_cast<Word>(bits | (load<Word>(reinterpret_cast<const std::uint8_t*>(at)) ^ first));
-    }
-    std::memcpy(differing.data() + offset, &bits, sizeof bits);
-  };
-  std::size_t offset = 0;
-  for (; offset + 8 <= stride; offset += 8) find(offset, std::uint64_t{});
-  if (offset < stride && stride >= 8) return find(stride - 8, std::uint64_t{});
-  for (; offset < stride; ++offset) find(offset, std::uint8_t{});
 }
 
 /// The extent of a column of an attribute, as keys.
@@ -325,9 +303,8 @@ void BlockEncoder::find_relative() {
   }
 }
 
-/// Codes the head and the places of the points; on a grid hands over to `heights`. Sets order_.
 template <class Coder, class Use>
-void BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights) {
+bool BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights) {
   const auto n = static_cast<std::uint32_t>(members_.size());
   const auto& size = coded_box_.size;
   const bool sequence = columns.sequence && n > 1;
@@ -346,12 +323,6 @@ void BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights
     heights();
     for (std::uint32_t i = 0; i < n; ++i) order_[i] = grid_.point(i);
   } else if (sequence) {
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      const auto number = static_cast<unsigned>(layout_->attributes.size()) + axis;
-      column_.assign(relative_[axis].begin(), relative_[axis].end());
-      code_column(coder, number, columns.kinds[number], nullptr, nullptr, column_.data(),
-                  scratch_.data(), n);
-    }
     std::iota(order_.begin(), order_.end(), 0u);
   } else {
     const auto at = [&](std::size_t axis, std::uint32_t i) {
@@ -359,6 +330,23 @@ void BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights
     };
     split_.encode(coder, size, at, n, order_.data());
   }
+  return !sequence;
+}
+
+/// The coordinates of points in their order.
+template <class Coder>
+void BlockEncoder::sequence(Coder& coder, const Columns& columns) {
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const auto number = static_cast<unsigned>(layout_->attributes.size()) + axis;
+    column_.assign(relative_[axis].begin(), relative_[axis].end());
+    code_column(coder, layout_->first_context(number), columns.kinds[number], nullptr,
+                columns.guide.exists() ? &lines_ : nullptr, nullptr, column_.data(),
+                scratch_.data(), static_cast<std::uint32_t>(members_.size()));
+  }
+}
+
+NumberForm* BlockEncoder::coded_form(Attribute& attribute) {
+  return is_floating(attribute.type) ? &attribute.form : nullptr;
 }
 
 /// Brings the values of the present cluster's points into column_, in the order of coding.
@@ -368,30 +356,46 @@ void BlockEncoder::gather(const Attribute& attribute) {
     return gather_integers(attribute.type, block_->payload.data() + attribute.offset,
                            layout_->payload_size, coded_, column_.data());
   }
-  for (std::size_t i = 0; i < coded_.size(); ++i) column_[i] = attribute.numbers[coded_[i]];
+  for (std::size_t i = 0; i < coded_.size(); ++i) {
+    column_[i] = attribute.one_value ? attribute.value : attribute.numbers[coded_[i]];
+  }
 }
 
 template <class Coder>
 void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
                                   const Columns& columns) {
   const auto n = static_cast<std::uint32_t>(members_.size());
-  positions(coder, columns, [&] { grid_.heights(coder, predictor, coded_box_.size[2], nullptr); });
+  const bool placed = positions(
+      coder, columns, [&] { grid_.heights(coder, predictor, coded_box_.size[2], nullptr); });
   coded_.resize(n);
   for (std::uint32_t i = 0; i < n; ++i) coded_[i] = members_[order_[i]];
 
+  if (columns.guide.exists()) {
+    const unsigned a = columns.guide.attribute;
+    gather(attributes_[a]);
+    code_guide(coder, layout_->first_context(a), columns.kinds[a], coded_form(attributes_[a]),
+               lines_, columns.guide.least_jump, column_.data(), scratch_.data(), n);
+    std::swap(column_, guide_);
+  }
+  const Lines* const lines = columns.guide.exists() ? &lines_ : nullptr;
+  if (!placed) sequence(coder, columns);
   bool beside = false;  // whether the column before rises and falls
   for (unsigned a = 0; a < attributes_.size(); ++a) {
     Attribute& attribute = attributes_[a];
-    NumberForm* const form = is_floating(attribute.type) ? &attribute.form : nullptr;
-    if (attribute.one_value) {
+    NumberForm* const form = coded_form(attribute);
+    const unsigned first = layout_->first_context(a);
+    if (a == columns.guide.attribute) {
+      column_ = guide_;
+      ranges_.push_back(range_of(attribute.type, attribute.form, column_));
+    } else if (attribute.one_value) {
       std::int64_t value = attribute.value;
       ranges_.push_back(range_of(attribute.type, attribute.form, {&value, 1}));
-      code_column(coder, a, columns.kinds[a], form, nullptr, &value, nullptr, 1);
+      code_column(coder, first, columns.kinds[a], form, nullptr, nullptr, &value, nullptr, 1);
     } else {
       std::swap(column_, beside_);
       gather(attribute);
       ranges_.push_back(range_of(attribute.type, attribute.form, column_));
-      code_column(coder, a, columns.kinds[a], form, beside ? beside_.data() : nullptr,
+      code_column(coder, first, columns.kinds[a], form, lines, beside ? beside_.data() : nullptr,
                   column_.data(), scratch_.data(), n);
     }
     beside = !attribute.one_value;
@@ -416,6 +420,18 @@ void BlockEncoder::fit(PredictorFit& sums) {
   }
 }
 
+void BlockEncoder::count_differences(unsigned attribute, std::array<std::uint64_t, 65>& widths) {
+  for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
+    const std::uint32_t begin = block_->first[c], end = block_->first[c + 1];
+    coded_.assign(block_->order.begin() + begin, block_->order.begin() + end);
+    gather(attributes_[attribute]);
+    for (std::size_t i = 1; i < column_.size(); ++i) {
+      const auto bits = static_cast<std::uint64_t>(wrapped_difference(column_[i], column_[i - 1]));
+      ++widths[static_cast<std::size_t>(std::bit_width(bits >> 63 != 0 ? -bits : bits))];
+    }
+  }
+}
+
 std::uint64_t BlockEncoder::count(const Predictor& predictor, const Columns& columns,
                                   Counts& counts) {
   counts.resize(layout_->contexts());
@@ -437,7 +453,7 @@ std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
 
 void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
                           std::vector<Entry>& entries, std::vector<KeyRange>& ranges) {
-  const Columns columns{sequence, tables.kinds};
+  const Columns columns{sequence, tables.guide, tables.kinds};
   // Two clusters at a time.
   SymbolEncoder coders[] = {SymbolEncoder(tables.tables), SymbolEncoder(tables.tables)};
   std::array<std::uint32_t, 2> last{};

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "store/codec/column_codec.hpp"
 #include "store/codec/grid_codec.hpp"
 #include "store/codec/layout.hpp"
 #include "store/codec/tables.hpp"
@@ -14,6 +15,7 @@ namespace terrace::stream::store {
 /// How clusters of points that lie on no grid are coded.
 struct Columns {
   bool sequence = false;  ///< points in their order, coordinates as columns; else SplitCodec's
+  Guide guide;
   std::span<const ColumnKind> kinds;
 };
 
@@ -27,6 +29,8 @@ class BlockEncoder {
 
   /// Training: the loaded block enters the least squares ...
   void fit(PredictorFit& sums);
+  /// ... the differences of an attribute in its clusters are counted, by bit width ...
+  void count_differences(unsigned attribute, std::array<std::uint64_t, 65>& widths);
   /// ... and its symbols are counted. Returns the raw bits beside them.
   std::uint64_t count(const Predictor& predictor, const Columns& columns, Counts& counts);
 
@@ -58,8 +62,14 @@ class BlockEncoder {
   /// In the order of coding; 0 without one.
   [[nodiscard]] std::uint32_t place_of_representative(std::size_t cluster) const;
   void gather(const Attribute& attribute);
+  /// Null for integers.
+  static NumberForm* coded_form(Attribute& attribute);
+  /// Codes the head and the places of the points, but for those of a sequence: false. On a grid
+  /// hands over to `heights`. Sets order_.
   template <class Coder, class Use>
-  void positions(Coder& coder, const Columns& columns, Use&& heights);
+  bool positions(Coder& coder, const Columns& columns, Use&& heights);
+  template <class Coder>
+  void sequence(Coder& coder, const Columns& columns);
   /// Leaves the ranges of the attributes in ranges_.
   template <class Coder>
   void encode_cluster(Coder& coder, const Predictor& predictor, const Columns& columns);
@@ -86,7 +96,8 @@ class BlockEncoder {
   std::vector<KeyRange> ranges_;
   GridCodec grid_;
   SplitEncoder split_;
-  std::vector<std::int64_t> column_, beside_, scratch_;
+  Lines lines_;
+  std::vector<std::int64_t> column_, beside_, guide_, scratch_;
   std::vector<double> doubles_;
 };
 

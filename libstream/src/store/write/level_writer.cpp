@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <utility>
 
 #include "store/read/index_page.hpp"
@@ -13,6 +14,10 @@ namespace {
 
 /// At most so many of the blocks held back are used to choose how columns are coded.
 constexpr std::size_t kTrialBlocks = 8;
+/// At most so many attributes are tried as guides.
+constexpr std::size_t kMostGuides = 2;
+/// At least one in so many differences of a guide begins a line, and as many do not.
+constexpr std::uint64_t kLeastShare = 50;
 
 std::string file_name(unsigned level, const char* what) {
   return "level-" + std::to_string(level) + ".0." + what;
@@ -67,11 +72,10 @@ std::uint64_t LevelWriter::Trial::bits() const {
   return bits;
 }
 
-std::uint64_t LevelWriter::Trial::bits_of_column(unsigned column) const {
+std::uint64_t LevelWriter::Trial::bits_of_column(const Layout& layout, unsigned column) const {
   std::uint64_t bits = 0;
-  for (unsigned c = 0; c < context::kPerAttribute; ++c) {
-    const auto& counted = counts[context::kAttribute + context::kPerAttribute * column + c];
-    bits += entropy_of(counted) + open_bits_of(counted);
+  for (unsigned c = layout.first_context(column); c < layout.first_context(column + 1); ++c) {
+    bits += entropy_of(counts[c]) + open_bits_of(counts[c]);
   }
   return bits;
 }
@@ -95,46 +99,90 @@ LevelWriter::Trial LevelWriter::count(const Predictor& predictor, const Columns&
   return all;
 }
 
-LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence, ColumnKind kind) {
-  std::vector<ColumnKind> kinds(layout_.columns(), kind);
-  for (unsigned c = 0; c < kinds.size(); ++c) {
-    if (kind == ColumnKind::beside && !layout_.may_lie_beside(c)) kinds[c] = ColumnKind::plain;
-  }
-  return count(predictor, {sequence, kinds}, (held_.size() + kTrialBlocks - 1) / kTrialBlocks);
+bool LevelWriter::possible(ColumnKind kind, unsigned column, const Guide& guide) const {
+  if (column == guide.attribute) return kind == ColumnKind::plain || kind == ColumnKind::recent;
+  if (along_line(kind) == ColumnKind::beside && !layout_.may_lie_beside(column)) return false;
+  return guide.exists() || static_cast<unsigned>(kind) < kUnguidedKinds;
 }
 
-/// The kind of each column that takes the fewest bits; the first time also the order of points.
-std::vector<ColumnKind> LevelWriter::choose_columns(const Predictor& predictor) {
-  std::vector<ColumnKind> kinds(layout_.columns(), ColumnKind::plain);
+LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence, const Guide& guide,
+                                      ColumnKind kind) {
+  std::vector<ColumnKind> kinds(layout_.columns(), kind);
+  for (unsigned c = 0; c < kinds.size(); ++c) {
+    if (!possible(kind, c, guide)) kinds[c] = ColumnKind::plain;
+  }
+  return count(predictor, {sequence, guide, kinds},
+               (held_.size() + kTrialBlocks - 1) / kTrialBlocks);
+}
+
+/// Takes for jumps what lies beyond the sizes of differences that are rarest, if some lie on either
+/// side. Points of scanners are microseconds apart, their lines milliseconds.
+Guide LevelWriter::find_guide(unsigned attribute) {
+  std::array<std::uint64_t, 65> widths{};
+  const std::size_t step = (held_.size() + kTrialBlocks - 1) / kTrialBlocks;
+  for (std::size_t b = 0; b < held_.size(); b += step) {
+    const ClusteredBlock view = held_[b].view();
+    encoders_.front().load(layout_, view);
+    encoders_.front().count_differences(attribute, widths);
+  }
+  const std::uint64_t all = std::accumulate(widths.begin() + 1, widths.end(), std::uint64_t{0});
+  Guide guide;
+  std::uint64_t below = 0, least = UINT64_MAX;
+  for (unsigned width = 1; width < 63; ++width) {
+    below += widths[width];
+    const std::uint64_t near = widths[width] + widths[width + 1];
+    const bool divides = below >= all / kLeastShare && all - below >= all / kLeastShare;
+    if (!divides || below == 0 || below == all || near >= least) continue;
+    least = near;
+    guide = {attribute, std::uint64_t{1} << width};
+  }
+  return guide;
+}
+
+/// The kind of each column that takes the fewest bits, with the guide that saves the most; the
+/// first time also the order of points.
+void LevelWriter::choose_columns(Tables& tables) {
+  tables.kinds.assign(layout_.columns(), ColumnKind::plain);
   if (layout_.version == 1) {
     sequence_ = false;
-    return kinds;
+    return;
   }
-  std::array<Trial, kColumnKinds> trials;
-  trials[0] = trial(predictor, sequence_.value_or(false), ColumnKind::plain);
-  if (!sequence_) {
-    sequence_ = false;
-    if (!layout_.grid) {
-      Trial in_sequence = trial(predictor, true, ColumnKind::plain);
-      sequence_ = in_sequence.bits() < trials[0].bits();
-      if (*sequence_) trials[0] = std::move(in_sequence);
+  std::array<std::optional<Trial>, kColumnKinds> trials;
+  std::vector<Guide> guides(1);
+  for (unsigned a = 0; a < layout_.attributes.size(); ++a) {
+    // Times are doubles or long integers.
+    if (size_of(layout_.attributes[a]) < sizeof(double)) continue;
+    if (const Guide guide = find_guide(a); guide.exists()) guides.push_back(guide);
+    if (guides.size() > kMostGuides) break;
+  }
+  const std::vector<bool> orders = sequence_      ? std::vector<bool>{*sequence_}
+                                   : layout_.grid ? std::vector<bool>{false}
+                                                  : std::vector<bool>{false, true};
+  std::uint64_t least_bits = UINT64_MAX;
+  for (const bool order : orders) {
+    for (const Guide& guide : guides) {
+      Trial plain = trial(tables.predictor, order, guide, ColumnKind::plain);
+      if (plain.bits() >= least_bits) continue;
+      least_bits = plain.bits();
+      sequence_ = order;
+      tables.guide = guide;
+      trials[0] = std::move(plain);
     }
   }
   for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
-    trials[kind] = trial(predictor, *sequence_, static_cast<ColumnKind>(kind));
+    if (kind >= kUnguidedKinds && !tables.guide.exists()) break;
+    trials[kind] = trial(tables.predictor, *sequence_, tables.guide, static_cast<ColumnKind>(kind));
   }
-  for (unsigned c = 0; c < kinds.size(); ++c) {
-    std::uint64_t least = trials[0].bits_of_column(c);
-    for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
-      const bool possible =
-          static_cast<ColumnKind>(kind) != ColumnKind::beside || layout_.may_lie_beside(c);
-      const std::uint64_t bits = trials[kind].bits_of_column(c);
-      if (!possible || bits >= least) continue;
+  for (unsigned c = 0; c < tables.kinds.size(); ++c) {
+    std::uint64_t least = trials[0]->bits_of_column(layout_, c);
+    for (unsigned kind = 1; kind < kColumnKinds && trials[kind]; ++kind) {
+      if (!possible(static_cast<ColumnKind>(kind), c, tables.guide)) continue;
+      const std::uint64_t bits = trials[kind]->bits_of_column(layout_, c);
+      if (bits >= least) continue;
       least = bits;
-      kinds[c] = static_cast<ColumnKind>(kind);
+      tables.kinds[c] = static_cast<ColumnKind>(kind);
     }
   }
-  return kinds;
 }
 
 void LevelWriter::train() {
@@ -151,12 +199,13 @@ void LevelWriter::train() {
     }
     tables.predictor = sums.fit();
   }
-  tables.kinds = choose_columns(tables.predictor);
-  const Counts counts = count(tables.predictor, {*sequence_, tables.kinds}, many ? 2 : 1).counts;
+  choose_columns(tables);
+  const Columns columns{*sequence_, tables.guide, tables.kinds};
+  const Counts counts = count(tables.predictor, columns, many ? 2 : 1).counts;
   for (const auto& context : counts) tables.frequencies.push_back(normalised(context));
 
   Bytes bytes;
-  tables.write(bytes);
+  tables.write(bytes, layout_.version);
   put_varint(table_bytes_, segment_start_);
   put_varint(table_bytes_, bytes.size());
   table_bytes_.insert(table_bytes_.end(), bytes.begin(), bytes.end());

@@ -69,12 +69,14 @@ class LevelWriter {
     std::uint64_t raw_bits = 0;
 
     [[nodiscard]] std::uint64_t bits() const;
-    [[nodiscard]] std::uint64_t bits_of_column(unsigned column) const;
+    [[nodiscard]] std::uint64_t bits_of_column(const Layout& layout, unsigned column) const;
   };
   /// Counts every step-th block held back.
   Trial count(const Predictor& predictor, const Columns& columns, std::size_t step);
-  Trial trial(const Predictor& predictor, bool sequence, ColumnKind kind);
-  std::vector<ColumnKind> choose_columns(const Predictor& predictor);
+  Trial trial(const Predictor& predictor, bool sequence, const Guide& guide, ColumnKind kind);
+  [[nodiscard]] bool possible(ColumnKind kind, unsigned column, const Guide& guide) const;
+  Guide find_guide(unsigned attribute);
+  void choose_columns(Tables& tables);
   void train();
   void write(const PreparedBlock& block);
   void write_full_page();

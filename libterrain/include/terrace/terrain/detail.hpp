@@ -24,8 +24,11 @@ struct FinerRegion {
 /// focuses. All regions are in the store's CRS.
 struct Detail {
   unsigned level = 0;
-  std::optional<Region> region;
-  std::vector<FinerRegion> focuses;
+  std::optional<Region> region{};
+  std::vector<FinerRegion> focuses{};
+  /// Only the points of `level` and above that this cluster stands for, its representative as its
+  /// last member; of its own level or a coarser one than `level`. Without region and focuses.
+  std::optional<stream::ClusterId> cluster{};
   /// Only points that meet this condition are wanted.
   std::optional<stream::Where> where{};
   /// In units of the CRS: what lies so far outside polygons, but in the box around them, is wanted
@@ -41,12 +44,12 @@ struct Detail {
   [[nodiscard]] bool reaches_into(const Region& there, const stream::Box3& world_box) const;
 };
 
-/// Visits every cluster that `detail` wants, the root first, then level by level downward; within a
-/// level in order of ordinals. A wanted cluster's parent is always wanted as well. Clusters of
-/// level 0 of which no point can meet the condition, by the ranges of its attributes, are left out.
-/// Memory: the ordinals of the wanted clusters of two levels where only a part is wanted; constant
-/// where a whole level is.
-/// Throws: stream::Error on a damaged store.
+/// Visits every cluster that `detail` wants, the root (or `cluster`) first, then level by level
+/// downward; within a level in order of ordinals. A wanted cluster's parent is always wanted as
+/// well. Clusters of level 0 of which no point can meet the condition, by the ranges of its
+/// attributes, are left out. Memory: the ordinals of the wanted clusters of two levels where only a
+/// part is wanted; constant where a whole level is. Throws: stream::Error on a damaged store;
+/// UsageError for a cluster that the store does not have or that is finer than the level.
 void for_each_wanted(const stream::Store& store, const Detail& detail,
                      const std::function<void(stream::ClusterId, const stream::ClusterRecord&,
                                               const stream::ClusterPoints&)>& visit);

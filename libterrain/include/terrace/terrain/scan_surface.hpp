@@ -28,7 +28,7 @@ struct SurfaceMethod {
 };
 
 struct ScanSurfaceOptions {
-  tri::RestoreOptions restore{};
+  tri::RestoreOptions restore{};          ///< its threads are the context's
   std::optional<SurfaceMethod> method{};  ///< in place of tri::restore_surface()
   bool tetrahedra = false;  ///< the tetrahedra inside the surface, not triangles; without `method`
 };
@@ -37,11 +37,19 @@ struct ScanSurfaceOptions {
 struct ScanSurface {
   TriangleMesh mesh;
   std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< where asked for, in place of triangles
-  tri::SurfaceMeasures measures;                         ///< of the surface, in metres
+  /// Of the surface, in metres. Components and Euler characteristic are those of tri::ShapeParts;
+  /// of a surface by a method, those of tri::measure().
+  tri::SurfaceMeasures measures;
+  /// Samples that are a corner of no face; samples at the same place count once. nullopt of a
+  /// surface that has corners of its own.
+  std::optional<std::size_t> samples_off;
+  /// The scan is open: the lids over what has not been scanned were left out, see
+  /// tri::BasicShape3::surface_without_lids(). Never of tetrahedra, which fill the closed surface.
+  bool open = false;
 };
 
 /// The surface of the points that `detail` wants, restored in metres on the ground: of points in
-/// degrees about the middle of their box. One thread. Throws: stream::Error on a damaged store, and
+/// degrees about the middle of their box. Throws: stream::Error on a damaged store, and
 /// where the points do not fit into the context's memory, saying what they need; UsageError for
 /// tetrahedra beside a method; what the method throws; stream::Stopped.
 [[nodiscard]] ScanSurface scan_surface(const stream::Store& store, const Detail& detail,

@@ -6,8 +6,9 @@
 
 namespace terrace::terrain {
 
-/// Lets libtri's multiresolution model read libstream's store, in stored coordinates. The two
-/// libraries do not know each other; their cluster ids are the same numbers.
+/// Lets libtri's multiresolution model read libstream's store, in stored coordinates; values are
+/// the attributes, as records of the store's schema. The two libraries do not know each other;
+/// their cluster ids are the same numbers.
 class StoreSource final : public tri::ClusterSource {
  public:
   /// The store must outlive the source.

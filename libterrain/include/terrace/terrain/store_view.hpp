@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -89,6 +90,11 @@ class StoreView {
   /// Metres east, north and up of a point in stored coordinates.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
+
+  /// The attributes of a vertex's point, a record of the store's schema; empty if its cluster is no
+  /// longer kept. Those of what a frame has added are there until the next frame, those of the root
+  /// always.
+  [[nodiscard]] std::span<const std::byte> attributes(tri::VertexId vertex) const;
 
   /// What has been read so far, the root included.
   [[nodiscard]] ViewTraffic traffic() const;

@@ -8,7 +8,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "mesh/bounded/bounded_mesher.hpp"
-#include "mesh/bounded/point_cells.hpp"
+#include "mesh/bounded/point_mesh_cells.hpp"
 #include "mesh/bounded/point_window_tin.hpp"
 #include "mesh/bounded/point_windows.hpp"
 

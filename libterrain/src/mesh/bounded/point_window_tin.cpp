@@ -14,8 +14,8 @@
 
 #include "base/orientation.hpp"
 #include "base/stopwatch.hpp"
+#include "base/streaming_hull.hpp"
 #include "base/units.hpp"
-#include "mesh/bounded/streaming_hull.hpp"
 
 namespace terrace::terrain {
 namespace {

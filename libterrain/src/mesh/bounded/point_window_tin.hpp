@@ -12,7 +12,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "mesh/bounded/point_cells.hpp"
+#include "mesh/bounded/point_mesh_cells.hpp"
 #include "mesh/bounded/point_windows.hpp"
 
 namespace terrace::terrain {

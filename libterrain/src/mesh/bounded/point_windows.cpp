@@ -11,7 +11,7 @@
 
 #include <terrace/tri/delaunay2.hpp>
 
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -12,7 +12,7 @@
 
 #include <terrace/tri/point_tin.hpp>
 
-#include "mesh/bounded/point_cells.hpp"
+#include "mesh/bounded/point_mesh_cells.hpp"
 #include "terrace/terrain/region.hpp"
 
 /// The windows that irregular samples are meshed in, and the vertices on their sides.

@@ -73,6 +73,9 @@ struct ClusterRecord {
 struct ClusterMembers {
   std::span<const Point3> positions;
   std::span<const std::uint64_t> children;
+  /// What else belongs to the members, the same number of bytes for each: the model does not look
+  /// at it, a view keeps it with the cluster.
+  std::span<const std::byte> values{};
 };
 
 /// Delivers clusters. Calls come from the thread that uses the model, one at a time. Exceptions

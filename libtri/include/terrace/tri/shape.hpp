@@ -12,10 +12,11 @@
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/metric.hpp"
 
-/// Reconstructs the non-convex shape of points scanned from a surface: from the Delaunay
-/// tetrahedra, which fill the convex hull, those outside the shape are peeled off, starting from
-/// the hull (J. Skala's thesis, section 8.3). The remaining tetrahedra are the inside, their outer
-/// facets the surface.
+/// Reconstructs the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
+/// which fill the convex hull, those inside the shape are kept, and their outer facets are the
+/// surface. Either every tetrahedron is judged by the angles between circumspheres
+/// (ShapeRule::kPoles), or those outside are peeled off, starting from the hull (J. Skala's thesis,
+/// section 8.3).
 ///
 /// restore_surface() goes from points to a surface in one call. BasicShape3 follows a changing
 /// triangulation. measure() takes surfaces of any origin.
@@ -55,8 +56,8 @@ SurfaceMeasures measure(const Surface& surface);
 /// component that is not closed is measured from its first corner. O(n log n). Throws as measure().
 void turn_outward(Surface& surface);
 
-/// Which facets of a tetrahedron are likely to lie on the surface ("boundary" facets), as seen from
-/// that tetrahedron: those that are small compared to it.
+/// For the two rules that peel: which facets of a tetrahedron are likely to lie on the surface
+/// ("boundary" facets), as seen from that tetrahedron: those that are small compared to it.
 enum class ShapeCriterion : std::uint8_t {
   /// The interior of the smallest sphere that contains the facet does not contain the tetrahedron's
   /// fourth corner (K. Gabriel, R. Sokal, doi:10.2307/2412323). Two corners of the facet lie on
@@ -68,6 +69,27 @@ enum class ShapeCriterion : std::uint8_t {
 };
 
 enum class ShapeRule : std::uint8_t {
+  /// By the strongest evidence on which side of the surface a tetrahedron is, in three steps.
+  ///
+  /// 1. Two tetrahedra that share a facet are the more likely on the same side the more deeply
+  /// their circumspheres cut each other: the defect of that statement is 1 - cos of the angle
+  /// between the directions from a corner to their circumcentres. At a vertex the two poles, the
+  /// largest circumspheres on opposite sides (N. Amenta, M. Bern, doi:10.1007/PL00009475), are on
+  /// different sides: the defect is 2 (1 + cos) of the angle between the directions to them. The
+  /// space beyond the hull takes part with half-spaces as spheres. A spanning forest of least
+  /// defect connects all tetrahedra with that space, and tells the side of each.
+  /// 2. Tetrahedra whose facets contradict that, with 2 - defect as weight, more than they support
+  /// it change sides, the largest difference first, if two or more neighbours differ and no vertex
+  /// thereby loses its last tetrahedron of a side.
+  /// 3. At a vertex whose tetrahedra are all on one side, a tetrahedron whose facet opposite to the
+  /// vertex is on the surface changes sides: the surface is drawn to the vertex. Its topology does
+  /// not change.
+  ///
+  /// Ties are broken by the corners sorted by x, y, z. It knows angles, no lengths, so the samples'
+  /// density may vary. Nearly every vertex ends on the surface; so it is for samples of surfaces,
+  /// not of volumes, and outliers become spikes. An open surface is closed by lids, see
+  /// BasicShape3::surface_without_lids().
+  kPoles,
   /// A tetrahedron beyond an open facet is removed as soon as that facet is not a boundary facet as
   /// seen from it. Open facets are those of the hull and of removed tetrahedra. So the removed
   /// tetrahedra are those reachable from outside: a function of the tetrahedra alone. Between
@@ -82,23 +104,31 @@ enum class ShapeRule : std::uint8_t {
 };
 
 struct ShapeOptions {
-  ShapeCriterion criterion = ShapeCriterion::kGabriel;
-  ShapeRule rule = ShapeRule::kFlood;
+  ShapeRule rule = ShapeRule::kPoles;
+  ShapeCriterion criterion = ShapeCriterion::kGabriel;  ///< of the rules that peel
   /// For ShapeCriterion::kEdgeLength; smaller values remove more. The thesis uses 0.5 with the
   /// published rule. The flood rule leaks through the first hole: with 0.5 it empties even a sphere
   /// of regular samples, which 1 restores.
   double edge_factor = 0.5;
-  /// No vertex loses all of its tetrahedra. Published rule: a removal that would take a vertex's
-  /// last one is skipped. Flood rule: after the flood tetrahedra are put back until every vertex
-  /// has one: each time the one with the shortest longest edge (on ties the lexicographically
-  /// first, corners sorted) among those that have a vertex without tetrahedra and share a facet
-  /// with a kept one; if there are none of these, among all that have such a vertex.
+  /// Of the rules that peel: no vertex loses all of its tetrahedra. Published rule: a removal that
+  /// would take a vertex's last one is skipped. Flood rule: after the flood tetrahedra are put back
+  /// until every vertex has one: each time the one with the shortest longest edge (on ties the
+  /// lexicographically first, corners sorted) among those that have a vertex without tetrahedra and
+  /// share a facet with a kept one; if there are none of these, among all that have such a vertex.
   bool keep_vertices = true;
 };
 
 struct ShapeSurface {
   Surface surface;
-  std::vector<VertexId> vertices;  ///< the vertex of each point of the surface; by slot
+  std::vector<VertexId> vertices;     ///< the vertex of each point of the surface; by slot
+  std::vector<TetrahedronId> behind;  ///< the kept tetrahedron behind each face
+  bool open = false;                  ///< lids were left out
+};
+
+/// Of a surface that is taken apart where solids touch in an edge or a vertex.
+struct ShapeParts {
+  std::size_t components = 0;
+  std::int64_t euler_characteristic = 0;  ///< each part's is 2 less twice its handles
 };
 
 /// The kept tetrahedra of a triangulation, computed from scratch or kept up to date with its
@@ -123,9 +153,11 @@ class BasicShape3 {
   BasicShape3(BasicShape3&&) noexcept;
   BasicShape3& operator=(BasicShape3&&) noexcept;
 
-  /// Computes the shape from scratch. Flood: O(n) facet tests, about twice as many as removed
-  /// tetrahedra, and O(m log m) for m tetrahedra at vertices that the flood has lost.
-  void restore(const Triangulation& triangulation);
+  /// Computes the shape from scratch; the same for any number of threads, of which only the poles
+  /// rule uses more than one (0: one per core). Poles: O(n log n). Flood: O(n) facet tests, about
+  /// twice as many as removed tetrahedra, and O(m log m) for m tetrahedra at vertices that the
+  /// flood has lost.
+  void restore(const Triangulation& triangulation, unsigned threads = 1);
 
   /// Updates the shape after changes of the triangulation that this object was restored from (or
   /// from its initial, empty state): the same result as restore(), at a cost that depends on the
@@ -135,7 +167,7 @@ class BasicShape3 {
   /// Flood: every removed tetrahedron remembers the facet through which the flood came. Tetrahedra
   /// reached through one that is gone, directly or indirectly, are tested again. O(changes + tested
   /// again), O(m log m) as above, and a walk around the corners of facets that joined the hull.
-  /// Published rule: from scratch, as it is not local.
+  /// Poles and published rule: from scratch.
   void update(const Triangulation& triangulation, const typename Triangulation::Changes& changes);
 
   /// Accepts any handle; false for those not in use.
@@ -144,8 +176,9 @@ class BasicShape3 {
   [[nodiscard]] std::size_t kept_count() const;
   /// Tetrahedra put back after the flood because of a vertex.
   [[nodiscard]] std::size_t rescued_count() const;
-  /// Vertices that the rule by itself leaves without a tetrahedron, by slot: with keep_vertices and
-  /// the flood rule, those that were given one back. Empty while there are no tetrahedra.
+  /// By slot. Poles: vertices that are not on the surface. Other rules: vertices that the rule by
+  /// itself leaves without a tetrahedron; with keep_vertices and the flood rule, those that were
+  /// given one back. Empty while there are no tetrahedra.
   [[nodiscard]] std::vector<VertexId> lost_vertices() const;
   /// Kept tetrahedra by slot. O(slots).
   [[nodiscard]] std::vector<TetrahedronId> kept_tetrahedra() const;
@@ -155,6 +188,16 @@ class BasicShape3 {
   /// tetrahedra meet only in an edge, that edge is in four or more faces; where they meet only in a
   /// vertex, the surface touches itself there. Faces by slot of their tetrahedron. O(slots).
   [[nodiscard]] ShapeSurface surface(const Triangulation& triangulation) const;
+  /// surface(), but of an open scan without its lids: the faces by which the poles rule closes what
+  /// has not been scanned. A face is a lid if one of its edges is more than 10 times as long as the
+  /// spacing at each of its corners, which is the sixth shortest edge of the triangulation there.
+  /// If lids are more than a tenth of the area, the scan is open and they are left out; otherwise
+  /// nothing is. Lengths and areas are those of the metric. O(slots).
+  [[nodiscard]] ShapeSurface surface_without_lids(const Triangulation& triangulation) const;
+  /// Of this shape's surface, with or without lids. Where four or more faces meet in an edge, those
+  /// that bound the same inside are joined there, and only those; measure() joins all. O(slots).
+  [[nodiscard]] ShapeParts parts(const Triangulation& triangulation,
+                                 const ShapeSurface& surface) const;
   /// Sum of the volumes of the kept tetrahedra. O(slots).
   [[nodiscard]] double volume(const Triangulation& triangulation) const;
 
@@ -183,12 +226,20 @@ struct RestoreOptions {
   /// An elliptical metric in which the points are triangulated and the facets classified, see
   /// BasicShape3. Not together with quantise_bits.
   std::optional<EllipticalMetric3> metric;
+  /// 0: one per core. The result is the same for any number.
+  unsigned threads = 1;
 };
 
 struct RestoredSurface {
   Surface surface;
   /// The input index of each point of the surface.
-  std::vector<std::size_t> input;
+  std::vector<std::size_t> input{};
+  /// Points that are a corner of no face. A point that coincides with another counts with it.
+  std::size_t points_off = 0;
+  /// The scan is open, and the lids over what has not been scanned were left out (poles rule only),
+  /// see BasicShape3::surface_without_lids().
+  bool open = false;
+  ShapeParts parts{};  ///< see BasicShape3::parts()
 };
 
 /// The surface from which the points were scanned. No faces if all points (after any rounding) are
@@ -197,7 +248,7 @@ struct RestoredSurface {
 /// Throws std::invalid_argument naming the index of a point that is not finite, or an option out of
 /// range (including a metric together with rounding).
 ///
-/// Cost: a triangulation and a flood, 0.1 to 0.3 s per 100,000 points.
+/// Cost: a triangulation and the shape, each 0.2 to 0.3 s per 100,000 points.
 RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOptions& options = {});
 
 }  // namespace terrace::tri

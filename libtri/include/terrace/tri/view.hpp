@@ -157,6 +157,7 @@ struct GivenCluster {
   /// As in ClusterMembers.
   std::vector<Point3> positions;
   std::vector<std::uint64_t> children;
+  std::vector<std::byte> values{};
   /// Above level 0: the records of the clusters one level down headed by each member, in order,
   /// then by the cluster's own head (ViewRequest::head_child); the root has no head.
   std::vector<ClusterRecord> child_records;
@@ -254,8 +255,11 @@ class ViewControl {
 
   /// Delivers a cluster, requested or not. It is kept, as far as max_cached_bytes allows, even
   /// after it was expanded, in case it is needed again. Returns false if it is larger than the
-  /// budget. Throws HierarchyError if counts of members, children and records do not agree.
+  /// budget. Throws HierarchyError if counts of members, children, values and records do not agree.
   bool give(GivenCluster cluster);
+  /// A cluster that is kept, null for others. What a step has expanded is kept until the next
+  /// give(). O(1).
+  [[nodiscard]] const GivenCluster* given(ClusterId cluster) const;
   /// Loading failed or was cancelled: the cluster may be requested again.
   void forget(ClusterId cluster);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/point_cells.hpp"
+#include "mesh/bounded/point_mesh_cells.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 #include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {

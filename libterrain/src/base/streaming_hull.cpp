@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/streaming_hull.hpp"
+#include "base/streaming_hull.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "base/orientation.hpp"
+#include <terrace/tri/predicates.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -20,7 +20,7 @@ double outward_place(const Point2& from, const Point2& to, unsigned axis, double
   const double part = (c - from[axis]) / (to[axis] - from[axis]);
   double at = from[along] + (to[along] - from[along]) * part;
   const auto left = [&](double t) {
-    return orientation(from, to, axis == 0 ? Point2{c, t} : Point2{t, c}) > 0;
+    return tri::orientation(from, to, axis == 0 ? Point2{c, t} : Point2{t, c}) > 0;
   };
   // To the right of a side that goes to larger x is down, of one that goes to larger y is right.
   const bool grows = (to[axis] > from[axis]) == (axis == 1);
@@ -39,16 +39,17 @@ std::vector<Point2> convex_hull(std::vector<Point2> points, bool keep_straight) 
   const int least = keep_straight ? 0 : 1;
   std::vector<Point2> hull;
   const auto add = [&](const Point2& p, std::size_t base) {
-    while (hull.size() >= base + 2 && orientation(hull[hull.size() - 2], hull.back(), p) < least) {
+    while (hull.size() >= base + 2 &&
+           tri::orientation(hull[hull.size() - 2], hull.back(), p) < least) {
       hull.pop_back();
     }
     hull.push_back(p);
   };
   for (const Point2& p : points) add(p, 0);
   // All on one line: there is no way back.
-  if (hull.size() == points.size() && orientation(points[0], points[1], points.back()) == 0 &&
+  if (hull.size() == points.size() && tri::orientation(points[0], points[1], points.back()) == 0 &&
       std::all_of(points.begin(), points.end(), [&](const Point2& p) {
-        return orientation(points.front(), points.back(), p) == 0;
+        return tri::orientation(points.front(), points.back(), p) == 0;
       })) {
     return {points.front(), points.back()};
   }
@@ -83,17 +84,17 @@ bool StreamingHull::inside(const Point2& point) const {
   const Point2& greatest = hull_[upper_];
   if (point < least || greatest < point) return false;
   // The chain below from the least corner to the greatest, the one above back again.
-  const bool below = orientation(least, greatest, point) < 0;
+  const bool below = tri::orientation(least, greatest, point) < 0;
   const auto begin = hull_.begin(), middle = begin + static_cast<std::ptrdiff_t>(upper_);
   if (below) {
     const auto to = std::upper_bound(begin + 1, middle, point);
-    return orientation(*(to - 1), *to, point) >= 0;
+    return tri::orientation(*(to - 1), *to, point) >= 0;
   }
   const auto from =
       std::upper_bound(middle + 1, hull_.end(), point, [](const Point2& a, const Point2& b) {
         return b < a;  // the chain descends
       });
-  return orientation(*(from - 1), from == hull_.end() ? least : *from, point) >= 0;
+  return tri::orientation(*(from - 1), from == hull_.end() ? least : *from, point) >= 0;
 }
 
 void StreamingHull::keep(const Point2& point) {

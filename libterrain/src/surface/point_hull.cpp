@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/point_hull.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <terrace/stream/store_query.hpp>
+#include <terrace/tri/predicates.hpp>
+
+#include "base/streaming_hull.hpp"
+
+namespace terrace::terrain {
+
+PointHull::PointHull(const stream::Store& store, unsigned level) {
+  stream::StoreQuery query(store);
+  StreamingHull hull;
+  std::uint64_t added = 0, made_of = 0;
+  query.descend(
+      level,
+      [&](unsigned, const stream::StoreQuery::Branch& branch) {
+        // The hull of so far is made anew as more points come, less and less often.
+        if (added > made_of + made_of / 4) {
+          set_corners(hull.corners());
+          made_of = added;
+        }
+        if (is_flat()) return true;
+        for (unsigned corner = 0; corner < 4; ++corner) {
+          const Point2 p{(corner & 1 ? branch.box.max : branch.box.min)[0],
+                         (corner & 2 ? branch.box.max : branch.box.min)[1]};
+          if (find(p).side == Side::kOutside) return true;
+        }
+        return false;
+      },
+      [&](const stream::StoreQuery::Node& node) {
+        for (const stream::Point3& p : node.positions) hull.add({p[0], p[1]});
+        added += node.positions.size();
+      });
+  set_corners(hull.corners());
+}
+
+void PointHull::set_corners(std::vector<Point2> corners) {
+  corners_ = std::move(corners);
+  greatest_ = static_cast<std::size_t>(std::max_element(corners_.begin(), corners_.end()) -
+                                       corners_.begin());
+}
+
+PointHull::Found PointHull::find(const Point2& place) const {
+  if (place < corners_.front() || corners_[greatest_] < place) return {};
+  const auto begin = corners_.begin();
+  const auto middle = begin + static_cast<std::ptrdiff_t>(greatest_);
+  Found found{Side::kInside};
+  // Whether the place is not beyond the edge to corner `next`.
+  const auto look_at = [&](std::size_t next) {
+    const std::size_t count = corners_.size();
+    const int side = tri::orientation(corners_[(next + count - 1) % count], corners_[next], place);
+    if (side == 0) found = {Side::kBorder, next};
+    return side >= 0;
+  };
+  // The chain below from the least corner to the greatest, then the one above back again.
+  if (place != *middle) {
+    const auto after = std::upper_bound(begin, middle + 1, place);
+    if (!look_at(static_cast<std::size_t>(after - begin))) return {};
+  }
+  if (place != *begin && found.side == Side::kInside) {
+    const auto after = std::upper_bound(middle, corners_.end(), place,
+                                        [](const Point2& a, const Point2& b) { return b < a; });
+    if (!look_at(after == corners_.end() ? 0 : static_cast<std::size_t>(after - begin))) return {};
+  }
+  return found;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/point_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <terrace/tri/interpolation.hpp>
+#include <terrace/tri/predicates.hpp>
+
+namespace terrace::terrain {
+namespace {
+
+constexpr double kFarAway = std::numeric_limits<double>::infinity();
+/// More than a square of a distance is wrong by: differences, squares and their sum.
+constexpr double kDoubt = 8 * std::numeric_limits<double>::epsilon();
+/// Cells around that are looked at without regard to the circle, at most.
+constexpr std::uint32_t kFarthest = 8;
+/// Decoded clusters to keep, for circles that reach beyond what is loaded.
+constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
+
+CircleCover circle_of(const std::array<Point2, 3>& t) {
+  return CircleCover::of_triangle(t[0], t[1], t[2]);
+}
+
+double square_of(double dx, double dy) { return dx * dx + dy * dy; }
+
+/// Not above the square of the distance of any point in the box.
+double least_square(const StoredBox& box, const Point2& place) {
+  const auto out = [&](std::size_t k) {
+    return std::max({box.min[k] - place[k], place[k] - box.max[k], 0.0});
+  };
+  // Infinite would mean that the box is not to be looked into.
+  return std::min(square_of(out(0), out(1)) * (1 - kDoubt), std::numeric_limits<double>::max());
+}
+
+double greatest_square(const StoredBox& box, const Point2& place) {
+  const auto out = [&](std::size_t k) {
+    return std::max(place[k] - box.min[k], box.max[k] - place[k]);
+  };
+  return square_of(out(0), out(1)) * (1 + kDoubt);
+}
+
+/// The disk around a place as far as a point, or a little more.
+CircleCover disk(const Point2& place, double square) {
+  CircleCover cover;
+  cover.has_disk = true;
+  cover.near = place;
+  constexpr double kVanished = 1e-145;  ///< more than lengths whose squares are zero
+  cover.radius = std::sqrt(square) * (1 + kDoubt) + kVanished;
+  return cover;
+}
+
+/// Around them all.
+StoredBox bounds_of(std::span<const CircleCover> covers) {
+  StoredBox all = covers[0].bounds();
+  for (const CircleCover& cover : covers.subspan(1)) {
+    const StoredBox box = cover.bounds();
+    for (std::size_t k = 0; k < 2; ++k) {
+      all.min[k] = std::min(all.min[k], box.min[k]);
+      all.max[k] = std::max(all.max[k], box.max[k]);
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+PointSurface::PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
+                           TooLong too_long)
+    : store_(store),
+      level_(level),
+      hull_(hull),
+      too_long_(std::move(too_long)),
+      query_(store, kSurfaceCacheBytes) {
+  own_.clear();
+}
+
+bool PointSurface::load(const StoredBox& box, std::size_t most_points, bool may_crowd) {
+  cells_ = &own_;
+  return own_.load(query_, level_, box, most_points, may_crowd);
+}
+
+int PointSurface::side_of(const Point2& a, const Point2& b, const Target& target) {
+  int side = tri::orientation(a, b, target.place);
+  if (side != 0) return side;
+  side = tri::orientation(a, b, target.towards);
+  if (side != 0) return side;
+  return (a < b) == (target.place < target.towards) ? 1 : -1;
+}
+
+bool PointSurface::has(const Corners& t, const Target& target) {
+  return side_of(t[0], t[1], target) > 0 && side_of(t[1], t[2], target) > 0 &&
+         side_of(t[2], t[0], target) > 0;
+}
+
+std::optional<PointSurface::Target> PointSurface::target_of(const Point2& place,
+                                                            PointHull::Side& side) const {
+  const PointHull::Found found = hull_.find(place);
+  side = found.side;
+  switch (side) {
+    case PointHull::Side::kOutside:
+      break;
+    case PointHull::Side::kBorder:
+      return Target{place, hull_.corners()[found.next]};
+    case PointHull::Side::kInside:
+      return Target{place, hull_.corners()[0]};
+  }
+  return std::nullopt;
+}
+
+template <class Visit>
+void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& from,
+                           const Visit& visit) {
+  query_.best_first(
+      level_,
+      [&](const stream::Box3& whole) {
+        const StoredBox box = flat(whole);
+        // Of a box that is one place the head is known, and so is its place.
+        if (box.min == box.max || cells_->knows(box)) return kFarAway;
+        const auto meets = [&](const CircleCover& cover) { return cover.meets(box); };
+        return std::any_of(covers.begin(), covers.end(), meets) ? least_square(box, from)
+                                                                : kFarAway;
+      },
+      [&](const stream::StoreQuery::Node& node) {
+        for (const stream::Point3& p : node.positions) {
+          const Point2 place{p[0], p[1]};
+          if (!cells_->knows(place)) visit(place);
+        }
+        return greatest_square(bounds_of(covers), from);
+      });
+}
+
+void PointSurface::find_triangle(const Target& target) {
+  if (triangle_ && has(*triangle_, target)) return;
+  triangle_.reset();  // in case reading fails
+  // The hull is a fan of triangles round its first corner.
+  const std::span<const Point2> hull = hull_.corners();
+  std::size_t before = 1, after = hull.size() - 1;
+  while (after - before > 1) {
+    const std::size_t middle = before + (after - before) / 2;
+    (side_of(hull[0], hull[middle], target) > 0 ? before : after) = middle;
+  }
+  Corners t{hull[0], hull[before], hull[after]};
+  CircleCover cover = circle_of(t);
+  bool changed = false;
+  const auto offer = [&](const Point2& p) {
+    if (!cover.meets(StoredBox{p, p})) return;
+    if (p == t[0] || p == t[1] || p == t[2]) return;
+    if (!tri::inside_circle(t[0], t[1], t[2], p)) return;
+    // The point and the corners part the triangle, or it and what lies between it and the point.
+    std::array<int, 3> side{};
+    for (std::size_t i = 0; i < 3; ++i) side[i] = side_of(p, t[i], target);
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!(side[(i + 1) % 3] > 0 && side[(i + 2) % 3] < 0)) continue;
+      t[i] = p;
+      cover = circle_of(t);
+      changed = true;
+      break;
+    }
+  };
+  // First as if there were no points but those around, until they leave a small circle.
+  for (std::uint32_t reach = 1;; reach *= 2) {
+    do {
+      changed = false;
+      cells_->visit_cells(cells_->near(target.place, reach), offer);
+    } while (changed);
+    if (reach >= kFarthest || cells_->is_near(cover.bounds(), reach)) break;
+  }
+  do {
+    changed = false;
+    cells_->in(cover, offer);
+    if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, target.place, offer);
+  } while (changed);
+  triangle_ = t;
+}
+
+void PointSurface::find_star(const Point2& centre) {
+  star_.start(centre);
+  double limit = kFarAway;
+  const auto offer = [&](const Point2& p) {
+    if (square_of(p[0] - centre[0], p[1] - centre[1]) <= limit) star_.offer(p);
+  };
+  // Circles in which all points in memory, or all, have been offered.
+  enum Mark : std::uint8_t { kNone, kMemory, kAll };
+  PointCells::Range seen, wanted;
+  std::size_t cells = 0;
+  // The circles that points in memory may lie in yet.
+  const auto find_open = [&] {
+    covers_.clear();
+    cells = 0;
+    for (std::size_t i = 0; i < star_.triangles(); ++i) {
+      if (star_.mark(i) != kNone) continue;
+      const CircleCover cover = star_.circle(i);
+      const PointCells::Range range = cells_->cells_of(cover.bounds());
+      if (seen.contains(range)) {
+        star_.set_mark(i, kMemory);
+      } else {
+        covers_.push_back(cover);
+        cells += range.count();
+      }
+    }
+    if (covers_.empty()) return;
+    wanted = cells_->cells_of(bounds_of(covers_));
+    limit = greatest_square(bounds_of(covers_), centre);
+  };
+  for (std::uint32_t reach = 1;; reach *= 2) {
+    wanted = cells_->near(centre, reach);
+    cells_->visit_cells(wanted, seen, offer);
+    seen = wanted;
+    if (reach >= kFarthest) break;
+    if (!star_.is_closed()) continue;
+    find_open();
+    if (covers_.empty() || wanted.count() <= 2 * seen.count()) break;
+  }
+  if (!star_.is_closed()) {
+    for (const Point2& corner : hull_.corners()) offer(corner);
+  }
+  while (true) {
+    for (find_open(); !covers_.empty(); find_open()) {
+      for (std::size_t i = 0; i < star_.triangles(); ++i) {
+        if (star_.mark(i) == kNone) star_.set_mark(i, kMemory);
+      }
+      // Circles of new triangles lie in those of the old ones.
+      if (wanted.count() <= cells) {
+        cells_->visit_cells(wanted, seen, offer);
+        seen = wanted;
+      } else {
+        for (const CircleCover& cover : covers_) cells_->in(cover, offer);
+      }
+    }
+    for (std::size_t i = 0; i < star_.triangles(); ++i) {
+      if (star_.mark(i) == kAll) continue;
+      star_.set_mark(i, kAll);
+      const CircleCover cover = star_.circle(i);
+      if (!cells_->knows(cover.bounds())) covers_.push_back(cover);
+    }
+    if (covers_.empty()) return;
+    limit = greatest_square(bounds_of(covers_), centre);
+    read_in(covers_, centre, offer);
+  }
+}
+
+double PointSurface::height(const Point2& point) {
+  if (cells_->knows(point)) return cells_->height(point);
+  const stream::Channel& channel = store_.schema().coordinates[2];
+  const StoredBox box{point, point};
+  std::optional<double> found;
+  query_.descend(
+      level_,
+      [&](unsigned, const stream::StoreQuery::Branch& branch) {
+        return !found && box.meets(branch.box);
+      },
+      [&](const stream::StoreQuery::Node& node) {
+        for (const stream::Point3& p : node.positions) {
+          if (found || p[0] != point[0] || p[1] != point[1]) continue;
+          found = p[2] * channel.scale + channel.offset;
+        }
+      });
+  return found.value_or(NAN);
+}
+
+SurfaceTriangle PointSurface::with_heights(const Corners& corners) {
+  SurfaceTriangle triangle;
+  for (std::size_t i = 0; i < 3; ++i) triangle[i] = {corners[i], height(corners[i])};
+  return triangle;
+}
+
+SurfacePoint PointSurface::at_point(const Point2& point) {
+  find_star(point);
+  const SurfaceCorner centre{point, height(point)};
+  const auto corner = [&](const Point2& p) { return SurfaceCorner{p, height(p)}; };
+  SurfaceCorner before = corner(star_.neighbour(0));
+  meeting_.clear();
+  for (std::size_t i = 0; i < star_.triangles(); ++i) {
+    const SurfaceCorner next = corner(star_.next_neighbour(i));
+    meeting_.push_back({centre, before, next});
+    before = next;
+  }
+  return where_triangles_meet(point, centre.height, meeting_, too_long_);
+}
+
+SurfacePoint PointSurface::linear(const Point2& place) {
+  PointHull::Side where{};
+  const std::optional<Target> target = target_of(place, where);
+  if (!target) return {};
+  find_triangle(*target);
+  const Corners t = *triangle_;
+  if (std::find(t.begin(), t.end(), place) != t.end()) return at_point(place);
+  const SurfaceTriangle triangle = with_heights(t);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const SurfaceCorner &a = triangle[i], &b = triangle[(i + 1) % 3];
+    if (tri::orientation(a.place, b.place, place) != 0) continue;
+    if (too_long_ && too_long_(a.place, b.place)) return {};
+    meeting_.assign(1, triangle);
+    // The triangle on the other side, unless the edge is on the hull.
+    for (const Point2& beyond : hull_.corners()) {
+      if (tri::orientation(a.place, b.place, beyond) >= 0) continue;
+      find_triangle({place, beyond});
+      meeting_.push_back(with_heights(*triangle_));
+      break;
+    }
+    return where_triangles_meet(place, on_edge(a, b, place), meeting_, too_long_);
+  }
+  return is_surface(triangle, too_long_) ? on_plane(triangle, place) : SurfacePoint{};
+}
+
+SurfacePoint PointSurface::natural_among(std::vector<Point2>& points, const Point2& place) {
+  // In an order of their own, for the last bits.
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  tri::Delaunay2<double> few;
+  const std::vector<tri::VertexId> vertices = few.build(points);
+  std::vector<double> heights(few.vertex_slots());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    heights[tri::slot(vertices[i])] = height(points[i]);
+  }
+  const std::span<const Point2> one(&place, 1);
+  const double at = tri::heights_at(few, heights, one, tri::Interpolation::kNaturalNeighbour, 1)[0];
+  const tri::Gradient gradient =
+      tri::gradients_at(few, heights, one, tri::GradientFrom::kNaturalNeighbours, 1)[0];
+  return {at, gradient.x, gradient.y};
+}
+
+SurfacePoint PointSurface::natural(const Point2& place) {
+  PointHull::Side where{};
+  const std::optional<Target> target = target_of(place, where);
+  if (!target || (too_long_ && std::isnan(linear(place).height))) return {};
+  points_.clear();
+  if (where == PointHull::Side::kBorder) {
+    find_triangle(*target);
+    const Corners& t = *triangle_;
+    points_.assign(t.begin(), t.end());
+  }
+  // The neighbours that the place has, or would have as a point.
+  if (where == PointHull::Side::kInside || std::count(points_.begin(), points_.end(), place) > 0) {
+    find_star(place);
+    points_.clear();
+    if (star_.has_centre()) points_.push_back(place);
+    for (std::size_t i = 0; i < star_.size(); ++i) points_.push_back(star_.neighbour(i));
+  }
+  return natural_among(points_, place);
+}
+
+Point2 PointSurface::nearest(const Point2& place) {
+  Point2 best{};
+  double bound = kFarAway;  ///< the square of its distance, or a little more
+  const auto offer = [&](const Point2& p) {
+    const double square = square_of(p[0] - place[0], p[1] - place[1]);
+    if (square > bound) return;
+    if (bound < kFarAway) {
+      // Doubles tell most of them apart.
+      const bool is_nearer = square * (1 + kDoubt) * (1 + kDoubt) < bound;
+      if (!is_nearer) {
+        const int order = tri::compare_distance(place, p, best);
+        if (order > 0 || (order == 0 && !(p < best))) return;
+      }
+    }
+    best = p;
+    bound = square * (1 + kDoubt);
+  };
+  for (std::uint32_t reach = 1;; reach *= 2) {
+    cells_->visit_cells(cells_->near(place, reach), offer);
+    if (bound < kFarAway && cells_->is_near(disk(place, bound).bounds(), reach)) break;
+    if (bound < kFarAway || reach < kFarthest) continue;
+    for (const Point2& corner : hull_.corners()) offer(corner);
+  }
+  const CircleCover cover = disk(place, bound);
+  cells_->in(cover, offer);
+  if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, place, offer);
+  return best;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
+#include <terrace/tri/delaunay2.hpp>
+
+#include "surface/circle_cover.hpp"
+#include "surface/point_cells.hpp"
+#include "surface/point_hull.hpp"
+#include "surface/point_star.hpp"
+#include "surface/surface_corner.hpp"
+#include "terrace/terrain/heights.hpp"
+
+namespace terrace::terrain {
+
+/// The surface between the points of a level and above at single places: what the Delaunay
+/// triangulation of all of them has there, found without making it.
+///
+/// The triangle above a place is the solution of a linear programme: of all planes through three
+/// lifted points that enclose the place, the one below all others. It is found by the simplex
+/// method: from any triangle with the place, a point inside its circle takes the place of a corner
+/// until there is none. The triangles round a place are found by offering it the points around, see
+/// PointStar. All decisions are exact, ties are broken as Delaunay2
+/// breaks them, so the triangles are those of the whole whatever is loaded.
+///
+/// Points come from the cells of a grid over what load() has read, and where a circle reaches
+/// beyond that from the store, by its clusters' boxes. Places should come near each other: as a
+/// rule one lies in the triangle of the one before or close to it. About 1 us a place in a loaded
+/// box, half a millisecond elsewhere.
+///
+/// One object per thread; any number of them share a Store and a hull, which must outlive them. All
+/// functions throw stream::Error on a damaged store and stream::Stopped.
+class PointSurface {
+ public:
+  /// Requires a hull that is not flat, of the same level.
+  PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
+               TooLong too_long = {});
+  PointSurface(const PointSurface&) = delete;
+  PointSurface& operator=(const PointSurface&) = delete;
+
+  /// See PointCells::load().
+  bool load(const StoredBox& box, std::size_t most_points, bool may_crowd);
+  /// Takes the points of these cells from now on, which must outlive this.
+  void share(const PointCells& cells) { cells_ = &cells; }
+
+  /// The linear surface. On an edge and on a point the height comes from the points there alone and
+  /// the gradient is the mean of the triangles that meet there. NaN outside the hull. Triangles
+  /// with too long an edge are left out; shorter edges and points that have no other have heights
+  /// but no gradients. Requires a finite place.
+  SurfacePoint linear(const Point2& place);
+  /// By Sibson's natural neighbours, see tri::heights_at() and tri::gradients_at(). NaN outside the
+  /// hull and where linear() has no height.
+  SurfacePoint natural(const Point2& place);
+  /// The nearest point; of several equally near, the lexicographically smallest. Requires a finite
+  /// place.
+  Point2 nearest(const Point2& place);
+  /// Of a point, in the store's vertical unit.
+  double height(const Point2& point);
+  /// The surface of linear() at the nearest point.
+  SurfacePoint at_nearest(const Point2& place) { return at_point(nearest(place)); }
+
+ private:
+  using Corners = std::array<Point2, 3>;  ///< counter-clockwise
+  /// A place moved infinitesimally towards another one, and to the left of that way infinitely
+  /// less: so it lies on no line through two points.
+  struct Target {
+    Point2 place, towards;
+  };
+
+  static int side_of(const Point2& a, const Point2& b, const Target& target);
+  [[nodiscard]] static bool has(const Corners& triangle, const Target& target);
+  /// Nothing outside the hull.
+  std::optional<Target> target_of(const Point2& place, PointHull::Side& side) const;
+  /// Lets triangle_ be that of the target, which must be inside the hull.
+  void find_triangle(const Target& target);
+  /// Lets star_ be that of a place among all points, which may be one of them. Requires that it is
+  /// not outside the hull.
+  void find_star(const Point2& centre);
+  /// Calls visit(point) at least for all points in the covers that are not held in memory.
+  template <class Visit>
+  void read_in(std::span<const CircleCover> covers, const Point2& from, const Visit& visit);
+
+  SurfaceTriangle with_heights(const Corners& corners);
+  SurfacePoint at_point(const Point2& point);
+  SurfacePoint natural_among(std::vector<Point2>& points, const Point2& place);
+
+  const stream::Store& store_;
+  unsigned level_;
+  const PointHull& hull_;
+  TooLong too_long_;
+  stream::StoreQuery query_;
+  PointCells own_;
+  const PointCells* cells_ = &own_;
+  std::optional<Corners> triangle_;  ///< one of the triangulation of all points
+  PointStar star_;
+  std::vector<CircleCover> covers_;
+  std::vector<SurfaceTriangle> meeting_;
+  std::vector<Point2> points_;
+};
+
+}  // namespace terrace::terrain

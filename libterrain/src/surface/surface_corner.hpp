@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <functional>
+#include <span>
+
+#include "terrace/terrain/heights.hpp"
+#include "terrace/terrain/region.hpp"
+
+/// The linear surface on the triangles of points: the same bits for the same points, in whatever
+/// order they come.
+
+namespace terrace::terrain {
+
+/// A point of a surface.
+struct SurfaceCorner {
+  Point2 place;
+  double height = 0;
+};
+using SurfaceTriangle = std::array<SurfaceCorner, 3>;  ///< counter-clockwise
+
+/// Whether an edge between two places is so long that triangles with it are no surface.
+using TooLong = std::function<bool(const Point2&, const Point2&)>;
+
+/// Inside a triangle, its border included.
+SurfacePoint on_plane(SurfaceTriangle triangle, const Point2& place);
+/// The height between the ends of an edge.
+double on_edge(SurfaceCorner a, SurfaceCorner b, const Point2& place);
+/// At a place where triangles meet: the height is given, the gradient is the mean of those of the
+/// triangles without too long an edge. Reorders them.
+SurfacePoint where_triangles_meet(const Point2& place, double height,
+                                  std::span<SurfaceTriangle> triangles, const TooLong& too_long);
+
+inline bool is_surface(const SurfaceTriangle& t, const TooLong& too_long) {
+  return !too_long || (!too_long(t[0].place, t[1].place) && !too_long(t[1].place, t[2].place) &&
+                       !too_long(t[2].place, t[0].place));
+}
+
+}  // namespace terrace::terrain

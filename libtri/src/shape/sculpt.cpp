@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <queue>
+
+#include "poles.hpp"
+
+namespace terrace::tri::shape {
+namespace {
+
+/// Labels, and how many tetrahedra of each label every vertex has. The space beyond the hull counts
+/// as one tetrahedron outside at every vertex of the hull.
+class Labels {
+ public:
+  Labels(const Spheres& spheres, std::vector<std::uint8_t>& inside)
+      : spheres_(spheres), inside_(inside), count_(spheres.places().size()) {
+    const auto tetrahedra = spheres.tetrahedra();
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+      if (!spheres.finite(t)) continue;
+      for (std::size_t i = 0; i < 4; ++i) {
+        ++count_[tetrahedra[t].corner[i]][inside_[t]];
+        if (spheres.finite(spatial::tetrahedron_of(tetrahedra[t].mate[i]))) continue;
+        for (const std::uint32_t v : spatial::facet_of(tetrahedra[t], static_cast<unsigned>(i)))
+          ++count_[v][0];
+      }
+    }
+  }
+  [[nodiscard]] std::uint8_t at(std::uint32_t t) const { return inside_[t]; }
+  [[nodiscard]] std::uint32_t count(std::uint32_t vertex, std::uint8_t label) const {
+    return count_[vertex][label];
+  }
+  [[nodiscard]] std::uint32_t vertex_slots() const {
+    return static_cast<std::uint32_t>(count_.size());
+  }
+  void flip(std::uint32_t t) {
+    for (const std::uint32_t v : spheres_.tetrahedra()[t].corner) {
+      --count_[v][inside_[t]];
+      ++count_[v][1 - inside_[t]];
+    }
+    inside_[t] ^= 1;
+  }
+
+ private:
+  const Spheres& spheres_;
+  std::vector<std::uint8_t>& inside_;
+  std::vector<std::array<std::uint32_t, 2>> count_;
+};
+
+/// Gains of rounding alone could turn a tetrahedron back and forth.
+constexpr double kLeastGain = 0x1p-40;
+
+/// How much t's facets contradict its label, if two neighbours or more differ from it; else 0.
+double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
+  const spatial::Tetrahedron& tetrahedron = spheres.tetrahedra()[t];
+  std::array<bool, 4> differs{};
+  int differing = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    differs[i] = labels.at(spatial::tetrahedron_of(tetrahedron.mate[i])) != labels.at(t);
+    differing += differs[i];
+  }
+  if (differing < 2) return 0.0;
+  std::array<double, 4> terms{};
+  for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
+    const double weight = 2.0 - spheres.facet_defect(spatial::make_side(t, i));
+    terms[i] = differs[i] ? weight : -weight;
+  }
+  std::sort(terms.begin(), terms.end());
+  return terms[0] + terms[1] + terms[2] + terms[3];
+}
+
+}  // namespace
+
+void smooth(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+  struct Candidate {
+    double gain;
+    Ranks corners;
+    std::uint32_t tetrahedron;
+    bool operator<(const Candidate& other) const {
+      return gain != other.gain ? gain < other.gain : corners > other.corners;
+    }
+  };
+  const auto tetrahedra = spheres.tetrahedra();
+  Labels labels(spheres, inside);
+  std::priority_queue<Candidate> next;
+  const auto consider = [&](std::uint32_t t) {
+    if (!spheres.finite(t)) return;
+    const double gain = gain_of(spheres, labels, t);
+    if (gain > kLeastGain) next.push({gain, spheres.ranks_of(t), t});
+  };
+  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) consider(t);
+  while (!next.empty()) {
+    const Candidate candidate = next.top();
+    next.pop();
+    const std::uint32_t t = candidate.tetrahedron;
+    if (gain_of(spheres, labels, t) != candidate.gain) continue;
+    const auto& corner = tetrahedra[t].corner;
+    if (std::any_of(corner.begin(), corner.end(),
+                    [&](std::uint32_t v) { return labels.count(v, labels.at(t)) == 1; }))
+      continue;
+    labels.flip(t);
+    for (const spatial::Side mate : tetrahedra[t].mate) consider(spatial::tetrahedron_of(mate));
+  }
+}
+
+void sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside) {
+  struct Candidate {
+    double defect;
+    std::uint32_t vertex_rank;
+    Ranks facet;
+    spatial::Side side;  ///< of the tetrahedron to flip, opposite to the vertex
+    bool operator<(const Candidate& other) const {
+      if (defect != other.defect) return defect > other.defect;
+      if (vertex_rank != other.vertex_rank) return vertex_rank > other.vertex_rank;
+      return facet > other.facet;
+    }
+  };
+  const auto tetrahedra = spheres.tetrahedra();
+  Labels labels(spheres, inside);
+  const auto vertex_of = [&](spatial::Side side) {
+    return tetrahedra[spatial::tetrahedron_of(side)].corner[spatial::index_of(side)];
+  };
+  const auto buried = [&](std::uint32_t v) {
+    return labels.count(v, 0) == 0 || labels.count(v, 1) == 0;
+  };
+  std::priority_queue<Candidate> next;
+  const auto consider = [&](spatial::Side side) {
+    const std::uint32_t t = spatial::tetrahedron_of(side);
+    if (!spheres.finite(t) || !buried(vertex_of(side))) return;
+    const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
+    if (labels.at(spatial::tetrahedron_of(mate)) == labels.at(t)) return;
+    next.push({spheres.facet_defect(side), spheres.places()[vertex_of(side)].rank,
+               spheres.facet_ranks(side), side});
+  };
+  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t)
+    for (const std::uint32_t i : {0u, 1u, 2u, 3u}) consider(spatial::make_side(t, i));
+  while (!next.empty()) {
+    const spatial::Side side = next.top().side;
+    next.pop();
+    const std::uint32_t t = spatial::tetrahedron_of(side);
+    const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
+    if (!buried(vertex_of(side)) || labels.at(spatial::tetrahedron_of(mate)) == labels.at(t))
+      continue;
+    labels.flip(t);
+    for (const spatial::Side beyond : tetrahedra[t].mate) consider(beyond);
+  }
+}
+
+}  // namespace terrace::tri::shape

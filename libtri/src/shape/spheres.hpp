@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "../delaunay3/mesh.hpp"
+#include "criterion.hpp"
+
+/// Circumspheres of the tetrahedra and the angles between them, on which the poles rule stands.
+///
+/// Every number is computed from corners in lexicographic order, by additions, multiplications,
+/// divisions and square roots alone. So its bits depend on the coordinates, not on slots, threads
+/// or the machine.
+
+namespace terrace::tri::shape {
+
+/// Where a vertex is, scaled by a power of two so that all points fit a box of side 1; in an
+/// elliptical metric mapped to where the metric is Euclidean.
+struct Place {
+  Vector3 at;
+  std::uint32_t rank;  ///< among all vertices in lexicographic order
+};
+
+/// Lexicographic order of the living vertices.
+template <class Mesh>
+std::vector<std::uint32_t> sorted_vertices(const Mesh& mesh) {
+  struct Key {
+    double x;
+    std::uint32_t vertex;
+  };
+  std::vector<Key> keys;
+  keys.reserve(mesh.vertex.size());
+  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
+    if (mesh.vertex_alive(v)) keys.push_back({static_cast<double>(mesh.vertex[v].point[0]), v});
+  std::sort(keys.begin(), keys.end(), [&](const Key& a, const Key& b) {
+    if (a.x != b.x) return a.x < b.x;
+    return spatial::lexicographically_less(mesh.vertex[a.vertex].point,
+                                           mesh.vertex[b.vertex].point);
+  });
+  std::vector<std::uint32_t> order;
+  order.reserve(keys.size());
+  for (const Key& key : keys) order.push_back(key.vertex);
+  return order;
+}
+
+/// The largest power of two by which coordinates of this size can be multiplied to be at most 1 in
+/// absolute value (up to a factor of 2); within the range of normal numbers.
+inline double scale_to_one(double size) {
+  int exponent = 0;
+  std::frexp(size, &exponent);
+  return std::ldexp(1.0, std::clamp(-exponent, -1022, 1022));
+}
+
+/// By vertex slot. Requires a scope of the metric.
+template <class Mesh>
+std::vector<Place> places_of(const Mesh& mesh) {
+  std::vector<Place> places(mesh.vertex.size(), Place{{}, 0});
+  const std::vector<std::uint32_t> order = sorted_vertices(mesh);
+  for (std::uint32_t i = 0; i < order.size(); ++i) places[order[i]].rank = i;
+  double size = 0.0;
+  for (const std::uint32_t v : order) {
+    places[v].at = to_doubles(mesh.vertex[v].point);
+    size = std::max(size, largest(places[v].at));
+  }
+  // First so that differences cannot overflow, then once more for points that lie together.
+  const auto rescale = [&](double by) {
+    for (const std::uint32_t v : order)
+      for (double& c : places[v].at) c *= by;
+  };
+  rescale(scale_to_one(size));
+  if (order.empty()) return places;
+  const Vector3 origin = places[order.front()].at;
+  size = 0.0;
+  for (const std::uint32_t v : order) {
+    if constexpr (is_elliptical<Mesh>) places[v].at = edge(mesh, origin, places[v].at);
+    const Vector3 difference = minus(places[v].at, places[order.front()].at);
+    size = std::max(size, largest(difference));
+  }
+  rescale(scale_to_one(size));
+  return places;
+}
+
+/// The corners of a tetrahedron or facet by rank.
+using Ranks = std::array<std::uint32_t, 4>;
+
+class Spheres {
+ public:
+  using Side = spatial::Side;
+
+  /// O(tetrahedra). Any number of threads computes the same.
+  Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
+          unsigned threads);
+
+  [[nodiscard]] std::span<const spatial::Tetrahedron> tetrahedra() const { return tetrahedra_; }
+  [[nodiscard]] const std::vector<Place>& places() const { return places_; }
+  /// Whether the slot holds a finite tetrahedron.
+  [[nodiscard]] bool finite(std::uint32_t t) const { return sphere_[t].first != spatial::kGhost; }
+  /// Whether the tetrahedron is so flat that rounding decides where its circumcentre lies.
+  [[nodiscard]] bool flat(std::uint32_t t) const { return std::isnan(sphere_[t].centre[0]); }
+  /// The squared circumradius; NaN if flat.
+  [[nodiscard]] double radius2(std::uint32_t t) const {
+    return dot(sphere_[t].centre, sphere_[t].centre);
+  }
+  /// From a vertex of the finite tetrahedron t to its circumcentre.
+  [[nodiscard]] Vector3 to_centre(std::uint32_t t, std::uint32_t vertex) const {
+    const Sphere& s = sphere_[t];
+    if (s.first == vertex) return s.centre;
+    const Vector3 shift = minus(places_[s.first].at, places_[vertex].at);
+    return {shift[0] + s.centre[0], shift[1] + s.centre[1], shift[2] + s.centre[2]};
+  }
+  /// The outward unit normal of the hull facet that is this side of a finite tetrahedron.
+  [[nodiscard]] Vector3 hull_normal(Side side) const;
+
+  /// 1 - cos of the angle at which the circumspheres on both sides of a facet meet: 0 if they are
+  /// the same, 2 if they only touch. Beyond the hull the sphere is a half-space. 1 if one of the
+  /// tetrahedra is flat. `side` belongs to a finite tetrahedron.
+  [[nodiscard]] double facet_defect(Side side) const;
+
+  [[nodiscard]] Ranks ranks_of(std::uint32_t t) const {
+    const auto& corner = tetrahedra_[t].corner;
+    Ranks ranks{};
+    for (std::size_t i = 0; i < 4; ++i) ranks[i] = places_[corner[i]].rank;
+    std::sort(ranks.begin(), ranks.end());
+    return ranks;
+  }
+  /// Three ranks, then 0.
+  [[nodiscard]] Ranks facet_ranks(Side side) const {
+    const auto f =
+        spatial::facet_of(tetrahedra_[spatial::tetrahedron_of(side)], spatial::index_of(side));
+    Ranks ranks{places_[f[0]].rank, places_[f[1]].rank, places_[f[2]].rank, 0};
+    std::sort(ranks.begin(), ranks.begin() + 3);
+    return ranks;
+  }
+  [[nodiscard]] std::size_t bytes() const {
+    return places_.capacity() * sizeof(Place) + sphere_.capacity() * sizeof(Sphere);
+  }
+
+ private:
+  struct Sphere {
+    Vector3 centre;       ///< as seen from the first corner; NaN if flat
+    std::uint32_t first;  ///< the lexicographically first corner; kGhost if not finite
+  };
+  [[nodiscard]] Sphere sphere_of(const spatial::Tetrahedron& t) const;
+
+  std::span<const spatial::Tetrahedron> tetrahedra_;
+  std::vector<Place> places_;   ///< by vertex slot
+  std::vector<Sphere> sphere_;  ///< by tetrahedron slot
+};
+
+/// 1 - cos of the angle between two vectors, in 0 .. 2; 1 where rounding leaves no angle.
+inline double defect_between(const Vector3& u, const Vector3& v) {
+  const double cosine = dot(u, v) / std::sqrt(dot(u, u) * dot(v, v));
+  if (std::isnan(cosine)) return 1.0;
+  return std::clamp(1.0 - cosine, 0.0, 2.0);
+}
+
+}  // namespace terrace::tri::shape

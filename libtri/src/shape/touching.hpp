@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "state.hpp"
+
+/// Parts of a surface that touch: told apart by the tetrahedra inside.
+
+namespace terrace::tri::shape {
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count) : parent_(count), count_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = root(a);
+    b = root(b);
+    if (a == b) return;
+    parent_[std::max(a, b)] = std::min(a, b);
+    --count_;
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  std::uint32_t root(std::uint32_t a) {
+    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+    return a;
+  }
+  std::vector<std::uint32_t> parent_;
+  std::size_t count_;
+};
+
+/// Components and Euler characteristic of a surface of the kept tetrahedra, some of whose faces may
+/// have been left out, with its vertices repeated where it touches itself: an edge joins the two
+/// faces that bound the same inside at it, a vertex the faces that such edges join. O(slots).
+template <class Mesh>
+ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface& surface) {
+  const auto inside = [&](std::uint32_t t) { return is_kept(state.of[t]); };
+  const std::size_t faces = surface.surface.faces.size();
+  std::vector<spatial::Side> sides(faces);
+  constexpr std::uint32_t kNoFace = spatial::kNone;
+  std::vector<std::uint32_t> number(state.of.size(), kNoFace);  // of a tetrahedron's first face
+  for (std::uint32_t f = 0; f < faces; ++f) {
+    const std::uint32_t t = slot(surface.behind[f]);
+    std::uint32_t i = 0;
+    const auto on_face = [&](std::uint32_t v) {
+      const auto& face = surface.surface.faces[f];
+      return std::any_of(face.begin(), face.end(),
+                         [&](std::uint32_t p) { return slot(surface.vertices[p]) == v; });
+    };
+    while (i < 3 && on_face(mesh.tetrahedron[t].corner[i])) ++i;
+    sides[f] = spatial::make_side(t, i);
+    number[t] = std::min(number[t], f);
+  }
+  const auto face_of = [&](spatial::Side side) {
+    const std::uint32_t t = spatial::tetrahedron_of(side);
+    for (std::uint32_t f = number[t]; f < faces && spatial::tetrahedron_of(sides[f]) == t; ++f)
+      if (sides[f] == side) return f;
+    return kNoFace;
+  };
+  // Corners of faces that are the same vertex, as disjoint sets.
+  DisjointSets corners(3 * faces), parts(faces);
+  const auto corner_of = [&](std::uint32_t face, std::uint32_t vertex) {
+    const auto f = spatial::facet_of(mesh.tetrahedron[spatial::tetrahedron_of(sides[face])],
+                                     spatial::index_of(sides[face]));
+    return 3 * face + (f[0] == vertex ? 0u : f[1] == vertex ? 1u : 2u);
+  };
+  std::size_t shared = 0;  // edges of two faces, met from both
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    const std::uint32_t first = spatial::tetrahedron_of(sides[face]);
+    const auto f = spatial::facet_of(mesh.tetrahedron[first], spatial::index_of(sides[face]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t p = f[k], q = f[(k + 1) % 3];
+      // Around the edge, through the inside: out of t by the corner that is not the facet's.
+      std::uint32_t t = first, from = spatial::index_of(sides[face]);
+      for (;;) {
+        const auto& corner = mesh.tetrahedron[t].corner;
+        std::uint32_t to = 0;
+        while (to == from || corner[to] == p || corner[to] == q) ++to;
+        const spatial::Side mate = mesh.tetrahedron[t].mate[to];
+        if (!inside(spatial::tetrahedron_of(mate))) {
+          const std::uint32_t other = face_of(spatial::make_side(t, to));
+          if (other == kNoFace) break;
+          ++shared;
+          parts.join(face, other);
+          corners.join(corner_of(face, p), corner_of(other, p));
+          corners.join(corner_of(face, q), corner_of(other, q));
+          break;
+        }
+        t = spatial::tetrahedron_of(mate);
+        from = spatial::index_of(mate);
+      }
+    }
+  }
+  const auto edges = static_cast<std::int64_t>(3 * faces - shared / 2);
+  return {parts.count(),
+          static_cast<std::int64_t>(corners.count()) - edges + static_cast<std::int64_t>(faces)};
+}
+
+}  // namespace terrace::tri::shape

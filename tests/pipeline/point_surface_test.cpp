@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The surface at single places, found without a triangulation, against the triangulation of all
+// points.
+#include "surface/point_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/predicates.hpp>
+
+#include "../../libterrain/tests/temporary_folder.hpp"
+#include "cloud_case.hpp"
+#include "surface/point_window.hpp"
+#include "terrace/terrain/heights.hpp"
+
+namespace terrace {
+namespace {
+
+using terrain::Point2;
+using terrain::PointHull;
+using terrain::PointSurface;
+using terrain::PointWindow;
+using terrain::StoredBox;
+using terrain::SurfacePoint;
+using tests::cloud_store;
+using tests::Points;
+using tests::points_of;
+using tests::Random;
+using tests::same_bits;
+
+/// Around the store, on its points, and near the middles of its edges.
+std::vector<Point2> places_of(const tri::Delaunay2<double>& whole, const stream::Box3& box) {
+  Random random(23);
+  std::vector<Point2> points, places;
+  for (const tri::VertexId v : whole.all_vertices()) points.push_back(whole.point(v));
+  for (int i = 0; i < 240; ++i) {
+    Point2 p{};
+    for (std::size_t k = 0; k < 2; ++k) {
+      p[k] = box.min[k] + (random.unit() * 1.1 - 0.05) * (box.max[k] - box.min[k]);
+      if (i % 4 == 1) p[k] = std::round(2 * p[k]) / 2;
+    }
+    if (i % 4 == 2) p = points[random.below(points.size())];
+    if (i % 4 == 3) {
+      const Point2 a = points[random.below(points.size())], b = points[random.below(points.size())];
+      p = {0.5 * a[0] + 0.5 * b[0], 0.5 * a[1] + 0.5 * b[1]};
+    }
+    places.push_back(p);
+  }
+  return places;
+}
+
+class SurfaceOfClouds : public testing::TestWithParam<std::string> {};
+
+TEST_P(SurfaceOfClouds, IsThatOfTheTriangulationWhateverIsLoaded) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store =
+      stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    SCOPED_TRACE("level " + std::to_string(level));
+    const PointHull hull(store, level);
+    if (hull.is_flat()) continue;
+    PointWindow whole(store, level, 0);
+    whole.load(terrain::flat(store.bounds()));
+    const auto& triangulation = whole.triangulation();
+    const std::vector<Point2> places = places_of(triangulation, store.bounds());
+    const StoredBox all = terrain::flat(store.bounds());
+    StoredBox part = all;
+    for (std::size_t k = 0; k < 2; ++k) {
+      part.min[k] += 0.3 * (all.max[k] - all.min[k]);
+      part.max[k] -= 0.3 * (all.max[k] - all.min[k]);
+    }
+    PointSurface loaded(store, level, hull), some(store, level, hull), none(store, level, hull);
+    ASSERT_TRUE(loaded.load(all, 1U << 20, true));
+    ASSERT_TRUE(some.load(part, 1U << 20, true));
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      SCOPED_TRACE("place " + std::to_string(i));
+      const SurfacePoint expected = whole.at(places[i]);
+      const Point2 nearest = triangulation.point(triangulation.nearest(places[i]));
+      for (PointSurface* surface : {&loaded, &some, &none}) {
+        const SurfacePoint found = surface->linear(places[i]);
+        ASSERT_TRUE(same_bits(found.height, expected.height));
+        ASSERT_TRUE(same_bits(found.per_column, expected.per_column));
+        ASSERT_TRUE(same_bits(found.per_row, expected.per_row));
+        ASSERT_EQ(surface->nearest(places[i]), nearest);
+      }
+      // Exact areas of cells of hundreds of cocircular points take milliseconds.
+      const bool is_round = GetParam() == "circle" || GetParam() == "parabola";
+      if (is_round && (level > 0 || i >= 4)) continue;
+      const SurfacePoint natural = loaded.natural(places[i]);
+      ASSERT_EQ(std::isnan(natural.height), std::isnan(expected.height));
+      const SurfacePoint again = some.natural(places[i]), alone = none.natural(places[i]);
+      ASSERT_TRUE(same_bits(natural.height, again.height));
+      ASSERT_TRUE(same_bits(natural.per_column, again.per_column));
+      ASSERT_TRUE(same_bits(natural.height, alone.height));
+      ASSERT_TRUE(same_bits(natural.per_row, alone.per_row));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(PointSurface, SurfaceOfClouds,
+                         testing::Values("random", "lattice", "duplicates", "voids", "clusters",
+                                         "turned", "straight borders", "circle", "parabola", "far",
+                                         "huge", "tiny", "nearly a line"),
+                         [](const auto& one) {
+                           std::string name = one.param;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
+TEST(PointSurface, RefusesMoreThanThereIsRoomForAndCrowds) {
+  const tests::TemporaryFolder folder;
+  Random random(5);
+  Points points;
+  for (int i = 0; i < 3000; ++i) points.push_back({random.unit(), random.unit(), 0});
+  for (int i = 0; i < 3000; ++i) {
+    points.push_back({0.5 + 1e-6 * random.unit(), 0.5 + 1e-6 * random.unit(), 1});
+  }
+  const stream::Store store = stream::Store::open(cloud_store(folder.path(), points));
+  const PointHull hull(store, 0);
+  PointSurface surface(store, 0, hull);
+  const StoredBox all = terrain::flat(store.bounds());
+  EXPECT_FALSE(surface.load(all, 5999, true));
+  EXPECT_FALSE(surface.load(all, 6000, false));
+  EXPECT_TRUE(surface.load(all, 6000, true));
+  EXPECT_TRUE(surface.load({{0, 0}, {0.4, 0.4}}, 6000, false));
+}
+
+/// A part of the area that has more points than memory allows is halved, again and again.
+TEST(PointSampler, PartsThatDoNotFitAreHalvedAndAnswersStayTheSame) {
+  const tests::TemporaryFolder folder;
+  Random random(11);
+  Points points;
+  for (int i = 0; i < 60000; ++i) {
+    points.push_back({random.unit(), random.unit(), 10 * random.unit()});
+  }
+  for (int i = 0; i < 240000; ++i) {
+    points.push_back({0.3 + 1e-3 * random.unit(), 0.7 + 1e-3 * random.unit(), random.unit()});
+  }
+  const stream::Store store = stream::Store::open(cloud_store(folder.path(), points));
+  std::vector<Point2> places;
+  for (int i = 0; i < 3000; ++i) {
+    places.push_back({random.unit(), random.unit()});
+    places.push_back({0.3 + 1e-3 * random.unit(), 0.7 + 1e-3 * random.unit()});
+  }
+  for (const auto method : {tri::Interpolation::kLinear, tri::Interpolation::kNearest}) {
+    terrain::SamplerOptions options;
+    options.method = method;
+    std::vector<SurfacePoint> expected(places.size()), found(places.size());
+    terrain::make_sampler(store, options, {.threads = 2})->sample(places, expected);
+    // Half of it is for places, and 12 MiB of the rest for reading.
+    terrain::make_sampler(store, options, {.threads = 1, .memory_bytes = std::uint64_t{28} << 20})
+        ->sample(places, found);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      ASSERT_TRUE(same_bits(found[i].height, expected[i].height)) << i;
+      ASSERT_TRUE(same_bits(found[i].per_row, expected[i].per_row)) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace
