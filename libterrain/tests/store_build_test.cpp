@@ -2,19 +2,26 @@
 // The bytes of a store are a function of input and options: not of the compiler or its
 // optimisation.
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/memory_source.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/heights.hpp"
+#include "terrace/terrain/profile.hpp"
 
 namespace terrace::terrain {
 
@@ -163,4 +170,68 @@ TEST(StoreBuild, TheClustersOfALevelPartThePointsOfEveryFinerOne) {
 }
 
 }  // namespace
+// An array in memory; heights, gradients and a profile of the plane that its points lie on.
+TEST(StoreBuild, TakesASourceOfTheCaller) {
+  const tests::TemporaryFolder folder;
+  const auto plane = [](double x, double y) { return 2 + 0.25 * x - 0.5 * y; };
+  std::vector<stream::Point3> points;
+  for (int i = 0; i < 3000; ++i) {
+    const double x = i * 7919 % 10007 / 16.0, y = i * 104729 % 10009 / 16.0;
+    points.push_back({x, y, plane(x, y)});
+  }
+  stream::MemoryPoints columns;
+  columns.info.files = {"<points>"};
+  columns.info.coordinates[0].name = "x";
+  columns.info.coordinates[1].name = "y";
+  columns.info.coordinates[2].name = "z";
+  columns.count = points.size();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    columns.coordinates[axis] = {reinterpret_cast<const std::byte*>(&points[0][axis]),
+                                 std::ptrdiff_t{sizeof(stream::Point3)}};
+  }
+  BuildRequest request;
+  request.open = [&columns](const stream::SourceOptions& options) {
+    return stream::open_memory(columns, options);
+  };
+  request.store = folder.path() / "store";
+  request.block_points = 500;
+  EXPECT_EQ(build_store(request).points, points.size());
+  const stream::Store store = stream::Store::open(request.store);
+  EXPECT_EQ(store.points(), points.size());
+
+  const std::vector<Point2> places{{100, 100}, {333.25, 47.5}, {512, 600}, {-1e6, 0}};
+  const std::vector<GroundPoint> found = sample_places(store, places);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(found[i].height, plane(places[i][0], places[i][1]), 1e-9);
+    EXPECT_NEAR(found[i].east, 0.25, 1e-9);
+    EXPECT_NEAR(found[i].north, -0.5, 1e-9);
+  }
+  EXPECT_TRUE(std::isnan(found[3].height) && std::isnan(found[3].east));
+
+  ProfileRequest line;
+  line.line = {{100, 100}, {400, 500}};
+  line.step = 50.0;
+  std::vector<ProfilePoint> along;
+  const ProfileOutcome outcome = profile(store, line, [&](std::span<const ProfilePoint> more) {
+    along.insert(along.end(), more.begin(), more.end());
+  });
+  EXPECT_EQ(outcome.points, 11u);
+  ASSERT_EQ(along.size(), 11u);
+  for (std::size_t i = 0; i < along.size(); ++i) {
+    EXPECT_NEAR(along[i].metres, 50.0 * static_cast<double>(i), 1e-6);
+    EXPECT_NEAR(along[i].height, plane(along[i].place[0], along[i].place[1]), 1e-9);
+  }
+  line.line.pop_back();
+  EXPECT_THROW(profile(store, line, [](std::span<const ProfilePoint>) {}), UsageError);
+
+  columns.count = 0;
+  request.replace = true;
+  try {
+    build_store(request);
+    FAIL() << "a store without points";
+  } catch (const stream::Error& error) {
+    EXPECT_EQ(error.parts().file, "<points>");
+  }
+}
+
 }  // namespace terrace::terrain

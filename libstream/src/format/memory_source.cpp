@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-const std::byte* number_at(const MemoryColumn& column, std::uint64_t index) {
+const std::byte* value_of_column(const MemoryColumn& column, std::uint64_t index) {
   return column.first + static_cast<std::ptrdiff_t>(index) * column.stride;
 }
 
@@ -50,7 +50,7 @@ class ColumnSource final : public PointSource {
       const std::size_t bytes = size_of(info.attributes[a].type);
       std::byte* to = block.payload.data() + info.attribute_offset(a);
       for (std::size_t i = 0; i < size; ++i, to += record) {
-        std::memcpy(to, number_at(points_.attributes[a], delivered_ + i), bytes);
+        std::memcpy(to, value_of_column(points_.attributes[a], delivered_ + i), bytes);
       }
     }
     delivered_ += size;
@@ -61,7 +61,8 @@ class ColumnSource final : public PointSource {
   void fill_axis(std::size_t axis, PointBlock& block) const {
     with_type(points_.info.coordinates[axis].type, [&]<class T>(T number) {
       for (std::size_t i = 0; i < block.positions.size(); ++i) {
-        std::memcpy(&number, number_at(points_.coordinates[axis], delivered_ + i), sizeof number);
+        std::memcpy(&number, value_of_column(points_.coordinates[axis], delivered_ + i),
+                    sizeof number);
         const auto value = static_cast<double>(number);
         if (!std::isfinite(value)) {
           throw Error({.file = points_.info.files.empty() ? "" : points_.info.files.front(),
@@ -93,7 +94,7 @@ class SampleArray final : public Raster {
             raster_.first + static_cast<std::ptrdiff_t>(window.row + r) * raster_.row_stride,
             raster_.column_stride};
         for (std::uint64_t c = 0; c < window.columns; ++c) {
-          std::memcpy(&sample, number_at(row, window.column + c), sizeof sample);
+          std::memcpy(&sample, value_of_column(row, window.column + c), sizeof sample);
           if (!has_data(sample)) continue;
           const std::size_t cell = r * out.stride + c;
           std::memcpy(out.samples + cell * sizeof sample, &sample, sizeof sample);
@@ -117,8 +118,8 @@ class SampleArray final : public Raster {
   MemoryRaster raster_;
 };
 
-std::unique_ptr<PointSource> selected(std::unique_ptr<PointSource> source,
-                                      const SourceOptions& options) {
+std::unique_ptr<PointSource> memory_selection(std::unique_ptr<PointSource> source,
+                                              const SourceOptions& options) {
   source = selection_of(std::move(source), options);
   if (options.blocks_ahead == 0) return source;
   return read_ahead(std::move(source), options.blocks_ahead, std::stop_source(std::nostopstate),
@@ -128,11 +129,11 @@ std::unique_ptr<PointSource> selected(std::unique_ptr<PointSource> source,
 }  // namespace
 
 std::unique_ptr<PointSource> open_memory(MemoryPoints points, const SourceOptions& options) {
-  return selected(std::make_unique<ColumnSource>(std::move(points), options), options);
+  return memory_selection(std::make_unique<ColumnSource>(std::move(points), options), options);
 }
 
 std::unique_ptr<PointSource> open_memory(const MemoryRaster& raster, const SourceOptions& options) {
-  return selected(points_of(std::make_unique<SampleArray>(raster), options), options);
+  return memory_selection(points_of(std::make_unique<SampleArray>(raster), options), options);
 }
 
 }  // namespace terrace::stream

@@ -81,6 +81,18 @@ T named(const std::string& name, const char* what,
   throw py::value_error("`" + std::string(what) + "` is one of " + list + ", not '" + name + "'");
 }
 
+/// The value of an option, if it is given. Throws: TypeError for one of another type.
+template <class T>
+void take_option(const py::dict& options, const char* name, T& value) {
+  if (!options.contains(name)) return;
+  try {
+    value = options[name].cast<T>();
+  } catch (const py::cast_error&) {
+    throw py::type_error("`" + std::string(name) + "` cannot be " +
+                         std::string(py::repr(options[name])));
+  }
+}
+
 /// numpy's name of a type: "u1", "f8".
 std::string type_name(stream::ScalarType type);
 /// Throws: TypeError for what is no number of 8 to 64 bits in the machine's byte order.

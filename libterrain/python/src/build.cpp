@@ -96,9 +96,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   terrain::BuildRequest request;
   set_source(request, source);
   request.store = path;
-  const auto set = [&]<class T>(const char* name, T& to) {
-    if (options.contains(name)) to = options[name].cast<T>();
-  };
+  const auto set = [&](const char* name, auto& to) { take_option(options, name, to); };
   set("replace", request.replace);
   set("input_format", request.input_format);
   set("skip_damaged", request.skip_damaged);
@@ -125,8 +123,9 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   if (options.contains("region")) {
     if (const auto region = region_of(options["region"])) region->restrict(request.selection);
   }
-  const auto text = [&](const char* name, const char* otherwise) {
-    return options.contains(name) ? options[name].cast<std::string>() : std::string(otherwise);
+  const auto text = [&](const char* name, std::string value) {
+    take_option(options, name, value);
+    return value;
   };
   request.effort = named<cluster::Effort>(text("effort", "default"), "effort",
                                           {{"fast", cluster::Effort::fast},

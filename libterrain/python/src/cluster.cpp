@@ -63,7 +63,7 @@ py::array cut(const Array<double>& given, std::optional<std::size_t> count,
     dendrogram.merges.reserve(rows.size());
     const double most = 2.0 * static_cast<double>(rows.size()) + 1;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      for (const std::size_t column : {0, 1, 3}) {
+      for (const std::size_t column : std::initializer_list<std::size_t>{0, 1, 3}) {
         if (rows[i][column] >= 0 && rows[i][column] <= most) continue;
         throw std::invalid_argument("row " + std::to_string(i) + " of the linkage is none");
       }

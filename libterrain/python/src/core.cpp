@@ -27,6 +27,8 @@ void translate(std::exception_ptr thrown) {
     }
   } catch (const terrain::UsageError& error) {
     PyErr_SetString(PyExc_ValueError, error.what());
+  } catch (const py::cast_error&) {
+    PyErr_SetString(PyExc_TypeError, "an argument has a type that cannot be used here");
   } catch (const stream::Stopped&) {
     PyErr_SetString(PyExc_KeyboardInterrupt, "stopped");
   }

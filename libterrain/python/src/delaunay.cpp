@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <mutex>
 #include <string>
@@ -82,7 +83,7 @@ class SharedDelaunay {
   }
 
   [[nodiscard]] py::array_t<double> points() {
-    return to_array(locked(mesh_.vertex_count(), [&] {
+    return to_array(locked(size_, [&] {
       constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
       Point none;
       none.fill(kNan);
@@ -93,7 +94,7 @@ class SharedDelaunay {
   }
 
   [[nodiscard]] py::array_t<std::int32_t> vertices() {
-    return to_array(locked(mesh_.vertex_count(), [&] {
+    return to_array(locked(size_, [&] {
       std::vector<std::int32_t> handles;
       handles.reserve(mesh_.vertex_count());
       for (const tri::VertexId v : mesh_.all_vertices()) handles.push_back(handle(v));
@@ -102,7 +103,7 @@ class SharedDelaunay {
   }
 
   [[nodiscard]] py::array_t<std::int32_t> simplices() {
-    return to_array(locked(Kind::count(mesh_), [&] {
+    return to_array(locked(size_, [&] {
       std::vector<std::array<std::int32_t, N + 1>> rows;
       rows.reserve(Kind::count(mesh_));
       for (const auto s : Kind::all(mesh_)) {
@@ -115,7 +116,7 @@ class SharedDelaunay {
   }
 
   [[nodiscard]] py::array_t<std::int32_t> neighbours() {
-    return to_array(locked(Kind::count(mesh_), [&] {
+    return to_array(locked(size_, [&] {
       const std::vector<std::int32_t> rank = rows_of_simplices();
       std::vector<std::array<std::int32_t, N + 1>> rows;
       rows.reserve(Kind::count(mesh_));
@@ -132,7 +133,7 @@ class SharedDelaunay {
 
   [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& given) {
     const auto places = rows_of<N>(given, "points");
-    return to_array(locked(places.size() + Kind::count(mesh_), [&] {
+    return to_array(locked(places.size() + size_, [&] {
       const std::vector<std::int32_t> rank = rows_of_simplices();
       std::vector<std::int32_t> found(places.size(), -1);
       tri::VertexId hint = tri::kNoVertex;
@@ -166,7 +167,7 @@ class SharedDelaunay {
     return locked(0, [&] { return Kind::count(mesh_); });
   }
   [[nodiscard]] std::uint64_t hash() {
-    return locked(mesh_.vertex_count(), [&] { return mesh_.hash(); });
+    return locked(size_, [&] { return mesh_.hash(); });
   }
 
  private:
@@ -181,7 +182,9 @@ class SharedDelaunay {
     constexpr std::size_t kMuch = 10000;
     const auto alone = [&] {
       const std::lock_guard lock(mutex_);
-      return work();
+      auto result = work();
+      size_ = mesh_.vertex_count();
+      return result;
     };
     if (items > kMuch) return released(alone);
     const py::gil_scoped_release open;
@@ -210,7 +213,8 @@ class SharedDelaunay {
   }
 
   std::mutex mutex_;
-  typename Kind::Type mesh_;
+  typename Kind::Type mesh_;           ///< under the mutex only
+  std::atomic<std::size_t> size_ = 0;  ///< vertices after the last piece of work
 };
 
 template <std::size_t N>

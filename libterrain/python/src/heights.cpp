@@ -32,7 +32,7 @@ terrain::SamplerOptions sampler_of(const std::string& method, unsigned level,
 py::array sample(const OpenStore& open, const Array<double>& xy, const std::string& method,
                  unsigned level, std::optional<double> max_edge, const std::string& crs,
                  const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   const auto given = rows_of<2>(xy, "xy");
   const terrain::SamplerOptions options = sampler_of(method, level, max_edge);
   std::vector<terrain::GroundPoint> found = Job(how).run([&](const terrain::Context& context) {
@@ -54,7 +54,7 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
 py::array profile(const OpenStore& open, const Array<double>& line, std::optional<double> step,
                   const std::string& method, unsigned level, std::optional<double> max_edge,
                   const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   terrain::ProfileRequest request;
   request.sampler = sampler_of(method, level, max_edge);
   const auto places = rows_of<2>(line, "line");
@@ -77,7 +77,7 @@ py::array profile(const OpenStore& open, const Array<double>& line, std::optiona
 
 py::str contours(const OpenStore& open, double interval, unsigned level,
                  std::optional<double> max_edge, const py::object& region, const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   if (!(interval > 0)) throw py::value_error("`interval` must be above 0");
   const terrain::ContourRequest request{
       .interval = interval, .level = level, .max_edge = max_edge, .region = region_of(region)};
@@ -94,7 +94,7 @@ void write_raster(const OpenStore& open, const std::string& path, const std::str
                   std::optional<double> cell, const py::object& region, const std::string& crs,
                   const std::string& method, unsigned level, std::optional<double> max_edge,
                   bool replace, const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   using terrain::RasterValue;
   terrain::RasterRequest request{
       .value = named<RasterValue>(value, "value",

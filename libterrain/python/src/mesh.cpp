@@ -25,7 +25,7 @@ py::tuple arrays_of(terrain::TriangleMesh&& mesh) {
 py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
                const py::list& focuses, const std::string& where, const std::string& metric,
                const std::string& crs, const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   const terrain::Detail detail = detail_of(store, level, region, focuses, where);
   terrain::DetailMeshOptions options;
   options.metric = terrain::MetricChoice::parse(metric);
@@ -41,12 +41,10 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
                       const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   terrain::BoundedMeshOptions options;
   options.path = path;
-  const auto set = [&]<class T>(const char* name, T& to) {
-    if (given.contains(name)) to = given[name].cast<T>();
-  };
+  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
   set("max_error", options.max_error);
   set("max_points", options.max_points);
   set("replace", options.writer.replace);

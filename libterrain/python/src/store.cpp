@@ -18,7 +18,7 @@ namespace terrace::python {
 namespace {
 
 py::dict info_of(const OpenStore& open) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   const stream::StoreSchema& schema = store.schema();
   const stream::Box3 box = world_box(schema, store.bounds());
   py::dict info;
@@ -85,7 +85,7 @@ void append(std::vector<std::byte>& to, std::span<const double> numbers,
 py::array points(const OpenStore& open, unsigned level, const py::object& region,
                  const py::list& focuses, const std::string& where, const std::string& crs,
                  const py::tuple& how) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   const terrain::Detail detail = detail_of(store, level, region, focuses, where);
   const std::size_t payload = store.schema().payload_size();
   std::vector<std::byte> records = Job(how).run([&](const terrain::Context& context) {
@@ -141,7 +141,7 @@ std::vector<std::byte> records_of(const stream::Store& store,
 
 py::array near(const OpenStore& open, const std::vector<double>& place,
                std::optional<std::size_t> count, std::optional<double> radius, unsigned level) {
-  const stream::Store& store = open.get();
+  const stream::Store store = open.get();
   if (place.size() != 2 && place.size() != 3)
     throw py::value_error("`near` has two or three numbers");
   terrain::NearPlace wanted{.xy = {place[0], place[1]}};
@@ -191,7 +191,7 @@ void bind_store(py::module_& module) {
       .def("points", &points)
       .def("near", &near)
       .def("verify", [](const OpenStore& open, const py::tuple& how) {
-        const stream::Store& store = open.get();
+        const stream::Store store = open.get();
         return Job(how).run([&](const terrain::Context& context) {
           std::vector<std::string> faults;
           store.with_stop(context.stop).verify([&](const stream::Problem& problem) {

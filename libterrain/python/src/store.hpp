@@ -20,8 +20,9 @@ class OpenStore {
  public:
   explicit OpenStore(const std::string& path) : store_(stream::Store::open(path)) {}
 
+  /// A copy, which is cheap: another thread may close this store meanwhile.
   /// Throws: ValueError once it is closed.
-  [[nodiscard]] const stream::Store& get() const {
+  [[nodiscard]] stream::Store get() const {
     if (!store_) throw py::value_error("the store is closed");
     return *store_;
   }

@@ -13,9 +13,7 @@ namespace {
 
 terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& given) {
   terrain::TilesRequest request{.folder = folder};
-  const auto set = [&]<class T>(const char* name, T& to) {
-    if (given.contains(name)) to = given[name].cast<T>();
-  };
+  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
   set("name", request.name);
   set("first_zoom", request.first_zoom);
   set("last_zoom", request.last_zoom);
@@ -29,8 +27,9 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
   set("gzip", request.gzip);
   set("resume", request.resume);
   set("replace", request.replace);
-  const auto text = [&](const char* name, const char* otherwise) {
-    return given.contains(name) ? given[name].cast<std::string>() : std::string(otherwise);
+  const auto text = [&](const char* name, std::string value) {
+    take_option(given, name, value);
+    return value;
   };
   using tri::TinQuality, terrain::Fill, terrain::HeightReference;
   request.quality = named<TinQuality>(text("quality", "removal"), "quality",
@@ -52,7 +51,7 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
 void bind_tiles(py::module_& module) {
   module.def("write_tiles", [](const OpenStore& open, const std::string& folder,
                                const py::dict& given, const py::tuple& how) {
-    const stream::Store& store = open.get();
+    const stream::Store store = open.get();
     const terrain::TilesRequest request = tiles_request(folder, given);
     const terrain::TilesOutcome outcome = Job(how).run([&](const terrain::Context& context) {
       return terrain::write_tiles(store, request, context);

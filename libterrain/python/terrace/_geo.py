@@ -49,7 +49,10 @@ def region(given):
     if hasattr(given, '__geo_interface__'):
         given = given.__geo_interface__
     if isinstance(given, dict):
-        polygons = _polygons(given)
+        try:
+            polygons = _polygons(given)
+        except (KeyError, IndexError, TypeError, AttributeError) as fault:
+            raise ValueError('`region` is not GeoJSON of polygons') from fault
         if not polygons:
             raise ValueError('`region` has no polygons')
         return polygons

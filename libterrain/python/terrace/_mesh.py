@@ -6,6 +6,7 @@ import os
 import numpy as np
 
 from . import _core
+from ._arrays import as_array, as_rows
 from ._pictures import light, triangles_svg
 
 
@@ -24,7 +25,12 @@ class Mesh:
 
     def save(self, path, replace=False):
         """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk. It is whole or not there."""
-        _core.write_mesh(os.fspath(path), self.vertices, self.triangles, replace)
+        triangles = as_array(self.triangles, 'triangles')
+        if triangles.dtype.kind not in 'iu':
+            raise TypeError(f'triangles are whole numbers, not {triangles.dtype}')
+        if triangles.size and (triangles.min() < 0 or triangles.max() >= len(self.vertices)):
+            raise ValueError('triangles have corners that are no vertices')
+        _core.write_mesh(os.fspath(path), as_rows(self.vertices, 'vertices', (3,)), triangles, bool(replace))
 
     def area(self):
         """Of the surface, in square units of its coordinates."""

@@ -101,6 +101,8 @@ def _xarray(array, transform, crs, nodata):
 
 def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
     """(what the compiled half takes, the CRS as text or None)"""
+    if attributes is not None and not hasattr(attributes, 'items'):
+        raise TypeError('`attributes` is a dict of columns')
     if isinstance(given, (str, os.PathLike)):
         given = [given]
     if isinstance(given, (list, tuple)) and given and all(isinstance(name, (str, os.PathLike)) for name in given):

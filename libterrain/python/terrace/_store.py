@@ -37,9 +37,12 @@ def _checked(options, known, function):
 
 def xyz(points):
     """The coordinates of a structured array of points as an array of shape (n, 3), without a copy."""
-    if points.dtype.names is None or points.dtype.names[:3] != ('x', 'y', 'z'):
-        raise ValueError('points have the fields x, y and z first')
-    return np.ndarray((len(points), 3), np.float64, points, strides=(points.strides[0], 8))
+    if not isinstance(points, np.ndarray):
+        raise TypeError('points are a structured array')
+    fields = points.dtype.fields or {}
+    if points.ndim != 1 or any(fields.get(axis, ())[:2] != (np.dtype(np.float64), 8 * i) for i, axis in enumerate('xyz')):
+        raise ValueError('points have one dimension and the fields x, y and z, of float64, first')
+    return np.lib.stride_tricks.as_strided(points['x'], (len(points), 3), (points.strides[0], 8))
 
 
 def _real_values(records, info):
@@ -322,7 +325,8 @@ class Store:
 
         quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time. duplicates: which of samples
         at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. fill: of a raster's cells without data:
-        'none' leaves holes, 'flat', 'interpolate'. path: where to write it (.ply, .obj, .glb, .vtk).
+        'none' leaves holes, 'flat', 'interpolate'. path: where to write it (.ply, .obj, .glb); other formats than PLY round
+        numbers in their own way and get a mesh that is verified as they have it.
 
         Returns: a BoundedMesh: ``vertices``, ``triangles``, ``max_error``, ``rms_error``. It is made window by window
         in constant memory, but for the arrays.
@@ -339,14 +343,18 @@ class Store:
         else:
             options['max_points'] = whole(max_points, 'max_points', 3)
         how = job(progress, threads, memory)
-        with tempfile.TemporaryDirectory() as folder:
-            name = os.path.join(folder, 'mesh.ply')
+
+        def make(name):
             measured = _core.bounded_mesh(self._core, name, options, how)
-            vertices, triangles, _ = _core.read_mesh(name)
-        mesh = BoundedMesh(vertices, triangles, measured)
+            return BoundedMesh(*_core.read_mesh(name)[:2], measured)
+
         if path is not None:
-            mesh.save(path, replace)
-        return mesh
+            path = os.fspath(path)
+            if path.endswith('.ply'):
+                return make(path)
+            _core.bounded_mesh(self._core, path, options, how)
+        with tempfile.TemporaryDirectory() as folder:
+            return make(os.path.join(folder, 'mesh.ply'))
 
     def tiles(self, folder, zooms=None, *, progress=None, threads=None, memory=None, **options):
         """Writes quantized-mesh tiles for web globes, and layer.json.

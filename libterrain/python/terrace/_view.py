@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import _core
-from ._arrays import whole
+from ._arrays import as_numbers, whole
+from ._store import Store
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,11 @@ class View:
     """
 
     def __init__(self, store, kind='mesh', *, reader='thread', max_points=1 << 22):
-        if kind not in ('mesh', 'points'):
+        if not isinstance(store, Store):
+            raise TypeError(f'a view is of a terrace.Store, not of {type(store).__name__}')
+        if not isinstance(kind, str) or kind not in ('mesh', 'points'):
             raise ValueError(f'`kind` is one of mesh, points, not {kind!r}')
-        if reader not in ('thread', 'frame'):
+        if not isinstance(reader, str) or reader not in ('thread', 'frame'):
             raise ValueError(f'`reader` is one of thread, frame, not {reader!r}')
         self._core = _core.SharedView(store._core, kind == 'points', reader == 'frame', whole(max_points, 'max_points'))
         self._first = True
@@ -72,6 +75,11 @@ class View:
         width, height = size
         if not (width > 0 and height > 0):
             raise ValueError('`size` is the width and height of a picture in pixels')
+        position, direction, up, matrix = (
+            None if given is None else as_numbers(given, what) for what, given in
+            (('position', position), ('direction', direction), ('up', up), ('matrix', matrix)))
+        if direction is None or up is None:
+            raise TypeError('`direction` and `up` are three numbers each')
         delta = self._core.frame(
             {'position': position, 'direction': direction, 'up': up, 'fov': fov, 'width': width, 'height': height,
              'matrix': matrix, 'pixel_error': pixel_error, 'ground_error': ground_error}, float(seconds))

@@ -9,7 +9,9 @@ import sys
 import textwrap
 import threading
 import time
+import types
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -95,6 +97,29 @@ class Jobs(StoreCase):
         code = f'import terrace; terrace.build({ALPS!r}, {self.path("shown")!r}, progress=True)'
         told = subprocess.run([sys.executable, '-c', code], stderr=subprocess.PIPE, text=True, check=True).stderr
         self.assertIn('points', told)
+
+    def test_a_bar_of_tqdm_where_it_is(self):
+        bars = []
+
+        class Bar:
+            total, n, closed = None, 0, False
+
+            def __init__(self, unit, unit_scale):
+                self.unit = unit
+                bars.append(self)
+
+            def refresh(self):
+                pass
+
+            def close(self):
+                self.closed = True
+
+        fake = types.ModuleType('tqdm.auto')
+        fake.tqdm = Bar
+        with mock.patch.dict(sys.modules, {'tqdm': types.ModuleType('tqdm'), 'tqdm.auto': fake}):
+            terrace.build(ALPS, self.path('with-bar'), progress=True)
+        self.assertEqual([bar.unit for bar in bars], [' points'])
+        self.assertTrue(all(bar.closed and 0 < bar.n <= bar.total for bar in bars))
 
     def test_import_is_quick_and_needs_numpy_alone(self):
         code = ('import sys, time, numpy; before = set(sys.modules); began = time.perf_counter(); import terrace; '

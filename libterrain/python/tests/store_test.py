@@ -4,6 +4,7 @@
 import errno
 import os
 import threading
+import time
 import unittest
 
 import numpy as np
@@ -21,6 +22,11 @@ class Stores(StoreCase):
         np.testing.assert_array_equal(sorted_rows(np.column_stack((terrace.xyz(got), got['class']))), sorted_rows(both))
         view = terrace.xyz(got)
         self.assertTrue(np.shares_memory(view, got))
+        np.testing.assert_array_equal(terrace.xyz(got[::-3]), view[::-3])
+        for wrong in (np.zeros(3), np.zeros(3, [('x', 'f4'), ('y', 'f8'), ('z', 'f8')]),
+                      np.zeros(3, [('x', 'f8'), ('z', 'f8'), ('y', 'f8')]), np.zeros((2, 2), got.dtype)):
+            with self.assertRaises(ValueError):
+                terrace.xyz(wrong)
 
     def test_every_sample_comes_back_at_the_middle_of_its_cell(self):
         got = terrace.xyz(self.raster.points())
@@ -126,6 +132,29 @@ class Stores(StoreCase):
             self.scan.points(region=(3, 3, 1, 1))
         with self.assertRaises(ValueError):
             terrace.build(self.points, self.path('new'), crs='EPSG:999999')
+
+    def test_a_store_may_be_closed_while_others_ask(self):
+        failures = []
+        for _ in range(10):
+            store = terrace.Store.open(self.path('cloud'))
+
+            def ask():
+                try:
+                    for _ in range(20):
+                        if len(store.points()) != len(self.points):
+                            failures.append('other points')
+                except ValueError as error:
+                    if 'closed' not in str(error):
+                        failures.append(error)
+
+            threads = [threading.Thread(target=ask) for _ in range(3)]
+            for thread in threads:
+                thread.start()
+            time.sleep(0.01)
+            store.close()
+            for thread in threads:
+                thread.join()
+        self.assertEqual(failures, [])
 
     def test_a_store_may_be_asked_by_many_threads_and_by_a_fork(self):
         expected = self.scan.query(near=(300500, 5200400), k=9)

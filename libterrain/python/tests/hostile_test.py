@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random bad arguments give Python's exceptions and never a crash: each seed in a process of its own.
+
+TERRACE_PYTHON_SEEDS and TERRACE_PYTHON_CALLS make it longer.
+"""
+
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import traceback
+import unittest
+
+import numpy as np
+
+SEEDS = int(os.environ.get('TERRACE_PYTHON_SEEDS', '4'))
+CALLS = int(os.environ.get('TERRACE_PYTHON_CALLS', '250'))
+
+
+class Odd:
+    """Has protocols that lie."""
+
+    __array_interface__ = {'shape': (3, 2), 'typestr': '<f8', 'data': b'short', 'version': 3}
+
+
+class OddGeometry:
+    __geo_interface__ = {'type': 'Polygon', 'coordinates': [[(0, 0), (1, 1)]]}
+
+
+def arrays(luck):
+    """An array of a random shape, type and layout, with odd numbers in it."""
+    shape = luck.choice([(0,), (3,), (0, 2), (0, 3), (1, 2), (1, 3), (5, 2), (40, 2), (40, 3), (40, 4), (7, 7), (2, 3, 4), ()])
+    numbers = np.random.default_rng(luck.randrange(2 ** 32)).normal(scale=luck.choice([1, 1e3, 1e300, 1e-300]), size=shape)
+    if numbers.size and luck.random() < 0.3:
+        flat = numbers.reshape(-1)
+        flat[luck.randrange(flat.size)] = luck.choice([np.nan, np.inf, -np.inf, 1e308, -0.0, 5e-324])
+    if luck.random() < 0.3:
+        numbers = np.round(numbers)  # equal points
+    with np.errstate(all='ignore'):
+        kind = luck.choice(['f8', 'f8', 'f8', 'f4', 'f2', 'i4', 'u1', 'i8', '>f8', 'c16', '?', 'U5', 'O', 'M8[s]'])
+        if kind == 'M8[s]':
+            numbers = np.zeros(shape, kind)
+        elif kind == 'i8' or kind == 'i4' or kind == 'u1':
+            numbers = np.nan_to_num(numbers, posinf=0, neginf=0).clip(-100, 100).astype(kind)
+        else:
+            numbers = numbers.astype(kind)
+    if numbers.ndim == 2 and luck.random() < 0.3:
+        numbers = luck.choice([np.asfortranarray(numbers), numbers[::-1], numbers[::2], np.flipud(numbers).T.T,
+                               numbers[:, ::-1]])
+    if luck.random() < 0.1:
+        numbers = numbers.tolist()
+    return numbers
+
+
+def anything(luck):
+    return luck.choice([
+        lambda: arrays(luck), lambda: arrays(luck), lambda: arrays(luck), lambda: arrays(luck), lambda: None, lambda: -1,
+        lambda: 0, lambda: 1, lambda: 2 ** 70, lambda: float('nan'), lambda: float('inf'), lambda: 0.5, lambda: '',
+        lambda: 'linear', lambda: '\0', lambda: b'bytes', lambda: [], lambda: {}, lambda: {'type': 'Polygon'}, Odd,
+        OddGeometry, object, lambda: (0, 0, 1, 1), lambda: (1, 1, 0, 0), lambda: [[0, 0], [1]], lambda: True,
+        lambda: (0, 0, float('nan'), 1), lambda: range(4), lambda: 'z > 0', lambda: 'z >', lambda: lambda *_: 1 / 0,
+        lambda: np.zeros(4, [('x', 'f8'), ('y', 'f4'), ('z', 'i2'), ('name', 'U3')]),
+        lambda: np.lib.stride_tricks.as_strided(np.zeros(1), (50, 3), (0, 0)),
+    ])()
+
+
+def calls(luck, terrace, stores, folder):
+    """One call of something public with mostly senseless arguments."""
+    store = luck.choice(stores)
+    some = lambda: anything(luck)  # noqa: E731
+    view = terrace.View(stores[0], reader='frame')
+    shape2, shape3 = terrace.Delaunay2(), terrace.Delaunay3()
+    points = lambda: np.random.default_rng(luck.randrange(99)).random((luck.randrange(1, 60), luck.choice([2, 3])))  # noqa: E731
+    flat = lambda: points()[:, :2] * luck.choice([1, 400, 5e5])  # noqa: E731
+    solid = lambda: np.random.default_rng(1).random((luck.randrange(60), 3))  # noqa: E731
+    number = lambda: luck.randrange(1, 9)  # noqa: E731
+    box = lambda: (0, 0, luck.random(), 1)  # noqa: E731
+    place = lambda: tuple(luck.uniform(-300, 300) for _ in range(3))  # noqa: E731
+    handles = lambda: np.arange(luck.randrange(5))  # noqa: E731
+    targets = [  # what is called, a fitting value of each argument, names of options
+        (lambda a, **k: terrace.build(a, os.path.join(folder, str(luck.randrange(10 ** 9))), **k), [solid],
+         ['transform', 'crs', 'nodata', 'attributes', 'progress', 'threads', 'memory', 'where', 'region', 'effort',
+          'block_points', 'facility_cost', 'channels', 'outlier_price', 'seed', 'keep', 'order', 'metric', 'entities']),
+        (store.points, [box], ['level', 'where', 'focus', 'crs']),
+        (store.query, [], ['box', 'near', 'k', 'radius', 'level']),
+        (lambda p, k: store.query(near=p, k=k), [place, number], []),
+        (store.heights, [flat], ['method', 'level', 'max_edge', 'crs', 'threads', 'memory']),
+        (store.heights, [flat], []), (store.gradients, [flat], []),
+        (store.raster, [lambda: 'height'], ['cell', 'region', 'crs', 'method', 'level']),
+        (store.profile, [flat], ['step', 'method', 'level', 'max_edge']),
+        (store.contours, [number], ['level', 'region', 'max_edge']),
+        (store.mesh, [lambda: 0], ['region', 'focus', 'where', 'metric', 'crs', 'max_points']),
+        (store.bounded_mesh, [luck.random], ['max_points', 'quality', 'region', 'where', 'fill', 'duplicates']),
+        (view.frame, [place, place, place], ['fov', 'size', 'matrix', 'pixel_error', 'ground_error']),
+        (terrace.View, [lambda: store, lambda: 'points'], ['reader', 'max_points']),
+        (terrace.Store.open, [lambda: os.path.join(folder, 'dem')], []), (terrace.xyz, [stores[0].points], []),
+        (lambda a, b: (shape2.insert(a), shape2.remove(b), shape2.simplices, shape2.neighbors), [flat, handles], []),
+        (lambda a, b: (shape3.insert(a), shape3.remove(b), shape3.simplices, shape3.neighbors), [solid, handles], []),
+        (lambda a, b: (shape2.insert(a), shape2.find_simplex(b), shape2.nearest(b)), [flat, flat], []),
+        (lambda a, b: (shape3.insert(a), shape3.find_simplex(b), shape3.nearest(b)), [solid, solid], []),
+        (lambda a: terrace.Delaunay2(a).digest(), [flat], []), (lambda a: terrace.Delaunay3(a).digest(), [solid], []),
+        (terrace.linkage, [points], ['method', 'threads']), (terrace.linkage, [points], []),
+        (terrace.flat_clusters, [lambda: terrace.linkage(points())], ['count', 'height']),
+        (terrace.kmeans, [points, number], ['weights', 'seed', 'restarts', 'max_iterations', 'tolerance']),
+        (lambda a: terrace.kmeans(a, 3), [points], []),
+        (terrace.cluster, [points], ['facility_cost', 'method', 'effort', 'metric', 'weights', 'outlier_price']),
+        (terrace.cluster, [points], []),
+        (terrace.assignment, [points], []), (terrace.assignment, [flat, flat], []),
+        (terrace.matching, [points], ['exact_limit', 'window', 'rounds']), (terrace.matching, [points], []),
+        (lambda a, b: terrace.Mesh(a, b).save(os.path.join(folder, 'a.ply'), True), [solid, lambda: [[0, 0, 0]]], []),
+    ]
+    call, fitting, options = luck.choice(targets)
+    arguments = [fit() if luck.random() < 0.6 else some() for fit in fitting]
+    given = {name: some() for name in options if luck.random() < 0.15}
+    try:
+        call(*arguments, **given)
+        return True
+    except (ValueError, TypeError, OverflowError, OSError, MemoryError, ZeroDivisionError, KeyError, AttributeError,
+            IndexError, terrace.Error, np.exceptions.AxisError if hasattr(np, 'exceptions') else ValueError) as error:
+        # Kinds that only an oversight of ours would raise are let through for objects that lie alone.
+        if isinstance(error, (KeyError, AttributeError, IndexError)):
+            traceback.print_exc()
+            raise SystemExit(f'{call} with {arguments!r}, {given!r}') from error
+        return False
+
+
+def main(seed, count):
+    import terrace
+    luck = random.Random(seed)
+    with tempfile.TemporaryDirectory() as folder:
+        y, x = np.mgrid[0:40, 0:50]
+        stores = [terrace.build(np.sin(x / 5) * 20 + y, os.path.join(folder, 'dem'), transform=(10, 0, 5e5, 0, -10, 5e6),
+                                crs='EPSG:32632'),
+                  terrace.build(np.random.default_rng(1).random((3000, 3)), os.path.join(folder, 'cloud'),
+                                attributes={'class': np.arange(3000) % 5}, block_points=500)]
+        closed = terrace.Store.open(os.path.join(folder, 'cloud'))
+        closed.close()
+        worked = sum(calls(luck, terrace, stores + [closed], folder) for _ in range(count))
+        print('done', worked)
+
+
+class Hostile(unittest.TestCase):
+    def test_nothing_crashes(self):
+        children = [(seed, subprocess.Popen([sys.executable, '-B', '-X', 'faulthandler', __file__, str(seed), str(CALLS)],
+                                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True))
+                    for seed in range(SEEDS)]
+        for seed, child in children:
+            told = child.communicate()[0]
+            self.assertEqual(child.returncode, 0, f'seed {seed}: {told[-3000:]}')
+            self.assertGreater(int(told.split('done')[1]), CALLS // 50, 'hardly a call went through')
+
+
+if __name__ == '__main__':
+    if len(sys.argv) == 3 and sys.argv[1].isdigit():
+        main(int(sys.argv[1]), int(sys.argv[2]))
+    else:
+        unittest.main()
