@@ -56,7 +56,7 @@ struct SamplerOptions {
 /// Places are sorted by windows of the store within a call, so give many at once; each window is
 /// read once: about 25 ns per sample of a raster at level 0. Elsewhere nothing is triangulated: the
 /// points around the places are read, about 0.15 us per point, and each place then costs about 1 us
-/// (natural, and nearest with its gradient: 3 to 4 us). Results depend on neither threads, memory,
+/// (natural, and nearest with its gradient: 3 to 9 us). Results depend on neither threads, memory,
 /// nor the order of the places.
 class HeightSampler {
  public:
