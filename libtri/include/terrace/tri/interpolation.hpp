@@ -88,8 +88,9 @@ struct VertexWeight {
 ///
 /// The triangles that a query affects are found exactly. The weights are computed in double; if the
 /// estimated error is above 1e-11 (needles, queries close to the hull, coordinates near the ends of
-/// the range) they are recomputed with rational numbers, about a hundred times as slow; with more than 32
-/// neighbours these are kept to 512 bits, so the time grows with the number of neighbours alone.
+/// the range) they are recomputed with rational numbers, about a hundred times as slow; with more
+/// than 32 neighbours these are kept to 512 bits, so the time grows with the number of neighbours
+/// alone.
 ///
 /// Replaces the contents of `weights`. hint: a vertex near the query, where the walk starts. Throws
 /// std::invalid_argument for a query that is not finite.
