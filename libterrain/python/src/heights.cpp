@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 #include <terrace/stream/raster.hpp>
 #include <terrace/terrain/contours.hpp>
+#include <terrace/terrain/error.hpp>
 #include <terrace/terrain/heights.hpp>
 #include <terrace/terrain/profile.hpp>
 #include <terrace/terrain/raster.hpp>
@@ -63,9 +64,15 @@ py::array profile(const OpenStore& open, const Array<double>& line, std::optiona
   request.step = step;
   return to_array(Job(how).run([&](const terrain::Context& context) {
     std::vector<std::array<double, 4>> rows;
+    // Twice while the vector grows.
+    const std::uint64_t most = context.memory_or(0) / (3 * sizeof rows[0]);
     terrain::profile(
         store, request,
         [&](std::span<const terrain::ProfilePoint> points) {
+          if (rows.size() + points.size() > most) {
+            throw terrain::UsageError("the profile would have more than " + std::to_string(most) +
+                                      " points, which memory does not hold");
+          }
           for (const terrain::ProfilePoint& p : points) {
             rows.push_back({p.metres, p.place[0], p.place[1], p.height});
           }

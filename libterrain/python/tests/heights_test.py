@@ -135,8 +135,12 @@ class Lines(StoreCase):
         np.testing.assert_allclose(self.raster.heights(middle[:, :2]), middle[:, 2], rtol=0, atol=1e-6)
         with self.assertRaises(ValueError):
             self.raster.profile([[0, 0]])
-        with self.assertRaises(ValueError):
-            self.raster.profile(line, step=0)
+        for wrong in ({'step': 0}, {'step': -1}, {'step': np.nan}):
+            with self.assertRaises(ValueError):
+                self.raster.profile(line, **wrong)
+        for far in (1e300, np.inf, np.nan):
+            with self.assertRaises(ValueError):
+                self.raster.profile([[0, 0], [far, 5]])
 
     def test_contours_lie_at_their_height(self):
         lines = self.raster.contours(20)

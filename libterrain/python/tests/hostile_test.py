@@ -45,6 +45,7 @@ def arrays(luck):
             numbers = np.nan_to_num(numbers, posinf=0, neginf=0).clip(-100, 100).astype(kind)
         else:
             numbers = numbers.astype(kind)
+    numbers = np.asarray(numbers)  # of no dimension it may be a number
     if numbers.ndim == 2 and luck.random() < 0.3:
         numbers = luck.choice([np.asfortranarray(numbers), numbers[::-1], numbers[::2], np.flipud(numbers).T.T,
                                numbers[:, ::-1]])

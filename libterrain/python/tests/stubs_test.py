@@ -25,9 +25,11 @@ print(delta.added_corners.shape, terrace.kmeans(inside, 3).centres, terrace.Dela
 
 
 def mypy(folder, *arguments):
-    found = os.path.dirname(terrace.__path__[0])
+    environment, found = dict(os.environ), os.path.dirname(terrace.__path__[0])
+    if not found.endswith('-packages'):  # those of the interpreter are found anyway
+        environment.update(MYPYPATH=found, PYTHONPATH=found)
     return subprocess.run([sys.executable, '-m', *arguments], cwd=folder, stdout=subprocess.PIPE, text=True,
-                          stderr=subprocess.STDOUT, env={**os.environ, 'MYPYPATH': found, 'PYTHONPATH': found})
+                          stderr=subprocess.STDOUT, env=environment)
 
 
 class Stubs(unittest.TestCase):

@@ -203,6 +203,14 @@ ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request
                        const Context& context) {
   need_points(store, "a profile");
   if (request.line.size() < 2) throw UsageError("a profile needs a line of two places or more");
+  for (const Point2& place : request.line) {
+    constexpr double kFarthest = 0x1p40;  // columns and rows must differ by 1 there
+    for (const double c : stream::stored_place(store.schema(), place)) {
+      if (!(std::abs(c) < kFarthest)) {
+        throw UsageError("a place of the line is not finite or too far away");
+      }
+    }
+  }
   return ProfileRun(store.with_stop(context.stop), request, take, context).run();
 }
 

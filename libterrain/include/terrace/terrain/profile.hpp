@@ -45,7 +45,8 @@ struct ProfilePoint {
 /// does not show; without a CRS they are the map's.
 ///
 /// take: gets the points in order, some thousand at a time.
-/// Throws: stream::Error on a damaged store, stream::Stopped, UsageError as make_sampler().
+/// Throws: stream::Error on a damaged store, stream::Stopped, UsageError as make_sampler() and for
+/// a line of less than two places or with one that is 2^40 stored units away or not finite.
 ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context = {});
