@@ -397,7 +397,7 @@ class OptionTest(ProcessTest):
                         result = terrace(*command, given)
                         self.assertEqual(result.returncode, 2, result.stderr)
                         if not option.endswith(('crs', 'weight', 'iterations')):
-                            self.assertIn(option.lstrip('-'), result.stderr)
+                            self.assertIn(option.lstrip('-').replace('input-', 'input '), result.stderr)
         self.assertLessEqual({'--facility-cost', '--z-weight', '--outlier-price', '--height',
                               '--max-error', '--cell', '--step', '--interval', '--exaggerate',
                               '--max-edge', '--seconds', '--hurst', '--roughness', '--threads',

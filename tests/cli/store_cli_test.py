@@ -210,7 +210,7 @@ class StoreTest(unittest.TestCase):
         level = json.loads(self.run_ok('info', self.store, '--json'))['levels'][1]
         clusters = [lines('--cluster', f'1:{n}') for n in range(level['clusters'])]
         self.assertEqual(sorted(sum(clusters, [])), lines('--level', 1))
-        below = lines('--cluster', '1:0', '--level', 0)
+        below = sorted(self.run_ok('points', self.store, '-o', '-', '--cluster', '1:0', '--level', 0).splitlines())
         self.assertLess(set(clusters[0]), set(below))
         self.assertLess(set(below), set(lines()))
         for wrong in ('1', '1:x', 'x:1', '1:-1', '1:2:3', f'1:{level["clusters"]}', '77:0', '300:0'):
@@ -455,7 +455,7 @@ class BuildOptionTest(unittest.TestCase):
         cloud, side = self.shuffled(640000)
         result = terrace('build', cloud, '-o', self.path('no.terrace'), '--dry-run', '--json')
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertGreater(json.loads(result.stdout)['temporary_bytes'], 10 * side * side)
+        self.assertGreater(json.loads(result.stdout)['temporary_bytes'], 5 * side * side)
         result = terrace('build', cloud, '-o', self.path('no.terrace'), '--dry-run', '--json',
                          '--order', 'stream')
         self.assertEqual(json.loads(result.stdout)['temporary_bytes'], 0)
