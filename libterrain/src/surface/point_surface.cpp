@@ -119,7 +119,7 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
       level_,
       [&](const stream::Box3& whole) {
         const StoredBox box = flat(whole);
-        // Of a box that is one place the head is known, and so is its place.
+        // A box that is a single place adds nothing: its head is known.
         if (box.min == box.max || cells_->knows(box)) return kFarAway;
         const auto meets = [&](const CircleCover& cover) { return cover.meets(box); };
         return std::any_of(covers.begin(), covers.end(), meets) ? least_square(box, from)

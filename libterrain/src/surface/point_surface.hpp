@@ -62,7 +62,7 @@ class PointSurface {
   /// The nearest point; of several equally near, the lexicographically smallest. Requires a finite
   /// place.
   Point2 nearest(const Point2& place);
-  /// Of a point, in the store's vertical unit.
+  /// The height of a point of the store, in its vertical unit.
   double height(const Point2& point);
   /// The surface of linear() at the nearest point.
   SurfacePoint at_nearest(const Point2& place) { return at_point(nearest(place)); }
@@ -98,7 +98,7 @@ class PointSurface {
   const PointHull& hull_;
   TooLong too_long_;
   stream::StoreQuery query_;
-  /// Of a triangle of star_: in its circle all points in memory, or all, were offered.
+  /// Which points were offered to star_ in the circle of one of its triangles.
   enum Mark : std::uint8_t { kNone, kMemory, kAll };
 
   PointCells own_;

@@ -87,7 +87,8 @@ class PoleFinder {
     double radius2 = -1.0;
     std::uint32_t tetrahedron = spatial::kNone;
   };
-  /// Of two equal radii the tetrahedron with the lexicographically first corners is the pole.
+  /// Where two radii are equal, the tetrahedron with the lexicographically first corners is the
+  /// pole.
   [[nodiscard]] bool larger(double r2, std::uint32_t t, const Largest& held) const {
     if (r2 != held.radius2) [[likely]]
       return r2 > held.radius2;

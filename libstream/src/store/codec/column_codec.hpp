@@ -94,7 +94,7 @@ class RecentDifferences {
     return first;
   }();
 };
-/// Of the guide, and of other columns.
+/// How many recent differences the guide keeps, and every other column.
 inline constexpr unsigned kGuideRecent = 7, kColumnRecent = 3;
 
 constexpr std::int64_t wrapped_sum(std::int64_t a, std::int64_t b) {

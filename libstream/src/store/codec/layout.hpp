@@ -63,7 +63,7 @@ struct Layout {
     return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
   }
   [[nodiscard]] unsigned contexts() const { return first_context(columns()); }
-  /// Of those of a column.
+  /// The first context of a column.
   [[nodiscard]] unsigned first_context(unsigned column) const {
     return context::kAttribute +
            column * (version > 2 ? context::kPerAttribute : context::kPerAttributeBefore3);

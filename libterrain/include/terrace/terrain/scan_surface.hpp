@@ -37,8 +37,8 @@ struct ScanSurfaceOptions {
 struct ScanSurface {
   TriangleMesh mesh;
   std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< where asked for, in place of triangles
-  /// Of the surface, in metres. Components and Euler characteristic are those of tri::ShapeParts;
-  /// of a surface by a method, those of tri::measure().
+  /// The surface's measures, in metres. Components and Euler characteristic are those of
+  /// tri::ShapeParts; a surface by a method has those of tri::measure().
   tri::SurfaceMeasures measures;
   /// Samples that are a corner of no face; samples at the same place count once. nullopt of a
   /// surface that has corners of its own.

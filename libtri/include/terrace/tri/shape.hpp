@@ -110,9 +110,9 @@ struct ShapeOptions {
   /// published rule. The flood rule leaks through the first hole: with 0.5 it empties even a sphere
   /// of regular samples, which 1 restores.
   double edge_factor = 0.5;
-  /// Of the rules that peel: no vertex loses all of its tetrahedra. Published rule: a removal that
-  /// would take a vertex's last one is skipped. Flood rule: after the flood tetrahedra are put back
-  /// until every vertex has one: each time the one with the shortest longest edge (on ties the
+  /// With the rules that peel, no vertex loses all of its tetrahedra. Published rule: a removal
+  /// that would take a vertex's last one is skipped. Flood rule: after the flood tetrahedra are put
+  /// back until every vertex has one: each time the one with the shortest longest edge (on ties the
   /// lexicographically first, corners sorted) among those that have a vertex without tetrahedra and
   /// share a facet with a kept one; if there are none of these, among all that have such a vertex.
   bool keep_vertices = true;
@@ -125,7 +125,7 @@ struct ShapeSurface {
   bool open = false;                  ///< lids were left out
 };
 
-/// Of a surface that is taken apart where solids touch in an edge or a vertex.
+/// What a surface consists of once it is taken apart where solids touch in an edge or a vertex.
 struct ShapeParts {
   std::size_t components = 0;
   std::int64_t euler_characteristic = 0;  ///< each part's is 2 less twice its handles
@@ -202,8 +202,9 @@ class BasicShape3 {
   /// If lids are more than a tenth of the area, the scan is open and they are left out; otherwise
   /// nothing is. Lengths and areas are those of the metric. O(slots).
   [[nodiscard]] ShapeSurface surface_without_lids(const Triangulation& triangulation) const;
-  /// Of this shape's surface, with or without lids. Where four or more faces meet in an edge, those
-  /// that bound the same inside are joined there, and only those; measure() joins all. O(slots).
+  /// The parts of this shape's surface, with or without lids. Where four or more faces meet in an
+  /// edge, those that bound the same inside are joined there, and only those; measure() joins all.
+  /// O(slots).
   [[nodiscard]] ShapeParts parts(const Triangulation& triangulation,
                                  const ShapeSurface& surface) const;
   /// Sum of the volumes of the kept tetrahedra. O(slots).
