@@ -56,7 +56,7 @@ std::vector<PackedRow> some_rows() {
 
 TEST(MemorySource, PointsComeInTheirOrderWithTheirAttributes) {
   const std::vector<PackedRow> rows = some_rows();
-  for (const std::size_t ahead : {0, 3}) {
+  for (const std::size_t ahead : {std::size_t{0}, std::size_t{3}}) {
     const auto source =
         open_memory(points_of_rows(rows), {.block_points = 1000, .blocks_ahead = ahead});
     EXPECT_EQ(source->info().points, rows.size());
