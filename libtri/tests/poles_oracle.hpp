@@ -151,7 +151,8 @@ class PolesOracle {
                              false,
                              beside[0],
                              beside.size() == 2 ? Node(beside[1]) : std::nullopt});
-    for (const auto& [v, star] : star_) {
+    for (const auto& entry : star_) {
+      const auto v = entry.first;
       ShapePoint direction{};
       Node first;
       bool on_hull = false;
