@@ -38,7 +38,7 @@ MemoryPoints points_of_rows(const std::vector<PackedRow>& rows) {
   points.count = rows.size();
   const auto* bytes = reinterpret_cast<const std::byte*>(rows.data());
   const auto column = [&](std::size_t offset) {
-    return MemoryColumn{bytes + offset, std::ptrdiff_t{sizeof(PackedRow)}};
+    return MemoryColumn{rows.empty() ? nullptr : bytes + offset, std::ptrdiff_t{sizeof(PackedRow)}};
   };
   points.coordinates = {column(offsetof(PackedRow, x)), column(offsetof(PackedRow, y)),
                         column(offsetof(PackedRow, z))};

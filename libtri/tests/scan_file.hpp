@@ -103,7 +103,8 @@ inline Surface read_ply(std::istream& in) {
         std::vector<std::uint32_t> corners(
             static_cast<std::size_t>(read_number(in, property[1], format)));
         for (auto& corner : corners)
-          corner = static_cast<std::uint32_t>(read_number(in, property[2], format));
+          // Other elements, such as strips, may have negative numbers, which do not count.
+          corner = static_cast<std::uint32_t>(std::max(0.0, read_number(in, property[2], format)));
         if (element.name != "face") continue;
         for (std::size_t i = 2; i < corners.size(); ++i)
           surface.faces.push_back({corners[0], corners[i - 1], corners[i]});

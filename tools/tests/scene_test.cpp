@@ -76,7 +76,9 @@ struct MirrorOf {
       }
     };
     std::vector<Vertex> changed(changes.vertices.size() / sizeof(Vertex));
-    std::memcpy(changed.data(), changes.vertices.data(), changes.vertices.size());
+    if (!changed.empty()) {
+      std::memcpy(changed.data(), changes.vertices.data(), changes.vertices.size());
+    }
     put(changes.vertex_blocks, changed, vertices);
     put(changes.triangle_blocks, changes.triangles, triangles);
   }
