@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
+#include "disjoint_sets.hpp"
 #include "gabriel.hpp"
 #include "state.hpp"
 
@@ -43,29 +43,6 @@ ShapeSurface surface_of(const Mesh& mesh, const State& state) {
     for (std::uint32_t& v : face) v = number[v];
   return result;
 }
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parent_(count), count_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    parent_[std::max(a, b)] = std::min(a, b);
-    --count_;
-  }
-  [[nodiscard]] std::size_t count() const { return count_; }
-
- private:
-  std::uint32_t root(std::uint32_t a) {
-    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
-    return a;
-  }
-  std::vector<std::uint32_t> parent_;
-  std::size_t count_;
-};
 
 /// Components and Euler characteristic of a surface of the kept tetrahedra, some of whose faces may
 /// have been left out, with its vertices repeated where it touches itself: an edge joins the two

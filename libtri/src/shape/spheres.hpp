@@ -58,8 +58,8 @@ inline double scale_to_one(double size) {
   return std::ldexp(1.0, std::clamp(-exponent, -1022, 1022));
 }
 
-/// Of vertices in lexicographic order, which become ranks 0, 1 and so on. Requires a scope of the
-/// metric.
+/// The places of vertices given in lexicographic order, which become ranks 0, 1 and so on. Requires
+/// a scope of the metric.
 template <class Mesh>
 std::vector<Place> places_of(const Mesh& mesh, std::span<const std::uint32_t> sorted) {
   std::vector<Place> places(sorted.size());
@@ -85,7 +85,7 @@ std::vector<Place> places_of(const Mesh& mesh, std::span<const std::uint32_t> so
   return places;
 }
 
-/// Of all vertices, by slot.
+/// The places of all vertices, by slot.
 template <class Mesh>
 std::vector<Place> places_of(const Mesh& mesh) {
   const std::vector<std::uint32_t> sorted = sorted_vertices(mesh);

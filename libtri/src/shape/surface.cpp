@@ -3,13 +3,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "disjoint_sets.hpp"
 #include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
@@ -38,33 +38,9 @@ std::vector<SurfaceEdge> sorted_edges(std::span<const std::array<std::uint32_t, 
   return edges;
 }
 
-/// Disjoint sets of faces.
-class SurfaceParts {
- public:
-  explicit SurfaceParts(std::size_t faces) : parent_(faces), count_(faces) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    parent_[std::max(a, b)] = std::min(a, b);
-    --count_;
-  }
-  /// The first face of its set.
-  std::uint32_t root(std::uint32_t a) {
-    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
-    return a;
-  }
-  [[nodiscard]] std::size_t count() const { return count_; }
-
- private:
-  std::vector<std::uint32_t> parent_;
-  std::size_t count_;
-};
-
-SurfaceParts parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
-  SurfaceParts parts(faces.size());
+/// Sets of faces that edges join.
+shape::DisjointSets parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
+  shape::DisjointSets parts(faces.size());
   const std::vector<SurfaceEdge> edges = sorted_edges(faces);
   for (std::size_t i = 1; i < edges.size(); ++i)
     if (edges[i].ends == edges[i - 1].ends) parts.join(edges[i].face, edges[i - 1].face);
@@ -131,7 +107,7 @@ SurfaceMeasures measure(const Surface& surface) {
     for (const std::uint32_t v : face) used[v] = true;
   result.vertices = static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
   const std::vector<SurfaceEdge> edges = sorted_edges(surface.faces);
-  SurfaceParts parts(surface.faces.size());
+  shape::DisjointSets parts(surface.faces.size());
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
     std::int64_t ways = 0;
     for (; end < edges.size() && edges[end].ends == edges[begin].ends; ++end) {
@@ -152,7 +128,7 @@ SurfaceMeasures measure(const Surface& surface) {
 
 void turn_outward(Surface& surface) {
   check(surface);
-  SurfaceParts parts = parts_of(surface.faces);
+  shape::DisjointSets parts = parts_of(surface.faces);
   std::vector<double> volume(surface.faces.size());
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
     const std::uint32_t part = parts.root(f);

@@ -92,7 +92,7 @@ class Scene {
   /// cluster that it is a member of. They stay so until release().
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
-  /// Of points: what they can be drawn by.
+  /// What points can be drawn by; nothing for triangles.
   [[nodiscard]] virtual const CloudColours& colours() const = 0;
   /// The box of all points in the view frame.
   [[nodiscard]] virtual stream::Box3 box() const = 0;

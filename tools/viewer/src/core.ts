@@ -51,7 +51,7 @@ export interface Hit {
 export interface Opened {
   box: number[];
   triangles: boolean;
-  /// Of points: what they can be drawn by, and the classes that there are.
+  /// What points can be drawn by, and the classes that occur.
   colours: {rgb: boolean, intensity: boolean, classes: number[]};
 }
 
@@ -181,7 +181,7 @@ export class Core {
       attributes: this.numbers(11 + n[10]).slice(11)
     };
   }
-  /// Of what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
+  /// Acts on what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
   pin(how: number): void {
     this.check(this.wasm.pin(how));
   }

@@ -7,7 +7,7 @@ import type {FromWorker, ToWorker} from './messages';
 import {CATEGORIES, type Colour, COLOURS, type Look, Renderer} from './render';
 import {type Manifest, worldPoint} from './store';
 
-/// Of the stores that the page shows, from stores.json.
+/// A store that the page shows, from stores.json.
 interface Listed {
   name: string;
   points: number;

@@ -6,7 +6,7 @@ import type {FromWorker, ToWorker} from './messages';
 import {FetchFault, Ranges} from './ranges';
 import {type Manifest, parseManifest, parseStart} from './store';
 
-/// Of a frame in the worker, in milliseconds.
+/// What a frame may take in the worker, in milliseconds.
 const FRAME = 10;
 /// What it aims at, so that nearly all end within FRAME.
 const AIM = 0.85 * FRAME;
