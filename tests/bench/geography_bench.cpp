@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Longitudes and latitudes of a raster's samples by window, and of single places, on one core. The
-// second kind is what the first would cost without its polynomials.
+// Longitudes and latitudes on one core: of a raster's samples by window, of places all over a box,
+// and of single places, which is what the others would cost without their polynomials.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -8,6 +8,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "earth/geography_patch.hpp"
 #include "earth/grid_geography.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -45,17 +46,45 @@ void windows(benchmark::State& state) {
 }
 BENCHMARK(windows)->DenseRange(0, 4);
 
+/// All over 1024 x 1024 cells.
+std::vector<Point2> places_of(const Grid& grid) {
+  std::vector<Point2> list(4096);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const auto column = static_cast<double>(i * 619 % 1024),
+               row = static_cast<double>(i * 173 % 1024);
+    list[i] = {grid.world.xy[2] + grid.world.xy[0] * column,
+               grid.world.xy[5] + grid.world.xy[4] * row};
+  }
+  return list;
+}
+
+void in_box(benchmark::State& state) {
+  const Grid& grid = kGrids[state.range(0)];
+  state.SetLabel(grid.crs);
+  const std::vector<Point2> list = places_of(grid);
+  terrace::stream::Box3 box;
+  for (const Point2& p : list) box.include(terrace::stream::Point3{p[0], p[1], 0.0});
+  const terrace::terrain::BoxGeography geography(CoordinateSystem::parse(grid.crs), box);
+  std::vector<Point2> found;
+  for (auto _ : state) {
+    found = list;
+    geography(found);
+    benchmark::DoNotOptimize(found.data());
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(list.size()));
+}
+BENCHMARK(in_box)->DenseRange(0, 4);
+
 void places(benchmark::State& state) {
   const Grid& grid = kGrids[state.range(0)];
   state.SetLabel(grid.crs);
   const CoordinateSystem system = CoordinateSystem::parse(grid.crs);
-  std::vector<Point2> list(4096);
+  const std::vector<Point2> list = places_of(grid);
+  std::vector<Point2> found;
   for (auto _ : state) {
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      list[i] = {grid.world.xy[2] + 30.0 * static_cast<double>(i), grid.world.xy[5]};
-    }
-    system.to_geographic(list);
-    benchmark::DoNotOptimize(list.data());
+    found = list;
+    system.to_geographic(found);
+    benchmark::DoNotOptimize(found.data());
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(list.size()));
 }

@@ -22,6 +22,17 @@ constexpr int kDecimals = 9;
 /// Points turned into text at a time.
 constexpr std::size_t kContourPoints = std::size_t{1} << 17;
 
+stream::Box3 world_box(const stream::Store& store, const GroundSlope& ground) {
+  const stream::Box3& bounds = store.bounds();
+  stream::Box3 box;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const Point2 p = ground.world(
+        {(corner & 1 ? bounds.max : bounds.min)[0], (corner & 2 ? bounds.max : bounds.min)[1]});
+    box.include(stream::Point3{p[0], p[1], 0.0});
+  }
+  return box;
+}
+
 }  // namespace
 
 ContourText::ContourText(const stream::Store& store, double interval, unsigned threads,
@@ -29,6 +40,7 @@ ContourText::ContourText(const stream::Store& store, double interval, unsigned t
     : file_(store.path().string()),
       system_(system_of(store)),
       ground_(store),
+      geography_(system_, world_box(store, ground_)),
       interval_(interval),
       threads_(std::max(1U, threads)),
       write_(std::move(write)),
@@ -51,7 +63,7 @@ void ContourText::append(std::string& text, const ContourLine& line,
   places.clear();
   for (const Point2& p : line.points) places.push_back(ground_.world(p));
   if (reverse_) std::reverse(places.begin(), places.end());
-  system_.to_geographic(places);
+  geography_(places);
   for (std::size_t i = 0; i < places.size(); ++i) {
     if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);

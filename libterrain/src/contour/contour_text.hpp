@@ -11,6 +11,7 @@
 
 #include "base/fixed_text.hpp"
 #include "contour/line_joiner.hpp"
+#include "earth/geography_patch.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/contours.hpp"
 #include "terrace/terrain/crs.hpp"
@@ -38,6 +39,7 @@ class ContourText {
   std::string file_;
   CoordinateSystem system_;
   GroundSlope ground_;
+  BoxGeography geography_;
   bool reverse_;  ///< higher ground is on the left in the CRS
   double interval_;
   unsigned threads_;
