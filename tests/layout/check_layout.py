@@ -52,7 +52,7 @@ RESTRICTED = [
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'CLI/', ['tools']),
     (r'pybind11/|Python\.h', [BINDINGS]),
-    (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'tools', 'tests'] + IN_STREAM),
+    (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'libterrain/fuzz', 'tools', 'tests'] + IN_STREAM),
     (r'gtest/|gmock/', TESTS + ['tools']),
     (r'benchmark/', BENCHES),
 ]

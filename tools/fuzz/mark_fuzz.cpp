@@ -6,7 +6,9 @@
 #include "cli/output.hpp"
 #include "fuzz_target.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
+
+using namespace tools;
 
 bool accepts(const std::uint8_t* data, std::size_t size) {
   const std::string_view text = text_of(data, size);
@@ -21,4 +23,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   return ours;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

@@ -18,9 +18,10 @@
 #include "terrace/terrain/region.hpp"
 #include "tile/format/tile_address.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
-using namespace terrain;
+using namespace tools;
+
 namespace {
 
 bool parse(std::string_view name, const std::string& value) {
@@ -44,6 +45,12 @@ bool parse(std::string_view name, const std::string& value) {
   } else if (name == "level") {
     const auto level = parse_level(value);
     require(!level || *level <= 255, "a level");
+  } else if (name == "focus") {
+    // Not the name of a file of this machine.
+    if (value.find_first_not_of("0123456789+-.,eE :top") != std::string::npos) return false;
+    const Focus focus = parse_focus(value);
+    require(!focus.region.box().empty(), "the box of a focus is not empty");
+    require(!focus.level || *focus.level <= 255, "a level");
   } else if (name == "smooth") {
     const auto smoothing = parse_smoothing(value);
     require(!smoothing || (smoothing->iterations >= 1 && smoothing->iterations <= 10000), "steps");
@@ -114,4 +121,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   return false;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

@@ -11,9 +11,10 @@
 #include "tables/matching_result.hpp"
 #include "terrace/stream/error.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
-using namespace terrain;
+using namespace tools;
+
 namespace {
 
 /// As `sample` goes through a table; true if there was a place in it.
@@ -92,4 +93,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   return false;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

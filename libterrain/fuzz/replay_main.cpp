@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Runs a fuzz target over the files of a corpus folder, so that the target compiles everywhere and
 // every input that once failed stays tested. A file whose name begins with "good" must be accepted,
 // any other be refused: a target that gives up on everything would find nothing.
@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
       std::ifstream file(entry.path(), std::ios::binary);
       const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
       const bool due = entry.path().filename().string().starts_with("good");
-      const bool accepted = terrace::tools::accepts(
+      const bool accepted = terrace::terrain::fuzz::accepts(
           reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
       ++(due ? good : bad);
       if (accepted == due) continue;

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Coordinate reference systems. The first line says how they are given: "text" as --crs takes them
 // (WKT or codes), "wkt" as a source has them, "keys" as GeoKeys, one a line (number=values or
 // number="text"), "shift" as --towgs84. What is known maps places without fault, and what a store
@@ -12,9 +12,8 @@
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
-using namespace terrain;
 namespace {
 
 stream::Crs crs_of_keys(std::string_view text) {
@@ -95,4 +94,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   return true;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

@@ -1,8 +1,8 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // What libFuzzer calls.
 #include "fuzz_target.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  terrace::tools::accepts(data, size);
+  terrace::terrain::fuzz::accepts(data, size);
   return 0;
 }

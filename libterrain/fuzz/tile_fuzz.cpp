@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // What a folder of terrain tiles holds. The first byte says which: 't' a tile, 'l' layer.json, 'j'
 // the journal behind its first line. A tile that can be read can be checked, and what was read of
 // the others is the same when it has been written and read again.
@@ -12,11 +12,9 @@
 #include "tile/format/tile_layer.hpp"
 #include "tile/set/tile_journal.hpp"
 #include "tile/verify/tile_mesh_check.hpp"
-#include "version.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
-using namespace terrain;
 namespace {
 
 bool read_tile(std::string_view text) {
@@ -63,7 +61,7 @@ bool read_journal(std::string_view text) {
   const std::string folder = scratch.path().string();
   const auto write = [&] {
     std::ofstream file(scratch.path() / TileJournal::kName, std::ios::binary);
-    file << "terrace tiles 2 " << kVersion << '\n' << text;
+    file << "terrace tiles 2 " << TERRACE_TERRAIN_VERSION << '\n' << text;
   };
   write();
   const std::vector<TileJournal::Record> records = read_tile_records(folder);
@@ -99,4 +97,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   return false;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

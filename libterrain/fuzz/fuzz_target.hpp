@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,10 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/// What the fuzz targets of the command share. A target is one file with one function, accepts();
-/// fuzz_main.cpp hands it to libFuzzer, replay_main.cpp runs it over a corpus.
+/// What the fuzz targets of this library and of the command share. A target is one file with one
+/// function, accepts(); fuzz_main.cpp hands it to libFuzzer, replay_main.cpp runs it over a corpus.
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
 /// Reads any bytes: true if they were read to their end and hold what they should, false if they
 /// were refused as bad input is. Ends the process by fail() where a promise was broken.
@@ -81,4 +81,4 @@ inline std::string_view take_line(std::string_view& text) {
   return line;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

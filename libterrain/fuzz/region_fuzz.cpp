@@ -1,20 +1,18 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Regions and metrics: JSON files, and what the command line takes in their place. The first line
 // says which: "region" or "metric" for a file's text, "box" for a box or BOX:L.
 #include <cmath>
 
 #include <nlohmann/json.hpp>
 
-#include "cli/option_values.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 #include "terrace/terrain/region.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
-using namespace terrain;
 namespace {
 
 void use(const Region& region) {
@@ -63,14 +61,8 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
       const MemoryFile file(text);
       use(MetricChoice::parse("elliptical:" + file.name()));
     } else if (how == "box") {
-      if (text.find_first_not_of("0123456789+-.,eE :top") != std::string_view::npos) return false;
-      if (text.find(':') == std::string_view::npos) {
-        use(Region::parse(std::string(text)));
-      } else {
-        const Focus focus = parse_focus(std::string(text));
-        use(focus.region);
-        require(!focus.level || *focus.level <= 255, "a level");
-      }
+      if (text.find_first_not_of("0123456789+-.,eE ") != std::string_view::npos) return false;
+      use(Region::parse(std::string(text)));
     } else {
       return false;
     }
@@ -83,4 +75,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   return true;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // An overlay of a small store: the bytes of its header, its pages and its directory, to which the
 // checksums are added here, since nobody guesses those.
 #include <cmath>
@@ -15,9 +15,8 @@
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 
-namespace terrace::tools {
+namespace terrace::terrain::fuzz {
 
-using namespace terrain;
 namespace {
 
 /// 40 points in clusters, made anew in every run: what the store's bytes are does not matter.
@@ -112,4 +111,4 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   }
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain::fuzz
