@@ -22,13 +22,6 @@ struct BasicShape3<Triangulation>::Impl {
   ShapeOptions options;
   shape::State state;
 
-  static shape::Spheres spheres(const Triangulation& triangulation, unsigned threads) {
-    [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
-    const auto& mesh = Delaunay3Access::mesh(triangulation);
-    return {std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()), shape::places_of(mesh),
-            threads};
-  }
-
   template <class Work>
   void with_criterion(const Triangulation& triangulation, const Work& work) const {
     [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
@@ -61,11 +54,8 @@ void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, uns
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   shape::State& state = impl_->state;
   if (impl_->options.rule == ShapeRule::kPoles) {
-    const shape::Spheres spheres = impl_->spheres(triangulation, threads);
-    std::vector<std::uint8_t> inside = shape::signed_forest(spheres, threads);
-    state.forest = inside;
-    shape::smooth_and_sculpt(spheres, inside);
-    return shape::set_labels(mesh, state, inside);
+    [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+    return shape::restore_by_poles(mesh, state, threads);
   }
   const bool keep_vertices = impl_->options.keep_vertices;
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
@@ -94,10 +84,7 @@ void BasicShape3<Triangulation>::update_nearby(const Triangulation& triangulatio
                                                const typename Triangulation::Changes& changes) {
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   if (impl_->options.rule != ShapeRule::kPoles) return update(triangulation, changes);
-  const std::size_t tetrahedra = triangulation.tetrahedron_count();
-  // From scratch if most of it is new.
-  if (impl_->state.forest.empty() || 2 * changes.added_tetrahedra.size() >= tetrahedra)
-    return restore(triangulation);
+  if (!shape::worth_updating(mesh, impl_->state, changes)) return restore(triangulation);
   [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
   shape::update_nearby(mesh, impl_->state, changes);
 }
@@ -177,11 +164,7 @@ const ShapeOptions& BasicShape3<Triangulation>::options() const {
 
 template <class Triangulation>
 std::size_t BasicShape3<Triangulation>::memory_bytes() const {
-  const shape::State& s = impl_->state;
-  std::size_t words = s.degree.capacity() + s.lost.capacity() + s.rescued.capacity() +
-                      s.queue.capacity() + s.pending.capacity() + s.touched.capacity();
-  words += s.local_tetrahedron.capacity() + s.local_vertex.capacity();
-  return sizeof(Impl) + s.of.capacity() + s.forest.capacity() + words * sizeof(std::uint32_t);
+  return sizeof(Impl) + impl_->state.bytes();
 }
 
 template class BasicShape3<Delaunay3<std::int32_t>>;

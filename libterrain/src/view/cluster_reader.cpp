@@ -67,7 +67,12 @@ tri::ClusterRecord FramedSource::record(tri::ClusterId id) {
 tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
   const stream::ClusterRecord record =
       store_.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id)));
-  const tri::ClusterMembers members = inner_.read(id);
+  tri::ClusterMembers members = inner_.read(id);
+  if (lattice_ != nullptr) {
+    nodes_.clear();
+    for (const stream::Point3& p : members.positions) nodes_.push_back(lattice_->node(frame_(p)));
+    members.positions = nodes_;
+  }
   ++clusters_;
   points_ += record.points;
   bytes_ += record.bytes;

@@ -19,11 +19,12 @@
 
 namespace terrace::terrain {
 
-/// The clusters of a store, members in stored coordinates, boxes in the view frame.
+/// The clusters of a store, members in stored coordinates or on a lattice, boxes in the view frame.
 class FramedSource final : public tri::ClusterSource {
  public:
-  FramedSource(const stream::Store& store, const ViewFrame& frame)
-      : store_(store), inner_(store), frame_(frame) {}
+  /// Without a lattice (null) members are in stored coordinates. Keeps references.
+  FramedSource(const stream::Store& store, const ViewFrame& frame, const ViewLattice* lattice)
+      : store_(store), inner_(store), frame_(frame), lattice_(lattice) {}
 
   [[nodiscard]] unsigned top() const override { return inner_.top(); }
   [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
@@ -47,6 +48,8 @@ class FramedSource final : public tri::ClusterSource {
   const stream::Store& store_;
   StoreSource inner_;
   const ViewFrame& frame_;
+  const ViewLattice* lattice_;
+  std::vector<stream::Point3> nodes_;       ///< what the last read() shows, with a lattice
   std::vector<stream::ByteRange> missing_;  ///< of the records of the cluster being loaded
   std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
 };

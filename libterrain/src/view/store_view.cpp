@@ -17,5 +17,6 @@ template StoreView<std::int32_t>::StoreView(const stream::Store&, const tri::Vie
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,
                                                Reader);
 template class StoreView<double>;
+template class StoreView<tri::DynamicSurface<std::int32_t>>;
 
 }  // namespace terrace::terrain

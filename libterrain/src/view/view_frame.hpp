@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 #include <terrace/tri/multiresolution.hpp>
@@ -26,6 +30,23 @@ class ViewFrame {
             map_[3] * v[0] + map_[4] * v[1] + map_[5] * v[2],
             map_[6] * v[0] + map_[7] * v[1] + map_[8] * v[2]};
   }
+  /// Back to stored coordinates, up to rounding. The map must not be singular.
+  [[nodiscard]] stream::Point3 stored(const stream::Point3& p) const {
+    const auto minor = [&](std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
+      return map_[a] * map_[d] - map_[b] * map_[c];
+    };
+    const stream::LinearMap adjugate{minor(4, 5, 7, 8), minor(2, 1, 8, 7), minor(1, 2, 4, 5),
+                                     minor(5, 3, 8, 6), minor(0, 2, 6, 8), minor(2, 0, 5, 3),
+                                     minor(3, 4, 6, 7), minor(1, 0, 7, 6), minor(0, 1, 3, 4)};
+    const double determinant =
+        map_[0] * adjugate[0] + map_[1] * adjugate[3] + map_[2] * adjugate[6];
+    stream::Point3 result;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double* row = &adjugate[3 * k];
+      result[k] = middle_[k] + (row[0] * p[0] + row[1] * p[1] + row[2] * p[2]) / determinant;
+    }
+    return result;
+  }
   [[nodiscard]] tri::Box3 box_of(const tri::Box3& stored) const {
     stream::Box3 box;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -40,6 +61,39 @@ class ViewFrame {
  private:
   stream::LinearMap map_;
   stream::Point3 middle_{};
+};
+
+/// Integers in the view frame, for exact predicates in space: cells of a power of two metres, at
+/// most 2^29 of them along a side of the store's box.
+class ViewLattice {
+ public:
+  ViewLattice(const stream::Store& store, const ViewFrame& frame) {
+    if (store.bounds().empty()) return;
+    const tri::Box3 box = frame.box_of({store.bounds().min, store.bounds().max});
+    origin_ = box.min;
+    double side = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) side = std::max(side, box.max[k] - box.min[k]);
+    int exponent = 0;
+    std::frexp(side, &exponent);
+    cell_ = std::ldexp(1.0, std::max(exponent, -900) - 29);
+  }
+  /// The nearest node, numbered from the low corner of the box.
+  [[nodiscard]] stream::Point3 node(const stream::Point3& in_view_frame) const {
+    stream::Point3 n;
+    for (std::size_t k = 0; k < 3; ++k) {
+      n[k] = std::floor((in_view_frame[k] - origin_[k]) / cell_ + 0.5);
+    }
+    return n;
+  }
+  [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& node) const {
+    stream::Point3 p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = origin_[k] + cell_ * node[k];
+    return p;
+  }
+
+ private:
+  stream::Point3 origin_{};
+  double cell_ = 1.0;
 };
 
 }  // namespace terrace::terrain

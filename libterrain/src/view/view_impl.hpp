@@ -16,6 +16,12 @@
 
 namespace terrace::terrain {
 
+/// Whether vertices are on a lattice in the view frame.
+template <class Shown>
+inline constexpr bool is_surface = false;
+template <class Coord>
+inline constexpr bool is_surface<tri::DynamicSurface<Coord>> = true;
+
 template <class Shown>
 struct StoreView<Shown>::Impl {
   using MakeReader = std::unique_ptr<ClusterReader> (*)(FramedSource&);
@@ -24,7 +30,8 @@ struct StoreView<Shown>::Impl {
        MakeReader make_reader)
       : store(given),
         frame(store, ground),
-        source(store, frame),
+        lattice(store, frame),
+        source(store, frame, is_surface<Shown> ? &lattice : nullptr),
         control(source.counts(), load_root(), options),
         reader(make_reader(source)) {
     assert((!std::is_integral_v<Shown> || store.schema().grid));
@@ -42,6 +49,7 @@ struct StoreView<Shown>::Impl {
 
   stream::Store store;
   ViewFrame frame;
+  ViewLattice lattice;
   FramedSource source;
   std::vector<std::byte> root_values;
   Control control;
@@ -68,6 +76,11 @@ const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& 
   impl_->reader->ask(step.wanted, step.requests, step.withdrawn);
   impl_->settled = step.settled && step.wanted.empty();
   return step;
+}
+
+template <class Shown>
+auto StoreView<Shown>::restore(unsigned threads) -> const typename Control::Delta& {
+  return impl_->control.restore(threads);
 }
 
 template <class Shown>
@@ -107,13 +120,23 @@ stream::Point3 StoreView<Shown>::in_view_frame(const stream::Point3& stored) con
 
 template <class Shown>
 stream::Point3 StoreView<Shown>::in_view_frame(tri::VertexId vertex) const {
-  return impl_->frame(stored(vertex));
+  if constexpr (is_surface<Shown>) {
+    const auto p = model().triangulation().point(vertex);
+    return impl_->lattice.in_view_frame(
+        {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
+  } else {
+    return impl_->frame(stored(vertex));
+  }
 }
 
 template <class Shown>
 stream::Point3 StoreView<Shown>::stored(tri::VertexId vertex) const {
-  const auto p = model().triangulation().point(vertex);
-  return {static_cast<double>(p[0]), static_cast<double>(p[1]), model().height(vertex)};
+  if constexpr (is_surface<Shown>) {
+    return impl_->frame.stored(in_view_frame(vertex));
+  } else {
+    const auto p = model().triangulation().point(vertex);
+    return {static_cast<double>(p[0]), static_cast<double>(p[1]), model().height(vertex)};
+  }
 }
 
 template <class Shown>

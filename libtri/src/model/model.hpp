@@ -90,6 +90,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
   const Delta& set_detail(const Detail& detail) { return apply(tree_.plan(judge(detail), take())); }
   void open_step();
   const Delta& close_step();
+  const Delta& restore(unsigned threads);
 
   [[nodiscard]] PointId point_id(VertexId vertex) const;
   [[nodiscard]] unsigned level(VertexId vertex) const {
@@ -102,6 +103,11 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   using Slot = ClusterTree::Slot;
   using Verdict = ClusterTree::Verdict;
+  /// Whether a part of it, a surface, follows by its journal and can be made from scratch.
+  static constexpr bool kFollows =
+      requires(Triangulation t, typename Triangulation::Changes& changes) {
+    t.restore(changes, 1u);
+  };
   static constexpr std::size_t kKeptPoints = 1 << 16;
 
   struct Staged {
@@ -152,7 +158,7 @@ MultiresolutionModel<Triangulation>::Impl::Impl(ClusterSource& source, const Det
                                                 ModelOptions options, Triangulation empty)
     : triangulation_(std::move(empty)),
       tree_(source),
-      deltas_(options.deltas),
+      deltas_(options.deltas || kFollows),
       old_heights_(options.deltas && options.old_heights) {
   const ClusterTree::Take take_points = take();
   tree_.read_root(take_points);
@@ -271,6 +277,16 @@ auto MultiresolutionModel<Triangulation>::Impl::close_step() -> const Delta& {
   assert(open_);
   open_ = false;
   finish_delta();
+  return delta_;
+}
+
+template <class Triangulation>
+auto MultiresolutionModel<Triangulation>::Impl::restore([[maybe_unused]] unsigned threads)
+    -> const Delta& {
+  assert(!open_);
+  start_delta();
+  delta_.changes = {};
+  if constexpr (kFollows) triangulation_.restore(delta_.changes, threads);
   return delta_;
 }
 
@@ -519,6 +535,11 @@ void MultiresolutionModel<Triangulation>::open_step() {
 template <class Triangulation>
 auto MultiresolutionModel<Triangulation>::close_step() -> const Delta& {
   return impl_->close_step();
+}
+
+template <class Triangulation>
+auto MultiresolutionModel<Triangulation>::restore(unsigned threads) -> const Delta& {
+  return impl_->restore(threads);
 }
 
 template <class Triangulation>

@@ -30,8 +30,9 @@ class Nearby {
   Nearby(const Nearby&) = delete;
   Nearby& operator=(const Nearby&) = delete;
 
+  /// examined: by slot, all tetrahedra whose label or whose neighbours may have changed; or null.
   template <class Changes>
-  void relabel(const Changes& changes) {
+  void relabel(const Changes& changes, std::vector<std::uint32_t>* examined) {
     collect(changes);
     number_vertices();
     const std::vector<spatial::Tetrahedron> tetrahedra = local_tetrahedra();
@@ -48,6 +49,7 @@ class Nearby {
     }
     smooth_and_sculpt(spheres, inside, part);
     write(tetrahedra, inside);
+    if (examined != nullptr) *examined = slots_;
   }
 
  private:
@@ -171,9 +173,28 @@ class Nearby {
   std::vector<std::uint8_t> whole_;      ///< by local vertex: all tetrahedra at it are here
 };
 
-/// The state of the poles rule after changes; `forest` has the labels before.
+/// The state of the poles rule from scratch. Requires a scope of the metric.
+template <class Mesh>
+void restore_by_poles(const Mesh& mesh, State& state, unsigned threads) {
+  const Spheres spheres(std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()),
+                        places_of(mesh), threads);
+  std::vector<std::uint8_t> inside = signed_forest(spheres, threads);
+  state.forest = inside;
+  smooth_and_sculpt(spheres, inside);
+  set_labels(mesh, state, inside);
+}
+
+/// Whether update_nearby() can follow the changes, and costs less than starting from scratch.
 template <class Changes, class Mesh>
-void update_nearby(const Mesh& mesh, State& state, const Changes& changes) {
+bool worth_updating(const Mesh& mesh, const State& state, const Changes& changes) {
+  return !state.forest.empty() && 2 * changes.added_tetrahedra.size() < mesh.finite_count;
+}
+
+/// The state of the poles rule after changes; `forest` has the labels before. `examined` as in
+/// Nearby::relabel(). Requires a scope of the metric.
+template <class Changes, class Mesh>
+void update_nearby(const Mesh& mesh, State& state, const Changes& changes,
+                   std::vector<std::uint32_t>* examined = nullptr) {
   for (std::size_t k = 0; k < changes.removed_tetrahedra.size(); ++k) {
     const std::uint32_t t = slot(changes.removed_tetrahedra[k]);
     if (state.of[t] == kKept) {
@@ -185,7 +206,7 @@ void update_nearby(const Mesh& mesh, State& state, const Changes& changes) {
   state.of.resize(std::max<std::size_t>(state.of.size(), mesh.tetrahedron.size()), kAbsent);
   state.forest.resize(state.of.size());
   state.degree.resize(std::max<std::size_t>(state.degree.size(), mesh.vertex.size()));
-  Nearby<Mesh>(mesh, state).relabel(changes);
+  Nearby<Mesh>(mesh, state).relabel(changes, examined);
 }
 
 }  // namespace terrace::tri::shape

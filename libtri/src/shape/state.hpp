@@ -50,6 +50,12 @@ struct State {
     --kept_count;
     for (const std::uint32_t v : mesh.tetrahedron[t].corner) --degree[v];
   }
+  [[nodiscard]] std::size_t bytes() const {
+    const std::size_t words = degree.capacity() + lost.capacity() + rescued.capacity() +
+                              queue.capacity() + pending.capacity() + touched.capacity() +
+                              local_tetrahedron.capacity() + local_vertex.capacity();
+    return of.capacity() + forest.capacity() + words * sizeof(std::uint32_t);
+  }
   void forget_rescued() {
     for (const std::uint32_t t : rescued) of[t] &= static_cast<std::uint8_t>(~kRescuedBit);
     rescued.clear();

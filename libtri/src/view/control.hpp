@@ -296,6 +296,10 @@ auto ViewControl<Triangulation>::step(const View& view, const StepBudget& budget
   return impl_->step(view, budget);
 }
 template <class Triangulation>
+auto ViewControl<Triangulation>::restore(unsigned threads) -> const Delta& {
+  return impl_->model_.restore(threads);
+}
+template <class Triangulation>
 bool ViewControl<Triangulation>::give(GivenCluster cluster) {
   detail::check(cluster, impl_->model_.top());
   impl_->asked_.erase(cluster.cluster);

@@ -27,6 +27,10 @@ template <>
 struct ViewTriangulation<tri::PointCloud> {
   using type = tri::PointCloud;
 };
+template <class Coord>
+struct ViewTriangulation<tri::DynamicSurface<Coord>> {
+  using type = tri::DynamicSurface<Coord>;
+};
 
 /// A store under a camera: clusters expand where the camera comes near and collapse where it has
 /// been, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
@@ -38,7 +42,11 @@ struct ViewTriangulation<tri::PointCloud> {
 /// in_view_frame() tells where its vertices are.
 ///
 /// Shown: std::int32_t for rasters, whose triangulation is exact on integers; double for any store;
-/// tri::PointCloud for the points alone.
+/// tri::PointCloud for the points alone; tri::DynamicSurface<std::int32_t> for scans: the surface
+/// in space that the points lie on, which is part of what a frame may spend. Its vertices are not
+/// in stored coordinates but on a lattice in the view frame, of a power of two metres, 2^-29 to
+/// 2^-28 of the longest side of the store's box, to which points are rounded.
+///
 /// Members may be called by one thread at a time.
 template <class Shown>
 class StoreView {
@@ -70,6 +78,9 @@ class StoreView {
   /// step tells which triangles came and went. Throws: stream::Error once a cluster could not be
   /// read; stream::Stopped if the store is to stop.
   const Step& frame(const tri::View& view, double seconds);
+  /// Computes from scratch what frames only follow, see tri::ViewControl::restore(): the surface of
+  /// a scan, for a camera that rests. The delta is valid until the next frame.
+  const typename Control::Delta& restore(unsigned threads = 1);
   /// Whether another frame with the view of the last one would change nothing, now or later.
   [[nodiscard]] bool settled() const;
   /// The bytes that the last frame lacked for what is wanted, the most important first; a frame
@@ -85,7 +96,7 @@ class StoreView {
 
   /// From a step in stored coordinates to metres.
   [[nodiscard]] const stream::LinearMap& ground() const;
-  /// A vertex in stored coordinates.
+  /// A vertex in stored coordinates; of a surface up to the lattice's rounding.
   [[nodiscard]] stream::Point3 stored(tri::VertexId vertex) const;
   /// Metres east, north and up of a point in stored coordinates.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
@@ -107,5 +118,6 @@ class StoreView {
 extern template class StoreView<std::int32_t>;
 extern template class StoreView<double>;
 extern template class StoreView<tri::PointCloud>;
+extern template class StoreView<tri::DynamicSurface<std::int32_t>>;
 
 }  // namespace terrace::terrain

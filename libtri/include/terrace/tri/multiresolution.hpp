@@ -14,6 +14,7 @@
 
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
+#include "terrace/tri/dynamic_surface.hpp"
 #include "terrace/tri/point_cloud.hpp"
 
 /// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and the interface
@@ -126,7 +127,8 @@ struct Detail {
 };
 
 struct ModelOptions {
-  /// false: no deltas are recorded, steps are faster and every Delta is empty.
+  /// false: no deltas are recorded, steps are faster and every Delta is empty. A DynamicSurface
+  /// follows by its deltas and always has them.
   bool deltas = true;
   /// true: a Delta also reports the former heights, for 8 bytes and a bit per vertex.
   bool old_heights = false;
@@ -154,7 +156,7 @@ struct ModelOptions {
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
 /// vertex.
 ///
-/// Triangulation: Delaunay2 or Delaunay3, in any metric, or PointCloud.
+/// Triangulation: Delaunay2 or Delaunay3, in any metric, DynamicSurface, or PointCloud.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -211,6 +213,10 @@ class MultiresolutionModel {
   /// between.
   void open_step();
   const Delta& close_step();
+  /// Not within a step: computes from scratch what steps only follow, the surface of a
+  /// DynamicSurface. Of other triangulations an empty delta: they are always exact. Throws nothing
+  /// of the source's.
+  const Delta& restore(unsigned threads = 1);
 
   // ---- Reading --------------------------------------------------------------------------------
 
@@ -255,7 +261,8 @@ class MultiresolutionModel {
 /// The model of points in the plane: std::int32_t for rasters in column and row, otherwise double.
 template <class Coord, class Metric = Euclidean>
 using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord, Metric>>;
-/// The model of points in space: tetrahedra instead of triangles; a height is the z of a vertex.
+/// The model of points in space: tetrahedra instead of triangles; a height is the z of a vertex. Of
+/// points scanned from a surface, MultiresolutionModel<DynamicSurface<Coord>> keeps that, too.
 template <class Coord, class Metric = Euclidean>
 using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord, Metric>>;
 
@@ -264,5 +271,7 @@ extern template class MultiresolutionModel<PointCloud>;
 extern template class MultiresolutionModel<Delaunay2<double>>;
 extern template class MultiresolutionModel<Delaunay3<std::int32_t>>;
 extern template class MultiresolutionModel<Delaunay3<double>>;
+extern template class MultiresolutionModel<DynamicSurface<std::int32_t>>;
+extern template class MultiresolutionModel<DynamicSurface<double>>;
 
 }  // namespace terrace::tri

@@ -202,7 +202,9 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
 /// (with outlines 32 more each), and the given clusters that are kept.
 ///
-/// Triangulation: Delaunay2, for points in the plane with heights; PointCloud, for points in space.
+/// Triangulation: Delaunay2, for points in the plane with heights; DynamicSurface, for scans of
+/// surfaces in space, whose shape is then part of what a step may spend; PointCloud, for points in
+/// space alone.
 template <class Triangulation>
 class ViewControl {
  public:
@@ -252,6 +254,9 @@ class ViewControl {
   /// tolerance that is negative or NaN, or seconds without a clock; then nothing has changed. Clock
   /// and cone must not throw.
   const Step& step(const View& view, const StepBudget& budget = {});
+  /// Computes from scratch what steps only follow, as MultiresolutionModel::restore() does: for a
+  /// camera that rests. Not bounded by a budget. A step's delta is valid until then.
+  const Delta& restore(unsigned threads = 1);
 
   /// Delivers a cluster, requested or not. It is kept, as far as max_cached_bytes allows, even
   /// after it was expanded, in case it is needed again. Returns false if it is larger than the
@@ -285,5 +290,7 @@ using ViewControl2 = ViewControl<Delaunay2<Coord>>;
 extern template class ViewControl<Delaunay2<std::int32_t>>;
 extern template class ViewControl<PointCloud>;
 extern template class ViewControl<Delaunay2<double>>;
+extern template class ViewControl<DynamicSurface<std::int32_t>>;
+extern template class ViewControl<DynamicSurface<double>>;
 
 }  // namespace terrace::tri

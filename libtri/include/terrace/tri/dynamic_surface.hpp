@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "terrace/tri/delaunay3.hpp"
+
+namespace terrace::tri {
+
+/// The surface that a changing set of points was scanned from: their tetrahedra and those of them
+/// inside the shape (ShapeRule::kPoles), read like a Delaunay2, whose triangles are here the facets
+/// of the surface. In a multiresolution model, and under the control of a view, it takes the place
+/// of a triangulation.
+///
+/// Points come and go at once; the surface follows in take_changes(), by the rules of
+/// BasicShape3::update_nearby(): new tetrahedra are judged, with those around them, all others stay
+/// as they were. So the tetrahedra are a function of the points alone, but the surface may depend
+/// in a few pockets on how they came; restore() computes it from scratch.
+///
+/// It is closed, turned outward, and touches itself where kept tetrahedra meet in an edge or a
+/// vertex, see BasicShape3::surface(). Open scans have lids. Handles of vertices are those of
+/// Delaunay3; a triangle has a handle as long as it is on the surface, even if the tetrahedron
+/// behind it is replaced.
+///
+/// Coord: as in Delaunay3. Memory: 350 bytes per vertex, most of it for the tetrahedra.
+template <class Coord>
+class DynamicSurface {
+ public:
+  using Point = std::array<Coord, 3>;
+  using Insertion = typename Delaunay3<Coord>::Insertion;
+
+  /// The net difference between two moments, as in Delaunay2. Vertices are those of the
+  /// tetrahedra; nearly all of them are on the surface.
+  struct Changes {
+    std::vector<VertexId> removed_vertices;
+    std::vector<Point> removed_points;
+    std::vector<VertexId> added_vertices;
+    std::vector<TriangleId> removed_triangles;
+    std::vector<std::array<VertexId, 3>> removed_corners;  ///< of removed_triangles, in parallel
+    std::vector<TriangleId> added_triangles;
+    void clear();
+  };
+
+  DynamicSurface();
+  ~DynamicSurface();
+  /// A moved-from surface can only be destroyed or assigned to.
+  DynamicSurface(DynamicSurface&&) noexcept;
+  DynamicSurface& operator=(DynamicSurface&&) noexcept;
+
+  /// As in Delaunay3; the surface of these points is there at once.
+  std::vector<VertexId> build(std::span<const Point> points);
+  /// As in Delaunay3. Until take_changes() the surface is that of before, and its triangles may
+  /// have corners that are gone.
+  void insert(std::span<const Point> points, std::span<Insertion> results,
+              VertexId hint = kNoVertex);
+  void remove(std::span<const VertexId> vertices);
+  void reserve(std::size_t vertices);
+
+  /// Brings the surface up to date and drops the changes so far.
+  void start_journal();
+  /// Brings the surface up to date: the changes since start_journal() or the last call. Applying
+  /// removals first is a must, a reused handle is on both sides. Each list is in the order of the
+  /// corners. About 12 us per point that came or went; from scratch if most tetrahedra are new.
+  void take_changes(Changes& changes);
+  /// The same, with the surface computed from scratch: 2.5 to 3 us per vertex. The result is that
+  /// of a new object of the same points. threads: 0 is one per core; the result is the same.
+  void restore(Changes& changes, unsigned threads = 1);
+
+  [[nodiscard]] std::size_t vertex_count() const;
+  [[nodiscard]] std::size_t triangle_count() const;
+  [[nodiscard]] Point point(VertexId vertex) const;
+  /// Counter-clockwise seen from outside, the smallest handle first.
+  [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;
+
+  [[nodiscard]] std::uint32_t vertex_slots() const;
+  [[nodiscard]] std::uint32_t triangle_slots() const;
+  [[nodiscard]] bool alive(VertexId vertex) const;
+  [[nodiscard]] bool alive(TriangleId triangle) const;
+  [[nodiscard]] AliveRange<DynamicSurface, VertexId> all_vertices() const {
+    return {*this, vertex_slots()};
+  }
+  [[nodiscard]] AliveRange<DynamicSurface, TriangleId> all_triangles() const {
+    return {*this, triangle_slots()};
+  }
+
+  [[nodiscard]] const Delaunay3<Coord>& tetrahedra() const;
+  /// Equal for equal sets of triangles by coordinates, whatever their history. O(n).
+  [[nodiscard]] std::uint64_t hash() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+template <class Coord>
+void DynamicSurface<Coord>::Changes::clear() {
+  removed_vertices.clear();
+  removed_points.clear();
+  added_vertices.clear();
+  removed_triangles.clear();
+  removed_corners.clear();
+  added_triangles.clear();
+}
+
+extern template class DynamicSurface<std::int32_t>;
+extern template class DynamicSurface<double>;
+
+}  // namespace terrace::tri

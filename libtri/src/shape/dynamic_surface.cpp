@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/tri/dynamic_surface.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "delaunay3/access.hpp"
+#include "free_slots.hpp"
+#include "nearby.hpp"
+#include "poles.hpp"
+#include "state.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using Corners3 = std::array<std::uint32_t, 3>;
+
+/// The same turn, the smallest number first.
+Corners3 turned(Corners3 c) {
+  std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
+  return c;
+}
+
+/// The finalizer of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
+std::uint64_t stirred(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
+  return x ^ (x >> 31);
+}
+
+template <class Coord>
+std::uint64_t number_of(Coord c) {
+  if constexpr (std::is_integral_v<Coord>) {
+    return static_cast<std::uint32_t>(c);
+  } else {
+    const double value = c + 0.0;
+    std::uint64_t bits = 0;  // std::bit_cast, which Debian's Emscripten lacks
+    std::memcpy(&bits, &value, sizeof bits);
+    return bits;
+  }
+}
+
+}  // namespace
+
+template <class Coord>
+struct DynamicSurface<Coord>::Impl {
+  Delaunay3<Coord> tetrahedra;
+  shape::State state;
+  // Triangles by slot; at_side: their slots by side of the tetrahedron behind, kNone elsewhere.
+  std::vector<Corners3> corners;
+  std::vector<spatial::Side> side;  ///< kNone: the slot is free
+  std::vector<std::uint32_t> at_side;
+  FreeSlots free;
+  std::size_t count = 0;
+  // Scratch memory.
+  struct Facet {
+    Corners3 corners;
+    std::uint32_t what;  ///< a triangle's slot if it vanishes, a side if it appears
+    bool operator<(const Facet& other) const { return corners < other.corners; }
+  };
+  typename Delaunay3<Coord>::Changes changes;
+  std::vector<std::uint32_t> examined;
+  std::vector<Facet> vanished, appeared;
+  std::vector<bool> fresh;  ///< by vertex slot: new since the last changes; false between calls
+
+  [[nodiscard]] const auto& mesh() const { return Delaunay3Access::mesh(tetrahedra); }
+
+  /// Brings labels up to date and lists the tetrahedra whose facets may have come or gone.
+  void relabel(bool from_scratch, unsigned threads) {
+    if (!from_scratch && shape::worth_updating(mesh(), state, changes)) {
+      shape::update_nearby(mesh(), state, changes, &examined);
+      return;
+    }
+    shape::restore_by_poles(mesh(), state, threads);
+    examined.resize(mesh().tetrahedron.size());
+    for (std::uint32_t t = 0; t < examined.size(); ++t) examined[t] = t;
+  }
+
+  void compare() {
+    const auto& all = mesh();
+    vanished.clear();
+    appeared.clear();
+    at_side.resize(4 * std::max<std::size_t>(at_side.size() / 4, all.tetrahedron.size()),
+                   spatial::kNone);
+    const auto vanish = [&](spatial::Side s) {
+      const std::uint32_t triangle = std::exchange(at_side[s], spatial::kNone);
+      if (triangle != spatial::kNone) vanished.push_back({corners[triangle], triangle});
+    };
+    for (const TetrahedronId t : changes.removed_tetrahedra)
+      for (std::uint32_t i = 0; i < 4; ++i) vanish(spatial::make_side(slot(t), i));
+    for (const std::uint32_t t : examined) {
+      const spatial::Tetrahedron& tetrahedron = all.tetrahedron[t];
+      if (!spatial::is_finite(tetrahedron.corner)) continue;
+      for (std::uint32_t i = 0; i < 4; ++i) {
+        const spatial::Side s = spatial::make_side(t, i);
+        const bool open = state.of[t] == shape::kKept &&
+                          state.of[spatial::tetrahedron_of(tetrahedron.mate[i])] != shape::kKept;
+        if (!open) {
+          vanish(s);
+        } else if (at_side[s] == spatial::kNone) {
+          appeared.push_back({turned(spatial::facet_of(tetrahedron, i)), s});
+        }
+      }
+    }
+    std::sort(vanished.begin(), vanished.end());
+    std::sort(appeared.begin(), appeared.end());
+  }
+
+  /// Triangles that are there before and after keep their slots; the others are told.
+  void settle(Changes& out) {
+    fresh.resize(std::max<std::size_t>(fresh.size(), tetrahedra.vertex_slots()));
+    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = true;
+    const auto stays = [&](const Facet& before, const Facet& after) {
+      return before.corners == after.corners && !fresh[before.corners[0]] &&
+             !fresh[before.corners[1]] && !fresh[before.corners[2]];
+    };
+    auto old = vanished.begin();
+    std::size_t left = 0;
+    for (const Facet& facet : appeared) {
+      for (; old != vanished.end() && *old < facet; ++old) drop(*old, out);
+      if (old != vanished.end() && stays(*old, facet)) {
+        at_side[facet.what] = old->what;
+        side[old->what] = facet.what;
+        ++old;
+      } else {
+        appeared[left++] = facet;
+      }
+    }
+    for (; old != vanished.end(); ++old) drop(*old, out);
+    appeared.resize(left);
+    for (const Facet& facet : appeared) {
+      const auto end = static_cast<std::uint32_t>(side.size());
+      const std::uint32_t triangle = free.empty() ? end : free.take();
+      if (triangle == end) {
+        side.push_back({});
+        corners.push_back({});
+      }
+      side[triangle] = facet.what;
+      corners[triangle] = facet.corners;
+      at_side[facet.what] = triangle;
+      out.added_triangles.push_back(TriangleId{triangle});
+    }
+    count += out.added_triangles.size();
+    count -= out.removed_triangles.size();
+    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
+  }
+  void drop(const Facet& facet, Changes& out) {
+    const auto& [a, b, c] = facet.corners;
+    out.removed_triangles.push_back(TriangleId{facet.what});
+    out.removed_corners.push_back({VertexId{a}, VertexId{b}, VertexId{c}});
+    side[facet.what] = spatial::kNone;
+    free.put(facet.what);
+  }
+
+  void take(Changes& out, bool from_scratch, unsigned threads) {
+    out.clear();
+    tetrahedra.take_changes(changes);
+    relabel(from_scratch, threads);
+    compare();
+    settle(out);
+    out.removed_vertices.swap(changes.removed_vertices);
+    out.removed_points.swap(changes.removed_points);
+    out.added_vertices.swap(changes.added_vertices);
+  }
+};
+
+template <class Coord>
+DynamicSurface<Coord>::DynamicSurface() : impl_(std::make_unique<Impl>()) {
+  impl_->tetrahedra.start_journal();
+}
+template <class Coord>
+DynamicSurface<Coord>::~DynamicSurface() = default;
+template <class Coord>
+DynamicSurface<Coord>::DynamicSurface(DynamicSurface&&) noexcept = default;
+template <class Coord>
+DynamicSurface<Coord>& DynamicSurface<Coord>::operator=(DynamicSurface&&) noexcept = default;
+
+template <class Coord>
+std::vector<VertexId> DynamicSurface<Coord>::build(std::span<const Point> points) {
+  std::vector<VertexId> vertices = impl_->tetrahedra.build(points);
+  start_journal();
+  return vertices;
+}
+
+template <class Coord>
+void DynamicSurface<Coord>::insert(std::span<const Point> points, std::span<Insertion> results,
+                                   VertexId hint) {
+  impl_->tetrahedra.insert(points, results, hint);
+}
+template <class Coord>
+void DynamicSurface<Coord>::remove(std::span<const VertexId> vertices) {
+  impl_->tetrahedra.remove(vertices);
+}
+template <class Coord>
+void DynamicSurface<Coord>::reserve(std::size_t vertices) {
+  impl_->tetrahedra.reserve(vertices);
+}
+
+template <class Coord>
+void DynamicSurface<Coord>::start_journal() {
+  Changes dropped;
+  impl_->take(dropped, false, 1);
+}
+template <class Coord>
+void DynamicSurface<Coord>::take_changes(Changes& changes) {
+  impl_->take(changes, false, 1);
+}
+template <class Coord>
+void DynamicSurface<Coord>::restore(Changes& changes, unsigned threads) {
+  impl_->take(changes, true, threads);
+}
+
+template <class Coord>
+std::size_t DynamicSurface<Coord>::vertex_count() const {
+  return impl_->tetrahedra.vertex_count();
+}
+template <class Coord>
+std::size_t DynamicSurface<Coord>::triangle_count() const {
+  return impl_->count;
+}
+template <class Coord>
+auto DynamicSurface<Coord>::point(VertexId vertex) const -> Point {
+  return impl_->tetrahedra.point(vertex);
+}
+template <class Coord>
+std::array<VertexId, 3> DynamicSurface<Coord>::vertices(TriangleId triangle) const {
+  assert(alive(triangle));
+  const auto& [a, b, c] = impl_->corners[slot(triangle)];
+  return {VertexId{a}, VertexId{b}, VertexId{c}};
+}
+
+template <class Coord>
+std::uint32_t DynamicSurface<Coord>::vertex_slots() const {
+  return impl_->tetrahedra.vertex_slots();
+}
+template <class Coord>
+std::uint32_t DynamicSurface<Coord>::triangle_slots() const {
+  return static_cast<std::uint32_t>(impl_->side.size());
+}
+template <class Coord>
+bool DynamicSurface<Coord>::alive(VertexId vertex) const {
+  return impl_->tetrahedra.alive(vertex);
+}
+template <class Coord>
+bool DynamicSurface<Coord>::alive(TriangleId triangle) const {
+  return slot(triangle) < impl_->side.size() && impl_->side[slot(triangle)] != spatial::kNone;
+}
+
+template <class Coord>
+const Delaunay3<Coord>& DynamicSurface<Coord>::tetrahedra() const {
+  return impl_->tetrahedra;
+}
+
+template <class Coord>
+std::uint64_t DynamicSurface<Coord>::hash() const {
+  std::uint64_t sum = stirred(impl_->count);
+  for (const TriangleId triangle : all_triangles()) {
+    std::array<Point, 3> p;
+    for (std::size_t i = 0; i < 3; ++i) p[i] = point(vertices(triangle)[i]);
+    std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
+    std::uint64_t one = 0;
+    for (const Point& corner : p)
+      for (const Coord c : corner) one = stirred(one ^ number_of(c)) + 1;
+    sum += one;
+  }
+  return sum;
+}
+
+template <class Coord>
+std::size_t DynamicSurface<Coord>::memory_bytes() const {
+  const Impl& i = *impl_;
+  return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.capacity() * sizeof(Corners3) +
+         (i.side.capacity() + i.at_side.capacity() + i.examined.capacity()) *
+             sizeof(std::uint32_t) +
+         i.free.bytes() +
+         (i.vanished.capacity() + i.appeared.capacity()) * sizeof(typename Impl::Facet) +
+         i.fresh.capacity() / 8;
+}
+
+template class DynamicSurface<std::int32_t>;
+template class DynamicSurface<double>;
+
+}  // namespace terrace::tri

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/tri/dynamic_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <random>
+#include <set>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "delaunay3/access.hpp"
+#include "points3.hpp"
+#include "terrace/tri/shape.hpp"
+#include "view_world.hpp"
+
+namespace terrace::tri::test {
+namespace {
+
+template <class T>
+class DynamicSurfaceOf : public testing::Test {};
+using SurfaceCoords = testing::Types<std::int32_t, double>;
+TYPED_TEST_SUITE(DynamicSurfaceOf, SurfaceCoords);
+
+/// What a renderer keeps: the corners of triangles as they were when it was told of them.
+template <class Coord>
+class Drawn {
+ public:
+  using Points = std::array<std::array<Coord, 3>, 3>;
+
+  explicit Drawn(const DynamicSurface<Coord>& surface) : surface_(&surface), drawn_(now()) {}
+  void apply(const typename DynamicSurface<Coord>::Changes& changes) {
+    ASSERT_EQ(changes.removed_triangles.size(), changes.removed_corners.size());
+    for (const TriangleId t : changes.removed_triangles) ASSERT_EQ(drawn_.erase(t), 1u);
+    for (const TriangleId t : changes.added_triangles) {
+      ASSERT_TRUE(surface_->alive(t));
+      ASSERT_TRUE(drawn_.emplace(t, points(t)).second);
+    }
+  }
+  void check() const {
+    ASSERT_EQ(drawn_.size(), surface_->triangle_count());
+    ASSERT_EQ(drawn_, now());
+  }
+  [[nodiscard]] std::multiset<Points> triangles() const {
+    std::multiset<Points> all;
+    for (const auto& [triangle, corners] : drawn_) all.insert(from_least(corners));
+    return all;
+  }
+  static Points from_least(Points p) {
+    std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
+    return p;
+  }
+
+ private:
+  [[nodiscard]] Points points(TriangleId t) const {
+    const auto [a, b, c] = surface_->vertices(t);
+    return {surface_->point(a), surface_->point(b), surface_->point(c)};
+  }
+  [[nodiscard]] std::map<TriangleId, Points> now() const {
+    std::map<TriangleId, Points> all;
+    for (const TriangleId t : surface_->all_triangles()) all.emplace(t, points(t));
+    return all;
+  }
+  const DynamicSurface<Coord>* surface_;
+  std::map<TriangleId, Points> drawn_;
+};
+
+/// The surface of a shape as points, from the smallest corner on.
+template <class Coord>
+auto faces_of(const Shape3<Coord>& shape, const Delaunay3<Coord>& triangulation) {
+  std::multiset<typename Drawn<Coord>::Points> all;
+  const ShapeSurface surface = shape.surface(triangulation);
+  for (const auto& face : surface.surface.faces) {
+    typename Drawn<Coord>::Points p;
+    for (std::size_t i = 0; i < 3; ++i) p[i] = triangulation.point(surface.vertices[face[i]]);
+    all.insert(Drawn<Coord>::from_least(p));
+  }
+  return all;
+}
+
+/// Points of a bumpy ball; integers as doubles.
+std::vector<Point3> bumpy_ball(std::size_t count, std::mt19937_64& random) {
+  std::vector<Point3> points(count);
+  for (Point3& p : points) {
+    double length = 0.0;
+    do {
+      length = 0.0;
+      for (double& c : p) c = 2.0 * unit(random) - 1.0;
+      for (const double c : p) length += c * c;
+    } while (length > 1.0 || length < 0.01);
+    const double bumps = 1.0 + 0.1 * p[0] * p[1] / length;
+    for (double& c : p) c = std::round(0x1p20 + 0x1p19 * bumps * c / std::sqrt(length));
+  }
+  return points;
+}
+
+// Any points come and go: the deltas tell all, and the surface is that of the shape that follows
+// the same changes; from scratch it is that of a new object.
+TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
+  using Coord = TypeParam;
+  for (const PointSet3 kind : kPointSets3) {
+    SCOPED_TRACE(name(kind));
+    std::mt19937_64 random(6);
+    DynamicSurface<Coord> surface;
+    const auto points = make_points3<Coord>(kind, kind == PointSet3::kCurves ? 40 : 250, 6);
+    Delaunay3<Coord> triangulation;
+    triangulation.start_journal();
+    Shape3<Coord> shape;
+    shape.restore(triangulation);
+    Drawn<Coord> drawn(surface);
+    typename DynamicSurface<Coord>::Changes changes;
+    typename Delaunay3<Coord>::Changes tetrahedra;
+    for (int step = 0; step < 60; ++step) {
+      // Both the same way, so that handles are equal.
+      if (random() % 2 == 0) {
+        const std::size_t begin = random() % points.size();
+        const auto some =
+            std::span(points).subspan(begin, std::min<std::size_t>(30, points.size() - begin));
+        surface.insert(some, {});
+        triangulation.insert(some, {});
+      } else {
+        std::vector<VertexId> some;
+        for (const VertexId v : surface.all_vertices())
+          if (random() % 8 == 0 || step % 20 == 19) some.push_back(v);
+        surface.remove(some);
+        triangulation.remove(some);
+      }
+      if (random() % 4 == 0) continue;
+      triangulation.take_changes(tetrahedra);
+      const bool scratch = random() % 4 == 0;
+      if (scratch) {
+        surface.restore(changes, 2);
+        shape.restore(triangulation);
+      } else {
+        surface.take_changes(changes);
+        shape.update_nearby(triangulation, tetrahedra);
+      }
+      ASSERT_EQ(changes.added_vertices, tetrahedra.added_vertices);
+      ASSERT_EQ(changes.removed_points, tetrahedra.removed_points);
+      ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
+      ASSERT_NO_FATAL_FAILURE(drawn.check());
+      ASSERT_EQ(surface.tetrahedra().hash(), triangulation.hash());
+      ASSERT_EQ(drawn.triangles(), faces_of(shape, triangulation));
+      // A triangle that is told to go and to come has a new corner.
+      std::set<std::array<VertexId, 3>> gone(changes.removed_corners.begin(),
+                                             changes.removed_corners.end());
+      for (const TriangleId t : changes.added_triangles) {
+        const auto corners = surface.vertices(t);
+        const bool fresh = std::any_of(corners.begin(), corners.end(), [&](VertexId v) {
+          return std::count(changes.added_vertices.begin(), changes.added_vertices.end(), v) > 0;
+        });
+        ASSERT_TRUE(fresh || gone.count(corners) == 0);
+      }
+      if (!scratch) continue;
+      std::vector<std::array<Coord, 3>> there;
+      for (const VertexId v : surface.all_vertices()) there.push_back(surface.point(v));
+      DynamicSurface<Coord> again;
+      again.build(there);
+      ASSERT_EQ(surface.hash(), again.hash());
+    }
+  }
+}
+
+TYPED_TEST(DynamicSurfaceOf, WhatComesAndGoesUnseenIsNotTold) {
+  using Coord = TypeParam;
+  std::mt19937_64 random(5);
+  std::vector<std::array<Coord, 3>> points;
+  for (const Point3& p : bumpy_ball(2000, random))
+    points.push_back(
+        {static_cast<Coord>(p[0]), static_cast<Coord>(p[1]), static_cast<Coord>(p[2])});
+  DynamicSurface<Coord> surface;
+  surface.build(std::span(points).first(1800));
+  typename DynamicSurface<Coord>::Changes changes;
+  std::vector<typename DynamicSurface<Coord>::Insertion> inserted(200);
+  const std::uint64_t hash = surface.hash();
+  surface.insert(std::span(points).last(200), inserted);
+  std::vector<VertexId> vertices;
+  for (const auto& one : inserted) vertices.push_back(one.vertex);
+  surface.remove(vertices);
+  surface.take_changes(changes);
+  EXPECT_TRUE(changes.added_vertices.empty());
+  EXPECT_TRUE(changes.removed_vertices.empty());
+  EXPECT_TRUE(changes.added_triangles.empty());
+  EXPECT_TRUE(changes.removed_triangles.empty());
+  EXPECT_EQ(surface.hash(), hash);
+}
+
+/// A world of points on a bumpy ball.
+World ball_world(std::uint64_t seed, std::size_t count) {
+  World world(seed, Shape::random, 1);
+  const std::vector<Point3> points = bumpy_ball(count, world.random);
+  world.source = make_hierarchy(points, 2, 8.0, world.random);
+  fill_errors(world.source);
+  world.box = {points[0], points[0]};
+  for (const Point3& p : points) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      world.box.min[k] = std::min(world.box.min[k], p[k]);
+      world.box.max[k] = std::max(world.box.max[k], p[k]);
+    }
+  }
+  return world;
+}
+
+/// A surface made at once of the points that a model has.
+template <class Coord>
+DynamicSurface<Coord> made_at_once(const MultiresolutionModel<DynamicSurface<Coord>>& model) {
+  std::vector<std::array<Coord, 3>> there;
+  for (const VertexId v : model.triangulation().all_vertices())
+    there.push_back(model.triangulation().point(v));
+  DynamicSurface<Coord> surface;
+  surface.build(there);
+  return surface;
+}
+
+// Under the control of views: it ends where the rule says, interrupted or not; the tetrahedra are
+// those made at once, the deltas add up to the surface, and from scratch the surface is that made
+// at once, too.
+TYPED_TEST(DynamicSurfaceOf, FollowsViews) {
+  using T = DynamicSurface<TypeParam>;
+  int mixed = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    World world = ball_world(seed, 600);
+    const WholeTree tree(world.source);
+    ViewControl<T> control(counts(world.source), load_root(world.source));
+    const T& surface = control.model().triangulation();
+    Drawn<TypeParam> drawn(surface);
+    ASSERT_EQ(surface.hash(), made_at_once(control.model()).hash());
+    for (int views = 0; views < 6; ++views) {
+      const View view = world.view();
+      const ClusterSet goal =
+          wanted_by(tree, world.source, view, control.options(), expanded_set(control));
+      for (int steps = 0;; ++steps) {
+        ASSERT_LT(steps, 20000);
+        StepBudget budget;
+        if (seed % 2 == 0) budget.operations = 1 + below(world.random, 5);
+        const auto& step = control.step(view, budget);
+        ASSERT_NO_FATAL_FAILURE(drawn.apply(step.delta->changes));
+        if (step.settled && step.wanted.empty()) break;
+        for (const ViewRequest& r : std::vector<ViewRequest>(step.wanted)) {
+          control.give(load(world.source, r));
+        }
+      }
+      ASSERT_NO_FATAL_FAILURE(drawn.check());
+      ASSERT_EQ(expanded_set(control), goal);
+      ASSERT_EQ(find_fault(surface.tetrahedra()), "");
+      const T fresh = made_at_once(control.model());
+      ASSERT_EQ(surface.tetrahedra().hash(), fresh.tetrahedra().hash());
+      const auto& rest = control.restore(1 + static_cast<unsigned>(below(world.random, 3)));
+      ASSERT_TRUE(rest.changes.added_vertices.empty());
+      ASSERT_TRUE(rest.reassigned.empty());
+      ASSERT_NO_FATAL_FAILURE(drawn.apply(rest.changes));
+      ASSERT_NO_FATAL_FAILURE(drawn.check());
+      ASSERT_EQ(surface.hash(), fresh.hash());
+      ASSERT_TRUE(control.restore().changes.added_triangles.empty());
+      if (goal.size() > 3 && goal.size() + 3 < tree.parents.size()) ++mixed;
+    }
+  }
+  EXPECT_GT(mixed, 8) << "the views show everything or nothing";
+}
+
+// Regions by hand, and back to the start.
+TYPED_TEST(DynamicSurfaceOf, FollowsRegions) {
+  using Coord = TypeParam;
+  World world = ball_world(3, 3000);
+  ModelOptions options;
+  options.deltas = false;  // it has them all the same
+  MultiresolutionModel<DynamicSurface<Coord>> model(world.source, {}, options);
+  const std::uint64_t start = model.triangulation().hash();
+  Drawn<Coord> drawn(model.triangulation());
+  Box3 half = world.box;
+  half.max[0] = 0x1p20;
+  const auto apply = [&](const auto& delta) {
+    ASSERT_NO_FATAL_FAILURE(drawn.apply(delta.changes));
+    ASSERT_NO_FATAL_FAILURE(drawn.check());
+    ASSERT_EQ(model.triangulation().tetrahedra().hash(), made_at_once(model).tetrahedra().hash());
+  };
+  ASSERT_NO_FATAL_FAILURE(apply(model.refine(half, 0)));
+  EXPECT_GT(model.point_count(), 1200u);
+  ASSERT_NO_FATAL_FAILURE(apply(model.coarsen(half, 1)));
+  ASSERT_NO_FATAL_FAILURE(apply(model.set_region(half, 1)));
+  ASSERT_NO_FATAL_FAILURE(apply(model.set_level(0)));
+  EXPECT_EQ(model.point_count(), 3000u);
+  ASSERT_NO_FATAL_FAILURE(apply(model.restore()));
+  EXPECT_EQ(model.triangulation().hash(), made_at_once(model).hash());
+  EXPECT_GT(model.triangulation().triangle_count(), 5900u);
+  ASSERT_NO_FATAL_FAILURE(apply(model.set_level(Detail::kTop)));
+  ASSERT_NO_FATAL_FAILURE(apply(model.restore()));
+  EXPECT_EQ(model.triangulation().hash(), start);
+}
+
+}  // namespace
+}  // namespace terrace::tri::test

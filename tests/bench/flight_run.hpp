@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <sys/resource.h>
+
+#include "terrace/terrain/store_view.hpp"
+
+/// A flight over a store, measured frame by frame; of terrain or of a scan.
+
+namespace terrace::tests {
+
+inline double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+inline bool small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
+
+/// Reads every byte once: what is measured is not the disk.
+inline void warm(const stream::Store& store) {
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    store.for_each(level, [](stream::ClusterId, const stream::ClusterRecord&,
+                             const stream::ClusterPoints&) {});
+  }
+}
+
+/// Frames until nothing is left to do; 0 if that takes more than 100,000.
+template <class View>
+int settle(View& viewer, typename View::Reader reader, const tri::View& view, double seconds) {
+  for (int frame = 1; frame <= 100'000; ++frame) {
+    viewer.frame(view, seconds);
+    if (viewer.settled()) return frame;
+    if (reader == View::Reader::thread) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return 0;
+}
+
+/// Sets the scale at which the model has about the wanted number of points at the start.
+template <class View, class Path>
+void tune(Path& flight, const stream::Store& store, std::size_t active) {
+  double low = 1e-3, high = 1e3;
+  for (int i = 0; i < 14; ++i) {
+    flight.scale = std::sqrt(low * high);
+    tri::ViewOptions options;
+    options.max_points = 2 * active;
+    View viewer(store, options, View::Reader::in_frame);
+    settle(viewer, View::Reader::in_frame, flight.view(0.0), 1.0);
+    (viewer.model().point_count() > active ? high : low) = flight.scale;
+  }
+  flight.scale = low;
+}
+
+inline double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+inline double quantile(const std::vector<double>& sorted, double q) {
+  return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1))];
+}
+
+inline int frames() { return small() ? 60 : 600; }
+
+inline void print_head(const stream::Store& store, double budget) {
+  std::printf(
+      "%d frames over a store of %llu points, each moving by 1 %% of the width of what is seen;\n"
+      "milliseconds of the thread that draws, CPU of all, at most %.0f ms asked for\n"
+      "%-27s %6s %6s %6s %9s %9s %6s %9s %8s %9s %10s %8s %7s\n",
+      frames(), static_cast<unsigned long long>(store.points()), 1e3 * budget, "flight", "p50",
+      "p99", "max", "CPU/frame", "at target", "stop", "vertices", "changed", "clusters", "points",
+      "read", "error");
+  std::printf("%-27s %6s %6s %6s %9s %9s %6s %9s %8s %9s %10s %8s %7s\n", "", "ms", "ms", "ms",
+              "ms", "% frames", "frames", "mean", "/ frame", "decoded", "decoded, M", "MB",
+              "pixels");
+}
+
+/// At the end of the flight: the points of the expanded clusters, each once.
+template <class View>
+std::string fault(const View& viewer, const stream::Store& store, int stop, double worst) {
+  const auto& model = viewer.model();
+  if (stop == 0) return "the view that stopped is never at its target";
+  if (worst > 1.0) return "the view that stopped is settled and not at its target";
+  std::uint64_t points = store.levels()[store.top()].members;
+  for (const tri::ClusterId id : model.expanded()) {
+    points += store.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id))).points;
+  }
+  // Points of a scan may coincide.
+  const bool apart = store.schema().grid;
+  if (points != model.point_count() || (apart && points != model.triangulation().vertex_count())) {
+    return "the model does not have the points of the expanded clusters";
+  }
+  return {};
+}
+
+/// 600 frames, each moving by 1 % of the width of what is seen, in at most `budget` seconds each;
+/// then until the view that stopped is at its target. Prints a line below print_head(). Returns
+/// what is wrong.
+template <class View, class Path>
+std::string fly(const char* name, const Path& flight, View& viewer, typename View::Reader reader,
+                const stream::Store& store, double budget) {
+  settle(viewer, reader, flight.view(0.0), budget);
+  const terrain::ViewTraffic before = viewer.traffic();
+  std::vector<double> times;
+  double points = 0.0, changed = 0.0, spent = cpu_seconds();
+  int at_target = 0;
+  tri::View view;
+  for (int i = 1; i <= frames(); ++i) {
+    view = flight.view(i * 0.01 * flight.width());
+    const double begin = now();
+    const typename View::Step& step = viewer.frame(view, budget);
+    times.push_back(now() - begin);
+    at_target += step.worst <= 1.0;
+    points += static_cast<double>(viewer.model().point_count());
+    changed += static_cast<double>(step.delta->changes.added_vertices.size() +
+                                   step.delta->changes.removed_vertices.size());
+    // A second thread has as long as a display leaves it.
+    const double rest = budget - times.back();
+    if (reader == View::Reader::thread && rest > 0.0) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(rest));
+    }
+  }
+  spent = cpu_seconds() - spent;
+  int stop = 0;
+  double worst = 2.0;
+  for (bool settled = false; !settled && stop < 10'000;) {
+    const double begin = now();
+    const typename View::Step& step = viewer.frame(view, budget);
+    ++stop;
+    settled = viewer.settled();
+    worst = step.worst;
+    const double rest = budget - (now() - begin);
+    if (reader == View::Reader::thread && !settled && rest > 0.0) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(rest));
+    }
+  }
+  const terrain::ViewTraffic after = viewer.traffic();
+  std::sort(times.begin(), times.end());
+  const double count = frames();
+  std::printf("%-27s %6.2f %6.2f %6.2f %9.2f %9.1f %6d %9.0f %8.0f %9zu %10.2f %8.2f %7.2f\n", name,
+              1e3 * quantile(times, 0.5), 1e3 * quantile(times, 0.99), 1e3 * times.back(),
+              1e3 * spent / count, 100.0 * at_target / count, stop, points / count, changed / count,
+              static_cast<std::size_t>(after.clusters - before.clusters),
+              static_cast<double>(after.points - before.points) / 1e6,
+              static_cast<double>(after.bytes - before.bytes) / 1e6, view.pixel_error);
+  std::fflush(stdout);
+  return fault(viewer, store, stop, worst);
+}
+
+}  // namespace terrace::tests
