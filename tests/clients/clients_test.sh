@@ -1,9 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# clients_test.sh BUILD TEST: installs the clients below BUILD, unless they are there, and runs in them
-# the test: TEST FOLDER. TERRACE names the command. Exits with 77 where a client cannot be had.
+# clients_test.sh BUILD TEST [ARGUMENTS]: installs the clients below BUILD, unless they are there, and runs
+# in them the test: TEST FOLDER ARGUMENTS. TERRACE names the command. Exits with 77 where a client cannot be had.
 set -eu
 source=$(cd "${0%/*}" && pwd)
+build=$1 test=$2
+shift 2
 skip() {
   echo "clients are not tested: $*"
   exit 77
@@ -13,8 +15,8 @@ for program in node npm chromium; do
 done
 [ "$(node -p 'process.versions.node.split(".")[0]')" -ge 20 ] || skip 'node is older than 20'
 
-mkdir -p "$1/clients"
-packages=$(cd "$1/clients" && pwd)
+mkdir -p "$build/clients"
+packages=$(cd "$build/clients" && pwd)
 # One at a time.
 exec 9> "$packages/lock"
 flock 9
@@ -34,4 +36,4 @@ if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; the
   cp "$packages/package-lock.json" "$packages/node_modules/.clients"
 fi
 exec 9>&-
-CHROMIUM=$(command -v chromium) exec node "$2" "$packages"
+CHROMIUM=$(command -v chromium) exec node "$test" "$packages" "$@"

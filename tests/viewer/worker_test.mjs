@@ -6,6 +6,7 @@ import {readFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
+import {Flyer} from './flyer.mjs';
 import {MAX_POINTS, Sites} from './sites.mjs';
 import {folderFetch, Worker} from './worker_host.mjs';
 
@@ -13,50 +14,23 @@ const sites = new Sites();
 before(() => sites.build());
 after(() => sites.remove());
 
-/// A worker with its answers to wait for.
-class Flyer {
+/// A worker over a store of the site.
+class Tested extends Flyer {
   constructor(name, {fault, maxPoints = MAX_POINTS} = {}) {
     const {fetch, log} = folderFetch(sites.site, fault);
-    this.log = log;
-    this.waiting = [];
-    this.messages = [];
-    this.serial = 0;
-    this.blocks = 0;
-    this.worker = new Worker(join(sites.site, 'worker.js'), fetch, message => {
-      this.messages.push(message.type);
-      if (message.type === 'frame') {
-        this.last = message;
-        this.blocks += message.changes.vertexBlocks.length;
+    const messages = [];
+    let blocks = 0;
+    super(heard => new Worker(join(sites.site, 'worker.js'), fetch, heard), 'http://folder/', name, {
+      maxPoints,
+      heard: message => {
+        messages.push(message.type);
+        if (message.type === 'frame') blocks += message.changes.vertexBlocks.length;
       }
-      this.waiting = this.waiting.filter(wait => !wait(message));
     });
-    this.worker.tell({
-      type: 'open',
-      wasm: 'http://folder/core.wasm',
-      store: `http://folder/stores/${name}/`,
-      start: `http://folder/stores/${name}.start`,
-      maxPoints
-    });
-  }
-  until(is, seconds = 60) {
-    return new Promise((resolve, reject) => {
-      const timer = setTimeout(() => reject(new Error(`waited in vain; last: ${JSON.stringify(this.last?.state)}`)), seconds * 1000);
-      this.waiting.push(message => {
-        if (!is(message)) return false;
-        clearTimeout(timer);
-        resolve(message);
-        return true;
-      });
-    });
-  }
-  async opened() {
-    return this.until(message => message.type === 'opened');
+    Object.assign(this, {log, messages, blocks: () => blocks});
   }
   async settle({eye, direction, error}) {
-    const serial = ++this.serial;
-    const done = this.until(message => message.type === 'frame' && message.serial === serial && message.state.settled);
-    this.worker.tell({type: 'view', serial, camera: {eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error}});
-    return (await done).state;
+    return (await this.view({eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error})).state;
   }
   async hash() {
     const done = this.until(message => message.type === 'hashed');
@@ -72,7 +46,7 @@ for (const name of ['alps', 'flat', 'cloud']) {
   test(`a flight over ${name} gives the hashes of the native run`, async () => {
     const flight = sites.flight(name);
     assert.ok(new Set(flight.map(stop => stop.hash)).size >= 4, 'the flight does not change what is shown');
-    const flyer = new Flyer(name);
+    const flyer = new Tested(name);
     const {scene} = await flyer.opened();
     assert.equal(scene.triangles, name !== 'cloud');
     for (const [i, stop] of flight.entries()) {
@@ -80,7 +54,7 @@ for (const name of ['alps', 'flat', 'cloud']) {
       assert.deepEqual([i, state.points, state.expanded], [i, stop.points, stop.expanded]);
       assert.equal(await flyer.hash(), stop.hash, `stop ${i}`);
     }
-    assert.ok(flyer.blocks > 0);
+    assert.ok(flyer.blocks() > 0);
     // Ranges of the store's files, none of them twice, and nothing but the viewer and the start file whole.
     const seen = new Set();
     for (const {path, range} of flyer.log) {
@@ -96,7 +70,7 @@ for (const name of ['alps', 'flat', 'cloud']) {
 }
 
 test('the first picture needs the start file alone', async () => {
-  const flyer = new Flyer('alps');
+  const flyer = new Tested('alps');
   await flyer.opened();
   assert.deepEqual(flyer.log.map(request => request.path), ['/core.wasm', '/stores/alps.start']);
   const start = readFileSync(join(sites.site, 'stores', 'alps.start')).length;
@@ -123,7 +97,7 @@ const FAULTS = {
 for (const [name, [expected, spoil]] of Object.entries(FAULTS)) {
   test(`${name}: a message, no wrong picture, and a retry that helps`, async () => {
     let bad = true;
-    const flyer = new Flyer('alps', {fault: (request, response) => bad && request.range ? spoil(response) : response});
+    const flyer = new Tested('alps', {fault: (request, response) => bad && request.range ? spoil(response) : response});
     await flyer.opened();
     const failed = flyer.failed();
     const settled = flyer.settle(CLOSE);
@@ -132,7 +106,7 @@ for (const [name, [expected, spoil]] of Object.entries(FAULTS)) {
     bad = false;
     flyer.worker.tell({type: 'retry'});
     await settled;
-    const fine = new Flyer('alps');
+    const fine = new Tested('alps');
     await fine.opened();
     await fine.settle(CLOSE);
     assert.equal(await flyer.hash(), await fine.hash());
@@ -142,7 +116,7 @@ for (const [name, [expected, spoil]] of Object.entries(FAULTS)) {
 test('one short body or damaged part is fetched again without a word', async () => {
   for (const spoil of [FAULTS['a short body'][1], FAULTS['damaged bytes'][1], FAULTS['a broken server'][1]]) {
     let left = 1;
-    const flyer = new Flyer('alps', {fault: (request, response) => request.range && left-- > 0 ? spoil(response) : response});
+    const flyer = new Tested('alps', {fault: (request, response) => request.range && left-- > 0 ? spoil(response) : response});
     await flyer.opened();
     await flyer.settle(CLOSE);
     assert.ok(!flyer.messages.includes('failed'));
@@ -155,7 +129,7 @@ test('a start file that is missing or damaged', async () => {
            [/start file.*damaged/, response => ({...response, body: response.body.subarray(0, -1)})],
            [/start file.*damaged/, response => ({...response, body: Buffer.from('<html>')})]]) {
     let bad = true;
-    const flyer = new Flyer('alps', {fault: (request, response) => bad && request.path.endsWith('.start') ? spoil(response) : response});
+    const flyer = new Tested('alps', {fault: (request, response) => bad && request.path.endsWith('.start') ? spoil(response) : response});
     assert.match(await flyer.failed(), expected);
     bad = false;
     const opened = flyer.opened();

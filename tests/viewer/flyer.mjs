@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drives the viewer's worker: sends views, waits for answers, flies. Imports nothing, so that it runs in node and in a page.
+
+/// A worker with its answers to wait for.
+export class Flyer {
+  /// connect(heard): starts worker.js, returns {tell(message)}; heard takes what it says. base: the URL of a published
+  /// folder. name: of a store in it.
+  constructor(connect, base, name, {maxPoints = 1_500_000, heard = () => {}} = {}) {
+    this.serial = 0;
+    this.waiting = [];
+    this.last = null;  ///< frame
+    this.worker = connect(message => {
+      if (message.type === 'frame') this.last = message;
+      heard(message);
+      this.waiting = this.waiting.filter(wait => !wait(message));
+    });
+    this.worker.tell({
+      type: 'open',
+      wasm: `${base}core.wasm`,
+      store: `${base}stores/${name}/`,
+      start: `${base}stores/${name}.start`,
+      maxPoints
+    });
+  }
+  /// The next message that fits.
+  until(fits, seconds = 120) {
+    return new Promise((resolve, reject) => {
+      const timer =
+          setTimeout(() => reject(new Error(`waited in vain; last: ${JSON.stringify(this.last?.state)}`)), seconds * 1000);
+      this.waiting.push(message => {
+        if (!fits(message)) return false;
+        clearTimeout(timer);
+        resolve(message);
+        return true;
+      });
+    });
+  }
+  opened() {
+    return this.until(message => message.type === 'opened');
+  }
+  /// Sends a view and waits for its first frame, or for the one after which nothing changes any more.
+  view(camera, settled = true) {
+    const serial = ++this.serial;
+    const done = this.until(m => m.type === 'frame' && m.serial === serial && (!settled || m.state.settled));
+    this.worker.tell({type: 'view', serial, camera});
+    return done;
+  }
+}
+
+const FOV = 45;
+const HALF = Math.tan(FOV / 2 * Math.PI / 180);
+const picture = {fov: FOV, aspect: 1.6, height: 1000, up: [0, 1, 0]};
+const sizeOf = box => Math.hypot(box[3] - box[0], box[4] - box[1]);
+const middleOf = box => [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2];
+
+/// Level flight over the middle, looking ahead and down, there and back, each frame 1 % of the picture's width further,
+/// with so small an error that some `points` are kept. Returns the milliseconds of the worker's frames, the mean number
+/// of points, and the error in pixels.
+export async function cruise(connect, base, name, points, frames) {
+  let recorded = false;
+  const milliseconds = [];
+  const flyer = new Flyer(connect, base, name, {
+    heard: message => {
+      if (recorded && message.type === 'frame') milliseconds.push(message.milliseconds);
+    }
+  });
+  const {scene: {box}} = await flyer.opened();
+  const size = sizeOf(box), middle = middleOf(box);
+  const view = (share, error) => ({
+    ...picture,
+    eye: [middle[0] + share * size, middle[1] - 0.12 * size, box[5] + 0.12 * size],
+    direction: [0, Math.SQRT1_2, -Math.SQRT1_2],
+    error
+  });
+  let error = 64, there = 0;
+  while (there < points && error > 0.25) {
+    error /= 1.05;
+    there = (await flyer.view(view(-0.2, error))).state.points;
+  }
+  recorded = true;
+  let mean = 0;
+  const step = 0.01 * 1.6 * 0.24 * HALF;
+  for (let i = 0; i < frames; ++i) {
+    const steps = Math.min(i % 400, 400 - i % 400);
+    mean += (await flyer.view(view(-0.2 + step * steps, error), false)).state.points / frames;
+  }
+  return {milliseconds, points: Math.round(mean), error};
+}
+
+/// From above the whole down to full detail of 1 % of the area in 60 frames. Returns the last frame.
+export async function dive(connect, base, name) {
+  const flyer = new Flyer(connect, base, name);
+  const {scene: {box}} = await flyer.opened();
+  const middle = middleOf(box), from = 1.2 * sizeOf(box), to = 0.1 * (box[4] - box[1]) / (2 * HALF);
+  for (let i = 0; i <= 60; ++i) {
+    const above = from * (to / from) ** (i / 60);
+    await flyer.view(
+        {...picture, eye: [...middle, box[5] + above], direction: [0, 0, -1], error: i < 60 ? 4 : 0.01}, i === 60);
+  }
+  const {state, stats} = flyer.last;
+  return {state, stats};
+}
