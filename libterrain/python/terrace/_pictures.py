@@ -38,11 +38,11 @@ def grey_png(values):
     return png(scaled)
 
 
-def triangles_svg(xy, triangles, shade=None):
-    """Triangles seen from above; shade: from 0 to 1, one per triangle. Of very many, every so manieth."""
+def triangles_svg(xy, triangles, shade=None, most=MOST_TRIANGLES):
+    """Triangles seen from above; shade: from 0 to 1, one per triangle. If there are more than `most`, only some of them."""
     if len(triangles) == 0:
         return '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
-    step = -(-len(triangles) // MOST_TRIANGLES)
+    step = -(-len(triangles) // most)
     corners = xy[triangles[::step]]
     low, high = np.nanmin(corners, axis=(0, 1)), np.nanmax(corners, axis=(0, 1))
     scale = MOST_PIXELS / max(*(high - low), 1e-300)

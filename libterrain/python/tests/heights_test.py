@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Heights, gradients, rasters, profiles and contours, against SciPy, laws and the function sampled."""
 
+import logging
 import math
 import os
 import re
@@ -152,6 +153,26 @@ class Lines(StoreCase):
             heights = self.raster.heights(feature['geometry']['coordinates'], crs='EPSG:4326')
             # On the rim rounding may lead outside.
             np.testing.assert_allclose(heights[~np.isnan(heights)], elev, rtol=0, atol=1e-3)
+
+    def test_contours_in_the_stores_own_coordinates(self):
+        def heights_on(store, lines):
+            for line in lines['features']:
+                heights = store.heights(line['geometry']['coordinates'])
+                np.testing.assert_allclose(heights[~np.isnan(heights)], line['properties']['elev'], rtol=0, atol=1e-4)
+
+        known = self.raster.contours(20, lonlat=False)
+        heights_on(self.raster, known)
+        unknown = terrace.build(self.samples, self.path('no-crs'), transform=TRANSFORM)
+        with self.assertLogs('terrace', logging.INFO):
+            self.assertEqual(unknown.contours(20), known)
+        with self.assertRaisesRegex(terrace.Error, 'no CRS'):
+            unknown.contours(20, lonlat=True)
+        # A datum from which nothing leads to WGS 84.
+        datum = ('PROJCS["site",GEOGCS["site",DATUM["site",SPHEROID["ball",6370000,0]],PRIMEM["Greenwich",0],'
+                 'UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],'
+                 'PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],UNIT["metre",1]]')
+        apart = terrace.build(self.samples, self.path('apart'), transform=TRANSFORM, crs=datum)
+        self.assertEqual(len(apart.contours(20)['features']), len(known['features']))
 
     def test_contours_are_shapelys_too(self):
         try:

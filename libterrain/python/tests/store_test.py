@@ -3,6 +3,7 @@
 
 import errno
 import os
+import subprocess
 import threading
 import time
 import unittest
@@ -10,7 +11,7 @@ import unittest
 import numpy as np
 
 import terrace
-from python_case import ALPS, TRANSFORM, StoreCase, cell_centres, cloud, hills, sorted_rows
+from python_case import ALPS, COMMAND, TRANSFORM, StoreCase, cell_centres, cloud, hills, sorted_rows
 
 
 class Stores(StoreCase):
@@ -64,6 +65,24 @@ class Stores(StoreCase):
         focused = self.scan.points(level=self.scan.top, focus=[(box, 0)])
         self.assertGreaterEqual(len(focused), inside.sum())
         self.assertLess(len(focused), len(self.points))
+
+    def test_clusters(self):
+        level = self.scan.info['levels'][1]
+        parts = [self.scan.points(cluster=(1, number), level=0) for number in range(level['clusters'])]
+        np.testing.assert_array_equal(sorted_rows(terrace.xyz(np.concatenate(parts))), sorted_rows(self.points))
+        one = self.scan.points(cluster=(1, 0), where='class == 3')
+        self.assertTrue((one['class'] == 3).all())
+        if COMMAND:
+            name = self.path('cluster.ply')
+            subprocess.run([COMMAND, 'points', self.path('cloud'), '--cluster', '1:0', '-o', name, '-q'], check=True)
+            theirs = terrace.build(name, self.path('cluster')).points()
+            np.testing.assert_array_equal(sorted_rows(terrace.xyz(theirs)),
+                                          sorted_rows(terrace.xyz(self.scan.points(cluster=(1, 0)))))
+        for wrong in ((99, 0), (0, 10 ** 9), (0, 2 ** 60), (1,), (1, -1)):
+            with self.assertRaises(ValueError):
+                self.scan.points(cluster=wrong)
+        with self.assertRaises(ValueError):
+            self.scan.points(cluster=(1, 0), region=(0, 0, 1, 1))
 
     def test_nearest(self):
         place = (300500.0, 5200400.0)

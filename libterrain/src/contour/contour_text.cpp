@@ -18,21 +18,21 @@ namespace terrace::terrain {
 namespace {
 
 /// Nine decimals of a degree are a tenth of a millimetre.
-constexpr int kDecimals = 9;
+constexpr int kDecimals = 9, kOwnDecimals = 6;
 /// Points turned into text at a time.
 constexpr std::size_t kContourPoints = std::size_t{1} << 17;
 
 }  // namespace
 
-ContourText::ContourText(const stream::Store& store, double interval, unsigned threads,
-                         std::function<void(std::string_view)> write)
+ContourText::ContourText(const stream::Store& store, const ContourRequest& request,
+                         unsigned threads, std::function<void(std::string_view)> write)
     : file_(store.path().string()),
-      system_(system_of(store)),
       ground_(store),
-      interval_(interval),
+      interval_(request.interval),
       threads_(std::max(1U, threads)),
       write_(std::move(write)),
-      degrees_(kDecimals) {
+      number_(request.own_crs ? kOwnDecimals : kDecimals) {
+  if (!request.own_crs) system_ = system_of(store);
   const std::array<double, 6>& m = store.schema().world.xy;
   reverse_ = m[0] * m[4] - m[1] * m[3] > 0;
 }
@@ -51,14 +51,14 @@ void ContourText::append(std::string& text, const ContourLine& line,
   places.clear();
   for (const Point2& p : line.points) places.push_back(ground_.world(p));
   if (reverse_) std::reverse(places.begin(), places.end());
-  system_.to_geographic(places);
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  if (system_) system_->to_geographic(places);
+  for (std::size_t i = 0; system_ && i < places.size(); ++i) {
     if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
     throw stream::Error({.file = file_,
                          .where = {},
                          .cause = number_text(at[0]) + ',' + number_text(at[1]) +
-                                  " has no longitude and latitude in " + system_.title(),
+                                  " has no longitude and latitude in " + system_->title(),
                          .remedy = "build the store with the right `crs`, or leave the "
                                    "place out with `region`"});
   }
@@ -67,9 +67,9 @@ void ContourText::append(std::string& text, const ContourLine& line,
           "},\"geometry\":{\"type\":\"LineString\",\"coordinates\":[";
   for (std::size_t i = 0; i < places.size(); ++i) {
     text += i == 0 ? "[" : ",[";
-    degrees_.append(text, places[i][0]);
+    number_.append(text, places[i][0]);
     text += ',';
-    degrees_.append(text, places[i][1]);
+    number_.append(text, places[i][1]);
     text += ']';
   }
   text += "]}}";
