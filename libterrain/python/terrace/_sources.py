@@ -114,14 +114,19 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         if crs is None and hasattr(header, 'parse_crs'):
             crs = header.parse_crs()
         return _structured(given.points.array, '<laspy>', header.scales, header.offsets), crs_text(crs)
-    if hasattr(given, 'read') and hasattr(given, 'transform') and hasattr(given, 'nodata'):  # rasterio's datasets
-        samples = as_array(given.read(1), 'the raster')
-        nodata = given.nodata if nodata is None else nodata
-        crs = crs if crs is not None else getattr(given, 'crs', None)
-        return _raster(samples, transform or given.transform, nodata, getattr(given, 'name', '<raster>')), crs_text(crs)
     if hasattr(given, 'dims') and hasattr(given, 'coords') and hasattr(given, 'values'):  # xarray.DataArray
         transform, crs, nodata = _xarray(given, transform, crs, nodata)
         return _raster(np.asarray(given.values), transform, nodata, '<xarray>'), crs_text(crs)
+    if hasattr(given, 'GetGeoTransform'):  # gdal.Dataset
+        band = given.GetRasterBand(1)
+        c, a, b, f, d, e = given.GetGeoTransform()
+        return _raster(band.ReadAsArray(), (a, b, c, d, e, f) if transform is None else transform, band.GetNoDataValue() if nodata is None else nodata,
+                       '<gdal>', band.GetScale() or 1.0, band.GetOffset() or 0.0), crs_text(crs or given.GetProjection())
+    if hasattr(given, 'transform'):  # a dataset of rasterio's, a Raster, or another array with an affine transform
+        samples = given.read(1) if hasattr(given, 'read') else given
+        nodata = getattr(given, 'nodata', None) if nodata is None else nodata
+        return (_raster(as_array(samples, 'the raster'), given.transform if transform is None else transform, nodata, '<raster>'),
+                crs_text(crs or getattr(given, 'crs', None)))
     if isinstance(given, dict):
         wrong = [axis for axis in 'xyz' if axis not in given]
         if wrong:

@@ -73,7 +73,8 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f from
       columns and rows of corners to x and y, as rasterio's) and ``nodata``. An array of three columns is a
       raster if ``transform`` is given;
-    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio;
+    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio or GDAL, a Raster, any array
+      with ``transform`` (and ``crs``, ``nodata``);
     - anything else with numpy's array interface, the buffer protocol or DLPack.
 
     Arrays are read in place. Coordinates that are not finite are refused; samples that are not are nodata.

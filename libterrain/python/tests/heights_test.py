@@ -146,6 +146,7 @@ class Lines(StoreCase):
     def test_contours_lie_at_their_height(self):
         lines = self.raster.contours(20)
         self.assertEqual(lines.__geo_interface__['type'], 'FeatureCollection')
+        self.assertEqual(lines._repr_svg_().count('<polyline'), len(lines['features']))
         self.assertGreater(len(lines['features']), 5)
         for feature in lines['features']:
             elev = feature['properties']['elev']
@@ -184,13 +185,30 @@ class Lines(StoreCase):
             self.assertTrue(shape(feature['geometry']).is_valid)
         area = shape(self.scan)
         self.assertAlmostEqual(area.area, 1000 * 800, delta=1000)
-        part = area.buffer(-200)
-        self.assertEqual(len(self.scan.points(region=part)),
-                         sum(part.contains(point) or part.touches(point) for point in self.shapely_points()))
+        mesh = shape(self.scan.bounded_mesh(5))
+        self.assertAlmostEqual(sum(triangle.area for triangle in mesh.geoms), area.area, delta=1000)
 
-    def shapely_points(self):
-        from shapely.geometry import Point
-        return [Point(*xy) for xy in self.points[:, :2]]
+    def test_points_in_polygons_are_shapelys(self):
+        try:
+            from hypothesis import given, settings, strategies as st
+            from shapely.geometry import MultiPoint, Polygon
+        except ImportError as missing:
+            self.skipTest(f'{missing.name} is missing')
+        few = self.points[:2000]
+        store = terrace.build(few, self.path('few'), crs='EPSG:32632', block_points=200)
+        points = MultiPoint(few[:, :2])
+
+        @settings(max_examples=50, deadline=None, derandomize=True)
+        @given(st.lists(st.floats(50, 600), min_size=3, max_size=30), st.floats(0.1, 0.9), st.floats(0, 1000), st.floats(0, 800))
+        def check(radii, inner, x, y):
+            angles = np.linspace(0, 2 * np.pi, len(radii), endpoint=False)
+            ring = np.asarray(radii)[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+            middle = few[:, :2].min(axis=0) + (x, y)
+            star = Polygon(ring + middle, [ring * inner + middle])
+            inside = points.intersection(star)
+            self.assertEqual(len(store.points(region=star)), len(getattr(inside, 'geoms', () if inside.is_empty else (inside,))))
+
+        check()
 
 
 class RealTerrain(unittest.TestCase):

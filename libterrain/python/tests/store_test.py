@@ -272,6 +272,24 @@ class Sources(StoreCase):
                 return self.samples if band == 1 else None
 
         self.assert_same(Dataset(), self.raster)
+
+        class Affine:
+            __array_interface__ = self.samples.__array_interface__
+            transform, crs = TRANSFORM, 'EPSG:32632'
+
+        self.assert_same(Affine(), self.raster)
+        self.assert_same(terrace.Raster(self.samples, TRANSFORM, 'EPSG:32632'), self.raster)
+
+        class Band:
+            GetNoDataValue = GetScale = GetOffset = lambda _: None
+            ReadAsArray = lambda _: self.samples  # noqa: E731
+
+        class Gdal:
+            GetGeoTransform = lambda _: (500000, 10, 0, 5000000, 0, -10)  # noqa: E731
+            GetProjection = lambda _: 'EPSG:32632'  # noqa: E731
+            GetRasterBand = lambda _, band: Band()  # noqa: E731
+
+        self.assert_same(Gdal(), self.raster)
         with_holes = self.samples.copy()
         with_holes[20:40, 30:60] = -9999
         store = self.built(with_holes, nodata=-9999, **options)
