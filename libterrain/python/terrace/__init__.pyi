@@ -121,6 +121,8 @@ class Store:
     def mesh(self, level: int | None = ..., region: _Region | None = ..., *, focus: Iterable[tuple[_Region, int]] = ...,
              where: str | None = ..., metric: str = ..., crs: _Crs | None = ..., max_points: int | None = ...,
              progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Mesh: ...
+    def surface(self, level: int = ..., region: _Region | None = ..., where: str | None = ..., *,
+                progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Mesh: ...
     def bounded_mesh(self, max_error: float | None = ..., *, max_points: int | None = ..., quality: _Quality = ...,
                      duplicates: Literal['all', 'min', 'max', 'mean', 'first', 'error'] = ...,
                      fill: Literal['none', 'flat', 'interpolate'] = ..., region: _Region | None = ...,
@@ -208,7 +210,7 @@ class Clusters:
     def __init__(self, facilities: npt.NDArray[np.uint32], labels: _Indices, opening_cost: float, connection_cost: float,
                  outlier_cost: float, lower_bound: float) -> None: ...
 
-def cluster(points: _Array, facility_cost: float = ..., *,
+def cluster(points: _Array, facility_cost: float = ..., *, count: int | None = ...,
             method: Literal['fast', 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities',
                             'interchange', 'jain-vazirani', 'greedy-stars'] = ...,
             effort: _Effort = ..., metric: str = ..., weights: _Array | None = ..., outlier_price: float = ...,

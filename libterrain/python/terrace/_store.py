@@ -68,8 +68,8 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     a mosaic), or what is in memory:
 
     - an array of shape (n, 3): points, with ``attributes`` (a dict of columns) beside them;
-    - a structured array with fields x, y, z (or LAS's X, Y, Z) and further ones, a dict of columns, a
-      ``laspy.LasData``;
+    - a structured array with fields x, y, z (or X, Y, Z) and further ones, a dict of columns, a ``laspy.LasData`` or its
+      ``points``, also part of them;
     - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f from
       columns and rows of corners to x and y, as rasterio's) and ``nodata``. An array of three columns is a
       raster if ``transform`` is given;
@@ -335,6 +335,15 @@ class Store:
             raise ValueError('mesh() takes either `level` or `max_points`')
         return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
                                 metric, (crs_text(crs) or ''), job(progress, threads, memory)))
+
+    def surface(self, level=0, region=None, where=None, *, progress=None, threads=None, memory=None):
+        """The surface that a scan was taken from: of any shape, in space, through its points. All in memory.
+
+        level, region, where: as points(). Returns: a Mesh, whose triangles are counter-clockwise seen from outside. Where
+        the scan does not go all round, the surface is open. Source: J. Skala, section 8.3.
+        """
+        return Mesh(*_core.surface(self._core, whole(level, 'level'), as_region(region), where or '',
+                                   job(progress, threads, memory)))
 
     def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
                      region=None, where=None, path=None, replace=False, progress=None, threads=None, memory=None):
