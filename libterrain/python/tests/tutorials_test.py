@@ -35,7 +35,7 @@ def run(name):
                 last = cell.strip().splitlines()[-1] if cell.strip() else ''
                 if re.match(r'[a-z_]+ *(#.*)?$', last):
                     shown = eval(last, names)
-                    pictures += '<polygon' in shown._repr_svg_()
+                    pictures += '<poly' in shown._repr_svg_()
             files = sorted(os.listdir('.'))
         finally:
             os.chdir(before)
@@ -50,8 +50,9 @@ class Tutorials(unittest.TestCase):
         self.assertEqual(pictures, 1)
 
     def test_lidar(self):
-        printed, files, _ = run('lidar.py')
+        printed, files, pictures = run('lidar.py')
         self.assertIn('150000 points', printed)
+        self.assertEqual(pictures, 2)
         self.assertEqual(files, ['ground.store', 'ground.tif', 'scan.store'])
 
     def test_clustering(self):
