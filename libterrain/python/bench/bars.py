@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the module with the packages that its users know, in one run.
 
-bars.py [HEIGHTS_SECONDS]   the C++ program built beside this module; PYTHONPATH names the module
+bars.py HEIGHTS_SECONDS [WORD...]   the C++ program built beside this module; rows that have one of the words.
+PYTHONPATH names the module.
 
 Each row: what, ours with all cores, ours with one thread, theirs, all in seconds (the least of some runs), and how
 many times faster we are with all cores. A package that is missing is named and left out.
@@ -44,20 +45,16 @@ def limited(work, limit):
     return time.perf_counter() - begin, late
 
 
-def row(what, ours, one, theirs, goal, late=False):
-    factor = theirs / ours
-    print(f'{what:58} {ours:9.3f} {one if one is None else format(one, "9.3f")!s:>9} '
-          f'{">" if late else " "}{theirs:9.3f} {">" if late else " "}{factor:8.1f} x   goal {goal}', flush=True)
-
-
 def bar(what, needs, goal, run):
     try:
-        for name in needs:
-            __import__(name)
+        __import__(needs)
     except ImportError as missing:
         print(f'{what}: {missing.name} is missing')
         return
-    row(what, *run(), goal=goal)
+    ours, one, theirs, *late = run()
+    mark = '>' if any(late) else ' '
+    print(f'{what:58} {ours:9.3f} {"" if one is None else format(one, ".3f"):>9} {mark}{theirs:9.3f} {mark}{theirs / ours:8.1f} x   '
+          f'goal {goal}', flush=True)
 
 
 def heights(program):
@@ -120,7 +117,7 @@ def matching():
         networkx.min_weight_matching(graph)
 
     lasted, late = limited(theirs, 60)
-    return (seconds(lambda: terrace.matching(points)), seconds(lambda: terrace.matching(points, threads=1)), lasted), late
+    return (seconds(lambda: terrace.matching(points)), seconds(lambda: terrace.matching(points, threads=1)), lasted, late)
 
 
 def delaunay(kind, count, width):
@@ -161,25 +158,25 @@ def processor():
 def main():
     print(f'{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}')
     print(f'{"":58} {"ours":>9} {"1 thread":>9}  {"theirs":>9}  {"":8}')
-    if len(sys.argv) > 1:
-        row('heights, 1 M places of 4 M samples: C++', *heights(sys.argv[1]), goal='0.9')
-    bar('heights, 1 M places in 1 M points, all in: SciPy', ['scipy'], '10', cloud)
-    bar('linkage, single, 10,000 points: fastcluster', ['fastcluster'], '3', lambda: linkage('single'))
-    bar('linkage, complete, 10,000 points: fastcluster', ['fastcluster'], '3', lambda: linkage('complete'))
-    try:
-        times, late = matching()
-        row('matching, 2,000 points: networkx (60 s at most)', *times, goal='100', late=late)
-    except ImportError:
-        print('matching: networkx is missing')
-    bar('Delaunay2, 1 M points: SciPy', ['scipy'], '5', lambda: delaunay(terrace.Delaunay2, 1_000_000, 2))
-    bar('Delaunay3, 200,000 points: SciPy', ['scipy'], '-', lambda: delaunay(terrace.Delaunay3, 200_000, 3))
-    bar('kmeans, 200,000 points, k = 100, 100 rounds: scikit-learn', ['sklearn'], '5', k_means)
-    bar('assignment, 4,000 x 4,000, uniform costs: SciPy', ['scipy'], '2', lambda: assignment(4000, False))
-    bar('assignment, 4,000 x 4,000, distances: SciPy', ['scipy'], '2', lambda: assignment(4000, True))
-    code = 'import numpy, time; t = time.perf_counter(); import terrace; print(time.perf_counter() - t)'
-    imported = min(float(subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, check=True).stdout)
-                   for _ in range(5))
-    print(f'import terrace, after numpy: {imported:.3f} s   goal 0.2 with numpy')
+    program, words = sys.argv[1], sys.argv[2:]
+    for what, needs, goal, run in (
+            ('heights, 1 M places of 4 M samples: C++', 'numpy', '0.9', lambda: heights(program)),
+            ('heights, 1 M places in 1 M points, all in: SciPy', 'scipy', '10', cloud),
+            ('linkage, single, 10,000 points: fastcluster', 'fastcluster', '3', lambda: linkage('single')),
+            ('linkage, complete, 10,000 points: fastcluster', 'fastcluster', '3', lambda: linkage('complete')),
+            ('matching, 2,000 points: networkx (60 s at most)', 'networkx', '100', matching),
+            ('Delaunay2, 1 M points: SciPy', 'scipy', '5', lambda: delaunay(terrace.Delaunay2, 1_000_000, 2)),
+            ('Delaunay3, 200,000 points: SciPy', 'scipy', '-', lambda: delaunay(terrace.Delaunay3, 200_000, 3)),
+            ('kmeans, 200,000 points, k = 100, 100 rounds: scikit-learn', 'sklearn', '5', k_means),
+            ('assignment, 4,000 x 4,000, uniform costs: SciPy', 'scipy', '2', lambda: assignment(4000, False)),
+            ('assignment, 4,000 x 4,000, distances: SciPy', 'scipy', '2', lambda: assignment(4000, True))):
+        if not words or any(word in what for word in words):
+            bar(what, needs, goal, run)
+    for before, what in (('time', "numpy's included"), ('numpy, time', "after numpy's")):
+        code = f'import {before}; t = time.perf_counter(); import terrace; print(time.perf_counter() - t)'
+        imported = min(float(subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, check=True).stdout)
+                       for _ in range(5))
+        print(f'import terrace, {what}: {imported:.3f} s   goal 0.2')
 
 
 if __name__ == '__main__':

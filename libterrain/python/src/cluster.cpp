@@ -8,6 +8,7 @@
 #include <terrace/cluster/dendrogram.hpp>
 #include <terrace/cluster/facility_location.hpp>
 #include <terrace/cluster/k_means.hpp>
+#include <terrace/cluster/k_median.hpp>
 #include <terrace/cluster/linkage.hpp>
 #include <terrace/terrain/metric_choice.hpp>
 
@@ -129,10 +130,12 @@ cluster::Effort effort_named(const std::string& name) {
 }
 
 /// (facilities, labels, opening, connection and outlier cost, lower bound); -1: an outlier.
+/// count: exactly so many facilities, which cost nothing.
 py::tuple facility_location(const Array<double>& given, double facility_cost,
-                            const std::string& method, const std::string& effort,
-                            const std::string& metric, const Array<double>& weights,
-                            double outlier_price, std::uint64_t seed, unsigned threads) {
+                            std::optional<std::size_t> count, const std::string& method,
+                            const std::string& effort, const std::string& metric,
+                            const Array<double>& weights, double outlier_price, std::uint64_t seed,
+                            unsigned threads) {
   const std::vector<cluster::Point3> points = points_of(given);
   const cluster::FacilityPoints problem{
       .points = points,
@@ -144,7 +147,11 @@ py::tuple facility_location(const Array<double>& given, double facility_cost,
                                          .effort = effort_named(effort),
                                          .seed = seed,
                                          .threads = all_or(threads)};
-  cluster::FacilitySolution made = released([&] { return solve(problem, options); });
+  cluster::FacilitySolution made = released([&] {
+    if (!count) return solve(problem, options);
+    return k_median(problem, *count,
+                    {.restarts = 1, .bound_steps = 0, .seed = seed, .threads = options.threads});
+  });
   return py::make_tuple(to_array(std::move(made.facilities)),
                         with_nobody(made.assignment, cluster::kOutlier), made.opening_cost,
                         made.connection_cost, made.outlier_cost, made.lower_bound);

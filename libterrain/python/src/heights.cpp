@@ -82,19 +82,30 @@ py::array profile(const OpenStore& open, const Array<double>& line, std::optiona
   }));
 }
 
-py::str contours(const OpenStore& open, double interval, unsigned level,
-                 std::optional<double> max_edge, const py::object& region, const py::tuple& how) {
+bool reaches_wgs84(const stream::Store& store) {
+  const stream::StoreSchema& schema = store.schema();
+  const auto system = terrain::CoordinateSystem::of(schema.crs, store.path().string());
+  return system && system->over(world_box(schema, store.bounds())).reaches_wgs84();
+}
+
+/// (GeoJSON, whether it is in the store's own CRS)
+py::tuple contours(const OpenStore& open, double interval, unsigned level,
+                   std::optional<double> max_edge, const py::object& region,
+                   std::optional<bool> lonlat, const py::tuple& how) {
   const stream::Store store = open.get();
   if (!(interval > 0)) throw py::value_error("`interval` must be above 0");
-  const terrain::ContourRequest request{
-      .interval = interval, .level = level, .max_edge = max_edge, .region = region_of(region)};
+  const terrain::ContourRequest request{.interval = interval,
+                                        .level = level,
+                                        .max_edge = max_edge,
+                                        .region = region_of(region),
+                                        .own_crs = !(lonlat ? *lonlat : reaches_wgs84(store))};
   const std::string text = Job(how).run([&](const terrain::Context& context) {
     std::string lines;
     write_contours(
         store, request, [&](std::string_view more) { lines += more; }, context);
     return lines;
   });
-  return text;
+  return py::make_tuple(text, request.own_crs);
 }
 
 void write_raster(const OpenStore& open, const std::string& path, const std::string& value,

@@ -6,6 +6,7 @@
 #include <terrace/stream/mesh_reader.hpp>
 #include <terrace/terrain/bounded_mesh.hpp>
 #include <terrace/terrain/detail_mesh.hpp>
+#include <terrace/terrain/scan_surface.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -36,6 +37,15 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
       places(made.positions);
     }
     return made;
+  }));
+}
+
+py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
+                  const std::string& where, const py::tuple& how) {
+  const stream::Store store = open.get();
+  const terrain::Detail detail = detail_of(store, level, region, py::list(), where);
+  return arrays_of(Job(how).run([&](const terrain::Context& context) {
+    return scan_surface(store, detail, {}, context).mesh;
   }));
 }
 
@@ -81,6 +91,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
 
 void bind_mesh(py::module_& module) {
   module.def("mesh", &mesh);
+  module.def("surface", &surface);
   module.def("bounded_mesh", &bounded_mesh);
   module.def("read_mesh", [](const std::string& path) {
     auto file = released([&] { return stream::read_mesh(path); });

@@ -83,16 +83,23 @@ void append(std::vector<std::byte>& to, std::span<const double> numbers,
 }
 
 py::array points(const OpenStore& open, unsigned level, const py::object& region,
-                 const py::list& focuses, const std::string& where, const std::string& crs,
+                 const py::list& focuses, const std::string& where,
+                 std::optional<std::pair<unsigned, std::uint64_t>> cluster, const std::string& crs,
                  const py::tuple& how) {
   const stream::Store store = open.get();
-  const terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  if (cluster) {
+    if (cluster->first > store.top() || cluster->second >> 56 != 0) {
+      throw py::value_error("the store has no such cluster");
+    }
+    detail.cluster = stream::cluster_id(cluster->first, cluster->second);
+  }
   const std::size_t payload = store.schema().payload_size();
   std::vector<std::byte> records = Job(how).run([&](const terrain::Context& context) {
     const auto to = change_to(store, crs);
     std::vector<std::byte> bytes;
     // Known beforehand where everything is wanted.
-    if (!detail.region && detail.focuses.empty() && !detail.where) {
+    if (!detail.region && detail.focuses.empty() && !detail.cluster && !detail.where) {
       bytes.reserve(store.levels()[level].points * (sizeof(stream::Point3) + payload));
     }
     for_each_wanted_point(store.with_stop(context.stop), detail,

@@ -98,8 +98,8 @@ class Store:
     @property
     def __geo_interface__(self) -> dict[str, Any]: ...
     def level_within(self, most_points: int) -> int: ...
-    def points(self, region: _Region | None = ..., level: int = ..., where: str | None = ..., *,
-               focus: Iterable[tuple[_Region, int]] = ..., crs: _Crs | None = ..., progress: _Progress | None = ...,
+    def points(self, region: _Region | None = ..., level: int | None = ..., where: str | None = ..., *,
+               focus: Iterable[tuple[_Region, int]] = ..., cluster: tuple[int, int] | None = ..., crs: _Crs | None = ..., progress: _Progress | None = ...,
                threads: int | None = ...) -> npt.NDArray[Any]: ...
     def query(self, *, box: Sequence[float] | None = ..., near: Sequence[float] | None = ..., k: int | None = ...,
               radius: float | None = ..., level: int = ...) -> npt.NDArray[Any]: ...
@@ -116,11 +116,13 @@ class Store:
     def profile(self, line: _Array | _GeoInterface, step: float | None = ..., *, method: _Method = ..., level: int = ...,
                 max_edge: float | None = ..., progress: _Progress | None = ..., threads: int | None = ...) -> _Floats: ...
     def contours(self, interval: float, *, level: int = ..., max_edge: float | None = ..., region: _Region | None = ...,
-                 progress: _Progress | None = ..., threads: int | None = ...,
+                 lonlat: bool | None = ..., progress: _Progress | None = ..., threads: int | None = ...,
                  memory: int | None = ...) -> FeatureCollection: ...
     def mesh(self, level: int | None = ..., region: _Region | None = ..., *, focus: Iterable[tuple[_Region, int]] = ...,
              where: str | None = ..., metric: str = ..., crs: _Crs | None = ..., max_points: int | None = ...,
              progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Mesh: ...
+    def surface(self, level: int = ..., region: _Region | None = ..., where: str | None = ..., *,
+                progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Mesh: ...
     def bounded_mesh(self, max_error: float | None = ..., *, max_points: int | None = ..., quality: _Quality = ...,
                      duplicates: Literal['all', 'min', 'max', 'mean', 'first', 'error'] = ...,
                      fill: Literal['none', 'flat', 'interpolate'] = ..., region: _Region | None = ...,
@@ -208,7 +210,7 @@ class Clusters:
     def __init__(self, facilities: npt.NDArray[np.uint32], labels: _Indices, opening_cost: float, connection_cost: float,
                  outlier_cost: float, lower_bound: float) -> None: ...
 
-def cluster(points: _Array, facility_cost: float = ..., *,
+def cluster(points: _Array, facility_cost: float = ..., *, count: int | None = ...,
             method: Literal['fast', 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities',
                             'interchange', 'jain-vazirani', 'greedy-stars'] = ...,
             effort: _Effort = ..., metric: str = ..., weights: _Array | None = ..., outlier_price: float = ...,

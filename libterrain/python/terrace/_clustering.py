@@ -103,24 +103,26 @@ class Clusters:
         return f'<terrace.Clusters: {len(self.facilities)} clusters of {len(self.labels)} points, cost {self.cost:g}>'
 
 
-def cluster(points, facility_cost=1.0, *, method='fast', effort='default', metric='euclidean', weights=None,
+def cluster(points, facility_cost=1.0, *, count=None, method='fast', effort='default', metric='euclidean', weights=None,
             outlier_price=float('inf'), seed=1, threads=None):
-    """Facility location: clusters whose number is not given but costs.
+    """Facility location: clusters whose number is not given but costs; or, with ``count``, k-median: exactly so many.
 
     Each cluster costs ``facility_cost`` times the diagonal of the points' bounding box, each point its (weighted) distance
     to its cluster's representative, which is one of the points; the sum is minimised.
 
-    points: shape (n, 2) or (n, 3). method: 'fast' (not with outliers); the thesis's local searches 'automatic',
+    points: shape (n, 2) or (n, 3). count: in place of facility_cost, method and effort; O(n^2) for a round of exchanges.
+    method: 'fast' (not with outliers); the thesis's local searches 'automatic',
     'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities'; on the matrix of distances (8 n^2 bytes) 'interchange',
     'jain-vazirani', 'greedy-stars'. effort: 'fast', 'default', 'fine', 'full'. metric: 'euclidean', 'squared',
     'minkowski:P', 'elliptical:FILE'. outlier_price: what leaving a point out costs, times the diagonal.
 
-    Source: J. Skala, 4.2.3, 7.1, 7.3.
+    Sources: J. Skala, 4.2.3, 7.1, 7.3; of k-median L. O'Callaghan et al., 2002.
 
     >>> found = cluster([[0, 0], [0, 1], [9, 0], [9, 1]], facility_cost=0.2)
     >>> found.labels
     array([0, 0, 1, 1])
     """
-    return Clusters(*_core.facility_location(as_rows(points, 'points'), float(facility_cost), method, effort, metric,
+    count = None if count is None else whole(count, 'count', 1)
+    return Clusters(*_core.facility_location(as_rows(points, 'points'), float(facility_cost), count, method, effort, metric,
                                              _weights(weights), float(outlier_price), whole(seed, 'seed'),
                                              _threads(threads)))

@@ -7,6 +7,8 @@ import os
 
 import numpy as np
 
+from ._pictures import lines_svg
+
 
 class FeatureCollection(dict):
     """A GeoJSON FeatureCollection, as shapely, geopandas and others take it by ``__geo_interface__``."""
@@ -14,6 +16,9 @@ class FeatureCollection(dict):
     @property
     def __geo_interface__(self):
         return dict(self)
+
+    def _repr_svg_(self):
+        return lines_svg([line['geometry']['coordinates'] for line in self['features']])
 
     def __repr__(self):
         return f'<terrace.FeatureCollection of {len(self["features"])} features>'

@@ -24,13 +24,18 @@ class Mesh:
         return iter((self.vertices, self.triangles))
 
     def save(self, path, replace=False):
-        """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk. It is whole or not there."""
+        """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk, whole or not at all; or .svg, a picture from above."""
+        path = os.fspath(path)
+        if path.endswith('.svg'):
+            with open(path, 'w' if replace else 'x', encoding='ascii') as file:
+                file.write(self._svg(len(self.triangles)))
+            return
         triangles = as_array(self.triangles, 'triangles')
         if triangles.dtype.kind not in 'iu':
             raise TypeError(f'triangles are whole numbers, not {triangles.dtype}')
         if triangles.size and (triangles.min() < 0 or triangles.max() >= len(self.vertices)):
             raise ValueError('triangles have corners that are no vertices')
-        _core.write_mesh(os.fspath(path), as_rows(self.vertices, 'vertices', (3,)), triangles, bool(replace))
+        _core.write_mesh(path, as_rows(self.vertices, 'vertices', (3,)), triangles, bool(replace))
 
     def area(self):
         """Of the surface, in square units of its coordinates."""
@@ -47,8 +52,11 @@ class Mesh:
     def __repr__(self):
         return f'<terrace.{type(self).__name__}: {len(self.vertices)} vertices, {len(self.triangles)} triangles>'
 
+    def _svg(self, *most):
+        return triangles_svg(self.vertices[:, :2], self.triangles, light(self.vertices, self.triangles), *most)
+
     def _repr_svg_(self):
-        return triangles_svg(self.vertices[:, :2], self.triangles, light(self.vertices, self.triangles))
+        return self._svg()
 
 
 class BoundedMesh(Mesh):

@@ -38,24 +38,30 @@ def grey_png(values):
     return png(scaled)
 
 
-def triangles_svg(xy, triangles, shade=None):
-    """Triangles seen from above; shade: from 0 to 1, one per triangle. Of very many, every so manieth."""
-    if len(triangles) == 0:
-        return '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
-    step = -(-len(triangles) // MOST_TRIANGLES)
+def triangles_svg(xy, triangles, shade=None, most=MOST_TRIANGLES):
+    """Triangles seen from above; shade: from 0 to 1, one per triangle. If there are more than `most`, only some of them."""
+    step = max(1, -(-len(triangles) // most))
     corners = xy[triangles[::step]]
-    low, high = np.nanmin(corners, axis=(0, 1)), np.nanmax(corners, axis=(0, 1))
-    scale = MOST_PIXELS / max(*(high - low), 1e-300)
-    size = (high - low) * scale
-    places = (corners - low) * scale
-    places[..., 1] = size[1] - places[..., 1]
     tones = np.full(len(corners), 210) if shade is None else np.clip(60 + 190 * shade[::step], 0, 255)
-    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]:.0f}" height="{max(size[1], 1):.0f}" '
-             'stroke="#345" stroke-width="0.3" stroke-linejoin="round">']
-    for tone, three in zip(tones.astype(int), places):
-        path = ' '.join(f'{x:.1f},{y:.1f}' for x, y in three)
-        lines.append(f'<polygon points="{path}" fill="rgb({tone},{tone},{tone})"/>')
-    return '\n'.join(lines) + '\n</svg>'
+    return _svg(corners, [f'<polygon fill="rgb({tone},{tone},{tone})"' for tone in tones.astype(int)])
+
+
+def lines_svg(lines):
+    """Lines seen from above."""
+    return _svg([np.asarray(line)[:, :2] for line in lines], ['<polyline fill="none"'] * len(lines))
+
+
+def _svg(parts, begins):
+    """parts: places, shape (n, 2) each, of an element each. begins: how that begins."""
+    places = np.concatenate(parts) if len(parts) else np.zeros((1, 2))
+    low, size = np.nanmin(places, axis=0), np.ptp(places, axis=0)
+    scale = MOST_PIXELS / max(*size, 1e-300)
+    rows = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{max(size[0] * scale, 1):.0f}" height="{max(size[1] * scale, 1):.0f}" '
+            'stroke="#345" stroke-width="0.3" stroke-linejoin="round">']
+    for begin, part in zip(begins, parts):
+        path = ' '.join(f'{x:.1f},{y:.1f}' for x, y in (part - low) * (scale, -scale) + (0, size[1] * scale))
+        rows.append(f'{begin} points="{path}"/>')
+    return '\n'.join(rows) + '\n</svg>'
 
 
 def light(vertices, triangles):

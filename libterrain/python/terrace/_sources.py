@@ -6,6 +6,7 @@ import os
 import numpy as np
 
 from ._arrays import as_array, as_native
+from ._job import notes
 
 
 def crs_text(crs):
@@ -56,26 +57,40 @@ def _points(columns, attributes, name):
     return {'name': name, 'columns': columns, 'attributes': attributes}
 
 
-def _structured(array, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
-    """Records with x, y and z, or with X, Y and Z as LAS stores them (with scales and offsets)."""
-    fields = array.dtype.names
-    for axes in (('x', 'y', 'z'), ('X', 'Y', 'Z')):
+def _records(array, fields, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
+    """Records with x, y and z, or with X, Y and Z as LAS stores them (with scales and offsets). Fields of several numbers
+    become name_0, name_1, ..."""
+    for axes in ('xyz', 'XYZ'):
         if all(axis in fields for axis in axes):
             break
     else:
         raise ValueError(f'points have fields x, y and z, or X, Y and Z, not {", ".join(fields)}')
-    if axes[0] == 'x':
-        scales, offsets = (1, 1, 1), (0, 0, 0)
-    columns = [_column(axis.lower(), array[axis], scales[i], offsets[i]) for i, axis in enumerate(axes)]
-    attributes = [_column(field, array[field]) for field in fields
-                  if field not in axes and array.dtype[field].shape == ()]
+    columns = [_column(axis.lower(), np.asarray(array[axis]), scales[i], offsets[i]) for i, axis in enumerate(axes)]
+    attributes = []
+    for field in fields:
+        values = np.asarray(array[field])
+        if values.ndim == 1 and field not in axes:
+            attributes.append(_column(field, values))
+        for i in range(values.shape[1] if values.ndim == 2 else 0):
+            attributes.append(_column(f'{field}_{i}', values[:, i]))
     return _points(columns, attributes, name)
+
+
+def _laspy_crs(data):
+    """Of a laspy.LasData, which reads it with pyproj."""
+    try:
+        return data.header.parse_crs()
+    except (AttributeError, ImportError) as missing:
+        notes.info('the CRS of the points is not known (%s); give `crs`', missing)
+        return None
 
 
 def _xarray(array, transform, crs, nodata):
     """An xarray.DataArray: rioxarray's accessor, else the CF attributes that it keeps, else the coordinates."""
     if hasattr(array, 'rio'):
-        return array.rio.transform(), array.rio.crs, array.rio.nodata
+        rio = array.rio
+        return (rio.transform() if transform is None else transform, rio.crs if crs is None else crs,
+                rio.nodata if nodata is None else nodata)
     grid = array.coords.get('spatial_ref')
     described = dict(grid.attrs) if grid is not None else {}
     crs = crs or described.get('crs_wkt') or described.get('spatial_ref') or array.attrs.get('crs')
@@ -109,19 +124,23 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('`transform`, `nodata` and `attributes` are for arrays: files have their own')
         return [os.fspath(name) for name in given], crs_text(crs)
-    if hasattr(given, 'header') and hasattr(given, 'points') and hasattr(given.points, 'array'):  # laspy.LasData
-        header = given.header
-        if crs is None and hasattr(header, 'parse_crs'):
-            crs = header.parse_crs()
-        return _structured(given.points.array, '<laspy>', header.scales, header.offsets), crs_text(crs)
-    if hasattr(given, 'read') and hasattr(given, 'transform') and hasattr(given, 'nodata'):  # rasterio's datasets
-        samples = as_array(given.read(1), 'the raster')
-        nodata = given.nodata if nodata is None else nodata
-        crs = crs if crs is not None else getattr(given, 'crs', None)
-        return _raster(samples, transform or given.transform, nodata, getattr(given, 'name', '<raster>')), crs_text(crs)
+    records = getattr(given, 'points', given)
+    if hasattr(records, 'point_format') and hasattr(records, 'scales'):  # laspy.LasData, or its points
+        return (_records(records, list(records.point_format.dimension_names), '<laspy>', records.scales, records.offsets),
+                crs_text(_laspy_crs(given) if crs is None else crs))
     if hasattr(given, 'dims') and hasattr(given, 'coords') and hasattr(given, 'values'):  # xarray.DataArray
         transform, crs, nodata = _xarray(given, transform, crs, nodata)
         return _raster(np.asarray(given.values), transform, nodata, '<xarray>'), crs_text(crs)
+    if hasattr(given, 'GetGeoTransform'):  # gdal.Dataset
+        band = given.GetRasterBand(1)
+        c, a, b, f, d, e = given.GetGeoTransform()
+        return _raster(band.ReadAsArray(), (a, b, c, d, e, f) if transform is None else transform, band.GetNoDataValue() if nodata is None else nodata,
+                       '<gdal>', band.GetScale() or 1.0, band.GetOffset() or 0.0), crs_text(crs or given.GetProjection())
+    if hasattr(given, 'transform'):  # a dataset of rasterio's, a Raster, or another array with an affine transform
+        samples = given.read(1) if hasattr(given, 'read') else given
+        nodata = getattr(given, 'nodata', None) if nodata is None else nodata
+        return (_raster(as_array(samples, 'the raster'), given.transform if transform is None else transform, nodata, '<raster>'),
+                crs_text(crs or getattr(given, 'crs', None)))
     if isinstance(given, dict):
         wrong = [axis for axis in 'xyz' if axis not in given]
         if wrong:
@@ -138,7 +157,7 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
     if array.dtype.names:
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('`transform`, `nodata` and `attributes` are not for structured arrays')
-        return _structured(array.reshape(-1), '<array>'), crs_text(crs)
+        return _records(array.reshape(-1), array.dtype.names, '<array>'), crs_text(crs)
     if array.ndim not in (2, 3):
         raise ValueError(f'a source array has the shape (n, 3): points, or (rows, columns): a raster, not {array.shape}')
     if array.ndim == 2 and array.shape[1] == 3 and transform is None:

@@ -12,7 +12,7 @@ import numpy as np
 from . import _core
 from ._arrays import as_rows, whole
 from ._geo import FeatureCollection, region as as_region
-from ._job import job
+from ._job import job, notes
 from ._mesh import BoundedMesh, Mesh
 from ._raster import read_raster
 from ._sources import crs_text, source_of
@@ -68,12 +68,13 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     a mosaic), or what is in memory:
 
     - an array of shape (n, 3): points, with ``attributes`` (a dict of columns) beside them;
-    - a structured array with fields x, y, z (or LAS's X, Y, Z) and further ones, a dict of columns, a
-      ``laspy.LasData``;
+    - a structured array with fields x, y, z (or X, Y, Z) and further ones, a dict of columns, a ``laspy.LasData`` or its
+      ``points``, also part of them;
     - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f from
       columns and rows of corners to x and y, as rasterio's) and ``nodata``. An array of three columns is a
       raster if ``transform`` is given;
-    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio;
+    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio or GDAL, a Raster, any array
+      with ``transform`` (and ``crs``, ``nodata``);
     - anything else with numpy's array interface, the buffer protocol or DLPack.
 
     Arrays are read in place. Coordinates that are not finite are refused; samples that are not are nodata.
@@ -195,17 +196,29 @@ class Store:
         """The finest level of at most so many points; the top if none has so few."""
         return _core.level_within(self._core, whole(most_points, 'most_points'))
 
-    def points(self, region=None, level=0, where=None, *, focus=(), crs=None, progress=None, threads=None):
+    def points(self, region=None, level=None, where=None, *, focus=(), cluster=None, crs=None, progress=None,
+               threads=None):
         """The points of a level and above, inside a region, that meet a condition.
 
         region: a box of four or six numbers in the store's CRS, polygons (an object with ``__geo_interface__``, a
         GeoJSON dict or file), or None. where: a condition on attributes, x, y and z, such as 'classification == 2 &&
-        z < 100'. focus: pairs (region, level) with finer levels. crs: that the coordinates are wanted in.
+        z < 100'. focus: pairs (region, level) with finer levels. cluster: in place of region and focus, a pair (L, N): the
+        points that cluster N of level L stands for. level: 0 unless given; with a cluster, its own. crs: that the coordinates
+        are wanted in.
 
         Returns: a structured array: x, y, z (float64), then the attributes with their types (float64 where they have
         a scale). ``xyz()`` gives its coordinates as an array (n, 3). Order: coarser levels first.
         """
-        records = self._core.points(whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
+        focuses = self._focuses(focus)
+        if cluster is not None:
+            if region is not None or focuses:
+                raise ValueError('points() takes either `cluster` or `region` and `focus`')
+            cluster = tuple(whole(number, 'cluster') for number in cluster)
+            if len(cluster) != 2:
+                raise ValueError('`cluster` is a pair of its level and its number there')
+        if level is None:
+            level = cluster[0] if cluster else 0
+        records = self._core.points(whole(level, 'level'), as_region(region), focuses, where or '', cluster,
                                     (crs_text(crs) or ''), job(progress, threads))
         return _real_values(records, self._info)
 
@@ -291,16 +304,21 @@ class Store:
         return _core.profile(self._core, as_rows(line, 'line', (2,)), step, method, whole(level, 'level'), max_edge,
                              job(progress, threads))
 
-    def contours(self, interval, *, level=0, max_edge=None, region=None, progress=None, threads=None, memory=None):
+    def contours(self, interval, *, level=0, max_edge=None, region=None, lonlat=None, progress=None, threads=None,
+                 memory=None):
         """Lines of equal height, every ``interval`` in the store's vertical unit.
 
-        Returns: a FeatureCollection (a dict, with ``__geo_interface__``) of LineStrings in longitude and latitude,
-        each with its height as the property ``elev``; higher ground is on a line's right. Raises: Error for a store
-        without a CRS.
+        lonlat: True for longitude and latitude of WGS 84, as GeoJSON has them; False for the store's own x and y; by
+        default the first where its CRS leads there, else the second, which is logged.
+
+        Returns: a FeatureCollection (a dict, with ``__geo_interface__``) of LineStrings, each with its height as the
+        property ``elev``; higher ground is on a line's right. Raises: Error if longitudes and latitudes are not known.
         """
-        return FeatureCollection(json.loads(_core.contours(
-            self._core, float(interval), whole(level, 'level'), max_edge, as_region(region),
-            job(progress, threads, memory))))
+        text, own = _core.contours(self._core, float(interval), whole(level, 'level'), max_edge, as_region(region),
+                                   None if lonlat is None else bool(lonlat), job(progress, threads, memory))
+        if own and lonlat is None:
+            notes.info('contours are in the store\'s own x and y: nothing leads from its CRS to WGS 84')
+        return FeatureCollection(json.loads(text))
 
     def mesh(self, level=None, region=None, *, focus=(), where=None, metric='euclidean', crs=None, max_points=None,
              progress=None, threads=None, memory=None):
@@ -317,6 +335,15 @@ class Store:
             raise ValueError('mesh() takes either `level` or `max_points`')
         return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
                                 metric, (crs_text(crs) or ''), job(progress, threads, memory)))
+
+    def surface(self, level=0, region=None, where=None, *, progress=None, threads=None, memory=None):
+        """The surface that a scan was taken from: of any shape, in space, through its points. All in memory.
+
+        level, region, where: as points(). Returns: a Mesh, whose triangles are counter-clockwise seen from outside. Where
+        the scan does not go all round, the surface is open. Source: J. Skala, section 8.3.
+        """
+        return Mesh(*_core.surface(self._core, whole(level, 'level'), as_region(region), where or '',
+                                   job(progress, threads, memory)))
 
     def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
                      region=None, where=None, path=None, replace=False, progress=None, threads=None, memory=None):

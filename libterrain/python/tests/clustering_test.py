@@ -110,6 +110,18 @@ class Facilities(unittest.TestCase):
                 self.assertLessEqual(cost, best * (1 + 1e-9 if method == 'interchange' else 1.9))
                 self.assertLessEqual(made.lower_bound, best + 1e-9)
 
+    def test_k_median(self):
+        points = np.random.default_rng(5).random((12, 2))
+        distances = cdist(points, points)
+        best = min(distances[list(chosen)].min(axis=0).sum() for chosen in itertools.combinations(range(12), 3))
+        made = terrace.cluster(points, count=3)
+        self.assertEqual(len(made.facilities), 3)
+        self.assertAlmostEqual(made.cost, distances[made.facilities[made.labels], np.arange(12)].sum(), places=9)
+        self.assertLessEqual(made.cost, 1.2 * best)
+        for wrong in (0, 13):
+            with self.assertRaises(ValueError):
+                terrace.cluster(points, count=wrong)
+
     def test_outliers_and_metrics(self):
         points = np.vstack((np.random.default_rng(1).random((200, 2)), [[50, 50]]))
         made = terrace.cluster(points, 0.05, method='automatic', outlier_price=0.03)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Heights, gradients, rasters, profiles and contours, against SciPy, laws and the function sampled."""
 
+import logging
 import math
 import os
 import re
@@ -145,6 +146,7 @@ class Lines(StoreCase):
     def test_contours_lie_at_their_height(self):
         lines = self.raster.contours(20)
         self.assertEqual(lines.__geo_interface__['type'], 'FeatureCollection')
+        self.assertEqual(lines._repr_svg_().count('<polyline'), len(lines['features']))
         self.assertGreater(len(lines['features']), 5)
         for feature in lines['features']:
             elev = feature['properties']['elev']
@@ -152,6 +154,26 @@ class Lines(StoreCase):
             heights = self.raster.heights(feature['geometry']['coordinates'], crs='EPSG:4326')
             # On the rim rounding may lead outside.
             np.testing.assert_allclose(heights[~np.isnan(heights)], elev, rtol=0, atol=1e-3)
+
+    def test_contours_in_the_stores_own_coordinates(self):
+        def heights_on(store, lines):
+            for line in lines['features']:
+                heights = store.heights(line['geometry']['coordinates'])
+                np.testing.assert_allclose(heights[~np.isnan(heights)], line['properties']['elev'], rtol=0, atol=1e-4)
+
+        known = self.raster.contours(20, lonlat=False)
+        heights_on(self.raster, known)
+        unknown = terrace.build(self.samples, self.path('no-crs'), transform=TRANSFORM)
+        with self.assertLogs('terrace', logging.INFO):
+            self.assertEqual(unknown.contours(20), known)
+        with self.assertRaisesRegex(terrace.Error, 'no CRS'):
+            unknown.contours(20, lonlat=True)
+        # A datum from which nothing leads to WGS 84.
+        datum = ('PROJCS["site",GEOGCS["site",DATUM["site",SPHEROID["ball",6370000,0]],PRIMEM["Greenwich",0],'
+                 'UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],'
+                 'PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],UNIT["metre",1]]')
+        apart = terrace.build(self.samples, self.path('apart'), transform=TRANSFORM, crs=datum)
+        self.assertEqual(len(apart.contours(20)['features']), len(known['features']))
 
     def test_contours_are_shapelys_too(self):
         try:
@@ -163,13 +185,30 @@ class Lines(StoreCase):
             self.assertTrue(shape(feature['geometry']).is_valid)
         area = shape(self.scan)
         self.assertAlmostEqual(area.area, 1000 * 800, delta=1000)
-        part = area.buffer(-200)
-        self.assertEqual(len(self.scan.points(region=part)),
-                         sum(part.contains(point) or part.touches(point) for point in self.shapely_points()))
+        mesh = shape(self.scan.bounded_mesh(5))
+        self.assertAlmostEqual(sum(triangle.area for triangle in mesh.geoms), area.area, delta=1000)
 
-    def shapely_points(self):
-        from shapely.geometry import Point
-        return [Point(*xy) for xy in self.points[:, :2]]
+    def test_points_in_polygons_are_shapelys(self):
+        try:
+            from hypothesis import given, settings, strategies as st
+            from shapely.geometry import MultiPoint, Polygon
+        except ImportError as missing:
+            self.skipTest(f'{missing.name} is missing')
+        few = self.points[:2000]
+        store = terrace.build(few, self.path('few'), crs='EPSG:32632', block_points=200)
+        points = MultiPoint(few[:, :2])
+
+        @settings(max_examples=50, deadline=None, derandomize=True)
+        @given(st.lists(st.floats(50, 600), min_size=3, max_size=30), st.floats(0.1, 0.9), st.floats(0, 1000), st.floats(0, 800))
+        def check(radii, inner, x, y):
+            angles = np.linspace(0, 2 * np.pi, len(radii), endpoint=False)
+            ring = np.asarray(radii)[:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+            middle = few[:, :2].min(axis=0) + (x, y)
+            star = Polygon(ring + middle, [ring * inner + middle])
+            inside = points.intersection(star)
+            self.assertEqual(len(store.points(region=star)), len(getattr(inside, 'geoms', () if inside.is_empty else (inside,))))
+
+        check()
 
 
 class RealTerrain(unittest.TestCase):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random bad arguments give Python's exceptions and never a crash: each seed in a process of its own.
+"""Random bad arguments give Python's exceptions and never a crash: alone, in threads and after a fork.
 
-TERRACE_PYTHON_SEEDS and TERRACE_PYTHON_CALLS make it longer.
+Each seed has a process of its own; TERRACE_PYTHON_SECONDS takes one seed after another for so long.
 """
 
 import os
@@ -9,19 +9,21 @@ import random
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-SEEDS = int(os.environ.get('TERRACE_PYTHON_SEEDS', '4'))
-CALLS = int(os.environ.get('TERRACE_PYTHON_CALLS', '250'))
+SECONDS = float(os.environ.get('TERRACE_PYTHON_SECONDS', '0'))
+CALLS = 250
 
 
 class Odd:
-    """Has protocols that lie."""
+    """Has a protocol without data. (More data than there are is what numpy believes and then reads.)"""
 
-    __array_interface__ = {'shape': (3, 2), 'typestr': '<f8', 'data': b'short', 'version': 3}
+    __array_interface__ = {'shape': (3, 2), 'typestr': '<f8', 'version': 3}
 
 
 class OddGeometry:
@@ -66,12 +68,11 @@ def anything(luck):
     ])()
 
 
-def calls(luck, terrace, stores, folder):
-    """One call of something public with mostly senseless arguments."""
+def calls(luck, terrace, shared, folder):
+    """One call of something public with mostly senseless arguments: whether it went through."""
+    stores, view, shape2, shape3 = shared
     store = luck.choice(stores)
     some = lambda: anything(luck)  # noqa: E731
-    view = terrace.View(stores[0], reader='frame')
-    shape2, shape3 = terrace.Delaunay2(), terrace.Delaunay3()
     points = lambda: np.random.default_rng(luck.randrange(99)).random((luck.randrange(1, 60), luck.choice([2, 3])))  # noqa: E731
     flat = lambda: points()[:, :2] * luck.choice([1, 400, 5e5])  # noqa: E731
     solid = lambda: np.random.default_rng(1).random((luck.randrange(60), 3))  # noqa: E731
@@ -83,14 +84,23 @@ def calls(luck, terrace, stores, folder):
         (lambda a, **k: terrace.build(a, os.path.join(folder, str(luck.randrange(10 ** 9))), **k), [solid],
          ['transform', 'crs', 'nodata', 'attributes', 'progress', 'threads', 'memory', 'where', 'region', 'effort',
           'block_points', 'facility_cost', 'channels', 'outlier_price', 'seed', 'keep', 'order', 'metric', 'entities']),
-        (store.points, [box], ['level', 'where', 'focus', 'crs']),
+        (terrace.build, [lambda: os.path.join(folder, luck.choice(['dem', 'a.ply', 'none'])), lambda: os.path.join(folder, 'new')],
+         ['replace', 'input_format', 'skip_damaged', 'vertical', 'band', 'cell', 'resolution', 'datum_shift', 'drop', 'z_weight']),
+        (store.points, [box], ['level', 'where', 'focus', 'crs']), (store.points, [], ['cluster', 'level', 'where', 'region']),
+        (lambda a: store.points(cluster=a), [lambda: (luck.randrange(3), luck.randrange(9))], []),
+        (store.tiles, [lambda: os.path.join(folder, 'tiles'), lambda: (0, number())],
+         ['max_error', 'quality', 'vertical', 'geoid', 'fill', 'flat_height', 'water', 'normals', 'gzip', 'name', 'resume', 'replace']),
+        (lambda: (repr(store), store._repr_svg_(), store.info, store.verify(), store.__geo_interface__), [], []),
+        (lambda: (repr(view), view.snapshot(), view.traffic), [], []),
+        (lambda a: terrace.Mesh(*a), [lambda: (solid(), handles())], []),
+        (lambda a: store.mesh(max_points=a).save(os.path.join(folder, 'm.glb'), True), [lambda: 40], []),
         (store.query, [], ['box', 'near', 'k', 'radius', 'level']),
         (lambda p, k: store.query(near=p, k=k), [place, number], []),
         (store.heights, [flat], ['method', 'level', 'max_edge', 'crs', 'threads', 'memory']),
         (store.heights, [flat], []), (store.gradients, [flat], []),
         (store.raster, [lambda: 'height'], ['cell', 'region', 'crs', 'method', 'level']),
         (store.profile, [flat], ['step', 'method', 'level', 'max_edge']),
-        (store.contours, [number], ['level', 'region', 'max_edge']),
+        (store.contours, [number], ['level', 'region', 'max_edge', 'lonlat']),
         (store.mesh, [lambda: 0], ['region', 'focus', 'where', 'metric', 'crs', 'max_points']),
         (store.bounded_mesh, [luck.random], ['max_points', 'quality', 'region', 'where', 'fill', 'duplicates']),
         (view.frame, [place, place, place], ['fov', 'size', 'matrix', 'pixel_error', 'ground_error']),
@@ -130,6 +140,7 @@ def main(seed, count):
     import terrace
     luck = random.Random(seed)
     with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
         y, x = np.mgrid[0:40, 0:50]
         stores = [terrace.build(np.sin(x / 5) * 20 + y, os.path.join(folder, 'dem'), transform=(10, 0, 5e5, 0, -10, 5e6),
                                 crs='EPSG:32632'),
@@ -137,19 +148,46 @@ def main(seed, count):
                                 attributes={'class': np.arange(3000) % 5}, block_points=500)]
         closed = terrace.Store.open(os.path.join(folder, 'cloud'))
         closed.close()
-        worked = sum(calls(luck, terrace, stores + [closed], folder) for _ in range(count))
+        shared = stores + [closed], terrace.View(stores[0]), terrace.Delaunay2(), terrace.Delaunay3()
+        worked = 0
+        for _ in range(count):
+            kind = luck.random()
+            if kind < 0.03:  # several at once on what they share
+                with ThreadPoolExecutor(3) as threads:
+                    for _ in threads.map(lambda own: calls(random.Random(own), terrace, shared, folder),
+                                         [luck.randrange(2 ** 32) for _ in range(3)]):
+                        pass
+            elif kind < 0.06:  # in a fork of all this
+                child = os.fork()
+                if child == 0:
+                    calls(luck, terrace, shared, folder)
+                    os._exit(0)
+                if os.waitpid(child, 0)[1] != 0:
+                    raise SystemExit('a fork has crashed')
+            else:
+                worked += calls(luck, terrace, shared, folder)
         print('done', worked)
 
 
 class Hostile(unittest.TestCase):
-    def test_nothing_crashes(self):
+    def try_seeds(self, seeds):
         children = [(seed, subprocess.Popen([sys.executable, '-B', '-X', 'faulthandler', __file__, str(seed), str(CALLS)],
                                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True))
-                    for seed in range(SEEDS)]
+                    for seed in seeds]
         for seed, child in children:
             told = child.communicate()[0]
-            self.assertEqual(child.returncode, 0, f'seed {seed}: {told[-3000:]}')
-            self.assertGreater(int(told.split('done')[1]), CALLS // 50, 'hardly a call went through')
+            self.assertEqual(child.returncode, 0, f'seed {seed}: {told[-8000:]}')
+            self.assertGreater(int(told.split('done')[1]), CALLS // 50, f'seed {seed}: hardly a call went through')
+
+    def test_nothing_crashes(self):
+        if SECONDS == 0:
+            return self.try_seeds(range(4))
+        first = seed = random.randrange(2 ** 30)
+        end = time.monotonic() + SECONDS
+        while time.monotonic() < end:
+            self.try_seeds([seed])
+            seed += 1
+        print(f'{seed - first} seeds from {first} on, {CALLS * (seed - first)} calls')
 
 
 if __name__ == '__main__':

@@ -89,6 +89,16 @@ class Meshes(StoreCase):
             error[near[held]] = np.minimum(error[near[held]], abs(weights[held] @ corners[:, 2] - samples[near[held], 2]))
         self.assertLessEqual(error.max(), 1.0 + 1e-6)
 
+    def test_the_surface_of_a_ball(self):
+        random = np.random.default_rng(4).normal(size=(5000, 3))
+        ball = 100 * random / np.linalg.norm(random, axis=1)[:, None]
+        surface = terrace.build(ball, self.path('ball')).surface()
+        vertices, triangles = surface
+        self.assertEqual((len(vertices), len(triangles)), (5000, 2 * 5000 - 4))  # Euler's, of a closed surface
+        self.assertAlmostEqual(surface.area(), 4 * np.pi * 100 ** 2, delta=300)
+        a, b, c = (vertices[triangles[:, i]] for i in range(3))
+        self.assertAlmostEqual(np.einsum('ij,ij', a, np.cross(b, c)) / 6, 4 / 3 * np.pi * 100 ** 3, delta=2e4)
+
     def test_files(self):
         mesh = self.raster.bounded_mesh(4, path=self.path('hills.ply'))
         from terrace import _core

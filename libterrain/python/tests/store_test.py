@@ -2,7 +2,9 @@
 """Stores: what goes in comes out, whole or in part."""
 
 import errno
+import logging
 import os
+import subprocess
 import threading
 import time
 import unittest
@@ -10,7 +12,7 @@ import unittest
 import numpy as np
 
 import terrace
-from python_case import ALPS, TRANSFORM, StoreCase, cell_centres, cloud, hills, sorted_rows
+from python_case import ALPS, COMMAND, TRANSFORM, StoreCase, cell_centres, cloud, hills, sorted_rows
 
 
 class Stores(StoreCase):
@@ -64,6 +66,24 @@ class Stores(StoreCase):
         focused = self.scan.points(level=self.scan.top, focus=[(box, 0)])
         self.assertGreaterEqual(len(focused), inside.sum())
         self.assertLess(len(focused), len(self.points))
+
+    def test_clusters(self):
+        level = self.scan.info['levels'][1]
+        parts = [self.scan.points(cluster=(1, number), level=0) for number in range(level['clusters'])]
+        np.testing.assert_array_equal(sorted_rows(terrace.xyz(np.concatenate(parts))), sorted_rows(self.points))
+        one = self.scan.points(cluster=(1, 0), where='class == 3')
+        self.assertTrue((one['class'] == 3).all())
+        if COMMAND:
+            name = self.path('cluster.ply')
+            subprocess.run([COMMAND, 'points', self.path('cloud'), '--cluster', '1:0', '-o', name, '-q'], check=True)
+            theirs = terrace.build(name, self.path('cluster')).points()
+            np.testing.assert_array_equal(sorted_rows(terrace.xyz(theirs)),
+                                          sorted_rows(terrace.xyz(self.scan.points(cluster=(1, 0)))))
+        for wrong in ((99, 0), (0, 10 ** 9), (0, 2 ** 60), (1,), (1, -1)):
+            with self.assertRaises(ValueError):
+                self.scan.points(cluster=wrong)
+        with self.assertRaises(ValueError):
+            self.scan.points(cluster=(1, 0), region=(0, 0, 1, 1))
 
     def test_nearest(self):
         place = (300500.0, 5200400.0)
@@ -221,22 +241,37 @@ class Sources(StoreCase):
     def test_laspy_records(self):
         scales, offsets = np.array([0.01, 0.01, 0.001]), np.array([300000.0, 5200000.0, 0.0])
         raw = np.round((self.points - offsets) / scales).astype(np.int32)
-        records = np.empty(len(raw), [('X', 'i4'), ('Y', 'i4'), ('Z', 'i4'), ('intensity', 'u2')])
+        records = np.empty(len(raw), [('X', 'i4'), ('Y', 'i4'), ('Z', 'i4'), ('intensity', 'u2'), ('bits', 'u1'), ('rgb', 'u2', 3)])
         records['X'], records['Y'], records['Z'] = raw.T
         records['intensity'] = np.arange(len(raw)) % 1000
+        records['bits'] = 0x20 | self.classes
 
-        class Header:
-            pass
+        class Format:
+            dimension_names = property(lambda _: iter(['X', 'Y', 'Z', 'intensity', 'classification', 'rgb']))
+
+        class Points(dict):  # as laspy.ScaleAwarePointRecord: fields of bits have names of their own
+            def __init__(points, records):
+                super().__init__({name: records[name] for name in records.dtype.names}, classification=records['bits'] & 31)
+                points.scales, points.offsets, points.point_format = scales, offsets, Format()
+
+        class Crs:
+            to_wkt = lambda _: self.scan.info['crs']['wkt']  # noqa: E731
 
         class Data:  # as laspy.LasData
-            header, points = Header(), Header()
+            points = Points(records)
 
-        Data.header.scales, Data.header.offsets, Data.points.array = scales, offsets, records
-        store = self.built(Data(), crs='EPSG:32632')
+            class header:
+                parse_crs = Crs
+
+        store = self.built(Data())
         got = store.points()
         np.testing.assert_allclose(sorted_rows(terrace.xyz(got)), sorted_rows(raw * scales + offsets), rtol=0, atol=1e-9)
+        self.assertEqual(got.dtype.names[3:], ('intensity', 'classification', 'rgb_0', 'rgb_1', 'rgb_2'))
         self.assertEqual(got.dtype['intensity'], np.uint16)
-        self.assertEqual(store.info['format'], 'array')
+        self.assertEqual(len(store.points(where='classification == 3')), (self.classes == 3).sum())
+        self.assertEqual((store.info['format'], store.info['crs']['epsg']), ('array', 32632))
+        with self.assertLogs('terrace', logging.INFO):  # points alone have no header
+            self.assertEqual(len(self.built(Points(records[:100]))), 100)
 
     def test_rasters(self):
         options = {'transform': TRANSFORM, 'crs': 'EPSG:32632'}
@@ -245,14 +280,13 @@ class Sources(StoreCase):
         self.assert_same(wide[1:, ::2], self.raster, **options)
         self.assert_same(np.ma.masked_array(self.samples, np.zeros(self.samples.shape, bool)), self.raster, **options)
 
-        class Dataset:  # as rasterio's
-            transform, crs, nodata, name = TRANSFORM, 'EPSG:32632', None, 'hills'
+        class Affine:
+            __array_interface__ = self.samples.__array_interface__
+            transform, crs = TRANSFORM, 'EPSG:32632'
 
-            @staticmethod
-            def read(band):
-                return self.samples if band == 1 else None
+        self.assert_same(Affine(), self.raster)
+        self.assert_same(terrace.Raster(self.samples, TRANSFORM, 'EPSG:32632'), self.raster)
 
-        self.assert_same(Dataset(), self.raster)
         with_holes = self.samples.copy()
         with_holes[20:40, 30:60] = -9999
         store = self.built(with_holes, nodata=-9999, **options)
@@ -260,6 +294,26 @@ class Sources(StoreCase):
         self.assertEqual(store.info['nodata'], 600)
         masked = np.ma.masked_equal(with_holes, -9999)
         self.assertEqual(len(self.built(masked, **options)), self.samples.size - 600)
+
+    def test_rasters_of_other_packages(self):
+        try:
+            import rasterio
+            import rioxarray
+            from osgeo import gdal
+        except ImportError as missing:
+            self.skipTest(f'{missing.name} is missing')
+        expected = self.built(ALPS)
+        with rasterio.open(ALPS) as of_rasterio:
+            of_xarray, of_gdal = rioxarray.open_rasterio(ALPS), gdal.Open(ALPS)
+            for source in (of_rasterio, of_xarray, rioxarray.open_rasterio(ALPS, masked=True), of_gdal):
+                with self.subTest(type(source).__module__):
+                    store = self.built(source)
+                    self.assertEqual((len(store), store.info['crs']['epsg']), (len(expected), 4326))
+                    np.testing.assert_allclose(store.bounds, expected.bounds, rtol=1e-12)
+        store = self.built(of_xarray, transform=TRANSFORM, crs='EPSG:32632', nodata=2000)  # what is given counts
+        self.assertEqual(store.info['crs']['epsg'], 32632)
+        self.assertAlmostEqual(store.bounds[0], 500005, delta=10000)
+        self.assertEqual(store.info['nodata'], int((of_xarray.values == 2000).sum()))
 
     def test_xarray(self):
         try:

@@ -12,9 +12,7 @@ import unittest
 import numpy as np
 
 import terrace
-from python_case import StoreCase
-
-COMMAND = os.environ.get('TERRACE_BIN')
+from python_case import COMMAND, StoreCase
 
 
 class Tiles(StoreCase):

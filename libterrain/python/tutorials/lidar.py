@@ -33,7 +33,8 @@ print('near the house:', scan.query(near=(500_090, 5_200_090), k=5)['classificat
 ground = scan.points(where='classification == 2')
 terrain = terrace.build(ground, 'ground.store', crs='EPSG:32632', replace=True)
 mesh = terrain.bounded_mesh(max_error=0.5)
-print(terrain, mesh)
+print(terrain)
+mesh  # a notebook shows its picture
 
 # %% [markdown]
 # How high does vegetation stand above it? Heights of the ground below each tree's points:
@@ -49,3 +50,4 @@ lines = terrain.contours(5)
 print(lines, sorted({line['properties']['elev'] for line in lines['features']}))
 height_model = terrain.raster(cell=2.0, path='ground.tif', replace=True)
 print(height_model, height_model.crs)
+lines

@@ -18,7 +18,7 @@ namespace terrace::terrain {
 namespace {
 
 /// Nine decimals of a degree are a tenth of a millimetre.
-constexpr int kDecimals = 9;
+constexpr int kDecimals = 9, kOwnDecimals = 6;
 /// Points turned into text at a time.
 constexpr std::size_t kContourPoints = std::size_t{1} << 17;
 
@@ -35,16 +35,15 @@ stream::Box3 world_box(const stream::Store& store, const GroundSlope& ground) {
 
 }  // namespace
 
-ContourText::ContourText(const stream::Store& store, double interval, unsigned threads,
-                         std::function<void(std::string_view)> write)
+ContourText::ContourText(const stream::Store& store, const ContourRequest& request,
+                         unsigned threads, std::function<void(std::string_view)> write)
     : file_(store.path().string()),
-      system_(system_of(store)),
       ground_(store),
-      geography_(system_, world_box(store, ground_)),
-      interval_(interval),
+      interval_(request.interval),
       threads_(std::max(1U, threads)),
       write_(std::move(write)),
-      degrees_(kDecimals) {
+      number_(request.own_crs ? kOwnDecimals : kDecimals) {
+  if (!request.own_crs) geography_.emplace(system_of(store), world_box(store, ground_));
   const std::array<double, 6>& m = store.schema().world.xy;
   reverse_ = m[0] * m[4] - m[1] * m[3] > 0;
 }
@@ -63,14 +62,14 @@ void ContourText::append(std::string& text, const ContourLine& line,
   places.clear();
   for (const Point2& p : line.points) places.push_back(ground_.world(p));
   if (reverse_) std::reverse(places.begin(), places.end());
-  geography_(places);
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  if (geography_) (*geography_)(places);
+  for (std::size_t i = 0; geography_ && i < places.size(); ++i) {
     if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
     throw stream::Error({.file = file_,
                          .where = {},
                          .cause = number_text(at[0]) + ',' + number_text(at[1]) +
-                                  " has no longitude and latitude in " + system_.title(),
+                                  " has no longitude and latitude in " + geography_->system().title(),
                          .remedy = "build the store with the right `crs`, or leave the "
                                    "place out with `region`"});
   }
@@ -79,9 +78,9 @@ void ContourText::append(std::string& text, const ContourLine& line,
           "},\"geometry\":{\"type\":\"LineString\",\"coordinates\":[";
   for (std::size_t i = 0; i < places.size(); ++i) {
     text += i == 0 ? "[" : ",[";
-    degrees_.append(text, places[i][0]);
+    number_.append(text, places[i][0]);
     text += ',';
-    degrees_.append(text, places[i][1]);
+    number_.append(text, places[i][1]);
     text += ']';
   }
   text += "]}}";

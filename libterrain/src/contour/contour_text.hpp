@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,9 +23,9 @@ namespace terrace::terrain {
 /// Contour lines of a store as a GeoJSON FeatureCollection (RFC 7946), higher ground on the right.
 class ContourText {
  public:
-  /// write: takes the text in large pieces. Throws: stream::Error if the store has no CRS; add()
-  /// and finish() also for a place without longitude and latitude.
-  ContourText(const stream::Store& store, double interval, unsigned threads,
+  /// write: takes the text in large pieces. Throws: stream::Error if longitudes and latitudes are
+  /// wanted and the store has no CRS; add() and finish() also for a place without them.
+  ContourText(const stream::Store& store, const ContourRequest& request, unsigned threads,
               std::function<void(std::string_view)> write);
 
   /// line: in stored coordinates, higher ground on the left where the second one grows upwards.
@@ -37,14 +38,13 @@ class ContourText {
   void flush();
 
   std::string file_;
-  CoordinateSystem system_;
   GroundSlope ground_;
-  BoxGeography geography_;
+  std::optional<BoxGeography> geography_;  ///< nothing: places stay in the store's CRS
   bool reverse_;  ///< higher ground is on the left in the CRS
   double interval_;
   unsigned threads_;
   std::function<void(std::string_view)> write_;
-  FixedText degrees_;
+  FixedText number_;
   ContourOutcome outcome_;
   std::vector<ContourLine> lines_;  ///< not written yet
   std::size_t points_ = 0;          ///< of these

@@ -79,7 +79,7 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
                     "give a larger `interval`");
     }
   }
-  ContourText text(store, request.interval, context.threads, write);
+  ContourText text(store, request, context.threads, write);
   const ProgressReport report(context, "lines");
   ContourParts parts{
       .store = store,

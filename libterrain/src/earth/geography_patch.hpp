@@ -68,6 +68,7 @@ class BoxGeography {
   /// As CoordinateSystem::to_geographic(), within kTolerance; the same bits for a place whatever
   /// the others. 29 million places per second and core (tests/bench/geography_bench).
   void operator()(std::span<Point2> places) const;
+  [[nodiscard]] const CoordinateSystem& system() const { return system_; }
 
  private:
   CoordinateSystem system_;

@@ -19,6 +19,8 @@ struct ContourRequest {
   /// Triangles with a longer side, in metres on the ground, are left out.
   std::optional<double> max_edge{};
   std::optional<Region> region{};  ///< in the store's CRS
+  /// Lines keep the store's x and y, which need not have a CRS, and are then no RFC 7946.
+  bool own_crs = false;
 };
 
 struct ContourOutcome {
@@ -26,8 +28,8 @@ struct ContourOutcome {
 };
 
 /// The contour lines of the linear surface as GeoJSON (RFC 7946): one LineString in longitude and
-/// latitude per line, within 1e-10 degrees before they are rounded to nine decimals, with its
-/// height as `elev`, higher ground on its right. See ContourLevels for what is exact.
+/// latitude of WGS 84 per line, within 1e-10 degrees before they are rounded to nine decimals, with
+/// its height as `elev`, higher ground on its right. See ContourLevels for what is exact.
 ///
 /// The surface of a raster at level 0 is its triangulated lattice of samples; else the Delaunay
 /// triangulation of the points of the level and above (see PointWindow), which spans the points'
@@ -37,8 +39,9 @@ struct ContourOutcome {
 /// write: what takes the text, in order, much at a time. Reports "lines".
 /// Lines and their order depend on neither threads nor memory. Memory: a band of rows, or parts of
 /// 65,536 to 2^19 points per thread, and the lines that go on beyond. Throws: stream::Error if the
-/// store has no CRS, does not meet the region, is damaged, or if the lines at work do not fit;
-/// UsageError for a level that the store does not have, and for max_edge with a raster at level 0.
+/// store's CRS is wanted and not known, if it does not meet the region, is damaged, or if the lines
+/// at work do not fit; UsageError for a level that the store does not have, and for max_edge with a
+/// raster at level 0.
 ContourOutcome write_contours(const stream::Store& store, const ContourRequest& request,
                               const std::function<void(std::string_view)>& write,
                               const Context& context = {});
