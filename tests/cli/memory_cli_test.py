@@ -362,6 +362,11 @@ class StoreMemoryTest(MemoryCase):
         code, _, err, peak = run('cluster', points, '-o', self.path('none.xyz'), '--memory', '1M')
         self.assertEqual(code, 1, err)
         self.assertIn('--memory', err)
+        # What is written counts beside the table.
+        octree = self.path('table.copc.laz')
+        clustering = ('cluster', points, '--method', 'k-means', '-k', '5', '--threads', 2)
+        needs = self.needed(64, octree, *clustering)
+        self.within(needs, *clustering, '-o', octree)
 
 
 class MachineMemoryTest(MemoryCase):

@@ -55,10 +55,11 @@ ChannelTable read_channels(const PointTable& table, const std::vector<std::strin
 }
 
 /// The table with two more columns, `cluster` and `representative` (the number of the point that
-/// stands for the cluster), both -1 for outliers; columns of these names are replaced. format: of
-/// point files, empty: by ending. Throws: stream::Error, Interrupted.
-void write_clustered(const std::string& path, const std::string& format, const PointTable& table,
-                     const ClusterOutcome& outcome, bool replace) {
+/// stands for the cluster), both -1 for outliers; columns of these names are replaced.
+/// Throws: stream::Error, Interrupted.
+void write_clustered(const std::string& path, stream::WriterOptions writing,
+                     const PointTable& table, const ClusterOutcome& outcome,
+                     std::uint64_t memory_bytes) {
   // Columns of an earlier clustering are replaced.
   struct Kept {
     std::size_t offset = 0, size = 0;
@@ -73,13 +74,15 @@ void write_clustered(const std::string& path, const std::string& format, const P
   }
   attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
-  const auto writer =
-      stream::open_point_writer(path,
-                                {.attributes = std::move(attributes),
-                                 .comments = {kWriterMark},
-                                 .crs = crs_to_write(table.info.crs),
-                                 .lattice = lattice_of(table.info)},
-                                {.format = format, .replace = replace, .stop = stop_token()});
+  const std::uint64_t held = table.payload.size() + table.size() * sizeof(stream::Point3);
+  writing.memory_bytes -= std::min(writing.memory_bytes, held);
+  const auto writer = stream::open_point_writer(path,
+                                                {.attributes = std::move(attributes),
+                                                 .comments = {kWriterMark},
+                                                 .crs = crs_to_write(table.info.crs),
+                                                 .lattice = lattice_of(table.info)},
+                                                writing);
+  writing_within_memory(*writer, path, memory_bytes, held);
   constexpr std::size_t kBlock = 65536;
   const std::size_t record_bytes = table.info.payload_size();
   stream::PointBlock block;
@@ -239,7 +242,8 @@ class ClusterCommand final : public Command {
     const Stopwatch watch;
     check_usage(common);
     const MetricChoice metric = MetricChoice::parse(metric_);
-    const bool replace_points = output_.empty() ? false : may_replace(output_, common.force);
+    stream::WriterOptions writing;
+    if (!output_.empty()) writing = point_writer_options(output_, format_, common);
     const bool replace_labels = labels_.empty() ? false : may_replace(labels_, common.force);
     const bool replace_tree = dendrogram_.empty() ? false : may_replace(dendrogram_, common.force);
 
@@ -285,7 +289,9 @@ class ClusterCommand final : public Command {
 
     if (!labels_.empty()) write_labels(labels_, outcome.labels, replace_labels);
     if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
-    if (!output_.empty()) write_clustered(output_, format_, table, outcome, replace_points);
+    if (!output_.empty()) {
+      write_clustered(output_, writing, table, outcome, request_.memory_bytes);
+    }
     Summary summary = summary_of(outcome, table.size(), watch);
     // Costs are a result too, unless another one goes to standard output.
     summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
