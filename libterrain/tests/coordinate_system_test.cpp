@@ -470,6 +470,35 @@ TEST(GeoKeys, UserDefinedProjections) {
        "EPSG:2263");
 }
 
+TEST(GeoKeys, ACodeOfTheDatumCountsBesideTheNumbersOfItsEllipsoid) {
+  const auto with = [](double inverse_flattening) {
+    return keys({{1024, {1}, ""},
+                 {2048, {32767}, ""},
+                 {2049, {}, "GCS Name = GCS_North_American_1983_HARN|Primem = Greenwich||"},
+                 {2050, {6152}, ""},
+                 {2054, {9102}, ""},
+                 {2057, {6378137}, ""},
+                 {2059, {inverse_flattening}, ""},
+                 {2061, {0}, ""},
+                 {3072, {32767}, ""},
+                 {3074, {32767}, ""},
+                 {3075, {8}, ""},
+                 {3076, {9002}, ""},
+                 {3078, {43}, ""},
+                 {3079, {45.5}, ""},
+                 {3084, {-120.5}, ""},
+                 {3085, {41.75}, ""},
+                 {3086, {1312335.958005249}, ""},
+                 {3087, {0}, ""}});
+  };
+  const auto system = CoordinateSystem::of(with(298.257222101), "file");
+  ASSERT_TRUE(system);
+  EXPECT_TRUE(system->same_places(CoordinateSystem::parse("EPSG:2994"))) << system->title();
+  EXPECT_TRUE(system->reaches_wgs84());
+  // The ellipsoid of another datum.
+  EXPECT_FALSE(CoordinateSystem::of(with(294.978698214), "file")->reaches_wgs84());
+}
+
 TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
   const std::vector<std::vector<stream::GeoKey>> lists{
       {{1024, {1}, ""}, {3072, {32632}, ""}, {3076, {9002}, ""}},

@@ -167,6 +167,22 @@ ProjObject required(ProjObject object, const std::string& what) {
   return object;
 }
 
+/// Whether the numbers that a file has beside a datum's code are those of a system on that datum.
+bool agrees(const GeoKeyValues& keys, const PJ* base) {
+  PJ_CONTEXT* const context = proj_context();
+  const ProjObject ellipsoid(proj_get_ellipsoid(context, base));
+  const ProjObject meridian(proj_get_prime_meridian(context, base));
+  double major = 0, minor = 0, inverse = 0, longitude = 0;
+  proj_ellipsoid_get_parameters(context, ellipsoid.get(), &major, &minor, nullptr, &inverse);
+  proj_prime_meridian_get_parameters(context, meridian.get(), &longitude, nullptr, nullptr);
+  const auto is = [&keys](int key, double value, double tolerance) {
+    const auto given = keys.number(key);
+    return !given || std::abs(*given - value) <= tolerance;
+  };
+  return is(2057, major, 1e-3) && is(2058, minor, 1e-3) && is(2059, inverse, 1e-6) &&
+         is(2061, longitude, 1e-9);
+}
+
 ProjObject base_of(const GeoKeyValues& keys) {
   PJ_CONTEXT* const context = proj_context();
   if (const int code = keys.known_code(2048); code != 0) {
@@ -179,8 +195,9 @@ ProjObject base_of(const GeoKeyValues& keys) {
   const double degrees = keys.degrees_per_unit();
   // Old files number the datum and mean the system on it: 6326 is that of 4326.
   const int datum_code = keys.known_code(2050);
-  if (datum_code >= 6001 && datum_code < 6999 && degrees == 1 && !keys.number(2057)) {
-    if (ProjObject base = object_of_code(datum_code - 2000, PJ_CATEGORY_CRS)) return base;
+  if (datum_code >= 6001 && datum_code < 6999 && degrees == 1) {
+    ProjObject base = object_of_code(datum_code - 2000, PJ_CATEGORY_CRS);
+    if (base != nullptr && agrees(keys, base.get())) return base;
   }
   double major = 0, inverse = 0;
   if (const auto size = keys.number(2057)) {
