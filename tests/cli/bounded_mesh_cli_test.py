@@ -44,6 +44,26 @@ def read_obj(path):
     return vertices, faces
 
 
+def read_glb(path):
+    """Of the one mesh of a file of ours, with z upwards again."""
+    with open(path, 'rb') as file:
+        data = file.read()
+    size = int.from_bytes(data[12:16], 'little')
+    head, body = json.loads(data[20:20 + size]), data[28 + size:]
+    east, up, south = head['nodes'][0]['translation']
+
+    def values(number, code, per_item):
+        accessor = head['accessors'][number]
+        begin = head['bufferViews'][accessor['bufferView']].get('byteOffset', 0)
+        flat = array.array(code, body[begin:begin + 4 * per_item * accessor['count']])
+        return [flat[i:i + per_item] for i in range(0, len(flat), per_item)]
+    primitive = head['meshes'][0]['primitives'][0]
+    vertices = [(x + east, -(z + south), y + up)
+                for x, y, z in values(primitive['attributes']['POSITION'], 'f', 3)]
+    corners = [c[0] for c in values(primitive['indices'], 'I', 1)]
+    return vertices, [corners[i:i + 3] for i in range(0, len(corners), 3)]
+
+
 class Raster:
     """Samples, and a check of a mesh against them in whole numbers."""
 
@@ -376,6 +396,19 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertRegex(result.stderr, r'differ by up to 1[78]\.?\d* m \(at ')
         self.assertIn('--duplicates min, max, mean or first', result.stderr)
         self.assertFalse(os.path.exists(self.path('tree.obj')))
+
+        # The file is measured as it is read back, by the samples that count.
+        heights = collections.defaultdict(list)
+        for *place, height in points + [(x, y, z + 17.25)]:
+            heights[tuple(place)].append(height)
+        for rule, counts in (('max', max), ('min', min)):
+            summary, out = self.mesh(store, 'tree.glb', '--max-error', 1, '--duplicates', rule)
+            points[:] = [(*place, counts(all_of_it)) for place, all_of_it in heights.items()]
+            largest, covered = largest_error(*read_glb(out))
+            self.assertEqual(covered, summary['covered'] - summary['duplicates'], rule)
+            self.assertGreater(covered, 0.98 * len(points))
+            self.assertLessEqual(largest, 1 + 1e-9)
+            self.assertAlmostEqual(summary['max_error'], largest, places=6)
 
     def test_irregular_points(self):
         noise = random.Random(4)

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -146,6 +147,26 @@ tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
   return tri::measure_surface(moved.x, moved.y, moved.z, read, tin.triangles);
 }
 
+/// Where several samples have one place, one of the height that counts.
+MeshSamples one_a_place(const MeshSamples& samples, tri::PointDuplicates duplicates) {
+  std::vector<std::size_t> order(samples.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto place = [&samples](std::size_t i) { return std::pair(samples.x[i], samples.y[i]); };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return place(a) < place(b); });
+  MeshSamples result;
+  result.reserve(samples.size());
+  std::vector<double> heights;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::size_t i = order[k];
+    heights.push_back(samples.z[i]);
+    if (k + 1 < order.size() && place(order[k + 1]) == place(i)) continue;
+    result.add({samples.x[i], samples.y[i], merged_height(heights, duplicates)});
+    heights.clear();
+  }
+  return result;
+}
+
 /// Removes the samples that the vertices of a frame represent; returns the number of their places.
 /// Interpolation at a vertex has a rounding error, which matters where no error is allowed.
 std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
@@ -222,13 +243,9 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
   out.errors = tin.errors;
   const bool exact = rounding.largest() == stream::Point3{};
   if (!exact) {
-    if (tin.duplicates > 0 && !all) {
-      fail(
-          "the format of the mesh rounds positions, so the error where several samples have one "
-          "place and not all of them count cannot be verified",
-          "write PLY, which is exact, or leave out `duplicates`");
-    }
-    out.errors = measure_rounded(samples, box, out, rounding);
+    const bool some_count = tin.duplicates > 0 && !all;
+    out.errors = measure_rounded(
+        some_count ? one_a_place(samples, options.tin.duplicates) : samples, box, out, rounding);
   }
   out.uncovered = out.triangles.empty() ? samples.size() : out.errors.uncovered;
   const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
