@@ -747,6 +747,21 @@ class RenderTest(CommandTest):
             pictures.add(open(out, 'rb').read())
         self.assertEqual(len(pictures), 1)
 
+    def test_colours_that_no_one_filled_are_not_shown(self):
+        noise = random.Random(5)
+        with open(self.path('black.csv'), 'w') as file:
+            file.write('x,y,z,red,green,blue\n')
+            for _ in range(2000):
+                file.write(f'{noise.random() * 50:.2f},{noise.random() * 50:.2f},{noise.random():.2f},0,0,0\n')
+        self.run_ok('build', self.path('black.csv'), '-o', self.path('black.store'), '--crs', 'EPSG:32632')
+        pictures = []
+        for options in ([], ['--color', 'height'], ['--color', 'rgb']):
+            self.run_ok('render', self.path('black.store'), '-o', self.path('a.png'), '--size', '100x80',
+                        '--force', *options)
+            pictures.append(png_pixels(self.path('a.png'))[2])
+        self.assertEqual(pictures[0], pictures[1])
+        self.assertNotEqual(pictures[0], pictures[2])
+
     def test_refuses_colours_that_are_not_there(self):
         self.run_ok('synth', 'uniform', '--points', '50', '-o', self.path('a.ply'))
         for what in ('rgb', 'level', 'class', 'slope'):

@@ -218,7 +218,11 @@ class RenderCommand : public Command {
                                             bool terrain) const {
     std::string by = color_;
     if (by.empty()) {
-      by = !mesh.colours.empty()           ? "rgb"
+      // Formats with fields for colours are often written without any.
+      using Colour = std::array<std::uint16_t, 3>;
+      const bool coloured = std::any_of(mesh.colours.begin(), mesh.colours.end(),
+                                        [](const Colour& c) { return c != Colour{}; });
+      by = coloured                        ? "rgb"
            : !mesh.representatives.empty() ? "cluster"
            : terrain                       ? "height"
                                            : "grey";
