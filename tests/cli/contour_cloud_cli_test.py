@@ -151,6 +151,24 @@ class CloudContourTest(CloudTestCase):
         # A last digit may be rounded otherwise.
         self.assertLessEqual(len(got ^ expected), 8)
 
+    @unittest.skipIf(SCIPY is None, 'no SciPy')
+    def test_lines_in_the_stores_own_places_need_no_crs(self):
+        store = self.build('local', self.points)
+        self.expect_error(1, 'contour', store, '--interval', 10, '-o', self.path('none.geojson'))
+
+        def named(level, a, b):
+            return (level, *sorted(tuple(f'{c:.6f}' for c in p) for p in (a, b)))
+
+        expected = {named(*s) for s in self.oracle(points=self.points, interval=10)}
+        got = set()
+        for feature in json.loads(self.run_ok('contour', store, '--own-crs', '--interval', 10, '-o', '-'))['features']:
+            level = round(feature['properties']['elev'] / 10)
+            places = feature['geometry']['coordinates']
+            got |= {named(level, a, b) for a, b in zip(places, places[1:])}
+        self.assertGreater(len(expected), 3000)
+        # A last digit may be rounded otherwise.
+        self.assertLessEqual(len(got ^ expected), 8)
+
     def test_higher_ground_is_on_the_right_as_it_is_of_rasters(self):
         # A hill, as points and as a raster.
         hill = [(500000 + 30 * i, 5200000 + 30 * j, 100 - math.hypot(i - 10.3, j - 9.6))

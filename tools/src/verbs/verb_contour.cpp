@@ -31,19 +31,24 @@ class ContourCommand final : public Command {
         ->type_name("HEIGHT");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_flag("--own-crs", request_.own_crs,
+                 "x and y of the store's own CRS, also of one that is not known, instead of "
+                 "longitude and latitude");
     crs_.define_region(app);
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    ContourRequest request;
+    ContourRequest request = request_;
     request.interval = *interval_;  // required
     SamplerOptions sampler;
     const stream::Store store = surface_.open(sampler);
     request.level = sampler.level;
     request.max_edge = sampler.max_edge;
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
-    if (const std::string note = system_of(store).wgs84_note(); !note.empty()) common.say(note);
+    if (!request.own_crs) {
+      if (const std::string note = system_of(store).wgs84_note(); !note.empty()) common.say(note);
+    }
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     const ContourOutcome outcome = write_contours(
         store, request, [&](std::string_view text) { output.write(text); }, common.context());
@@ -60,6 +65,7 @@ class ContourCommand final : public Command {
   }
 
  private:
+  ContourRequest request_;
   SurfaceOptions surface_;
   std::string output_, region_;
   std::optional<double> interval_;
