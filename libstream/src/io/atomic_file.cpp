@@ -82,7 +82,8 @@ struct AtomicFile::Impl {
     throw Error({.file = target.string(),
                  .where = {},
                  .cause = "exists already",
-                 .remedy = "remove it, choose another name, or ask to replace it"});
+                 .remedy = "remove it, choose another name, or ask to replace it",
+                 .error_number = EEXIST});
   }
 
   /// Creates and locks the temporary file. Between the two steps another writer may take it for

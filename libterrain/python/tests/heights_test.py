@@ -114,7 +114,7 @@ class Rasters(StoreCase):
         x, y = np.meshgrid(c + a * (np.arange(20) + 0.5), f + e * (np.arange(16) + 0.5))
         heights = self.scan.heights(np.column_stack((x.ravel(), y.ravel())))
         np.testing.assert_allclose(got.values.ravel(), heights, rtol=1e-6)
-        with self.assertRaises(terrace.Error):
+        with self.assertRaises(FileExistsError):
             self.scan.raster(cell=25, path=path)
         self.scan.raster(cell=25, path=path, replace=True)
         shade = self.scan.raster('hillshade', cell=25)

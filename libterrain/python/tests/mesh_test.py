@@ -105,9 +105,12 @@ class Meshes(StoreCase):
         vertices, triangles, _ = _core.read_mesh(self.path('hills.ply'))
         np.testing.assert_array_equal(vertices, mesh.vertices)
         np.testing.assert_array_equal(triangles, mesh.triangles)
-        with self.assertRaises(terrace.Error):
-            mesh.save(self.path('hills.ply'))
-        mesh.save(self.path('hills.ply'), replace=True)
+        for name in ('hills.ply', 'hills.svg'):
+            mesh.save(self.path(name), replace=True)
+            with self.assertRaises(FileExistsError):
+                mesh.save(self.path(name))
+        with self.assertRaises(FileNotFoundError):
+            mesh.save(self.path('nowhere/hills.ply'))
         mesh.save(self.path('hills.glb'))
         self.assertGreater(os.path.getsize(self.path('hills.glb')), 1000)
         with self.assertRaises(ValueError):
