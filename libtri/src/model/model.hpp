@@ -103,11 +103,8 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   using Slot = ClusterTree::Slot;
   using Verdict = ClusterTree::Verdict;
-  /// Whether a part of it, a surface, follows by its journal and can be made from scratch.
-  static constexpr bool kFollows =
-      requires(Triangulation t, typename Triangulation::Changes& changes) {
-    t.restore(changes, 1u);
-  };
+  /// Whether a part of it, a surface, follows after operations and can be made from scratch.
+  static constexpr bool kFollows = requires(Triangulation t) { t.restore(1u); };
   static constexpr std::size_t kKeptPoints = 1 << 16;
 
   struct Staged {
@@ -158,7 +155,7 @@ MultiresolutionModel<Triangulation>::Impl::Impl(ClusterSource& source, const Det
                                                 ModelOptions options, Triangulation empty)
     : triangulation_(std::move(empty)),
       tree_(source),
-      deltas_(options.deltas || kFollows),
+      deltas_(options.deltas),
       old_heights_(options.deltas && options.old_heights) {
   const ClusterTree::Take take_points = take();
   tree_.read_root(take_points);
@@ -261,6 +258,7 @@ auto MultiresolutionModel<Triangulation>::Impl::apply(const ClusterTree::Plan& p
   // present before and after, but those are few.
   for (const Slot cluster : plan.collapsed) remove_cluster(cluster);
   if (!plan.staged.empty()) insert_clusters(deltas_ && (open_ || !plan.collapsed.empty()));
+  if constexpr (kFollows) triangulation_.follow();  // so that what it takes is the operation's
   if (!open_) finish_delta();
   return delta_;
 }
@@ -285,8 +283,8 @@ auto MultiresolutionModel<Triangulation>::Impl::restore([[maybe_unused]] unsigne
     -> const Delta& {
   assert(!open_);
   start_delta();
-  delta_.changes = {};
-  if constexpr (kFollows) triangulation_.restore(delta_.changes, threads);
+  if constexpr (kFollows) triangulation_.restore(threads);
+  finish_delta();
   return delta_;
 }
 

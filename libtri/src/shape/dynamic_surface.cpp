@@ -9,6 +9,7 @@
 
 #include "delaunay3/access.hpp"
 #include "free_slots.hpp"
+#include "journal.hpp"
 #include "nearby.hpp"
 #include "poles.hpp"
 #include "state.hpp"
@@ -50,11 +51,12 @@ struct DynamicSurface<Coord>::Impl {
   Delaunay3<Coord> tetrahedra;
   shape::State state;
   // Triangles by slot; at_side: their slots by side of the tetrahedron behind, kNone elsewhere.
-  std::vector<Corners3> corners;
-  std::vector<spatial::Side> side;  ///< kNone: the slot is free
+  std::vector<Corners3> corners;  ///< kFreeCorner first: the slot is free
+  std::vector<spatial::Side> side;
   std::vector<std::uint32_t> at_side;
   FreeSlots free;
   std::size_t count = 0;
+  Journal<Point, 3> journal;
   // Scratch memory.
   struct Facet {
     Corners3 corners;
@@ -109,8 +111,8 @@ struct DynamicSurface<Coord>::Impl {
     std::sort(appeared.begin(), appeared.end());
   }
 
-  /// Triangles that are there before and after keep their slots; the others are told.
-  void settle(Changes& out) {
+  /// Triangles that are there before and after keep their slots.
+  void exchange() {
     fresh.resize(std::max<std::size_t>(fresh.size(), tetrahedra.vertex_slots()));
     for (const VertexId v : changes.added_vertices) fresh[slot(v)] = true;
     const auto stays = [&](const Facet& before, const Facet& after) {
@@ -120,7 +122,7 @@ struct DynamicSurface<Coord>::Impl {
     auto old = vanished.begin();
     std::size_t left = 0;
     for (const Facet& facet : appeared) {
-      for (; old != vanished.end() && *old < facet; ++old) drop(*old, out);
+      for (; old != vanished.end() && *old < facet; ++old) drop(old->what);
       if (old != vanished.end() && stays(*old, facet)) {
         at_side[facet.what] = old->what;
         side[old->what] = facet.what;
@@ -129,42 +131,54 @@ struct DynamicSurface<Coord>::Impl {
         appeared[left++] = facet;
       }
     }
-    for (; old != vanished.end(); ++old) drop(*old, out);
+    for (; old != vanished.end(); ++old) drop(old->what);
     appeared.resize(left);
-    for (const Facet& facet : appeared) {
-      const auto end = static_cast<std::uint32_t>(side.size());
-      const std::uint32_t triangle = free.empty() ? end : free.take();
-      if (triangle == end) {
-        side.push_back({});
-        corners.push_back({});
-      }
-      side[triangle] = facet.what;
-      corners[triangle] = facet.corners;
-      at_side[facet.what] = triangle;
-      out.added_triangles.push_back(TriangleId{triangle});
-    }
-    count += out.added_triangles.size();
-    count -= out.removed_triangles.size();
+    for (const Facet& facet : appeared) add(facet);
     for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
   }
-  void drop(const Facet& facet, Changes& out) {
-    const auto& [a, b, c] = facet.corners;
-    out.removed_triangles.push_back(TriangleId{facet.what});
-    out.removed_corners.push_back({VertexId{a}, VertexId{b}, VertexId{c}});
-    side[facet.what] = spatial::kNone;
-    free.put(facet.what);
+  void drop(std::uint32_t triangle) {
+    if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
+    corners[triangle].fill(spatial::kFreeCorner);
+    free.put(triangle);
+    --count;
+  }
+  void add(const Facet& facet) {
+    const auto end = static_cast<std::uint32_t>(side.size());
+    const std::uint32_t triangle = free.empty() ? end : free.take();
+    if (triangle == end) {
+      side.push_back({});
+      corners.emplace_back().fill(spatial::kFreeCorner);
+    }
+    if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
+    side[triangle] = facet.what;
+    corners[triangle] = facet.corners;
+    at_side[facet.what] = triangle;
+    ++count;
   }
 
-  void take(Changes& out, bool from_scratch, unsigned threads) {
-    out.clear();
+  void follow(bool from_scratch, unsigned threads) {
     tetrahedra.take_changes(changes);
+    if (!from_scratch && changes.added_vertices.empty() && changes.removed_vertices.empty()) return;
+    if (journal.on()) {
+      for (std::size_t i = 0; i < changes.removed_vertices.size(); ++i)
+        journal.touch_vertex(slot(changes.removed_vertices[i]), true, changes.removed_points[i]);
+      for (const VertexId v : changes.added_vertices) journal.touch_vertex(slot(v), false, {});
+    }
     relabel(from_scratch, threads);
     compare();
-    settle(out);
-    out.removed_vertices.swap(changes.removed_vertices);
-    out.removed_points.swap(changes.removed_points);
-    out.added_vertices.swap(changes.added_vertices);
+    exchange();
   }
+  void take(Changes& out) {
+    assert(journal.on());
+    out.clear();
+    const auto& all = mesh();
+    journal.take(
+        [&](std::uint32_t v) { return all.vertex_alive(v) ? &all.vertex[v].point : nullptr; },
+        [&](std::uint32_t t) { return in_use(corners[t]) ? &corners[t] : nullptr; },
+        [](const Corners3& c) { return in_use(c); }, out, out.removed_triangles,
+        out.added_triangles);
+  }
+  static bool in_use(const Corners3& c) { return c[0] != spatial::kFreeCorner; }
 };
 
 template <class Coord>
@@ -181,7 +195,7 @@ DynamicSurface<Coord>& DynamicSurface<Coord>::operator=(DynamicSurface&&) noexce
 template <class Coord>
 std::vector<VertexId> DynamicSurface<Coord>::build(std::span<const Point> points) {
   std::vector<VertexId> vertices = impl_->tetrahedra.build(points);
-  start_journal();
+  follow();
   return vertices;
 }
 
@@ -200,17 +214,22 @@ void DynamicSurface<Coord>::reserve(std::size_t vertices) {
 }
 
 template <class Coord>
+void DynamicSurface<Coord>::follow() {
+  impl_->follow(false, 1);
+}
+template <class Coord>
+void DynamicSurface<Coord>::restore(unsigned threads) {
+  impl_->follow(true, threads);
+}
+template <class Coord>
 void DynamicSurface<Coord>::start_journal() {
-  Changes dropped;
-  impl_->take(dropped, false, 1);
+  follow();
+  impl_->journal.start();
 }
 template <class Coord>
 void DynamicSurface<Coord>::take_changes(Changes& changes) {
-  impl_->take(changes, false, 1);
-}
-template <class Coord>
-void DynamicSurface<Coord>::restore(Changes& changes, unsigned threads) {
-  impl_->take(changes, true, threads);
+  follow();
+  impl_->take(changes);
 }
 
 template <class Coord>
@@ -246,7 +265,7 @@ bool DynamicSurface<Coord>::alive(VertexId vertex) const {
 }
 template <class Coord>
 bool DynamicSurface<Coord>::alive(TriangleId triangle) const {
-  return slot(triangle) < impl_->side.size() && impl_->side[slot(triangle)] != spatial::kNone;
+  return slot(triangle) < impl_->side.size() && Impl::in_use(impl_->corners[slot(triangle)]);
 }
 
 template <class Coord>
@@ -275,7 +294,7 @@ std::size_t DynamicSurface<Coord>::memory_bytes() const {
   return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.capacity() * sizeof(Corners3) +
          (i.side.capacity() + i.at_side.capacity() + i.examined.capacity()) *
              sizeof(std::uint32_t) +
-         i.free.bytes() +
+         i.free.bytes() + i.journal.bytes() +
          (i.vanished.capacity() + i.appeared.capacity()) * sizeof(typename Impl::Facet) +
          i.fresh.capacity() / 8;
 }

@@ -41,7 +41,7 @@ struct Poles {
 /// Poles by vertex slot.
 class PoleFinder {
  public:
-  /// Right at whole vertices.
+  /// In a part only whole vertices have poles.
   PoleFinder(const Spheres& spheres, const Part& part)
       : spheres_(spheres),
         part_(part),
@@ -56,7 +56,7 @@ class PoleFinder {
       if (!spheres_.finite(t)) continue;
       const double r2 = spheres_.radius2(t);
       for (const std::uint32_t v : tetrahedra[t].corner)
-        if (larger(r2, t, largest[v])) largest[v] = {r2, t};
+        if (whole(v) && larger(r2, t, largest[v])) largest[v] = {r2, t};
     }
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
       poles_[v].first = largest[v].tetrahedron;
@@ -68,7 +68,8 @@ class PoleFinder {
       if (!spheres_.finite(t)) continue;
       const double r2 = spheres_.radius2(t);
       for (const std::uint32_t v : tetrahedra[t].corner)
-        if (larger(r2, t, largest[v]) && dot(spheres_.to_centre(t, v), to_first_[v]) < 0.0)
+        if (whole(v) && larger(r2, t, largest[v]) &&
+            dot(spheres_.to_centre(t, v), to_first_[v]) < 0.0)
           largest[v] = {r2, t};
     }
     for (std::uint32_t v = 1; v < poles_.size(); ++v) poles_[v].second = largest[v].tetrahedron;
@@ -87,6 +88,9 @@ class PoleFinder {
     double radius2 = -1.0;
     std::uint32_t tetrahedron = spatial::kNone;
   };
+  [[nodiscard]] bool whole(std::uint32_t v) const {
+    return part_.whole.empty() || part_.whole[v] != 0;
+  }
   /// Where two radii are equal, the tetrahedron with the lexicographically first corners is the
   /// pole.
   [[nodiscard]] bool larger(double r2, std::uint32_t t, const Largest& held) const {

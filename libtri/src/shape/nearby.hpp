@@ -87,11 +87,13 @@ class Nearby {
     // All tetrahedra at their corners, ghosts too: joined to them by facets with such a corner.
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate) {
-        const auto& corner = mesh_.tetrahedron[spatial::tetrahedron_of(mate)].corner;
+        const std::uint32_t t = spatial::tetrahedron_of(mate);
+        if (state_.local_tetrahedron[t] != spatial::kNone) continue;
+        const auto& corner = mesh_.tetrahedron[t].corner;
         if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
               return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
             }))
-          take(spatial::tetrahedron_of(mate));
+          take(t);
       }
     }
   }

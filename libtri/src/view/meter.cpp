@@ -46,6 +46,7 @@ void StepMeter::spend(std::size_t points) {
   if (!timed_) return;
   const double before = std::exchange(last_, now());
   learn(operation_rate_, (last_ - before) / with_overhead(points));
+  learn(usual_points_, static_cast<double>(points));
 }
 
 void StepMeter::end() {

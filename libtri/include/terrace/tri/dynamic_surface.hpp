@@ -17,7 +17,7 @@ namespace terrace::tri {
 /// of the surface. In a multiresolution model, and under the control of a view, it takes the place
 /// of a triangulation.
 ///
-/// Points come and go at once; the surface follows in take_changes(), by the rules of
+/// Points come and go at once; the surface follows in follow(), by the rules of
 /// BasicShape3::update_nearby(): new tetrahedra are judged, with those around them, all others stay
 /// as they were. So the tetrahedra are a function of the points alone, but the surface may depend
 /// in a few pockets on how they came; restore() computes it from scratch.
@@ -54,22 +54,25 @@ class DynamicSurface {
 
   /// As in Delaunay3; the surface of these points is there at once.
   std::vector<VertexId> build(std::span<const Point> points);
-  /// As in Delaunay3. Until take_changes() the surface is that of before, and its triangles may
-  /// have corners that are gone.
+  /// As in Delaunay3. Until follow() the surface is that of before, and its triangles may have
+  /// corners that are gone.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(std::span<const VertexId> vertices);
   void reserve(std::size_t vertices);
 
-  /// Brings the surface up to date and drops the changes so far.
+  /// Brings the surface up to date. About 12 us per point that came or went; from scratch if most
+  /// tetrahedra are new.
+  void follow();
+  /// Computes the surface from scratch, 3 us per vertex. The result is that of a new object of the
+  /// same points. threads: 0 is one per core; the result is the same for any number.
+  void restore(unsigned threads = 1);
+
+  /// Starts recording and drops earlier records.
   void start_journal();
-  /// Brings the surface up to date: the changes since start_journal() or the last call. Applying
-  /// removals first is a must, a reused handle is on both sides. Each list is in the order of the
-  /// corners. About 12 us per point that came or went; from scratch if most tetrahedra are new.
+  /// Brings the surface up to date, and tells the changes since start_journal() or the last call.
+  /// Apply removals first: a reused handle is on both sides. Requires a started journal.
   void take_changes(Changes& changes);
-  /// The same, with the surface computed from scratch: 2.5 to 3 us per vertex. The result is that
-  /// of a new object of the same points. threads: 0 is one per core; the result is the same.
-  void restore(Changes& changes, unsigned threads = 1);
 
   [[nodiscard]] std::size_t vertex_count() const;
   [[nodiscard]] std::size_t triangle_count() const;

@@ -127,8 +127,7 @@ struct Detail {
 };
 
 struct ModelOptions {
-  /// false: no deltas are recorded, steps are faster and every Delta is empty. A DynamicSurface
-  /// follows by its deltas and always has them.
+  /// false: no deltas are recorded, steps are faster and every Delta is empty.
   bool deltas = true;
   /// true: a Delta also reports the former heights, for 8 bytes and a bit per vertex.
   bool old_heights = false;

@@ -134,6 +134,8 @@ class StepMeter {
   void start(const StepBudget& budget);
   /// Whether one more operation on this many points fits. The first one always does.
   [[nodiscard]] bool has(std::size_t points) const;
+  /// The same for an operation of which it is not known yet on how many.
+  [[nodiscard]] bool has_usual() const { return has(static_cast<std::size_t>(usual_points_)); }
   /// To be called after each operation.
   void spend(std::size_t points);
   /// To be called before the first operation, and at the end of the step.
@@ -147,8 +149,9 @@ class StepMeter {
   bool timed_ = false;
   double begin_ = 0.0, last_ = 0.0;
   std::size_t operations_ = 0, points_ = 0;
-  // Seconds per point of operations and of the end, estimated from previous steps.
-  double operation_rate_ = 0.0, end_rate_ = 0.0;
+  // Seconds per point of operations and of the end, and points of an operation, estimated from
+  // previous steps.
+  double operation_rate_ = 0.0, end_rate_ = 0.0, usual_points_ = 0.0;
 };
 
 /// A cluster as delivered by its loader.
