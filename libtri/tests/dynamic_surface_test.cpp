@@ -169,6 +169,73 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
   }
 }
 
+// At the border of detail a coarse vertex has tetrahedra with most of the fine ones: it is not
+// looked at as a whole, and still the surface is that of the shape, and nearly that from scratch.
+TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
+  using Coord = TypeParam;
+  std::mt19937_64 random(7);
+  std::vector<std::array<Coord, 3>> fine, coarse;
+  for (const Point3& p : bumpy_ball(12'000, random)) {
+    auto& part = p[2] > 0x1p20 ? fine : coarse;
+    if (&part == &coarse && coarse.size() >= 25) continue;
+    part.push_back({static_cast<Coord>(p[0]), static_cast<Coord>(p[1]), static_cast<Coord>(p[2])});
+  }
+  DynamicSurface<Coord> surface;
+  Delaunay3<Coord> triangulation;
+  coarse.insert(coarse.end(), fine.begin(), fine.end());
+  surface.build(coarse);
+  triangulation.build(coarse);
+  surface.start_journal();
+  triangulation.start_journal();
+  Shape3<Coord> shape;
+  shape.restore(triangulation);
+  Drawn<Coord> drawn(surface);
+  typename DynamicSurface<Coord>::Changes changes;
+  typename Delaunay3<Coord>::Changes tetrahedra;
+  std::size_t differing = 0;
+  for (int step = 0; step < 12; ++step) {
+    // A patch goes, and comes back.
+    const auto middle = fine[random() % fine.size()];
+    std::vector<VertexId> patch;
+    std::vector<std::array<Coord, 3>> points;
+    for (const VertexId v : surface.all_vertices()) {
+      double square = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double d = static_cast<double>(surface.point(v)[k]) - static_cast<double>(middle[k]);
+        square += d * d;
+      }
+      if (square > 0x1p32) continue;
+      patch.push_back(v);
+      points.push_back(surface.point(v));
+    }
+    ASSERT_GT(patch.size(), 20u);
+    for (const bool back : {false, true}) {
+      if (back) {
+        surface.insert(points, {});
+        triangulation.insert(points, {});
+      } else {
+        surface.remove(patch);
+        triangulation.remove(patch);
+      }
+      surface.take_changes(changes);
+      triangulation.take_changes(tetrahedra);
+      shape.update_nearby(triangulation, tetrahedra);
+      ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
+      ASSERT_NO_FATAL_FAILURE(drawn.check());
+      ASSERT_EQ(drawn.triangles(), faces_of(shape, triangulation));
+      const ShapeSurface found = shape.surface(triangulation);
+      ASSERT_TRUE(measure(found.surface).closed);
+      ASSERT_EQ(found.vertices.size() + shape.lost_vertices().size(), triangulation.vertex_count());
+    }
+    surface.restore();
+    surface.take_changes(changes);
+    ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
+    differing += changes.removed_triangles.size();
+    shape.restore(triangulation);
+  }
+  EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
+}
+
 TYPED_TEST(DynamicSurfaceOf, WhatComesAndGoesUnseenIsNotTold) {
   using Coord = TypeParam;
   std::mt19937_64 random(5);

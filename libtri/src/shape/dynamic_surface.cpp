@@ -12,6 +12,7 @@
 #include "journal.hpp"
 #include "nearby.hpp"
 #include "poles.hpp"
+#include "pool.hpp"
 #include "state.hpp"
 
 namespace terrace::tri {
@@ -50,10 +51,10 @@ template <class Coord>
 struct DynamicSurface<Coord>::Impl {
   Delaunay3<Coord> tetrahedra;
   shape::State state;
-  // Triangles by slot; at_side: their slots by side of the tetrahedron behind, kNone elsewhere.
-  std::vector<Corners3> corners;  ///< kFreeCorner first: the slot is free
-  std::vector<spatial::Side> side;
-  std::vector<std::uint32_t> at_side;
+  // Triangles by slot; behind: their slots by tetrahedron and corner opposite, kNone elsewhere.
+  Pool<Corners3> corners;  ///< kFreeCorner first: the slot is free
+  Pool<spatial::Side> side;
+  Pool<std::array<std::uint32_t, 4>> behind;
   FreeSlots free;
   std::size_t count = 0;
   Journal<Point, 3> journal;
@@ -68,6 +69,9 @@ struct DynamicSurface<Coord>::Impl {
   std::vector<Facet> vanished, appeared;
   std::vector<bool> fresh;  ///< by vertex slot: new since the last changes; false between calls
 
+  [[nodiscard]] std::uint32_t& at(spatial::Side s) {
+    return behind[spatial::tetrahedron_of(s)][spatial::index_of(s)];
+  }
   [[nodiscard]] const auto& mesh() const { return Delaunay3Access::mesh(tetrahedra); }
 
   /// Brings labels up to date and lists the tetrahedra whose facets may have come or gone.
@@ -85,10 +89,11 @@ struct DynamicSurface<Coord>::Impl {
     const auto& all = mesh();
     vanished.clear();
     appeared.clear();
-    at_side.resize(4 * std::max<std::size_t>(at_side.size() / 4, all.tetrahedron.size()),
-                   spatial::kNone);
+    const std::uint32_t known = behind.size();
+    behind.resize(std::max(known, all.tetrahedron.size()));
+    for (std::uint32_t t = known; t < behind.size(); ++t) behind[t].fill(spatial::kNone);
     const auto vanish = [&](spatial::Side s) {
-      const std::uint32_t triangle = std::exchange(at_side[s], spatial::kNone);
+      const std::uint32_t triangle = std::exchange(at(s), spatial::kNone);
       if (triangle != spatial::kNone) vanished.push_back({corners[triangle], triangle});
     };
     for (const TetrahedronId t : changes.removed_tetrahedra)
@@ -102,7 +107,7 @@ struct DynamicSurface<Coord>::Impl {
                           state.of[spatial::tetrahedron_of(tetrahedron.mate[i])] != shape::kKept;
         if (!open) {
           vanish(s);
-        } else if (at_side[s] == spatial::kNone) {
+        } else if (at(s) == spatial::kNone) {
           appeared.push_back({turned(spatial::facet_of(tetrahedron, i)), s});
         }
       }
@@ -124,7 +129,7 @@ struct DynamicSurface<Coord>::Impl {
     for (const Facet& facet : appeared) {
       for (; old != vanished.end() && *old < facet; ++old) drop(old->what);
       if (old != vanished.end() && stays(*old, facet)) {
-        at_side[facet.what] = old->what;
+        at(facet.what) = old->what;
         side[old->what] = facet.what;
         ++old;
       } else {
@@ -143,16 +148,15 @@ struct DynamicSurface<Coord>::Impl {
     --count;
   }
   void add(const Facet& facet) {
-    const auto end = static_cast<std::uint32_t>(side.size());
-    const std::uint32_t triangle = free.empty() ? end : free.take();
-    if (triangle == end) {
+    const std::uint32_t triangle = free.empty() ? side.size() : free.take();
+    if (triangle == side.size()) {
       side.push_back({});
-      corners.emplace_back().fill(spatial::kFreeCorner);
+      corners.push_back({spatial::kFreeCorner, 0, 0});
     }
     if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
     side[triangle] = facet.what;
     corners[triangle] = facet.corners;
-    at_side[facet.what] = triangle;
+    at(facet.what) = triangle;
     ++count;
   }
 
@@ -257,7 +261,7 @@ std::uint32_t DynamicSurface<Coord>::vertex_slots() const {
 }
 template <class Coord>
 std::uint32_t DynamicSurface<Coord>::triangle_slots() const {
-  return static_cast<std::uint32_t>(impl_->side.size());
+  return impl_->side.size();
 }
 template <class Coord>
 bool DynamicSurface<Coord>::alive(VertexId vertex) const {
@@ -291,10 +295,9 @@ std::uint64_t DynamicSurface<Coord>::hash() const {
 template <class Coord>
 std::size_t DynamicSurface<Coord>::memory_bytes() const {
   const Impl& i = *impl_;
-  return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.capacity() * sizeof(Corners3) +
-         (i.side.capacity() + i.at_side.capacity() + i.examined.capacity()) *
-             sizeof(std::uint32_t) +
-         i.free.bytes() + i.journal.bytes() +
+  return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.bytes() + i.side.bytes() +
+         i.behind.bytes() + i.examined.capacity() * sizeof(std::uint32_t) + i.free.bytes() +
+         i.journal.bytes() +
          (i.vanished.capacity() + i.appeared.capacity()) * sizeof(typename Impl::Facet) +
          i.fresh.capacity() / 8;
 }

@@ -20,8 +20,14 @@ template <class Mesh>
 class Nearby {
  public:
   Nearby(const Mesh& mesh, State& state) : mesh_(mesh), state_(state) {
-    state.local_tetrahedron.resize(mesh.tetrahedron.size(), spatial::kNone);
-    state.local_vertex.resize(mesh.vertex.size(), spatial::kNone);
+    const auto widen = [](Pool<std::uint32_t>& numbers, std::uint32_t size) {
+      const std::uint32_t known = numbers.size();
+      if (size <= known) return;
+      numbers.resize(size);
+      std::fill(numbers.data() + known, numbers.data() + size, spatial::kNone);
+    };
+    widen(state.local_tetrahedron, mesh.tetrahedron.size());
+    widen(state.local_vertex, mesh.vertex.size());
   }
   ~Nearby() {
     for (const std::uint32_t t : slots_) state_.local_tetrahedron[t] = spatial::kNone;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../delaunay3/mesh.hpp"
+#include "../pool.hpp"
 #include "terrace/tri/shape.hpp"
 
 /// The state of a shape, and the steps that the rules share.
@@ -36,7 +37,7 @@ struct State {
   std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
   /// Local numbers by slot, see nearby.hpp; kNone between two calls.
-  std::vector<std::uint32_t> local_tetrahedron, local_vertex;
+  Pool<std::uint32_t> local_tetrahedron, local_vertex;
 
   template <class Mesh>
   void keep(const Mesh& mesh, std::uint32_t t) {
@@ -52,9 +53,9 @@ struct State {
   }
   [[nodiscard]] std::size_t bytes() const {
     const std::size_t words = degree.capacity() + lost.capacity() + rescued.capacity() +
-                              queue.capacity() + pending.capacity() + touched.capacity() +
-                              local_tetrahedron.capacity() + local_vertex.capacity();
-    return of.capacity() + forest.capacity() + words * sizeof(std::uint32_t);
+                              queue.capacity() + pending.capacity() + touched.capacity();
+    return of.capacity() + forest.capacity() + words * sizeof(std::uint32_t) +
+           local_tetrahedron.bytes() + local_vertex.bytes();
   }
   void forget_rescued() {
     for (const std::uint32_t t : rescued) of[t] &= static_cast<std::uint8_t>(~kRescuedBit);
