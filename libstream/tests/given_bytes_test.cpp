@@ -46,6 +46,8 @@ TEST(GivenBytes, ReadsWhatWasGivenInWhateverPieces) {
       }
       bool all = true;
       for (std::size_t i = 0; i < length; ++i) all &= there.contains(begin + i);
+      EXPECT_EQ(given.has({"a", begin, length}), all);
+      EXPECT_FALSE(given.has({"b", begin, length}));
       std::vector<std::byte> out(length);
       try {
         source->read(begin, out);

@@ -218,6 +218,27 @@ class StoreTest(unittest.TestCase):
         self.expect_error(2, 'points', self.store, '-o', '-', '--cluster', '0:0', '--level', 1)
         self.expect_error(2, 'points', self.store, '-o', '-', '--cluster', '0:0', '--region', '0,0,1,1')
 
+    def test_mesh_of_a_cluster(self):
+        """The vertices are the points of the cluster, the triangles cover their hull."""
+        for args in (['--cluster', '1:0'], ['--cluster', '1:0', '--level', 0], ['--cluster', '0:3']):
+            out = self.path('cluster.obj')
+            summary = json.loads(self.run_ok('mesh', self.store, *args, '-o', out, '--json', '--force'))
+            points = {tuple(map(float, line.split()[:3]))
+                      for line in self.run_ok('points', self.store, *args, '-o', '-').splitlines()}
+            with open(out) as file:
+                lines = [line.split() for line in file]
+            vertices = [tuple(map(float, line[1:4])) for line in lines if line and line[0] == 'v']
+            self.assertEqual(len(vertices), summary['vertices'])
+            self.assertEqual(len(vertices), len(points))
+            for got, expected in zip(sorted(vertices), sorted(points)):
+                for a, b in zip(got, expected):
+                    self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(b)))
+            self.assertGreater(summary['triangles'], 0)
+            self.assertLess(summary['triangles'], 2 * len(vertices))
+        for wrong in (['--cluster', '77:0'], ['--cluster', '0:0', '--level', 1], ['--cluster', '0:0', '--region', '0,0,1,1'],
+                      ['--cluster', '0:0', '--max-error', 1], ['--cluster', '0:0', '--smooth', 'laplacian']):
+            self.expect_error(2, 'mesh', self.store, '-o', self.path('wrong.ply'), *wrong)
+
     def test_mesh_in_every_format(self):
         for ending in ('ply', 'obj', 'glb'):
             out = self.path(f'mesh.{ending}')

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // flight_bench.mjs [PACKAGES [STORE]]: what a frame takes in the viewer's worker, in node and in headless Chromium, and
 // what a flight fetches. TERRACE names the command, CHROMIUM the browser; without it and PACKAGES (npm's, with
-// playwright-core) node alone is measured. Without STORE a made raster of 8192 x 8192 cells is flown over.
+// playwright-core) node alone is measured. STORE: a store, or a published folder, whose first store is taken; without it a made
+// raster of 8192 x 8192 cells.
 //
 // The first flight keeps some 500,000 points, 600 frames. The second goes down from the whole to full detail of 1 % of the
 // area. Times are of the worker (the model's step, normals, slides and copies of what has changed), measured by the worker
 // itself, bytes those of requests, the start file included, against the stored bytes of all clusters read.
-import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
+import {existsSync, mkdtempSync, readFileSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
-import {basename, join, resolve} from 'node:path';
+import {join, resolve} from 'node:path';
 import {spawnSync} from 'node:child_process';
 
 import {cruise, dive} from './flyer.mjs';
@@ -18,7 +19,7 @@ import {folderFetch, Worker} from './worker_host.mjs';
 const small = process.env.TERRACE_BENCH_SMALL !== undefined;
 const FRAMES = small ? 60 : 600, POINTS = small ? 20_000 : 500_000;
 const folder = mkdtempSync(join(tmpdir(), 'terrace-flight-'));
-const site = join(folder, 'site');
+let site = join(folder, 'site');
 
 function terrace(...args) {
   const {status, stderr} = spawnSync(process.env.TERRACE, args, {encoding: 'utf8'});
@@ -37,8 +38,9 @@ async function inChromium(browser, url, call, ...args) {
         window.connect = heard => {
           const worker = new Worker('worker.js');
           worker.onmessage = ({data}) => {
-            if (data.type === 'frame') worker.postMessage({type: 'drawn'});
             heard(data);
+            const buffer = data.changes?.buffer;
+            if (buffer) worker.postMessage({type: 'drawn', buffer}, [buffer]);
           };
           return {tell: message => worker.postMessage(message)};
         };`
@@ -60,8 +62,12 @@ try {
     terrace('synth', 'dem', '--size', small ? '300x300' : '8192x8192', '-o', join(folder, 'dem.tif'), '-q');
     terrace('build', join(folder, 'dem.tif'), '-o', store, '-q');
   }
-  terrace('publish', store, '-o', site, '-q');
-  const name = basename(store).replace(/\.(store|terrace)$/, '');
+  if (existsSync(join(store, 'stores.json'))) {
+    site = store;
+  } else {
+    terrace('publish', store, '-o', site, '-q');
+  }
+  const {name} = JSON.parse(readFileSync(join(site, 'stores.json'), 'utf8')).stores[0];
 
   const inNode = (fly, ...args) =>
       fly(heard => new Worker(join(site, 'worker.js'), folderFetch(site).fetch, heard), 'http://folder/', name, ...args);

@@ -48,7 +48,7 @@ export class Worker {
   constructor(script, fetch, said) {
     this.self = {
       postMessage: message => {
-        if (message.type === 'frame') queueMicrotask(() => this.tell({type: 'drawn'}));
+        if (message.type === 'frame') queueMicrotask(() => this.tell({type: 'drawn', buffer: message.changes.buffer}));
         said(message);
       }
     };
@@ -61,6 +61,7 @@ export class Worker {
       AbortController,
       performance,
       setTimeout: (work, time) => setTimeout(work, time ?? 0),
+      ArrayBuffer,
       Uint8Array,
       Uint32Array,
       Float64Array,

@@ -139,6 +139,17 @@ OpenByName GivenBytes::open() const {
   };
 }
 
+bool GivenBytes::has(const ByteRange& range) const {
+  const auto file = impl_->files.find(range.file);
+  if (file == impl_->files.end()) return false;
+  for (std::uint64_t next = range.offset; next < range.offset + range.bytes;) {
+    const auto at = Impl::from(file->second, next);
+    if (at == file->second.parts.end() || at->first > next) return false;
+    next = at->second->end();
+  }
+  return true;
+}
+
 std::uint64_t GivenBytes::bytes() const { return impl_->bytes; }
 
 }  // namespace terrace::stream

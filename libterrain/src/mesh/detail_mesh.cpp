@@ -23,6 +23,36 @@
 namespace terrace::terrain {
 namespace {
 
+/// A store from one cluster on, which stands where the root stands otherwise; its representative is
+/// its last member.
+class ClusterTop final : public tri::ClusterSource {
+ public:
+  ClusterTop(const stream::Store& store, stream::ClusterId cluster)
+      : store_(store), inner_(store), cluster_(cluster) {}
+
+  [[nodiscard]] unsigned top() const override { return stream::level_of(cluster_); }
+  [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
+    return inner_.cluster_count(level);
+  }
+  tri::ClusterRecord record(tri::ClusterId id) override { return inner_.record(id); }
+  tri::ClusterMembers read(tri::ClusterId id) override {
+    if (tri::level_of(id) < top()) return inner_.read(id);
+    store_.read(cluster_, points_);
+    if (points_.has_representative) {
+      points_.positions.push_back(points_.representative);
+      points_.children.insert(points_.children.end(), points_.representative_children.begin(),
+                              points_.representative_children.end());
+    }
+    return {.positions = points_.positions, .children = points_.children};
+  }
+
+ private:
+  const stream::Store& store_;
+  StoreSource inner_;
+  stream::ClusterId cluster_;
+  stream::ClusterPoints points_;
+};
+
 /// Peak bytes per vertex: the triangulation and its bulk build, the model's bookkeeping, and the
 /// mesh that comes out (vertex, level, two triangles).
 constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
@@ -82,7 +112,7 @@ constexpr std::uint64_t kBytesToFlip = 120;
 void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
                   std::uint64_t more_per_vertex) {
   std::uint64_t points = 0;
-  if (!detail.region && detail.focuses.empty()) {
+  if (!detail.region && detail.focuses.empty() && !detail.cluster) {
     points = store.levels()[detail.level].points;
   } else {
     for_each_wanted_record(
@@ -194,7 +224,10 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model,
 template <class Coord>
 TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
                      const DetailMeshOptions& options) {
-  StoreSource source(store);
+  StoreSource whole(store);
+  std::optional<ClusterTop> part;
+  if (detail.cluster) part.emplace(store, *detail.cluster);
+  tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
   const stream::Placement& placement = store.schema();
   std::optional<tri::MetricField2> field;
   if (options.metric.kind == MetricChoice::Kind::elliptical) {
@@ -227,6 +260,9 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
     throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
                      options.metric.text);
+  }
+  if (detail.cluster && options.heights.any()) {
+    throw UsageError("`cluster`: without smoothing and overlays");
   }
   const Detail wide = with_margin(store, detail, store.schema());
   check_memory(store, wide, context.memory_or(0),

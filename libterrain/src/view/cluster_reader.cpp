@@ -2,6 +2,7 @@
 #include "view/cluster_reader.hpp"
 
 #include <chrono>
+#include <unordered_map>
 #include <utility>
 
 namespace terrace::terrain {
@@ -13,26 +14,40 @@ double steady_seconds() {
 
 /// Share of a frame's time that the calling thread spends reading.
 constexpr double kReadingShare = 0.4;
+/// And how much of it when it looks for bytes that turn out to be missing.
+constexpr double kMissingShare = 0.25;
 /// More missing ranges are not looked for in a frame: requests for these take longer than it does.
 constexpr std::size_t kMostMissing = 512;
 
 class FrameReader final : public ClusterReader {
  public:
-  explicit FrameReader(FramedSource& source) : source_(source) {}
+  FrameReader(FramedSource& source, std::function<bool(const stream::ByteRange&)> given)
+      : source_(source), given_(std::move(given)) {}
 
   void bring(double seconds, const Give& give) override {
     const tri::StepBudget budget{.seconds = kReadingShare * seconds, .clock = steady_seconds};
     meter_.start(budget);
     missing_.clear();
+    if (!given_ || lacking_.size() > 8 * kMostMissing) lacking_.clear();
+    const double end = steady_seconds() + kMissingShare * seconds;
     for (const tri::ViewRequest& request : wanted_) {
       const auto members = static_cast<std::size_t>(request.members);
-      if (!meter_.has(members) || missing_.size() >= kMostMissing) break;
-      try {
-        give(source_.load(request));
-        meter_.spend(members);
-      } catch (const stream::MissingBytes& missing) {
-        missing_.insert(missing_.end(), missing.ranges().begin(), missing.ranges().end());
+      // Above level 0 the records of the clusters below come with it, which takes far longer.
+      const std::size_t kind = tri::level_of(request.cluster) > 0 ? 1 : 0;
+      if (!meter_.has(members, kind) || missing_.size() >= kMostMissing) break;
+      auto lacking = lacking_.find(request.cluster);
+      if (lacking == lacking_.end() || given_(lacking->second.front())) {
+        try {
+          give(source_.load(request));
+          meter_.spend(members, kind);
+          continue;
+        } catch (const stream::MissingBytes& missing) {
+          lacking = lacking_.insert_or_assign(request.cluster, missing.ranges()).first;
+        }
+        // An exception takes longer than anything else here.
+        if (steady_seconds() > end) break;
       }
+      missing_.insert(missing_.end(), lacking->second.begin(), lacking->second.end());
     }
   }
   void ask(const std::vector<tri::ViewRequest>& wanted, const std::vector<tri::ViewRequest>&,
@@ -43,8 +58,11 @@ class FrameReader final : public ClusterReader {
 
  private:
   FramedSource& source_;
+  std::function<bool(const stream::ByteRange&)> given_;
   std::vector<tri::ViewRequest> wanted_;  ///< by the step before
   std::vector<stream::ByteRange> missing_;
+  /// What clusters lacked when they were last looked for.
+  std::unordered_map<tri::ClusterId, std::vector<stream::ByteRange>> lacking_;
   tri::StepMeter meter_;
 };
 
@@ -100,8 +118,9 @@ std::vector<std::uint64_t> FramedSource::counts() const {
   return counts;
 }
 
-std::unique_ptr<ClusterReader> make_frame_reader(FramedSource& source) {
-  return std::make_unique<FrameReader>(source);
+std::unique_ptr<ClusterReader> make_frame_reader(
+    FramedSource& source, std::function<bool(const stream::ByteRange&)> given) {
+  return std::make_unique<FrameReader>(source, std::move(given));
 }
 
 }  // namespace terrace::terrain

@@ -70,8 +70,10 @@ class ClusterReader {
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const { return {}; }
 };
 
-/// The calling thread, within the frame's time. Bytes that are missing are no fault of it.
-std::unique_ptr<ClusterReader> make_frame_reader(FramedSource& source);
+/// The calling thread, within the frame's time. Bytes that are missing are no fault of it; they are
+/// looked for again once they are `given`, or, if that is empty, in each frame.
+std::unique_ptr<ClusterReader> make_frame_reader(
+    FramedSource& source, std::function<bool(const stream::ByteRange&)> given = {});
 /// A thread of its own.
 std::unique_ptr<ClusterReader> make_reading_thread(FramedSource& source);
 

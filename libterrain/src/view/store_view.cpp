@@ -9,9 +9,11 @@ namespace terrace::terrain {
 template <class Shown>
 StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& options,
                             Reader reader)
-    : impl_(std::make_unique<Impl>(
-          store, Ground(store.schema()).map(store.bounds()), options,
-          reader == Reader::thread ? make_reading_thread : make_frame_reader)) {}
+    : impl_(std::make_unique<Impl>(store, Ground(store.schema()).map(store.bounds()), options,
+                                   [&](FramedSource& source) {
+                                     return reader == Reader::thread ? make_reading_thread(source)
+                                                                     : make_frame_reader(source);
+                                   })) {}
 
 template StoreView<std::int32_t>::StoreView(const stream::Store&, const tri::ViewOptions&, Reader);
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,

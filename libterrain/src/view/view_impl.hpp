@@ -3,6 +3,7 @@
 
 #include <cassert>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -24,10 +25,10 @@ inline constexpr bool is_surface<tri::DynamicSurface<Coord>> = true;
 
 template <class Shown>
 struct StoreView<Shown>::Impl {
-  using MakeReader = std::unique_ptr<ClusterReader> (*)(FramedSource&);
+  using MakeReader = std::function<std::unique_ptr<ClusterReader>(FramedSource&)>;
 
   Impl(const stream::Store& given, const stream::LinearMap& ground, const tri::ViewOptions& options,
-       MakeReader make_reader)
+       const MakeReader& make_reader)
       : store(given),
         frame(store, ground),
         lattice(store, frame),
@@ -59,20 +60,25 @@ struct StoreView<Shown>::Impl {
 
 template <class Shown>
 StoreView<Shown>::StoreView(const stream::Store& store, const stream::LinearMap& ground,
-                            const tri::ViewOptions& options)
-    : impl_(std::make_unique<Impl>(store, ground, options, make_frame_reader)) {}
+                            const tri::ViewOptions& options,
+                            std::function<bool(const stream::ByteRange&)> given)
+    : impl_(std::make_unique<Impl>(store, ground, options, [&](FramedSource& source) {
+        return make_frame_reader(source, std::move(given));
+      })) {}
 
 template <class Shown>
 StoreView<Shown>::~StoreView() = default;
 
 template <class Shown>
 const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& view,
-                                                               double seconds) {
+                                                               double seconds,
+                                                               const std::array<double, 2>& after) {
   const double begin = Impl::now();
   impl_->reader->bring(seconds,
                        [&](tri::GivenCluster cluster) { impl_->control.give(std::move(cluster)); });
   const double left = seconds - (Impl::now() - begin);
-  const Step& step = impl_->control.step(view, {.seconds = left, .clock = Impl::now});
+  const Step& step =
+      impl_->control.step(view, {.seconds = left, .clock = Impl::now, .after = after});
   impl_->reader->ask(step.wanted, step.requests, step.withdrawn);
   impl_->settled = step.settled && step.wanted.empty();
   return step;

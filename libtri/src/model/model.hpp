@@ -124,6 +124,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
   const Delta& apply(const ClusterTree::Plan& plan);
   void check_room() const;
   void remove_cluster(Slot cluster);
+  void reserve(std::size_t vertices);
   void insert_clusters(bool list_created);
   void build_clusters();
   void note(VertexOwners::Change change, VertexId vertex, double height_before);
@@ -162,6 +163,7 @@ MultiresolutionModel<Triangulation>::Impl::Impl(ClusterSource& source, const Det
   // Staged clusters stay staged: if this fails, the whole model is destroyed.
   static_cast<void>(tree_.plan(judge(start), take_points));
   check_room();
+  if (options.reserve > 0) reserve(options.reserve);
   build_clusters();
   if (deltas_) triangulation_.start_journal();
 }
@@ -304,13 +306,19 @@ void MultiresolutionModel<Triangulation>::Impl::remove_cluster(Slot cluster) {
 }
 
 template <class Triangulation>
+void MultiresolutionModel<Triangulation>::Impl::reserve(std::size_t vertices) {
+  owners_.reserve(vertices + 1);
+  if constexpr (requires { triangulation_.reserve(vertices); }) triangulation_.reserve(vertices);
+  if (old_heights_) {
+    heights_before_.reserve(vertices + 1);
+    noted_.reserve(vertices + 1);
+  }
+}
+
+template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::insert_clusters(bool list_created) {
   if (stage_.points.size() > kKeptPoints) {
-    const std::size_t vertices = triangulation_.vertex_count() + stage_.points.size();
-    owners_.reserve(vertices + 1);
-    if constexpr (requires { triangulation_.reserve(vertices); }) {
-      triangulation_.reserve(vertices);
-    }
+    reserve(triangulation_.vertex_count() + stage_.points.size());
   }
   for (const Staged& staged : stage_.clusters) {
     const std::span<VertexId> vertices = tree_.vertices(staged.slot);

@@ -109,6 +109,7 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   model_.open_step();
   expand_wanted();
   ask_soon();
+  meter_.fixed();
   const bool done = collapse_unwanted(0);
   withdraw();
   result_.delta = &model_.close_step();
@@ -122,7 +123,7 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
   while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
-    if (!meter_.has_usual()) return false;
+    if (!meter_.has_usual(StepMeter::kCollapse)) return false;
     const Slot slot = front_.next_to_collapse(options_.collapse_below);
     if (slot == ClusterTree::kNoSlot) break;
     collapse(slot);
@@ -178,7 +179,7 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
     if (!could_fit(candidate, members)) return Room::none;
     const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
     while (lacking(members) > 0) {
-      if (!meter_.has_usual()) return Room::later;
+      if (!meter_.has_usual(StepMeter::kCollapse)) return Room::later;
       const Slot slot = front_.next_to_collapse(below);
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
       collapse(slot);
@@ -261,7 +262,7 @@ void ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   front_.drop(slot, place);
   cache_.find(id, true);  // likely to come back
   ++result_.collapsed;
-  meter_.spend(points);
+  meter_.spend(points, StepMeter::kCollapse);
 }
 
 // Clusters that were requested and are neither wanted now nor within the band of hysteresis.

@@ -10,6 +10,8 @@ namespace terrace::tri {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// More clusters are not asked for ahead of time in a step: it would take too much of its time.
+constexpr std::size_t kMostSoon = 512;
 
 }  // namespace
 
@@ -266,15 +268,21 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
 }
 
 std::span<const ViewFront::Candidate> ViewFront::soon() {
+  const auto sooner = [](const Candidate& a, const Candidate& b) {
+    if (a.keep != b.keep) return a.keep > b.keep;
+    if (level_of(a.id) != level_of(b.id)) return level_of(a.id) > level_of(b.id);
+    return a.id < b.id;
+  };
+  if (soon_.size() > kMostSoon) {
+    const auto end = soon_.begin() + static_cast<std::ptrdiff_t>(kMostSoon);
+    std::nth_element(soon_.begin(), end, soon_.end(), sooner);
+    soon_.erase(end, soon_.end());
+  }
   std::erase_if(soon_, [&](const Candidate& candidate) {
     const auto place = tree_->find(candidate.id);
     return !place || *place != candidate.place;
   });
-  std::sort(soon_.begin(), soon_.end(), [](const Candidate& a, const Candidate& b) {
-    if (a.keep != b.keep) return a.keep > b.keep;
-    if (level_of(a.id) != level_of(b.id)) return level_of(a.id) > level_of(b.id);
-    return a.id < b.id;
-  });
+  std::sort(soon_.begin(), soon_.end(), sooner);
   return soon_;
 }
 

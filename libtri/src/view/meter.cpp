@@ -9,10 +9,11 @@
 namespace terrace::tri {
 namespace {
 
-// A new measurement counts an eighth, and one disturbed from outside at most twice the usual value.
+// The estimate rises fast and falls slowly, as a step must not last longer than its budget. A
+// measurement disturbed from outside counts as at most twice the usual value.
 void learn(double& rate, double measured) {
   if (rate > 0.0) measured = std::min(measured, 2.0 * rate);
-  rate = rate > 0.0 ? rate + (measured - rate) / 8.0 : measured;
+  rate += (measured - rate) * (rate == 0.0 ? 1.0 : measured > rate ? 0.25 : 0.0625);
 }
 
 // A part of the cost of each operation, and of the end of a step, does not depend on the number of
@@ -27,30 +28,43 @@ void StepMeter::start(const StepBudget& budget) {
     throw std::invalid_argument("step budget: finite seconds need a clock");
   }
   budget_ = &budget;
-  operations_ = points_ = 0;
+  operations_ = 0;
+  points_ = {};
+  fixed_done_ = false;
   begin_ = last_ = now();
 }
 
-bool StepMeter::has(std::size_t points) const {
+bool StepMeter::has(std::size_t points, std::size_t kind) const {
   if (operations_ == 0) return true;
   if (operations_ >= budget_->operations) return false;
   if (!timed_) return true;
-  const double ahead =
-      with_overhead(points) * operation_rate_ + with_overhead(points_ + points) * end_rate_;
+  const double ahead = with_overhead(points) * operation_rate_[kind] +
+                       with_overhead(points_[0] + points_[1] + points) * end_rate_ +
+                       static_cast<double>(points_[0]) * budget_->after[0] +
+                       static_cast<double>(points_[1]) * budget_->after[1] +
+                       with_overhead(points) * budget_->after[kind] + (fixed_done_ ? 0.0 : fixed_);
   return last_ - begin_ + ahead < budget_->seconds;
 }
 
-void StepMeter::spend(std::size_t points) {
+void StepMeter::spend(std::size_t points, std::size_t kind) {
   ++operations_;
-  points_ += points;
+  points_[kind] += points;
   if (!timed_) return;
   const double before = std::exchange(last_, now());
-  learn(operation_rate_, (last_ - before) / with_overhead(points));
-  learn(usual_points_, static_cast<double>(points));
+  learn(operation_rate_[kind], (last_ - before) / with_overhead(points));
+  learn(usual_points_[kind], static_cast<double>(points));
+}
+
+void StepMeter::fixed() {
+  fixed_done_ = true;
+  if (!timed_) return;
+  const double before = std::exchange(last_, now());
+  learn(fixed_, last_ - before);
 }
 
 void StepMeter::end() {
-  if (timed_ && operations_ > 0) learn(end_rate_, (now() - last_) / with_overhead(points_));
+  if (timed_ && operations_ > 0)
+    learn(end_rate_, (now() - last_) / with_overhead(points_[0] + points_[1]));
 }
 
 }  // namespace terrace::tri

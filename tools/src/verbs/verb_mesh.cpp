@@ -48,14 +48,21 @@ class MeshCommand final : public Command {
     part_.define(app, "only triangles that reach inside");
     add_output(app, output_, "the file to write: .ply, .obj, .glb");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
+    app.add_option("--cluster", cluster_,
+                   "L:N, the cluster N of level L: the mesh of the points of --level (default: L) "
+                   "that it stands for, itself included")
+        ->excludes("--region")
+        ->excludes("--focus");
     app.add_option(
            "--smooth", smooth_,
            "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
            "if wanted (10); with --region only inside it")
-        ->type_name("METHOD");
+        ->type_name("METHOD")
+        ->excludes("--cluster");
     app.add_option("--overlay", overlay_,
                    "a file of --save-overlay: its heights in place of the store's")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->excludes("--cluster");
     app.add_option("--save-overlay", save_overlay_,
                    "with --smooth: write the heights that changed to this file beside the store, "
                    "which stays as it is")
@@ -102,11 +109,11 @@ class MeshCommand final : public Command {
   Summary bounded(const CommonOptions& common) const {
     const Stopwatch watch;
     if ((!part_.level.empty() && part_.level != "0") || !part_.focuses.empty() ||
-        !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty()) {
+        !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty() ||
+        !cluster_.empty()) {
       throw UsageError(
           "--max-error and --max-points concern all samples: they exclude --level, --focus, "
-          "--smooth, "
-          "--overlay and --metric");
+          "--cluster, --smooth, --overlay and --metric");
     }
     BoundedMeshOptions options;
     if (max_error_ && !max_points_.empty()) {
@@ -199,7 +206,11 @@ class MeshCommand final : public Command {
       throw UsageError("--save-overlay and --output are the same file");
     }
     const stream::Store store = open_store(part_.path);
-    const Detail detail = part_.detail(store, common);
+    Detail detail = part_.detail(store, common);
+    if (!cluster_.empty()) {
+      detail.cluster = parse_cluster(cluster_);
+      if (part_.level.empty()) detail.level = stream::level_of(*detail.cluster);
+    }
     const PlaceConversion places = part_.crs.places(store, common);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;
@@ -231,7 +242,7 @@ class MeshCommand final : public Command {
 
   PartOptions part_;
   std::string output_, format_, smooth_, metric_ = "euclidean";
-  std::string overlay_, save_overlay_, where_;
+  std::string overlay_, save_overlay_, where_, cluster_;
   std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
   std::optional<double> max_error_;
 };

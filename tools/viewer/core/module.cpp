@@ -5,6 +5,7 @@
 /// A call takes what is longer than a number from input(), where JavaScript has written it, and
 /// leaves what is longer at output().
 
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -16,6 +17,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/given_bytes.hpp>
 #include <terrace/stream/store.hpp>
+#include <unistd.h>
 
 #include "scene.hpp"
 
@@ -35,7 +37,7 @@ struct Module {
   std::unique_ptr<viewer::Scene> scene;
   viewer::SceneState state;
   std::vector<double> numbers;
-  std::string text;
+  std::string text, told;  // told: what the last frame lacked
   std::optional<viewer::SceneHit> hit;
 };
 
@@ -65,6 +67,24 @@ int guarded(const Work& work) {
     module().text = error.what();
     return kFailed;
   }
+}
+
+/// What a scene needs at most beside its points, and what each of these takes: caches of clusters
+/// and bytes; triangulation, heights and the arrays to draw.
+constexpr std::size_t kMemory = std::size_t{128} << 20, kPointMemory = 200;
+
+/// Growing the memory takes the browser many milliseconds, however little it is, and malloc would
+/// ask for a page at a time. Pages that are not touched cost nothing.
+constexpr std::size_t kWasmPage = 65536;
+/// A frame that finds less than this free has more of it reserved.
+constexpr std::size_t kLeastMemory = std::size_t{8} << 20;
+
+std::size_t memory_left() {
+  return __builtin_wasm_memory_size(0) * kWasmPage - reinterpret_cast<std::uintptr_t>(sbrk(0));
+}
+void reserve_memory(std::size_t bytes) {
+  const std::size_t left = memory_left();
+  if (left < bytes) __builtin_wasm_memory_grow(0, (bytes - left + kWasmPage - 1) / kWasmPage);
 }
 
 stream::Point3 point_of(const double* at) { return {at[0], at[1], at[2]}; }
@@ -116,7 +136,10 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
     stream::LinearMap ground{};
     std::memcpy(ground.data(), m.input.data(), sizeof ground);
     if (!m.store) m.store = stream::Store::open("store", m.given.open());
-    m.scene = viewer::Scene::open(*m.store, ground, static_cast<std::size_t>(max_points));
+    reserve_memory(kMemory + kPointMemory * static_cast<std::size_t>(max_points));
+    m.scene =
+        viewer::Scene::open(*m.store, ground, static_cast<std::size_t>(max_points),
+                            [&m](const stream::ByteRange& range) { return m.given.has(range); });
     const stream::Box3 box = m.scene->box();
     m.numbers = {box.min[0],
                  box.min[1],
@@ -138,8 +161,8 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
 
 /// input: eye, direction, up; field of view in degrees, aspect, height in pixels; pixels of error;
 /// seconds to spend; the time. numbers: points, triangles, expanded clusters, slots of vertices and
-/// of triangles, whether it is settled, the worst demand, clusters and bytes read. text: what is
-/// missing.
+/// of triangles, whether it is settled, the worst demand, clusters and bytes read, whether the same
+/// is missing as after the last frame. text: what is missing.
 TERRACE_EXPORT(frame) int terrace_frame() {
   return guarded([&] {
     Module& m = module();
@@ -148,6 +171,7 @@ TERRACE_EXPORT(frame) int terrace_frame() {
     view.camera = tri::perspective_camera({point_of(in), point_of(in + 3), point_of(in + 6)}, in[9],
                                           in[10], in[11]);
     view.pixel_error = in[12];
+    if (memory_left() < kLeastMemory) reserve_memory(8 * kLeastMemory);
     const viewer::SceneState s = m.scene->frame(view, in[13], in[14]);
     m.numbers = {static_cast<double>(s.points),
                  static_cast<double>(s.triangles),
@@ -159,6 +183,8 @@ TERRACE_EXPORT(frame) int terrace_frame() {
                  static_cast<double>(s.clusters),
                  static_cast<double>(s.stored_bytes)};
     tell(m.scene->missing());
+    m.numbers.push_back(m.text == m.told ? 1.0 : 0.0);
+    m.told = m.text;
     return kDone;
   });
 }

@@ -2,6 +2,7 @@
 #include "scene.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -28,6 +29,7 @@ Point3 cross(const Point3& a, const Point3& b) {
 template <class Value>
 class Blocks {
  public:
+  void reserve(std::size_t slots) { values_.reserve(slots); }
   /// Blocks that are added count as changed.
   void grow(std::size_t slots) {
     const std::size_t blocks = (slots + SceneChanges::kBlock - 1) / SceneChanges::kBlock;
@@ -75,8 +77,11 @@ class SceneOf final : public Scene {
   using Vertex = std::conditional_t<kTriangles, SceneVertex, ScenePoint>;
 
   SceneOf(const stream::Store& store, const stream::LinearMap& ground,
-          const tri::ViewOptions& options)
-      : store_(store), view_(store, ground, options), bounds_(store.bounds()) {
+          const tri::ViewOptions& options,
+          const std::function<bool(const stream::ByteRange&)>& given)
+      : store_(store), view_(store, ground, options, given), bounds_(store.bounds()) {
+    vertices_.reserve(options.max_points);
+    if constexpr (kTriangles) triangles_.reserve(2 * options.max_points);
     if constexpr (!kTriangles) {
       std::vector<std::byte> records;
       for (const tri::VertexId vertex : mesh().all_vertices()) {
@@ -94,8 +99,12 @@ class SceneOf final : public Scene {
   }
 
   SceneState frame(const tri::View& wish, double seconds, double time) override {
-    const auto& step = view_.frame(wish, seconds);
+    const auto& step = view_.frame(wish, seconds, after_rate_);
+    const double begin = now();
     apply(*step.delta, time);
+    came_ += static_cast<double>(step.delta->changes.added_vertices.size());
+    went_ += static_cast<double>(step.delta->changes.removed_vertices.size());
+    after_ += now() - begin;
     const terrain::ViewTraffic traffic = view_.traffic();
     SceneState state{.points = view_.model().point_count(),
                      .expanded = view_.model().expanded_count(),
@@ -111,9 +120,13 @@ class SceneOf final : public Scene {
     return state;
   }
   const SceneChanges& take_changes() override {
+    const double begin = now();
     vertices_.take(changes_.vertex_blocks, changed_vertices_);
     changes_.vertices = std::as_bytes(std::span(changed_vertices_));
     triangles_.take(changes_.triangle_blocks, changes_.triangles);
+    // Copying the result costs as much again as taking it.
+    learn_after(after_ + 2 * (now() - begin));
+    came_ = went_ = after_ = 0;
     return changes_;
   }
   [[nodiscard]] std::span<const stream::ByteRange> missing() const override {
@@ -153,6 +166,23 @@ class SceneOf final : public Scene {
   }
 
  private:
+  static double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  }
+  /// Normalised least mean squares on the cost of a point that came and of one that went; the
+  /// estimates rise fast and fall slowly, and a measurement disturbed from outside counts as at
+  /// most twice the expected one.
+  void learn_after(double measured) {
+    const double size = came_ * came_ + went_ * went_;
+    if (size < 64 * 64) return;
+    const double expected = came_ * after_rate_[0] + went_ * after_rate_[1];
+    if (expected > 0) measured = std::min(measured, 2 * expected + 5e-4);
+    const double error = measured - expected;
+    const double step = (expected == 0 ? 1.0 : error > 0 ? 0.5 : 0.02) * error / size;
+    after_rate_[0] = std::max(0.0, after_rate_[0] + step * came_);
+    after_rate_[1] = std::max(0.0, after_rate_[1] + step * went_);
+  }
   [[nodiscard]] const auto& mesh() const { return view_.model().triangulation(); }
   void grow() {
     vertices_.grow(mesh().vertex_slots());
@@ -216,7 +246,10 @@ class SceneOf final : public Scene {
   std::vector<tri::VertexId> without_normal_, ring_;
   std::vector<tri::ClusterId> pinned_;
   mutable tri::VertexId picked_ = tri::kNoVertex;
-  tri::Geomorph2<std::int32_t> morph_;  // of rasters
+  /// Seconds that the changes of a point that came, or went, cost after a step.
+  std::array<double, 2> after_rate_{};
+  double after_ = 0, came_ = 0, went_ = 0;  ///< since the changes were last taken
+  tri::Geomorph2<std::int32_t> morph_;      // of rasters
 };
 
 template <class Shown>
@@ -245,7 +278,7 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
     }
     renew_normals();
     if (delta.changes.added_vertices.empty() && delta.reassigned.empty()) return;
-    morph_.make(view_.model(), delta);
+    morph_.make(view_.model(), delta, false);
     slide(morph_.added, time);
     slide(morph_.reassigned, time);
   }
@@ -360,16 +393,18 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
 }  // namespace
 
 std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::LinearMap& ground,
-                                   std::size_t max_points) {
+                                   std::size_t max_points,
+                                   const std::function<bool(const stream::ByteRange&)>& given) {
   if (store.points() == 0) throw std::invalid_argument("the store has no points");
   tri::ViewOptions options;
   options.max_points = max_points;
   options.max_cached_bytes = std::size_t{128} << 20;
+  options.model.reserve = max_points;
   if (store.schema().grid) {
     options.model.old_heights = true;  // for the slides
-    return std::make_unique<SceneOf<std::int32_t>>(store, ground, options);
+    return std::make_unique<SceneOf<std::int32_t>>(store, ground, options, given);
   }
-  return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options);
+  return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options, given);
 }
 
 }  // namespace terrace::viewer

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -72,13 +73,16 @@ struct SceneHit {
 class Scene {
  public:
   /// Throws: stream::MissingBytes; stream::Error; std::invalid_argument for a store without points.
-  static std::unique_ptr<Scene> open(const stream::Store& store, const stream::LinearMap& ground,
-                                     std::size_t max_points);
+  /// given: as in terrain::StoreView.
+  static std::unique_ptr<Scene> open(
+      const stream::Store& store, const stream::LinearMap& ground, std::size_t max_points,
+      const std::function<bool(const stream::ByteRange&)>& given = {});
   virtual ~Scene() = default;
 
-  /// As terrain::StoreView::frame(). time: of this frame, from which new vertices slide into place.
+  /// As terrain::StoreView::frame(); what the changes cost, here and in take_changes(), is part of
+  /// the seconds. time: of this frame, from which new vertices slide into place.
   virtual SceneState frame(const tri::View& view, double seconds, double time) = 0;
-  /// The changes since the last call; all there is at first.
+  /// The changes since the last call; all there is at first. To be called after each frame.
   virtual const SceneChanges& take_changes() = 0;
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const = 0;
   /// The hash of the triangulation, or of the set of points.

@@ -20,8 +20,9 @@ export interface State {
   storedBytes: number;
 }
 
-/// Blocks of 64 slots that changed: 24 bytes a vertex, three numbers a triangle.
+/// Blocks of 64 slots that changed: 24 bytes a vertex, three numbers a triangle. All are parts of `buffer`.
 export interface Changes {
+  buffer: ArrayBuffer;
   vertexBlocks: Uint32Array;
   vertices: Uint8Array;
   triangleBlocks: Uint32Array;
@@ -60,6 +61,9 @@ export const VERTEX_BYTES = 24;
 
 export class CoreError extends Error {}
 
+/// Of changes: kept ones, and bytes.
+const MOST_BUFFERS = 8, LEAST_BUFFER = 1 << 20;
+
 const MISSING = 1;
 const FAILED = 2;
 
@@ -84,6 +88,8 @@ interface Exports {
 export class Core {
   private readonly encoder = new TextEncoder();
   private readonly decoder = new TextDecoder();
+  private lacking: ByteRange[] = [];  ///< by the last frame
+  private readonly buffers: ArrayBuffer[] = [];  ///< for changes to come
 
   private constructor(private readonly wasm: Exports) {}
 
@@ -135,7 +141,8 @@ export class Core {
       time
     ]);
     this.check(this.wasm.frame());
-    const n = this.numbers(9);
+    const n = this.numbers(10);
+    if (n[9] === 0) this.lacking = this.missing();
     return {
       state: {
         points: n[0],
@@ -148,20 +155,34 @@ export class Core {
         clusters: n[7],
         storedBytes: n[8]
       },
-      missing: this.missing()
+      missing: this.lacking
     };
   }
   /// Copies of what has changed since the last call.
   changes(): Changes {
     this.check(this.wasm.changes());
     const [vertexBlocks, vertexBlocksAt, verticesAt, triangleBlocks, triangleBlocksAt, trianglesAt] = this.numbers(6);
-    const buffer = this.wasm.memory.buffer;
-    return {
-      vertexBlocks: new Uint32Array(buffer, vertexBlocksAt, vertexBlocks).slice(),
-      vertices: new Uint8Array(buffer, verticesAt, vertexBlocks * BLOCK * VERTEX_BYTES).slice(),
-      triangleBlocks: new Uint32Array(buffer, triangleBlocksAt, triangleBlocks).slice(),
-      triangles: new Uint32Array(buffer, trianglesAt, triangleBlocks * BLOCK * 3).slice()
+    const memory = new Uint8Array(this.wasm.memory.buffer);
+    const vertexBytes = vertexBlocks * BLOCK * VERTEX_BYTES, triangleBytes = triangleBlocks * BLOCK * 12;
+    const buffer = this.buffer(4 * (vertexBlocks + triangleBlocks) + vertexBytes + triangleBytes);
+    let end = 0;
+    const copy = (from: number, bytes: number) => {
+      const at = end;
+      new Uint8Array(buffer, at, bytes).set(memory.subarray(from, from + bytes));
+      end += bytes;
+      return at;
     };
+    return {
+      buffer,
+      vertexBlocks: new Uint32Array(buffer, copy(vertexBlocksAt, 4 * vertexBlocks), vertexBlocks),
+      vertices: new Uint8Array(buffer, copy(verticesAt, vertexBytes), vertexBytes),
+      triangleBlocks: new Uint32Array(buffer, copy(triangleBlocksAt, 4 * triangleBlocks), triangleBlocks),
+      triangles: new Uint32Array(buffer, copy(trianglesAt, triangleBytes), triangleBytes / 4)
+    };
+  }
+  /// Takes the buffer of changes back that are done with: new ones are slow to come by.
+  recycle(buffer: ArrayBuffer): void {
+    if (this.buffers.length < MOST_BUFFERS) this.buffers.push(buffer);
   }
   hash(): string {
     this.check(this.wasm.hash());
@@ -186,6 +207,12 @@ export class Core {
     this.check(this.wasm.pin(how));
   }
 
+  private buffer(bytes: number): ArrayBuffer {
+    const at = this.buffers.findIndex(buffer => buffer.byteLength >= bytes);
+    if (at >= 0) return this.buffers.splice(at, 1)[0];
+    this.buffers.shift();
+    return new ArrayBuffer(Math.max(LEAST_BUFFER, 2 ** Math.ceil(Math.log2(bytes))));
+  }
   private check(status: number): number {
     if (status === FAILED) throw new CoreError(this.text());
     return status;

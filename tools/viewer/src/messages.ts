@@ -8,7 +8,7 @@ import type {Manifest} from './store';
 export type ToWorker =
     |{type: 'open', wasm: string, store: string, start: string, maxPoints: number}
     |{type: 'view', camera: Camera, serial: number}
-    |{type: 'drawn'}
+    |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
     |{type: 'pin', how: number}
     |{type: 'hash', id: number}

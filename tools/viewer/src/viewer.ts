@@ -183,7 +183,7 @@ class Viewer {
         this.status = message;
         element('progress').hidden = true;
         this.redraw = true;
-        this.tell({type: 'drawn'});
+        this.worker?.postMessage({type: 'drawn', buffer: message.changes.buffer} satisfies ToWorker, [message.changes.buffer]);
         break;
       }
       case 'picked':

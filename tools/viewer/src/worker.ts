@@ -6,10 +6,9 @@ import type {FromWorker, ToWorker} from './messages';
 import {FetchFault, Ranges} from './ranges';
 import {type Manifest, parseManifest, parseStart} from './store';
 
-/// What a frame may take in the worker, in milliseconds.
-const FRAME = 10;
-/// What it aims at, so that nearly all end within FRAME.
-const AIM = 0.85 * FRAME;
+/// What a frame may take in the worker, in milliseconds, and what of it is kept in hand for what the core cannot foresee:
+/// garbage to collect, requests to start, other programs.
+const FRAME = 10, IN_HAND = 2;
 /// Frames that the page may be behind.
 const AHEAD = 6;
 
@@ -46,7 +45,6 @@ class Session {
   private undrawn = 0;
   private scheduled = false;
   private idle = false;  ///< nothing to do before something new comes
-  private share = 0.5;   ///< of a frame that the step may take; the rest is for normals, slides and copies
 
   constructor(private readonly request: ToWorker&{type: 'open'}) {}
 
@@ -95,7 +93,8 @@ class Session {
     this.serial = serial;
     this.wake();
   }
-  drawn(): void {
+  drawn(buffer: ArrayBuffer): void {
+    this.core.recycle(buffer);
     this.undrawn = Math.max(0, this.undrawn - 1);
     if (!this.idle) this.schedule();
   }
@@ -162,11 +161,10 @@ class Session {
   private frame(): void {
     if (!this.camera) return;
     const begin = performance.now();
-    const {state, missing} = this.core.frame(this.camera, this.share * FRAME / 1000, begin / 1000);
+    const {state, missing} = this.core.frame(this.camera, (FRAME - IN_HAND) / 1000, begin / 1000);
     const changes = this.core.changes();
     this.ranges.want(missing, this.serial, begin);
     const milliseconds = performance.now() - begin;
-    this.share = Math.min(0.9, Math.max(0.1, this.share * Math.min(1.1, Math.max(0.7, AIM / milliseconds))));
     const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
     // What is missing wakes it again.
     this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);
@@ -182,7 +180,7 @@ class Session {
           loading: !state.settled,
           time: begin / 1000
         },
-        [changes.vertexBlocks.buffer, changes.vertices.buffer, changes.triangleBlocks.buffer, changes.triangles.buffer]);
+        [changes.buffer]);
     if (!this.idle) this.schedule();
   }
 }
@@ -199,7 +197,7 @@ self.onmessage = event => {
       session?.view(message.camera, message.serial);
       break;
     case 'drawn':
-      session?.drawn();
+      session?.drawn(message.buffer);
       break;
     case 'pick':
       session?.pick(message);

@@ -57,6 +57,8 @@ class GivenBytes {
 
   /// For Store::open(). Throws: Error for files that are not there.
   [[nodiscard]] OpenByName open() const;
+  /// Whether all these bytes are there. O(log n).
+  [[nodiscard]] bool has(const ByteRange& range) const;
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:

@@ -43,7 +43,8 @@ struct DetailMeshOptions {
 /// The 2D Delaunay triangulation of what `detail` wants: rasters in column and row, exactly; other
 /// points in x and y. Positions are in the store's CRS, triangles counter-clockwise seen from
 /// above, levels the highest of each vertex's point. With a region, the triangles that reach into
-/// it, whole. The store never changes. One thread.
+/// it, whole. With a cluster, of the points that it stands for alone; its representative counts as
+/// of its level. The store never changes. One thread.
 ///
 /// A store of triangles gives those that `detail` wants, bit for bit and with their orientation;
 /// equal corners are one vertex. A triangle is where its first corner is, for
@@ -51,8 +52,8 @@ struct DetailMeshOptions {
 ///
 /// Takes half of the available memory unless the context gives another bound. Throws:
 /// stream::Error on a damaged store, or when the points would not fit, saying what they need;
-/// UsageError for a metric that triangles cannot follow, for boxes on a rotated raster, and for
-/// options beside a store of triangles;
+/// UsageError for a metric that triangles cannot follow, for boxes on a rotated raster, for
+/// options beside a store of triangles, for a cluster as for_each_wanted(), or heights beside one;
 /// stream::Stopped.
 [[nodiscard]] TriangleMesh detail_mesh(const stream::Store& store, const Detail& detail,
                                        const DetailMeshOptions& options = {},

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -66,18 +68,21 @@ class StoreView {
                      Reader reader = Reader::thread);
   /// For stores of which some bytes may be missing (stream::GivenBytes), read by the calling thread
   /// within the frame's time. ground: the linear map from stored coordinates to metres, as the
-  /// other constructor finds it and ground() tells. Needs neither threads nor PROJ.
+  /// other constructor finds it and ground() tells. given: as GivenBytes::has(), by which a
+  /// frame tells faster that bytes are still missing. Needs neither threads nor PROJ.
   /// Throws: as above, and stream::MissingBytes.
   StoreView(const stream::Store& store, const stream::LinearMap& ground,
-            const tri::ViewOptions& options);
+            const tri::ViewOptions& options,
+            std::function<bool(const stream::ByteRange&)> given = {});
   ~StoreView();
   StoreView(const StoreView&) = delete;
   StoreView& operator=(const StoreView&) = delete;
 
-  /// Brings the model nearer to what `view` asks for, which takes about `seconds` at most. The
-  /// step tells which triangles came and went. Throws: stream::Error once a cluster could not be
-  /// read; stream::Stopped if the store is to stop.
-  const Step& frame(const tri::View& view, double seconds);
+  /// Brings the model nearer to what `view` asks for, which takes about `seconds` at most, less
+  /// `after` for each point that came and that went (tri::StepBudget). The step tells which
+  /// triangles came and went. Throws: stream::Error once a cluster could not be read;
+  /// stream::Stopped if the store is to stop.
+  const Step& frame(const tri::View& view, double seconds, const std::array<double, 2>& after = {});
   /// Computes from scratch what frames only follow, see tri::ViewControl::restore(): the surface of
   /// a scan, for a camera that rests. The delta is valid until the next frame.
   const typename Control::Delta& restore(unsigned threads = 1);

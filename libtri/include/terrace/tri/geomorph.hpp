@@ -53,8 +53,9 @@ class Geomorph2 {
   Slides added, removed, reassigned;
 
   /// delta: of the model's last step, which needs ModelOptions::old_heights. Replaces the slides.
+  /// with_removed: false leaves `removed` empty, for renderers that do not draw what has gone.
   /// O(n log n) in the size of the delta. Throws std::invalid_argument for a delta without heights.
-  void make(const Model& model, const typename Model::Delta& delta);
+  void make(const Model& model, const typename Model::Delta& delta, bool with_removed = true);
 
  private:
   [[nodiscard]] Point3 old_position(const Model& model, VertexId vertex) const;

@@ -131,6 +131,8 @@ struct ModelOptions {
   bool deltas = true;
   /// true: a Delta also reports the former heights, for 8 bytes and a bit per vertex.
   bool old_heights = false;
+  /// Memory is reserved for this many vertices, so that no step has to move what is there.
+  std::size_t reserve = 0;
 };
 
 /// A triangulation of a hierarchy of clusters that is coarse in some places and fine in others. The

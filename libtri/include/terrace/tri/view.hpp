@@ -126,20 +126,32 @@ struct StepBudget {
   double seconds = std::numeric_limits<double>::infinity();
   /// Seconds since any fixed moment; required if `seconds` is finite.
   std::function<double()> clock;
+  /// Seconds that the caller will need after the step for each point that came, and for each that
+  /// went; they are kept free.
+  std::array<double, 2> after{};
 };
 
-/// Measures what a step spends; all times are from StepBudget::clock.
+/// Measures what a step spends and predicts what is still to come; all times are from
+/// StepBudget::clock.
 class StepMeter {
  public:
+  /// Kinds of operations, which have rates of their own.
+  static constexpr std::size_t kExpand = 0, kCollapse = 1;
+
   void start(const StepBudget& budget);
   /// Whether one more operation on this many points fits. The first one always does.
-  [[nodiscard]] bool has(std::size_t points) const;
+  [[nodiscard]] bool has(std::size_t points, std::size_t kind = kExpand) const;
   /// The same for an operation of which it is not known yet on how many.
-  [[nodiscard]] bool has_usual() const { return has(static_cast<std::size_t>(usual_points_)); }
+  [[nodiscard]] bool has_usual(std::size_t kind) const {
+    return has(static_cast<std::size_t>(usual_points_[kind]), kind);
+  }
   /// To be called after each operation.
-  void spend(std::size_t points);
-  /// To be called before the first operation, and at the end of the step.
+  void spend(std::size_t points, std::size_t kind = kExpand);
+  /// To be called before the first operation.
   void ready() { last_ = now(); }
+  /// To be called after work that takes about as long in each step, whatever it changes.
+  void fixed();
+  /// To be called at the end of the step.
   void end();
 
  private:
@@ -148,10 +160,13 @@ class StepMeter {
   const StepBudget* budget_ = nullptr;
   bool timed_ = false;
   double begin_ = 0.0, last_ = 0.0;
-  std::size_t operations_ = 0, points_ = 0;
-  // Seconds per point of operations and of the end, and points of an operation, estimated from
-  // previous steps.
-  double operation_rate_ = 0.0, end_rate_ = 0.0, usual_points_ = 0.0;
+  std::size_t operations_ = 0;
+  std::array<std::size_t, 2> points_{};  ///< by kind
+  bool fixed_done_ = false;
+  // Seconds per point of operations by kind and of the end, seconds of the fixed work, and points
+  // of an operation by kind, estimated from previous steps.
+  std::array<double, 2> operation_rate_{}, usual_points_{};
+  double end_rate_ = 0.0, fixed_ = 0.0;
 };
 
 /// A cluster as delivered by its loader.
