@@ -199,12 +199,13 @@ TEST(StoreCodec, FewSymbolsAreFewBytes) {
   counts[1] = 1000;
   counts[2] = 1;
   const BothTables tables({normalised(counts)});
-  for (const auto& [symbols, last, size] : {std::tuple<unsigned, std::uint32_t, std::size_t>{1, 0, 1},
-                                           {200, 0, 1},
-                                           {20, 5, 1},
-                                           {20, 300, 2},
-                                           {1, 60000, 2},
-                                           {1, 65535, 3}}) {
+  for (const auto& [symbols, last, size] :
+       {std::tuple<unsigned, std::uint32_t, std::size_t>{1, 0, 1},
+        {200, 0, 1},
+        {20, 5, 1},
+        {20, 300, 2},
+        {1, 60000, 2},
+        {1, 65535, 3}}) {
     SCOPED_TRACE(symbols);
     SymbolEncoder coder(tables.encode);
     coder.start();

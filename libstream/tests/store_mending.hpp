@@ -86,8 +86,8 @@ struct LevelBytes {
   }
   /// The tables of the page's first cluster. Throws: Damage.
   [[nodiscard]] store::Tables tables_of(std::size_t page) const {
-    store::ByteReader in({reinterpret_cast<const std::uint8_t*>(index.data()) + directory(),
-                          directory_bytes});
+    store::ByteReader in(
+        {reinterpret_cast<const std::uint8_t*>(index.data()) + directory(), directory_bytes});
     in.take(sets());
     store::ByteView found;
     for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
@@ -132,16 +132,16 @@ inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
     const store::Tables tables = old ? store::Tables() : level.tables_of(page);
     const store::DecodingTables decoding(tables);
     std::uint64_t from = 0;
-    store::PageColumns columns = store::read_page(
-        level.page_bytes(page), level.clusters_of(page), level.layout, &decoding, from);
+    store::PageColumns columns = store::read_page(level.page_bytes(page), level.clusters_of(page),
+                                                  level.layout, &decoding, from);
     const std::uint64_t offset = from;
     store::Bytes checksums;
     for (std::uint32_t i = 0; i < columns.clusters(); ++i) {
       const std::uint64_t size = columns.column(store::PageColumns::kBytes)[i];
       const bool there = from <= level.data.size() && size <= level.data.size() - from;
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
-      const auto checksum = there ? store::crc16({bytes + from, static_cast<std::size_t>(size)})
-                                  : std::uint16_t{0};
+      const auto checksum =
+          there ? store::crc16({bytes + from, static_cast<std::size_t>(size)}) : std::uint16_t{0};
       store::put(checksums, checksum);
       columns.column(store::PageColumns::kChecksum)[i] = checksum;
       from += size;

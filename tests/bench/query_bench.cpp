@@ -178,8 +178,8 @@ terrace::stream::OpenByName counting(const std::filesystem::path& folder, std::u
 /// What it takes to read all points inside a square from a store that has just been opened: the
 /// argument is its share of the area in parts of ten thousand. The counters are means over the
 /// squares; `delivered` and `bytes` are per point inside, `least` is what would be delivered by
-/// those clusters alone that have points inside, and `read` the bytes read, index included, per byte
-/// of these. The root, of any size up to a block, is left out: whoever asks often keeps it.
+/// those clusters alone that have points inside, and `read` the bytes read, index included, per
+/// byte of these. The root, of any size up to a block, is left out: whoever asks often keeps it.
 void region(benchmark::State& state) {
   const Store& source = store();
   const terrace::stream::Placement placement = source.schema();

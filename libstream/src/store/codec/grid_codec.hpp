@@ -181,8 +181,8 @@ class GridCodec {
   static constexpr std::uint32_t kPadX = 4, kPadY = 2;
 
   /// A border of the first run of the rows: coded as the step outwards from the row above, in the
-  /// context of the previous step and of how far away the side of the box is. Both borders, mirrored,
-  /// share contexts.
+  /// context of the previous step and of how far away the side of the box is. Both borders,
+  /// mirrored, share contexts.
   template <bool kRight>
   class Border {
    public:

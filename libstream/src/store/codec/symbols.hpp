@@ -69,10 +69,11 @@ constexpr bool from_line(ColumnKind kind) { return kind >= ColumnKind::line; }
 
 /// Contexts: each has a table of frequencies of its own. Attribute contexts follow the fixed ones.
 namespace context {
-inline constexpr unsigned kForm = 0;        ///< grid or k-d, own box or not
-inline constexpr unsigned kRunCount = 1;    ///< by the runs of the row above: 0, 1, more
-inline constexpr unsigned kRunStart = 4;    ///< by the last step of this border, -2 to 2; first row
-inline constexpr unsigned kRunEnd = 10;     ///< likewise; from version 4 on, of both the first row only
+inline constexpr unsigned kForm = 0;      ///< grid or k-d, own box or not
+inline constexpr unsigned kRunCount = 1;  ///< by the runs of the row above: 0, 1, more
+inline constexpr unsigned kRunStart = 4;  ///< by the last step of this border, -2 to 2; first row
+inline constexpr unsigned kRunEnd =
+    10;  ///< likewise; from version 4 on, of both the first row only
 inline constexpr unsigned kRunGap = 16;     ///< of second and further runs
 inline constexpr unsigned kRunLength = 17;  ///< likewise
 inline constexpr unsigned kInset = 18;      ///< six: low and high side of each axis

@@ -167,10 +167,9 @@ class PageCoder {
 
 /// The columns of a page before version 4, in the order in which they come.
 constexpr std::array<PageColumns::Field, PageColumns::kFields> kOldOrder{
-    PageColumns::kBytes,       PageColumns::kPoints, PageColumns::kForms, PageColumns::kLowX,
-    PageColumns::kLowY,        PageColumns::kLowZ,   PageColumns::kSizeX, PageColumns::kSizeY,
-    PageColumns::kSizeZ,       PageColumns::kError,  PageColumns::kDescendants,
-    PageColumns::kChecksum};
+    PageColumns::kBytes, PageColumns::kPoints, PageColumns::kForms,       PageColumns::kLowX,
+    PageColumns::kLowY,  PageColumns::kLowZ,   PageColumns::kSizeX,       PageColumns::kSizeY,
+    PageColumns::kSizeZ, PageColumns::kError,  PageColumns::kDescendants, PageColumns::kChecksum};
 
 /// A page before version 4: each column a base, a shift and a width, then that many bits per
 /// cluster. Returns the offset of the first cluster.

@@ -11,8 +11,8 @@
 
 namespace terrace::stream::store {
 
-/// A box around all points of a page's clusters and below them, which the directory has: in 65535ths
-/// of the store's bounds.
+/// A box around all points of a page's clusters and below them, which the directory has: in
+/// 65535ths of the store's bounds.
 struct PageBox {
   std::array<std::uint16_t, 3> low{UINT16_MAX, UINT16_MAX, UINT16_MAX}, high{};
 
@@ -22,9 +22,9 @@ struct PageBox {
 };
 inline constexpr std::uint64_t kPageBoxBytes = 12;
 
-/// Maximum bytes of a page: twelve columns and two for each attribute. Before version 4 each has its
-/// base, shift and width, and at most 64 bits per cluster; from then on its shift, and a number takes
-/// at most 81 bits.
+/// Maximum bytes of a page: twelve columns and two for each attribute. Before version 4 each has
+/// its base, shift and width, and at most 64 bits per cluster; from then on its shift, and a number
+/// takes at most 81 bits.
 constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
   return 18 + (12 + 2 * std::uint64_t{attributes}) * (10 + 2 + 11 * kMostPageClusters) + 4;
 }
@@ -76,8 +76,8 @@ class PageColumns {
   std::vector<std::uint64_t> values_;  ///< column after column
 };
 
-/// The columns of a page as it is in the file, checksum included. tables: those of its first cluster,
-/// from version 4 on. offset: becomes that of the first cluster in the level's data file.
+/// The columns of a page as it is in the file, checksum included. tables: those of its first
+/// cluster, from version 4 on. offset: becomes that of the first cluster in the level's data file.
 /// Throws: Damage.
 PageColumns read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
                       const DecodingTables* tables, std::uint64_t& offset);

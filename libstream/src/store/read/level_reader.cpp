@@ -85,8 +85,8 @@ void LevelReader::read_directory(std::uint64_t bytes) {
     for (std::uint64_t p = 0; p < pages_; ++p) {
       directory_.push_back(in.get<std::uint64_t>());
       if (directory_.back() < previous ||
-          directory_.back() - previous > most_page_bytes(layout_.ranges()) || directory_.back() > start ||
-          (p == 0 && directory_[0] != 0)) {
+          directory_.back() - previous > most_page_bytes(layout_.ranges()) ||
+          directory_.back() > start || (p == 0 && directory_[0] != 0)) {
         throw Damage("the pages of the directory do not follow one another");
       }
       previous = directory_.back();
@@ -130,8 +130,8 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number) co
   try {
     const std::uint64_t most = layout_.page_clusters(), first = number * most;
     return std::make_shared<const IndexPage>(
-        bytes, static_cast<std::uint32_t>(std::min(most, clusters_ - first)),
-        layout_, layout_.version > 3 ? tables(first).get() : nullptr);
+        bytes, static_cast<std::uint32_t>(std::min(most, clusters_ - first)), layout_,
+        layout_.version > 3 ? tables(first).get() : nullptr);
   } catch (const Damage& damage) {
     throw damaged_file(*index_, start, damage.what());
   }

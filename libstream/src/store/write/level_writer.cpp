@@ -254,7 +254,8 @@ void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& cou
   for (const PreparedBlock& block : blocks) {
     for (std::size_t i = 0; i < block.entries.size(); ++i) {
       entries.push_back(block.entries[i]);
-      for (std::size_t a = 0; a < attributes; ++a) ranges.push_back(block.ranges[i * attributes + a]);
+      for (std::size_t a = 0; a < attributes; ++a)
+        ranges.push_back(block.ranges[i * attributes + a]);
       if (entries.size() == layout_.page_clusters()) enter();
     }
   }

@@ -94,7 +94,7 @@ class LevelWriter {
   std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
-  SharedTablesPtr page_tables_;  ///< those of the page's first cluster
+  SharedTablesPtr page_tables_;      ///< those of the page's first cluster
   std::vector<Entry> page_;
   std::vector<KeyRange> page_ranges_;
   std::vector<Box3> page_boxes_;
