@@ -86,17 +86,38 @@ void decode_cluster(ByteReader in, bool grid, unsigned level, int version = 1,
   require(points.children.size() == points.size() * level);
 }
 
-void read_page(ByteReader in, std::size_t attributes) {
-  const std::uint32_t clusters = 1 + in.get<std::uint8_t>() % kPageClusters;
+void read_page(ByteReader in, int version) {
+  const Layout layout(schema_for(false, version), 0, version);
+  const auto clusters =
+      static_cast<std::uint32_t>(1 + in.get<std::uint8_t>() % layout.page_clusters());
   const ByteView rest = in.take(in.left());
   Bytes bytes(rest.begin(), rest.end());
   put(bytes, crc32(bytes));  // a fuzzer cannot guess a checksum: the parser after it is the target
-  const IndexPage page(std::move(bytes), clusters, attributes);
+  const IndexPage page(bytes, clusters, layout, &tables_of(version, ColumnKind::plain));
+  std::vector<Entry> entries;
+  std::vector<KeyRange> ranges;
   for (std::uint32_t i = 0; i < clusters; ++i) {
-    for (std::size_t a = 0; a < attributes; ++a) static_cast<void>(page.range(i, a));
-    static_cast<void>(page.entry(i));
+    for (std::size_t a = 0; a < layout.ranges(); ++a) ranges.push_back(page.range(i, a));
+    entries.push_back(page.entry(i));
   }
   static_cast<void>(page.end());
+  if (version < 4) return;
+  // Written again they are the same, and ranges no narrower.
+  Bytes again;
+  PageColumns(entries, layout.attributes, ranges)
+      .write(layout, EncodingTables(even_tables(layout, ColumnKind::plain)), page.offset(0), again);
+  const IndexPage second(again, clusters, layout, &tables_of(version, ColumnKind::plain));
+  for (std::uint32_t i = 0; i < clusters; ++i) {
+    const Entry entry = second.entry(i);
+    require(second.offset(i) == page.offset(i) && entry.points == entries[i].points);
+    require(entry.forms == entries[i].forms && entry.low == entries[i].low);
+    require(entry.size == entries[i].size && entry.error == entries[i].error);
+    require(entry.descendants == entries[i].descendants && entry.checksum == entries[i].checksum);
+    for (std::size_t a = 0; a < layout.ranges(); ++a) {
+      const KeyRange before = ranges[i * layout.ranges() + a], after = second.range(i, a);
+      require(after.low <= before.low && before.high <= after.high);
+    }
+  }
 }
 
 void read_tables(ByteReader in, int version) {
@@ -127,7 +148,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   try {
     const ByteReader rest({data + 1, size - 1});
-    switch (data[0] % 17) {
+    switch (data[0] % 22) {
       case 0:
         decode_cluster(rest, true, 0);
         break;
@@ -138,7 +159,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, true, 2);
         break;
       case 3:
-        read_page(rest, 0);
+        read_page(rest, 1);
         break;
       case 4:
         read_tables(rest, 1);
@@ -153,7 +174,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, false, 0, 2, ColumnKind::beside);
         break;
       case 9:
-        read_page(rest, 3);
+        read_page(rest, 2);
         break;
       case 10:
         read_tables(rest, 2);
@@ -175,6 +196,21 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         break;
       case 16:
         read_tables(rest, 3);
+        break;
+      case 17:
+        decode_cluster(rest, true, 0, 4);
+        break;
+      case 18:
+        decode_cluster(rest, true, 1, 4, ColumnKind::recent);
+        break;
+      case 19:
+        decode_cluster(rest, false, 0, 4, ColumnKind::line_recent);
+        break;
+      case 20:
+        read_page(rest, 4);
+        break;
+      case 21:
+        read_tables(rest, 4);
         break;
       default: {
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);

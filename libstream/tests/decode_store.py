@@ -92,8 +92,11 @@ class Bytes:
 class Tables:
     def __init__(self, data, schema, version):
         columns = len(schema) + (3 if version > 1 else 0)
+        self.version = version
         self.per_column = 18 if version > 2 else 10
-        contexts = 148 + self.per_column * columns
+        contexts = self.border = 148 + self.per_column * columns
+        if version > 3:
+            contexts += 50 + 88 + 1 + 2 * len(schema)
         source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
         given = source.number(8)
         self.coefficients = {}
@@ -115,15 +118,20 @@ class Tables:
             beside = 0 < k < len(schema) and integers[k] and integers[k - 1]
             require(kind < possible and (kind % 5 != 2 or beside), "kind")
         self.symbols = []  # per context: the (symbol, start, frequency) of every slot
-        for _ in range(contexts):
+        while len(self.symbols) < contexts:
             slots, symbol = [], 0
-            for _ in range(source.varint()):
+            used = source.varint()
+            if used == 0 and version > 3:
+                self.symbols += [[(ESCAPE, 0, 2048)] * 2048] * (1 + source.varint())
+                continue
+            for _ in range(used):
                 symbol += source.varint()
                 frequency = source.varint()
                 slots += [(symbol, len(slots), frequency)] * frequency
             missing = 2048 - len(slots)
             require(symbol < ESCAPE and missing >= 0, "frequencies")
             self.symbols.append(slots + [(ESCAPE, len(slots), missing)] * missing)
+        require(len(self.symbols) == contexts, "contexts")
         source.done()
 
 
@@ -131,8 +139,10 @@ class Symbols:
     """The two ends of a cluster's bytes."""
 
     def __init__(self, data, tables):
+        require(len(data) >= (4 if tables.version < 4 else 1), "too few bytes")
         self.data, self.tables = data, tables
-        self.state, self.front = struct.unpack_from("<I", data)[0], 4
+        self.front = min(4, len(data))
+        self.state = int.from_bytes(data[:self.front], "little")
         self.bits, self.left = int.from_bytes(data[::-1], "big"), 8 * len(data)
 
     def raw(self, count):
@@ -146,7 +156,7 @@ class Symbols:
     def symbol(self, context):
         symbol, start, frequency = self.tables.symbols[context][self.state % 2048]
         self.state = frequency * (self.state // 2048) + self.state % 2048 - start
-        if self.state < 65536:
+        if self.state < 65536 and (self.tables.version < 4 or self.front < len(self.data)):
             self.state = self.state * 65536 + struct.unpack_from("<H", self.data, self.front)[0]
             self.front += 2
         return self.raw(8) if symbol == ESCAPE else symbol
@@ -166,9 +176,12 @@ class Symbols:
         return value if value < s else 2 * value + self.raw(1) - s
 
     def end(self):
-        require(65536 <= self.state < 131072, "rANS state")
         rest = self.left - 8 * self.front
         require(0 <= rest < 8 and self.bits >> 8 * self.front & ((1 << rest) - 1) == 0, "the two ends do not meet")
+        if self.tables.version > 3 and self.left == 8 * len(self.data):
+            require(self.state < 65536, "rANS state")
+            return self.state
+        require(65536 <= self.state < 131072, "rANS state")
         return self.state - 65536
 
 
@@ -179,11 +192,16 @@ def magnitude(number_class):
     return (0, 2)[m] if m < 2 else 2 * (m.bit_length() - 1) + 2 + (m >> (m.bit_length() - 2) & 1)
 
 
-def rows(source, size):
+def rows(source, size, points):
     """Cells (column, row) of the box, row by row, then their heights."""
     cells, above = [], 0
     begin = end = None
     steps = [0, 0]
+
+    def outwards(step, row, room):
+        half = 25 if 2 * row >= size[1] else 0
+        return unzigzag(source.number(source.tables.border + half + 5 * (2 + clamp(step, -2, 2)) + min(room, 4))[0])
+
     for row in range(size[1]):
         count = source.number(1 + min(2, above))[0]
         at = None
@@ -194,6 +212,14 @@ def rows(source, size):
             elif begin is None:
                 first = source.number(9)[0]
                 at = first + 1 + source.number(15)[0]
+            elif source.tables.version > 3:
+                steps[0] = outwards(steps[0], row, begin)
+                first = begin - steps[0]
+                if row == size[1] - 1 and count == 1:
+                    at = first + points - len(cells)
+                else:
+                    steps[1] = outwards(steps[1], row, size[0] - end)
+                    at = end + steps[1]
             else:
                 steps[0] = unzigzag(source.number(6 + clamp(steps[0], -2, 2))[0])
                 steps[1] = unzigzag(source.number(12 + clamp(steps[1], -2, 2))[0])
@@ -410,13 +436,13 @@ class Cluster:
         if form & 1:
             places = []
             split(source, (0, 0, 0), size, count, places)
-        elif not grid:
+        elif not grid or level > 0 and tables.version > 3:
             require(tables.kinds is not None, "columns in version 1")
             guided = follow() if tables.guide >= 0 else None
             distances = [column(source, len(schema) + axis, count, False, None, guided and guided[2])[1] for axis in range(3)]
             places = [tuple(value % WORD for value in place) for place in zip(*distances)]
         else:
-            cells = rows(source, size)
+            cells = rows(source, size, count)
             places = [(c, r, h) for (c, r), h in zip(cells, heights(source, size[2], cells))]
         require(len(places) == count, "number of points")
         require(all(0 <= p[axis] < size[axis] for p in places for axis in range(3)), "a point outside of its box")
@@ -433,6 +459,8 @@ class Cluster:
         upper = source.raw(16) if count >= 65536 else 0
         place = upper << 16 | source.end()
         require(place < count and (not root or place == 0), "representative")
+        if tables.version > 3:
+            place = count // 2 + unzigzag(place)
         self.representative = None if root else place
 
     def members(self):
@@ -451,8 +479,11 @@ class Level:
         index, data = files["index"], files["data"]
         directory = Bytes(index[-segment["directory_bytes"]:], "directory checksum")
         clusters = segment["clusters"]
-        pages = (clusters + 127) // 128
+        version, bounds = manifest["version"], manifest["bounds"]
+        each = 64 if version > 3 else 128
+        pages = (clusters + each - 1) // each
         offsets = [directory.number(8) for _ in range(pages + 1)]
+        boxes = [[directory.number(2) for _ in range(6)] for _ in range(pages if version > 3 else 0)]
         require(offsets[0] == 0 and offsets[-1] == len(index) - segment["directory_bytes"], "page offsets")
         sets = []
         for _ in range(directory.number(4)):
@@ -460,8 +491,12 @@ class Level:
             sets.append((first, Tables(directory.take(directory.varint()), schema, manifest["version"])))
         directory.done()
         for page in range(pages):
-            ranges = len(schema) if manifest["version"] > 1 else 0
-            self.entries += self.page(index[offsets[page]:offsets[page + 1]], min(128, clusters - 128 * page), ranges)
+            data_of, count = index[offsets[page]:offsets[page + 1]], min(each, clusters - each * page)
+            if version > 3:
+                tables = [tables for first, tables in sets if first <= each * page][-1]
+                self.entries += self.page(data_of, count, tables, len(schema))
+            else:
+                self.entries += self.old_page(data_of, count, len(schema) if version > 1 else 0)
         self.clusters = []
         for ordinal, entry in enumerate(self.entries):
             tables = [each for first, each in sets if first <= ordinal]
@@ -469,8 +504,75 @@ class Level:
             root = number == len(levels) - 1
             self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
 
+        for ordinal, cluster in enumerate(self.clusters):
+            if version > 3 and cluster:
+                self.check_box(boxes[ordinal // each], bounds, cluster.points)
+
     @staticmethod
-    def page(data, count, ranges):
+    def check_box(box, bounds, points):
+        for axis in range(3):
+            low, high = (bounds["min"][axis] * (1 - q / 65535) + bounds["max"][axis] * (q / 65535)
+                         for q in box[2 * axis:2 * axis + 2])
+            require(all(low <= point[axis] <= high for point in points), "a page's box")
+
+    @staticmethod
+    def page(data, count, tables, attributes):
+        source = Bytes(data, "page checksum")
+        offset = source.varint()
+        symbols = Symbols(source.take(len(source.data) - source.at), tables)
+        first = tables.border + 50
+
+        def numbers(column, steps=None):
+            values, c = [], 0
+            for k in range(count):
+                value, c = symbols.number(first + 8 * column + (steps[k] if steps else step_of(c)))
+                values.append(value)
+                classes[column].append(step_of(c))
+            return values
+
+        def sums(differences):
+            value, values = 0, []
+            for difference in differences:
+                value = signed(value + unzigzag(difference))
+                values.append(value)
+            return values
+
+        def shift():
+            s = symbols.number(first + 88)[0]
+            require(s < 64, "shift")
+            return s
+
+        classes = [[] for _ in range(11)]
+        rows = [None] * 11
+        for axis in range(3):
+            s = shift()
+            rows[axis] = [(size + 1 << s) % WORD for size in numbers(axis)]
+            rows[3 + axis] = [signed(low << s) for low in sums(numbers(3 + axis, classes[2] if axis == 2 else None))]
+        rows[6] = numbers(6, classes[2])
+        rows[7] = numbers(7)
+        rows[9] = numbers(9)
+        rows[8] = sums(numbers(8))
+        rows[10] = sums(numbers(10))
+        checksums = [symbols.raw(16) for _ in range(count)]
+        ends = []
+        for end in range(2 * attributes):
+            s = shift()
+            ones = (1 << s) - 1 if end % 2 else 0
+            ends.append([(key << s | ones) % WORD
+                         for key in sums([symbols.number(first + 89 + end)[0] for _ in range(count)])])
+        require(symbols.end() == 0, "end of a page")
+        entries = []
+        for k in range(count):
+            entries.append({"offset": offset, "bytes": rows[6][k], "points": rows[7][k], "forms": rows[10][k],
+                            "low": [rows[3 + axis][k] for axis in range(3)], "size": [rows[axis][k] for axis in range(3)],
+                            "error": struct.unpack("<d", (rows[8][k] << 47).to_bytes(8, "little"))[0],
+                            "descendants": rows[9][k], "checksum": checksums[k],
+                            "ranges": [(low[k], high[k]) for low, high in zip(ends[::2], ends[1::2])]})
+            offset += rows[6][k]
+        return entries
+
+    @staticmethod
+    def old_page(data, count, ranges):
         source = Bytes(data, "page checksum")
         offset = source.varint()
         columns = []
@@ -502,7 +604,7 @@ class Store:
         folder = pathlib.Path(folder)
         text = (folder / "manifest.json").read_bytes()
         self.manifest = json.loads(text)
-        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2, 3), "not a store")
+        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2, 3, 4), "not a store")
         self.checksum = self.manifest["checksum"]
         require(text[-12:] == b"%s\"\n}\n" % self.checksum.encode(), "end of the manifest")
         self.checksum = int(self.checksum, 16)

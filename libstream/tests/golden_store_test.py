@@ -40,6 +40,10 @@ class GoldenStoreTest(unittest.TestCase):
     def test_version_3(self):
         self.check_points('lines')
 
+    def test_version_4(self):
+        self.check_points('island')
+        self.check_points('swath')
+
     def test_a_store_without_points(self):
         self.check_points('empty')
 
@@ -49,7 +53,7 @@ class GoldenStoreTest(unittest.TestCase):
 
     def test_points_head_their_clusters(self):
         """A point of highest level h heads a cluster on every level below, as its representative."""
-        for name in ('grid', 'cloud', 'survey', 'lines', 'int64', 'uint64'):
+        for name in ('grid', 'cloud', 'survey', 'lines', 'island', 'swath', 'int64', 'uint64'):
             levels = decode_store.Store(STORES / name).levels
             headed = [set() for _ in levels]
             for number, level in enumerate(levels):

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <numeric>
 #include <random>
 #include <span>
@@ -20,6 +21,7 @@
 #include "store/codec/column_codec.hpp"
 #include "store/codec/split_codec.hpp"
 #include "store/codec/tables.hpp"
+#include "store/read/index_page.hpp"
 #include "store/write/side_by_side.hpp"
 #include "store_inputs.hpp"
 #include "temp_folder.hpp"
@@ -99,12 +101,17 @@ TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
     std::array<std::uint32_t, 2> last{};
     std::array<Bytes, 2> alone;
     for (std::size_t k = 0; k < 2; ++k) {
-      items[k].resize(1 + random() % 2000);
+      items[k].resize(1 + random() % (round % 4 == 0 ? 4 : 2000));
+      const bool raw = random() % 2 == 0;
       coders[k].start();
       for (Item& item : items[k]) {
         item.context = static_cast<unsigned>(random() % tables.encode.size());
         item.symbol = static_cast<unsigned>(random() % kClasses);
-        item.bits = static_cast<unsigned>(random() % 65);
+        // Without raw bits only symbols that need no escape.
+        while (!raw && tables.encode[item.context].entries[item.symbol] == 0) {
+          item.symbol = static_cast<unsigned>(random() % kClasses);
+        }
+        item.bits = raw ? static_cast<unsigned>(random() % 65) : 0;
         item.value = item.bits == 0 ? 0 : random() >> (64 - item.bits);
         coders[k].symbol(item.context, item.symbol);
         coders[k].raw(item.value, item.bits);
@@ -184,6 +191,135 @@ TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
     }
     std::sort(order.begin(), order.end());
     for (std::uint32_t i = 0; i < n; ++i) ASSERT_EQ(order[i], i);
+  }
+}
+
+TEST(StoreCodec, FewSymbolsAreFewBytes) {
+  std::array<std::uint32_t, kSymbols> counts{};
+  counts[1] = 1000;
+  counts[2] = 1;
+  const BothTables tables({normalised(counts)});
+  for (const auto& [symbols, last, size] :
+       {std::tuple<unsigned, std::uint32_t, std::size_t>{1, 0, 1},
+        {200, 0, 1},
+        {20, 5, 1},
+        {20, 300, 2},
+        {1, 60000, 2},
+        {1, 65535, 3}}) {
+    SCOPED_TRACE(symbols);
+    SymbolEncoder coder(tables.encode);
+    coder.start();
+    for (unsigned i = 0; i < symbols; ++i) coder.symbol(0, 1);
+    Bytes bytes;
+    coder.finish(last, bytes);
+    EXPECT_EQ(bytes.size(), size);
+    const Bytes room = padded(bytes);
+    SymbolDecoder decoder(tables.pointers, inside(room));
+    for (unsigned i = 0; i < symbols; ++i) ASSERT_EQ(decoder.symbol(0), 1u);
+    EXPECT_EQ(decoder.finish(), last);
+  }
+  EXPECT_THROW(SymbolDecoder(tables.pointers, ByteView()), Damage);
+}
+
+/// Entries of every kind come back from a page, ranges perhaps wider; what is cut off or put behind
+/// is found, unless an escape happens to name a class with as many more bits.
+TEST(StoreCodec, IndexPagesComeBack) {
+  Random random(10);
+  int accepted = 0;
+  for (int round = 0; round < 300; ++round) {
+    SCOPED_TRACE(round);
+    Schema schema;
+    for (const ScalarType type : {ScalarType::u8, ScalarType::f32, ScalarType::i64}) {
+      if (round % 2 == 0) schema.attributes.push_back({.name = "a", .type = type});
+    }
+    const Layout layout(schema, round % 3 == 0 ? 0 : 1, kVersion);
+    Tables tables;
+    tables.kinds.assign(layout.columns(), ColumnKind::plain);
+    tables.frequencies = some_frequencies(random, layout.contexts());
+    const unsigned wide = round % 5 == 0 ? 64 : 12;
+    const auto shift = static_cast<unsigned>(random() % 4);
+    std::vector<Entry> entries(1 + random() % layout.page_clusters());
+    std::vector<KeyRange> ranges;
+    for (Entry& entry : entries) {
+      entry.bytes = static_cast<std::uint32_t>(any_number(random, 30));
+      entry.points = static_cast<std::uint32_t>(any_number(random, 20));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        entry.forms[axis] = static_cast<NumberForm>(random() % kNumberForms);
+        entry.low[axis] = static_cast<std::int64_t>(any_number(random, wide) << shift);
+        entry.size[axis] = (1 + any_number(random, wide - shift - 1)) << shift;
+      }
+      entry.error = static_cast<std::uint16_t>(any_number(random, 15));
+      entry.descendants = any_number(random, 48);
+      entry.checksum = static_cast<std::uint16_t>(random());
+      for (std::size_t a = 0; a < schema.attributes.size(); ++a) {
+        KeyRange range{attribute_key(static_cast<std::int64_t>(any_number(random, 40))), 0};
+        range.high = range.low + any_number(random, 40);
+        ranges.push_back(range);
+      }
+    }
+    Bytes bytes;
+    const std::uint64_t offset = any_number(random, 50);
+    PageColumns(entries, layout.attributes, ranges)
+        .write(layout, EncodingTables(tables), offset, bytes);
+    ASSERT_LE(bytes.size(), most_page_bytes(layout.ranges()));
+    const DecodingTables decoding(tables);
+    const auto n = static_cast<std::uint32_t>(entries.size());
+    const IndexPage page(bytes, n, layout, &decoding);
+    EXPECT_EQ(page.offset(0), offset);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const Entry entry = page.entry(i), &wanted = entries[i];
+      ASSERT_EQ(entry.bytes, wanted.bytes);
+      ASSERT_EQ(entry.points, wanted.points);
+      ASSERT_EQ(entry.forms, wanted.forms);
+      ASSERT_EQ(entry.low, wanted.low);
+      ASSERT_EQ(entry.size, wanted.size);
+      ASSERT_EQ(entry.error, wanted.error);
+      ASSERT_EQ(entry.descendants, wanted.descendants);
+      ASSERT_EQ(entry.checksum, wanted.checksum);
+      for (std::size_t a = 0; a < layout.ranges(); ++a) {
+        const KeyRange before = ranges[i * layout.ranges() + a], after = page.range(i, a);
+        ASSERT_LE(after.low, before.low);
+        ASSERT_GE(after.high, before.high);
+      }
+    }
+    for (const bool longer : {false, true}) {
+      Bytes wrong(bytes.begin(), bytes.end() - 4);
+      wrong.resize(wrong.size() + (longer ? 1 : -1));
+      put(wrong, crc32(wrong));
+      try {
+        static_cast<void>(IndexPage(wrong, n, layout, &decoding));
+        ++accepted;
+      } catch (const Damage&) {
+      }
+    }
+  }
+  EXPECT_LT(accepted, 10);
+}
+
+/// A page's box holds what it is made for, whatever the bounds, and little more.
+TEST(StoreCodec, BoxesOfPagesHoldTheirClusters) {
+  Random random(11);
+  constexpr double kMost = std::numeric_limits<double>::max();
+  for (int round = 0; round < 3000; ++round) {
+    SCOPED_TRACE(round);
+    const double scale = round % 4 == 0 ? kMost : round % 4 == 1 ? 1e-300 : 6000;
+    const auto any = [&] { return (static_cast<double>(random() >> 11) * 0x1p-52 - 1) * scale; };
+    Box3 bounds, box;
+    for (int i = 0; i < (round % 7 == 0 ? 1 : 2); ++i) bounds.include(Point3{any(), any(), any()});
+    for (int i = 0; i < 2; ++i) {
+      Point3 p{any(), any(), any()};
+      for (std::size_t a = 0; a < 3; ++a) p[a] = std::clamp(p[a], bounds.min[a], bounds.max[a]);
+      box.include(p);
+    }
+    const PageBox stored = PageBox::around(box, bounds);
+    const Box3 found = stored.in(bounds);
+    EXPECT_TRUE(found.contains(box.min) && found.contains(box.max));
+    EXPECT_TRUE(bounds.contains(found.min) && bounds.contains(found.max));
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double step = (bounds.max[a] / 65535 - bounds.min[a] / 65535) * 1.001;
+      EXPECT_LE(box.min[a] - found.min[a], step);
+      EXPECT_LE(found.max[a] - box.max[a], step);
+    }
   }
 }
 

@@ -42,7 +42,7 @@ std::vector<testing::Block> small_blocks() {
   return testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, kColumns, kRows, 12, 1);
 }
 
-/// A raster's store with three levels, level 0 of three pages.
+/// A raster's store with three levels, level 0 of several pages.
 const StoreFiles& grid_files() {
   static const StoreFiles files = [] {
     const TemporaryFolder folder;
@@ -379,7 +379,7 @@ TEST(StoreInvariants, DirectoriesThatCannotBeAreRefused) {
                       std::size_t n) {
     std::memcpy(level.index.data() + level.directory() + at, &value, n);
   };
-  const auto tables = [](const testing::LevelBytes& level) { return 8 * (level.pages() + 1); };
+  const auto tables = [](const testing::LevelBytes& level) { return level.sets(); };
   const std::vector<Case> cases{
       {"do not follow one another", [&](auto& level) { put(level, 0, 1, 8); }},
       {"do not follow one another", [&](auto& level) { put(level, 8, UINT64_MAX, 8); }},
@@ -427,7 +427,7 @@ StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
   bool done = false;
   testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json& segment) {
     if (std::exchange(done, true)) return;
-    const std::size_t directory = level.directory(), count_at = directory + 8 * (level.pages() + 1);
+    const std::size_t directory = level.directory(), count_at = directory + level.sets();
     const std::uint32_t two = 2;
     std::memcpy(level.index.data() + count_at, &two, 4);
     // Behind the first's ordinal.
@@ -452,15 +452,36 @@ TEST(StoreInvariants, SecondTablesServeClustersOfTheirOwn) {
   expect_unreadable(with_second_tables(100, true), "table");
 }
 
-TEST(StoreInvariants, PagesWithBitsThatMeanNothingAreNotRead) {
+TEST(StoreInvariants, BoxesOfPagesThatLeaveClustersOutAreFound) {
+  for (std::size_t place = 0; place < 6; ++place) {
+    StoreFiles files = grid_files();
+    auto manifest = ordered_json::parse(files["manifest.json"]);
+    bool done = false;
+    testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json&) {
+      if (std::exchange(done, true)) return;
+      // The second page's box: a low end upwards, a high end downwards.
+      const std::size_t at = level.directory() + 8 * (level.pages() + 1) + 12 + 2 * place;
+      std::uint16_t end = 0;
+      std::memcpy(&end, &level.index[at], 2);
+      end = static_cast<std::uint16_t>(place % 2 == 0 ? end + 2000 : end - 2000);
+      std::memcpy(&level.index[at], &end, 2);
+    });
+    testing::mend(files);
+    expect_problem(files, "the box reaches out of its page's");
+  }
+}
+
+TEST(StoreInvariants, OldPagesWithBitsThatMeanNothingAreNotRead) {
   bool tried = false;
-  for (const StoreFiles& sound : {grid_files(), cloud_files()}) {
+  const std::filesystem::path golden = std::filesystem::path(TERRACE_TEST_DATA) / "stores";
+  for (const char* name : {"grid", "cloud"}) {
+    const StoreFiles sound = testing::read_files(golden / name);
     auto manifest = ordered_json::parse(sound.at("manifest.json"));
     for (std::size_t page = 0; page < 3; ++page) {
       StoreFiles files = sound;
       bool first = true, padded = false;
       testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json&) {
-        if (!std::exchange(first, false)) return;
+        if (!std::exchange(first, false) || page >= level.pages()) return;
         // The last bit of the last column's bytes.
         char& last = level.index[level.page_offset(page + 1) - 5];
         last = static_cast<char>(last | 0x80);
@@ -580,7 +601,7 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
                      }),
             "a part of a cluster has more points than the whole");
   // Nine raw bits: seven behind them mean nothing.
-  const char* const ends = "a cluster's bytes do not end where its points do";
+  const char* const ends = "coded bytes do not end where their numbers do";
   EXPECT_EQ(
       decoding(false, 1, 0, one_point, [](store::Bytes& bytes) { bytes[bytes.size() - 2] ^= 1; }),
       ends);

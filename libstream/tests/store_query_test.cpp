@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "store_testing.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -49,6 +50,36 @@ class QueriedStore {
   std::unique_ptr<Store> store_;
   std::vector<FoundPoint> points_;
 };
+
+/// A small box is found without reading the index of what is far away.
+TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
+  const TemporaryFolder folder;
+  testing::write_store(
+      folder.path() / "s", testing::grid_schema(ScalarType::i16),
+      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 600, 600, 30, 1),
+      {.block_points = 900, .cluster_points = 10});
+  std::uint64_t read = 0;
+  const Store store = Store::open("s", [&](const std::string& name) {
+    const std::shared_ptr<ByteSource> file = open_file(folder.path() / "s" / name);
+    const bool counted = name == "level-0.0.index";
+    return bytes_by_function(
+        name, file->size(), [file, counted, &read](std::uint64_t offset, std::span<std::byte> out) {
+          file->read(offset, out);
+          if (counted) read += out.size();
+        });
+  });
+  const std::uint64_t index = store.levels()[0].index_bytes;
+  ASSERT_GT(store.levels()[0].clusters, 30000u);
+  read = 0;
+  StoreQuery query(store);
+  const Box3 box{{300, 200, -1e9}, {304, 204, 1e9}};
+  const std::size_t inside = query.in_box(box).size();  // some cells are empty
+  EXPECT_GT(inside, 10u);
+  EXPECT_EQ(query.count(box), inside);
+  EXPECT_EQ(query.nearest({100, 100, store.mean_height()}, 1).size(), 1u);
+  EXPECT_GT(read, 0u);
+  EXPECT_LT(read, index / 20);
+}
 
 constexpr double kFarAway = std::numeric_limits<double>::infinity();
 

@@ -6,13 +6,16 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <terrace/stream/byte_source.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
@@ -159,43 +162,72 @@ terrace::terrain::Region random_square(double share, std::uint64_t seed) {
   return terrace::terrain::Region::parse(text[0] + text[1]);
 }
 
-/// What it takes to read all points inside a square: the argument is its share of the area in parts
-/// of ten thousand. The counters are means over the squares; `delivered` and `bytes` are per point
-/// inside. The root, of any size up to a block, is left out of clusters and bytes: whoever asks
-/// often keeps it.
+/// A store's folder that counts the bytes that are read.
+terrace::stream::OpenByName counting(const std::filesystem::path& folder, std::uint64_t& bytes) {
+  return [folder, &bytes](const std::string& name) {
+    const std::shared_ptr<terrace::stream::ByteSource> file =
+        terrace::stream::open_file(folder / name);
+    return terrace::stream::bytes_by_function(
+        name, file->size(), [file, &bytes](std::uint64_t offset, std::span<std::byte> out) {
+          file->read(offset, out);
+          bytes += out.size();
+        });
+  };
+}
+
+/// What it takes to read all points inside a square from a store that has just been opened: the
+/// argument is its share of the area in parts of ten thousand. The counters are means over the
+/// squares; `delivered` and `bytes` are per point inside, `least` is what would be delivered by
+/// those clusters alone that have points inside, and `read` the bytes read, index included, per
+/// byte of these. The root, of any size up to a block, is left out: whoever asks often keeps it.
 void region(benchmark::State& state) {
   const Store& source = store();
   const terrace::stream::Placement placement = source.schema();
   const double share = static_cast<double>(state.range(0)) / 10000;
   const std::uint64_t squares = small() ? 2 : share < 0.005 ? 200 : share < 0.05 ? 40 : 10;
   std::uint64_t inside = 0, delivered = 0, clusters = 0, bytes = 0, reads = 0;
+  std::uint64_t read = 0, needed = 0, least = 0;
   for (auto _ : state) {
     for (std::uint64_t square = 1; square <= squares; ++square) {
+      state.PauseTiming();
       terrace::terrain::Detail detail;
       detail.region = random_square(share, square);
+      std::uint64_t counted = 0;
+      const Store fresh = Store::open("store", counting(source.path(), counted));
+      static_cast<void>(fresh.record(fresh.root()));
+      counted = 0;
+      state.ResumeTiming();
       terrace::terrain::for_each_wanted(
-          source, detail,
+          fresh, detail,
           [&](terrace::stream::ClusterId id, const terrace::stream::ClusterRecord& record,
               const terrace::stream::ClusterPoints& points) {
-            if (id != source.root()) {
-              ++clusters;
-              bytes += record.bytes;
-              delivered += points.size();
-            }
+            std::uint64_t within = 0;
             for (const auto& p : points.positions) {
-              inside += detail.region->contains(terrace::stream::world_point(placement, p));
+              within += detail.region->contains(terrace::stream::world_point(placement, p));
             }
+            inside += within;
+            if (id == fresh.root()) return;
+            ++clusters;
+            bytes += record.bytes;
+            delivered += points.size();
+            if (within == 0) return;
+            needed += record.bytes;
+            least += points.size();
           });
+      read += counted - fresh.record(fresh.root()).bytes;
       ++reads;
     }
   }
-  const double count = static_cast<double>(reads);
-  const double within = static_cast<double>(std::max<std::uint64_t>(1, inside));
+  const auto count = static_cast<double>(reads);
+  const auto within = static_cast<double>(std::max<std::uint64_t>(1, inside));
   state.counters["inside"] = static_cast<double>(inside) / count;
   state.counters["clusters"] = static_cast<double>(clusters) / count;
   state.counters["KB"] = static_cast<double>(bytes) / count / 1000;
   state.counters["delivered"] = static_cast<double>(delivered) / within;
+  state.counters["least"] = static_cast<double>(least) / within;
   state.counters["bytes"] = static_cast<double>(bytes) / within;
+  state.counters["read"] =
+      static_cast<double>(read) / static_cast<double>(std::max<std::uint64_t>(1, needed));
   state.SetItemsProcessed(static_cast<std::int64_t>(inside));
 }
 BENCHMARK(region)->Arg(1)->Arg(6)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);

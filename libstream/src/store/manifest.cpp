@@ -247,7 +247,7 @@ void check_counts(const Manifest& m) {
     if (level.clusters != (top ? 1 : above)) {
       throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
     }
-    if (m.points > 0 && level.clusters > level.data.bytes / kFewestClusterBytes) {
+    if (m.points > 0 && level.clusters > level.data.bytes / fewest_cluster_bytes(m.version)) {
       throw Damage("level " + std::to_string(l) + " has more clusters than its file can hold");
     }
     if (level.points / kMostPoints > level.clusters) {

@@ -160,7 +160,7 @@ class Verification {
     }
     data_end = page->end();
     for (std::uint32_t i = 0; i < page->clusters(); ++i) {
-      const std::uint64_t ordinal = number * kPageClusters + i;
+      const std::uint64_t ordinal = number * level.layout().page_clusters() + i;
       try {
         std::uint64_t offset = 0;
         const Entry entry = level.entry(ordinal, offset);
@@ -204,6 +204,15 @@ class Verification {
     for (const Point3& p : points_.positions) inside &= summary.box.contains(p);
     if (points_.has_representative) inside &= summary.box.contains(points_.representative);
     if (!inside) cluster_problem(l, ordinal, record.offset, "a point lies outside of its box");
+    Box3 within = summary.box;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      within.min[axis] = std::max(within.min[axis], manifest_.bounds.min[axis]);
+      within.max[axis] = std::min(within.max[axis], manifest_.bounds.max[axis]);
+    }
+    if (points_.size() + points_.has_representative > 0 &&
+        !holds(levels_[l]->coarse_box(ordinal), within)) {
+      cluster_problem(l, ordinal, record.offset, "the box reaches out of its page's");
+    }
     if (!(summary.error >= 0)) {
       cluster_problem(l, ordinal, record.offset, "the error is not a number from 0 up");
     }

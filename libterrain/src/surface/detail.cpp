@@ -120,6 +120,8 @@ class Descent {
     std::sort(ordinals.begin(), ordinals.end());
     for (const std::uint64_t ordinal : ordinals) {
       const stream::ClusterId id = stream::cluster_id(level, ordinal);
+      // Most are far away, and so are their pages of the index.
+      if (!detail_.wants(level, world_box(placement_, store_.coarse_box(id)))) continue;
       const stream::ClusterRecord record = store_.record(id);
       if (detail_.wants(level, world_box(placement_, record.summary.box))) found(id, record);
     }

@@ -44,20 +44,35 @@ class StoreQuery {
   struct Branch {
     Box3 box;
     std::uint64_t ordinal = 0;
-    std::uint64_t descendants = 0;  ///< points of level 0 below, including the representative
+    /// Points of level 0 below, including the representative; 0 if the index has not been read for
+    /// this one yet, and the box is Store::coarse_box().
+    std::uint64_t descendants = 0;
   };
   /// A decoded cluster and the clusters that its members head.
-  struct Node {
+  class Node {
+   public:
     ClusterId id{};
     std::vector<Point3> positions;  ///< of the members
-    std::vector<Branch> branches;   ///< level() per member, level 0 first
     std::uint64_t bytes = 0;
 
     [[nodiscard]] unsigned level() const { return level_of(id); }
-    /// The cluster that a member heads on a level below this node's.
+    /// The cluster that a member heads on a level below this node's. Throws: Error.
     [[nodiscard]] const Branch& branch(std::size_t member, unsigned below) const {
-      return branches[member * level() + below];
+      Branch& branch = branches_[member * level() + below];
+      if (branch.descendants == 0) look_up(branch, below);
+      return branch;
     }
+    /// The same as far as it is known without reading the index.
+    [[nodiscard]] const Branch& known_branch(std::size_t member, unsigned below) const {
+      return branches_[member * level() + below];
+    }
+
+   private:
+    friend class StoreQuery;
+    void look_up(Branch& branch, unsigned below) const;
+
+    const Store* store_ = nullptr;
+    mutable std::vector<Branch> branches_;  ///< level() per member, level 0 first
   };
 
   /// leaf_bytes: cache for decoded clusters of level 0 (LRU), for callers that query nearby places
@@ -93,7 +108,8 @@ class StoreQuery {
 
   /// Visits the root and then, level by level down to `level` and within a level by id, each
   /// cluster for which wants(level, branch) is true. A branch is tested only if that of the same
-  /// point on the level above was wanted, since it lies within that.
+  /// point on the level above was wanted, since it lies within that; and with a larger box first,
+  /// for which wants() must be true too where it is for the branch's.
   template <class Wants, class Visit>
   void descend(unsigned level, const Wants& wants, const Visit& visit);
 
@@ -151,8 +167,10 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
     if (at <= level) return;
     for (std::size_t i = 0; i < node.positions.size(); ++i) {
       for (unsigned below = at; below-- > level;) {
-        const Branch& branch = node.branch(i, below);
+        const Branch& branch = node.known_branch(i, below);
+        const bool known = branch.descendants > 0;
         if (!wants(below, branch)) break;
+        if (!known && !wants(below, node.branch(i, below))) break;
         wanted_[below].push_back(branch.ordinal);
       }
     }
@@ -178,9 +196,13 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
     const unsigned at = node.level();
     for (std::size_t i = 0; i < node.positions.size(); ++i) {
       for (unsigned below = level; below < at; ++below) {
+        const auto beyond = [bound](double distance) {
+          return distance > bound || distance == std::numeric_limits<double>::infinity();
+        };
+        if (beyond(least(node.known_branch(i, below).box))) continue;
         const Branch& branch = node.branch(i, below);
         const double distance = least(branch.box);
-        if (distance > bound || distance == std::numeric_limits<double>::infinity()) continue;
+        if (beyond(distance)) continue;
         open_.push_back({distance, cluster_id(below, branch.ordinal)});
         std::push_heap(open_.begin(), open_.end(), later);
       }
@@ -215,6 +237,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
     for (std::size_t i = 0; i < at.positions.size(); ++i) {
       // What a point heads on a level lies within what it heads on the level above.
       for (unsigned below = at.level(); below-- > 0;) {
+        if (!box.intersects(at.known_branch(i, below).box)) break;
         const Branch& branch = at.branch(i, below);
         if (!box.intersects(branch.box)) break;
         if (below == 0 || (box.contains(branch.box.min) && box.contains(branch.box.max))) {

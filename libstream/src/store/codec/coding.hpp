@@ -35,6 +35,15 @@ TERRACE_STORE_INLINE unsigned code_number(Coder& coder, unsigned context, std::u
   }
 }
 
+/// A place among n, counted from the middle one by zigzag: a representative is mostly near it.
+constexpr std::uint32_t centred(std::uint32_t place, std::uint32_t n) {
+  return static_cast<std::uint32_t>(zigzag(std::int64_t{place} - n / 2));
+}
+/// Requires code < n.
+constexpr std::uint32_t uncentred(std::uint32_t code, std::uint32_t n) {
+  return static_cast<std::uint32_t>(unzigzag(code) + n / 2);
+}
+
 /// Bits that stand for a number.
 struct RawBits {
   std::uint64_t value = 0;

@@ -33,8 +33,8 @@ inline constexpr std::array<std::uint8_t, kClasses> kDifferenceSteps = [] {
 constexpr unsigned difference_step(unsigned number_class) { return kDifferenceSteps[number_class]; }
 
 template <class Coder>
-unsigned code_difference(Coder& coder, unsigned context, std::int64_t previous,
-                         std::int64_t& value) {
+TERRACE_STORE_INLINE unsigned code_difference(Coder& coder, unsigned context, std::int64_t previous,
+                                              std::int64_t& value) {
   std::uint64_t number = 0;
   if constexpr (!Coder::kDecoding) {
     number = zigzag(static_cast<std::int64_t>(static_cast<std::uint64_t>(value) -

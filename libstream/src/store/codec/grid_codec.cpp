@@ -42,7 +42,8 @@ const std::array<GridCodec::Step, kPatterns> GridCodec::kStep = [] {
 
 void GridCodec::start(std::uint32_t width, std::uint32_t height) {
   stride_ = static_cast<std::ptrdiff_t>(width) + kPadX;
-  const std::size_t cells = static_cast<std::size_t>(stride_) * (height + kPadY);
+  rows_ = static_cast<std::ptrdiff_t>(height) + kPadY;
+  const auto cells = static_cast<std::size_t>(stride_ * rows_);
   mask_.assign(cells, 0);
   magnitudes_.assign(cells, 0);
   if (values_.size() < cells) {
@@ -52,10 +53,9 @@ void GridCodec::start(std::uint32_t width, std::uint32_t height) {
   }
 }
 
-void GridCodec::find_patterns(std::uint32_t height) {
+void GridCodec::find_patterns() {
   const std::ptrdiff_t up = stride_;
-  const std::ptrdiff_t begin = kPadY * up + 2,
-                       end = (static_cast<std::ptrdiff_t>(height) + kPadY) * up;
+  const std::ptrdiff_t begin = kPadY * up + 2, end = rows_ * up;
   const std::uint8_t* const mask = mask_.data();
   for (std::ptrdiff_t i = begin; i < end; ++i) {
     patterns_[static_cast<std::size_t>(i)] =
@@ -83,7 +83,8 @@ void GridCodec::find_run(std::uint32_t row, std::uint64_t from, std::uint64_t& b
   while (cells[end] != 0) ++end;  // stops in the padding at the latest
 }
 
-void GridCodec::fit(PredictorFit& sums) const {
+void GridCodec::fit(PredictorFit& sums) {
+  find_patterns();
   const std::ptrdiff_t up = stride_;
   for (const std::uint32_t cell : cells_) {
     const std::int64_t* const at = values_.data() + cell;

@@ -45,14 +45,19 @@ class GridCodec {
   [[nodiscard]] std::uint32_t point(std::size_t i) const { return points_[cells_[i]]; }
 
   /// The cells, in the order of rows and columns. Decoding fills x and y with n cells.
+  /// borders: the first context of borders from version 4 on; 0 before.
   template <class Coder>
-  void positions(Coder& shared, std::uint32_t width, std::uint32_t height, std::uint32_t n,
-                 std::uint64_t* x, std::uint64_t* y) {
+  void positions(Coder& shared, unsigned borders, std::uint32_t width, std::uint32_t height,
+                 std::uint32_t n, std::uint64_t* x, std::uint64_t* y) {
     typename Coder::Local coder = shared;
     if constexpr (Coder::kDecoding) start(width, height);
     cells_.resize(n);
+    // Not by way of the vectors, which a byte that is written might change.
+    std::uint32_t* const cells = cells_.data();
+    [[maybe_unused]] std::uint8_t* const mask = mask_.data();
     std::uint32_t found = 0;
-    Border left{context::kRunStart}, right{context::kRunEnd};
+    Border<false> left(borders, width);
+    Border<true> right(borders, width);
     std::uint64_t runs_above = 0;
     bool row_above = false;
     for (std::uint32_t row = 0; row < height; ++row) {
@@ -66,8 +71,18 @@ class GridCodec {
         std::uint64_t begin = 0, end = 0;
         if constexpr (!Coder::kDecoding) find_run(row, column, begin, end);
         if (run == 0) {
-          left.code(coder, row_above, 0, begin);
-          right.code(coder, row_above, begin + 1, end);
+          const bool lower_half = 2 * row >= height;
+          if (!row_above) {
+            left.begin(coder, 0, begin);
+            right.begin(coder, begin + 1, end);
+          } else {
+            left.move(coder, lower_half, begin);
+            if (borders == 0 || row + 1 < height || runs > 1) {
+              right.move(coder, lower_half, end);
+            } else if constexpr (Coder::kDecoding) {
+              end = begin + (n - found);  // all cells that are left
+            }
+          }
           row_above = true;
         } else {
           std::uint64_t gap = begin - column - 1, length = end - begin - 1;
@@ -84,11 +99,11 @@ class GridCodec {
             throw Damage("a run lies outside of its cluster");
           }
         }
-        std::size_t cell = cell_of(static_cast<std::uint32_t>(begin), row);
+        auto cell = static_cast<std::uint32_t>(cell_of(static_cast<std::uint32_t>(begin), row));
         for (std::uint64_t c = begin; c < end; ++c, ++cell, ++found) {
-          cells_[found] = static_cast<std::uint32_t>(cell);
+          cells[found] = cell;
           if constexpr (Coder::kDecoding) {
-            mask_[cell] = 1;
+            mask[cell] = 1;
             x[found] = c;
             y[found] = row;
           }
@@ -98,7 +113,6 @@ class GridCodec {
       runs_above = runs;
     }
     if (found != n) throw Damage("a cluster has too few cells");
-    find_patterns(height);
     if constexpr (Coder::kDecoding) shared = coder;
   }
 
@@ -109,6 +123,7 @@ class GridCodec {
       if constexpr (Coder::kDecoding) std::fill(z, z + cells_.size(), 0);
       return;
     }
+    find_patterns();
     const auto most = static_cast<std::int64_t>(std::min<std::uint64_t>(size - 1, INT64_MAX));
     typename Coder::Local coder = shared;
     const std::ptrdiff_t up = stride_;
@@ -160,37 +175,55 @@ class GridCodec {
   }
 
   /// Training: adds the cells of `positions` to the least squares.
-  void fit(PredictorFit& sums) const;
+  void fit(PredictorFit& sums);
 
  private:
   static constexpr std::uint32_t kPadX = 4, kPadY = 2;
 
-  /// A border of the first run of the rows: coded as the step from the row above, in the context of
-  /// the previous step.
-  struct Border {
-    unsigned context;
-    std::int64_t at = 0, step = 0;
+  /// A border of the first run of the rows: coded as the step outwards from the row above, in the
+  /// context of the previous step and of how far away the side of the box is. Both borders,
+  /// mirrored, share contexts.
+  template <bool kRight>
+  class Border {
+   public:
+    /// borders: as for positions().
+    Border(unsigned borders, std::uint32_t width) : borders_(borders), width_(width) {}
 
+    /// In the first row that has cells.
     template <class Coder>
-    void code(Coder& coder, bool row_above, std::uint64_t lowest, std::uint64_t& value) {
-      std::uint64_t number = 0;
-      if (!row_above) {
-        number = value - lowest;
-        code_number(coder, context + 5, number);
-        if (number > UINT32_MAX) throw Damage("a run lies outside of its cluster");
-        value = lowest + number;
-        step = 0;
-      } else {
-        number = zigzag(static_cast<std::int64_t>(value) - at);
-        code_number(coder,
-                    context + static_cast<unsigned>(std::clamp<std::int64_t>(step, -2, 2) + 2),
-                    number);
-        if (number > 2ull * UINT32_MAX) throw Damage("a run lies outside of its cluster");
-        step = unzigzag(number);
-        value = static_cast<std::uint64_t>(at + step);
-      }
-      at = static_cast<std::int64_t>(value);
+    void begin(Coder& coder, std::uint64_t lowest, std::uint64_t& value) {
+      std::uint64_t number = value - lowest;
+      code_number(coder, kFirstContext + 5, number);
+      if (number > UINT32_MAX) throw Damage("a run lies outside of its cluster");
+      value = lowest + number;
+      at_ = static_cast<std::int64_t>(value);
     }
+    template <class Coder>
+    TERRACE_STORE_INLINE void move(Coder& coder, bool lower_half, std::uint64_t& value) {
+      unsigned place = kFirstContext + last_;
+      const bool outwards = kRight || borders_ == 0;  // before version 4 to the right
+      if (borders_ > 0) {
+        const std::int64_t room = kRight ? width_ - at_ : at_;
+        place = borders_ + (lower_half ? context::kBorders / 2 : 0) +
+                last_ * context::kBorderRooms +
+                static_cast<unsigned>(std::min<std::int64_t>(room, context::kBorderRooms - 1));
+      }
+      const std::int64_t moved = static_cast<std::int64_t>(value) - at_;
+      std::uint64_t number = zigzag(outwards ? moved : -moved);
+      code_number(coder, place, number);
+      if (number > 2ull * UINT32_MAX) throw Damage("a run lies outside of its cluster");
+      const std::int64_t step = unzigzag(number);
+      at_ += outwards ? step : -step;
+      last_ = static_cast<unsigned>(std::clamp<std::int64_t>(step, -2, 2) + 2);
+      value = static_cast<std::uint64_t>(at_);
+    }
+
+   private:
+    static constexpr unsigned kFirstContext = kRight ? context::kRunEnd : context::kRunStart;
+
+    unsigned borders_, last_ = 2;  ///< last: the step, -2 to 2
+    std::uint32_t width_;
+    std::int64_t at_ = 0;
   };
 
   /// How neighbours' magnitudes form a context: their mean, where the pattern has them. Cells that
@@ -206,12 +239,12 @@ class GridCodec {
     return static_cast<std::size_t>(row + kPadY) * static_cast<std::size_t>(stride_) + column + 2;
   }
   void start(std::uint32_t width, std::uint32_t height);
-  void find_patterns(std::uint32_t height);
+  void find_patterns();
   [[nodiscard]] std::uint64_t count_runs(std::uint32_t row) const;
   void find_run(std::uint32_t row, std::uint64_t from, std::uint64_t& begin,
                 std::uint64_t& end) const;
 
-  std::ptrdiff_t stride_ = 0;
+  std::ptrdiff_t stride_ = 0, rows_ = 0;  ///< rows with their padding
   std::vector<std::uint8_t> mask_, patterns_, magnitudes_;
   std::vector<std::int64_t> values_;
   std::vector<std::uint32_t> points_, cells_;

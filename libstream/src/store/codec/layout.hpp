@@ -20,16 +20,17 @@ namespace terrace::stream::store {
 inline constexpr std::uint32_t kMostPoints = 1u << 20;
 inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
 /// Minimum bytes of a cluster that has points.
-inline constexpr std::uint32_t kFewestClusterBytes = 4;
+constexpr std::uint32_t fewest_cluster_bytes(int version) { return version > 3 ? 1 : 4; }
 /// Maximum bytes of a cluster: every point at its raw size, and as much again.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
-/// Stores of this version and earlier can be read. A raster without further attributes is written
-/// as version 1, which suffices for it.
-inline constexpr int kVersion = 3;
-inline int version_to_write(const Schema& schema) {
-  return schema.grid && schema.attributes.empty() ? 1 : kVersion;
-}
+/// The version that is written. Stores of earlier versions can be read.
+inline constexpr int kVersion = 4;
+
+/// Clusters per page of the index, except the last of a level: a page's ordinals follow by
+/// arithmetic.
+inline constexpr std::uint32_t kMostPageClusters = 128;
+constexpr std::uint32_t page_clusters(int version) { return version > 3 ? 64 : kMostPageClusters; }
 
 /// The common properties of the clusters of one level.
 struct Layout {
@@ -62,7 +63,20 @@ struct Layout {
   [[nodiscard]] unsigned columns() const {
     return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
   }
-  [[nodiscard]] unsigned contexts() const { return first_context(columns()); }
+  /// Attributes whose ranges the index has.
+  [[nodiscard]] std::size_t ranges() const { return version > 1 ? attributes.size() : 0; }
+  [[nodiscard]] std::uint64_t page_clusters() const { return store::page_clusters(version); }
+  [[nodiscard]] unsigned contexts() const {
+    const auto ends = 2 * static_cast<unsigned>(attributes.size());
+    return version > 3 ? index_context() + context::kIndexRange + ends : border_context();
+  }
+  /// The first context of borders, and of the index: both from version 4 on.
+  [[nodiscard]] unsigned border_context() const { return first_context(columns()); }
+  [[nodiscard]] unsigned index_context() const { return border_context() + context::kBorders; }
+  /// Whether points that are not split are coded as columns, instead of rows of a raster.
+  [[nodiscard]] bool has_point_columns() const {
+    return grid ? version > 3 && level > 0 : version > 1;
+  }
   /// The first context of a column.
   [[nodiscard]] unsigned first_context(unsigned column) const {
     return context::kAttribute +
@@ -84,7 +98,7 @@ struct Entry {
   std::array<std::int64_t, 3> low{};           ///< of the box, in the form of each axis
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< of the box: integers per axis
   std::uint16_t error = 0;                     ///< see error_code
-  std::uint64_t descendants = 0;               ///< levels above 0
+  std::uint64_t descendants = 0;               ///< on level 0: 0
   std::uint16_t checksum = 0;                  ///< CRC-16 of the bytes
 };
 

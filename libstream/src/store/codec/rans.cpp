@@ -48,7 +48,7 @@ void fill_decode_table(const Frequencies& frequencies, DecodeTable& table) {
 }
 
 void SymbolDecoder::throw_bad_symbol() {
-  throw Damage("a cluster has a symbol that does not exist");
+  throw Damage("coded bytes have a symbol that does not exist");
 }
 
 void BitWriter::append_reversed(Bytes& out) const {
@@ -78,7 +78,10 @@ class SymbolEncoder::Words {
  public:
   /// The initial state is the decoder's final one, so it carries 16 bits for nothing.
   Words(SymbolEncoder& encoder, std::uint32_t last)
-      : left(encoder.used_), symbols_(encoder.symbols_.data()), state_(kLow + last) {
+      : left(encoder.used_),
+        symbols_(encoder.symbols_.data()),
+        alone_(encoder.bits_.empty()),
+        state_(alone_ ? last : kLow + last) {
     assert(last < kLow);
     if (encoder.words_.size() <= left) encoder.words_.resize(2 * left + 64);
     end_ = next_ = encoder.words_.data() + encoder.words_.size();
@@ -98,15 +101,19 @@ class SymbolEncoder::Words {
   }
   void write(Bytes& out) const {
     const auto bytes = static_cast<std::size_t>(end_ - next_) * sizeof(std::uint16_t);
+    // Where it is all there is, no more of its bytes than it needs.
+    std::size_t of_state = sizeof state_;
+    while (alone_ && bytes == 0 && of_state > 1 && state_ >> (8 * of_state - 8) == 0) --of_state;
     const std::size_t start = out.size();
-    out.resize(start + sizeof state_ + bytes);
-    std::memcpy(out.data() + start, &state_, sizeof state_);
-    std::memcpy(out.data() + start + sizeof state_, next_, bytes);
+    out.resize(start + of_state + bytes);
+    std::memcpy(out.data() + start, &state_, of_state);
+    std::memcpy(out.data() + start + of_state, next_, bytes);
   }
 
  private:
   const EncodeTable::Entry* symbols_;
   std::uint16_t *next_, *end_;
+  bool alone_;  ///< no raw bits follow
   std::uint32_t state_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -24,7 +25,7 @@ namespace terrace::stream::store {
 
 inline constexpr unsigned kScaleBits = 11;
 inline constexpr std::uint32_t kScale = 1u << kScaleBits;
-/// The state lies in [kLow, 2^32) between symbols.
+/// The state lies in [kLow, 2^32) between symbols, and below kLow only where no words are left.
 inline constexpr std::uint32_t kLow = 1u << 16;
 
 /// Frequencies of a context, adding up to kScale. Symbols of frequency 0 go by the escape, which
@@ -69,6 +70,7 @@ class BitWriter {
     put_short(value, bits);
   }
   void append_reversed(Bytes& out) const;
+  [[nodiscard]] bool empty() const { return used_ == 0 && held_ == 0; }
 
  private:
   /// Requires bits <= 32. The next word is written whether it is full or not: a branch upon that is
@@ -134,7 +136,9 @@ class SymbolEncoder {
     symbols_[used_++] = entry;
   }
   TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) { bits_.put(value, bits); }
-  /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state.
+  /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state: with
+  /// raw bits above kLow; otherwise the state itself, as the string's end then tells that no word
+  /// is left.
   void finish(std::uint32_t last, Bytes& out);
   /// The same for two clusters, the first one's string before the other's; returns how many bytes
   /// are the first one's. Faster than one by one: each step of rANS waits for the one before.
@@ -168,9 +172,10 @@ class SymbolDecoder {
         next_(bytes.data()),
         end_(bytes.data() + bytes.size()),
         limit_bits_(bytes.size() * 8) {
-    if (bytes.size() < 4) throw Damage("a cluster has too few bytes");
+    if (bytes.empty()) throw Damage("a cluster or an index page has no bytes");
     state_ = load<std::uint32_t>(next_);
-    next_ += 4;
+    if (bytes.size() < 4) state_ &= (1u << 8 * bytes.size()) - 1;
+    next_ += std::min<std::size_t>(bytes.size(), 4);
   }
 
   TERRACE_STORE_INLINE unsigned symbol(unsigned context) {
@@ -181,10 +186,9 @@ class SymbolDecoder {
     state_ = range.frequency * (state_ >> kScaleBits) + slot - range.start;
     const std::uint32_t refilled = state_ << 16 | load<std::uint16_t>(next_);
     // Selected, not branched upon: whether a word is due is close to a coin toss.
-    const bool low = state_ < kLow;
+    const bool low = (state_ < kLow) & (next_ < end_);
     state_ = low ? refilled : state_;
     next_ += low ? 2 : 0;
-    next_ = next_ > end_ ? end_ : next_;
     if (symbol == kEscape) [[unlikely]]
       return escaped();
     return symbol;
@@ -200,10 +204,10 @@ class SymbolDecoder {
   std::uint32_t finish() const {
     const bool met = next_ == end_ - (used_bits_ + 7) / 8;
     if (!met || (used_bits_ % 8 != 0 && (*next_ & (0xff >> used_bits_ % 8)) != 0) ||
-        state_ < kLow || state_ >= 2 * kLow) {
-      throw Damage("a cluster's bytes do not end where its points do");
+        state_ >= 2 * kLow || (state_ < kLow && used_bits_ > 0)) {
+      throw Damage("coded bytes do not end where their numbers do");
     }
-    return state_ - kLow;
+    return state_ % kLow;
   }
 
  private:

@@ -46,23 +46,23 @@ std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts) {
   return bits;
 }
 
-Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts) {
-  std::uint64_t total = 0, once = 0;
+Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::uint32_t least) {
+  std::uint64_t total = 0, rare = 0;
   for (unsigned s = 0; s < kClasses; ++s) {
-    total += counts[s];
-    once += counts[s] == 1;
+    if (counts[s] >= least) total += counts[s];
+    if (counts[s] <= std::max(least - 1, 1u)) rare += counts[s];
   }
   if (total == 0) return escape_only();
   // As many unseen symbols are to be expected as there were that came once (Good-Turing).
   const std::uint64_t escape =
-      std::clamp<std::uint64_t>(once * kScale / (total + 1), 1, kScale / 16);
+      std::clamp<std::uint64_t>(rare * kScale / (total + 1), 1, kScale / 16);
   const std::uint64_t available = kScale - escape;
 
   Frequencies frequencies{};
   frequencies[kEscape] = static_cast<std::uint16_t>(escape);
   std::uint64_t given = 0;
   for (unsigned s = 0; s < kClasses; ++s) {
-    if (counts[s] == 0) continue;
+    if (counts[s] < std::max(least, 1u)) continue;
     const std::uint64_t share = std::max<std::uint64_t>(1, counts[s] * available / total);
     frequencies[s] = static_cast<std::uint16_t>(share);
     given += share;
@@ -86,9 +86,21 @@ void Tables::write(Bytes& out, int version) const {
   predictor.write(out);
   if (version > 2) put_varint(out, guide.exists() ? guide.attribute + std::uint64_t{1} : 0);
   for (const ColumnKind kind : kinds) out.push_back(static_cast<std::uint8_t>(kind));
+  std::uint64_t unused = 0;  // contexts without symbols, not yet written
+  const auto put_unused = [&] {
+    if (unused == 0) return;
+    put_varint(out, 0);
+    put_varint(out, unused - 1);
+    unused = 0;
+  };
   for (const Frequencies& context : frequencies) {
     const auto used = std::count_if(context.begin(), context.begin() + kClasses,
                                     [](std::uint16_t f) { return f != 0; });
+    if (version > 3 && used == 0) {
+      ++unused;
+      continue;
+    }
+    put_unused();
     put_varint(out, static_cast<std::uint64_t>(used));
     unsigned previous = 0;
     for (unsigned s = 0; s < kClasses; ++s) {
@@ -98,6 +110,7 @@ void Tables::write(Bytes& out, int version) const {
       previous = s;
     }
   }
+  put_unused();
 }
 
 Tables Tables::read(ByteView bytes, const Layout& layout) {
@@ -127,6 +140,13 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
     Frequencies frequencies{};
     std::uint64_t symbol = 0, left = kScale;
     const std::uint64_t used = in.varint();
+    if (layout.version > 3 && used == 0) {
+      const std::uint64_t more = in.varint();
+      if (more >= contexts - c) throw Damage("a table has contexts that do not exist");
+      tables.frequencies.resize(c + 1 + static_cast<std::size_t>(more), escape_only());
+      c += static_cast<unsigned>(more);
+      continue;
+    }
     for (std::uint64_t i = 0; i < used; ++i) {
       const std::uint64_t step = in.varint();
       if (step >= kClasses || (i > 0 && step == 0) || symbol + step >= kClasses) {

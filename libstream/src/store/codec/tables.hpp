@@ -21,8 +21,9 @@ using Counts = std::vector<std::array<std::uint32_t, kSymbols>>;
 [[nodiscard]] std::uint64_t entropy_of(const std::array<std::uint32_t, kSymbols>& counts);
 /// ... and the raw bits of their classes.
 [[nodiscard]] std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts);
-/// Frequencies for `counts` that keep every occurring symbol codable, and the escape.
-Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts);
+/// Frequencies for `counts` that keep every symbol codable: those that occur less often than
+/// `least` by the escape.
+Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::uint32_t least = 1);
 
 /// The attribute that tells where scan lines begin: the time of the pulses.
 struct Guide {

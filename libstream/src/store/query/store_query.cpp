@@ -113,23 +113,29 @@ void StoreQuery::fill(Node& node, ClusterId id) {
   node.id = id;
   // Not copied: the next cluster is read into what the node held before.
   std::swap(node.positions, points_.positions);
-  node.branches.clear();
+  node.store_ = &store_;
+  node.branches_.clear();
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     for (unsigned below = 0; below < level; ++below) {
       const std::uint64_t ordinal = points_.children[i * level + below];
-      const ClusterSummary summary = store_.record(cluster_id(below, ordinal)).summary;
-      node.branches.push_back({summary.box, ordinal, summary.descendants});
+      node.branches_.push_back({store_.coarse_box(cluster_id(below, ordinal)), ordinal, 0});
     }
   }
   // The node itself and its entries in list and map count too.
   node.bytes = node.positions.capacity() * sizeof(Point3) +
-               node.branches.capacity() * sizeof(Branch) + sizeof(Node) + 64;
+               node.branches_.capacity() * sizeof(Branch) + sizeof(Node) + 64;
 }
 
 void StoreQuery::Cache::drop(Nodes& to) {
   by_id.erase(static_cast<std::uint64_t>(nodes.back().id));
   held_bytes -= nodes.back().bytes;
   to.splice(to.begin(), nodes, std::prev(nodes.end()));
+}
+
+void StoreQuery::Node::look_up(Branch& branch, unsigned below) const {
+  const ClusterSummary summary = store_->record(cluster_id(below, branch.ordinal)).summary;
+  branch.box = summary.box;
+  branch.descendants = summary.descendants;
 }
 
 const StoreQuery::Node& StoreQuery::node(ClusterId id) {

@@ -91,9 +91,10 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
 
   std::uint64_t upper = 0;
   if (n >= kLow) upper = coder.raw(16);
-  const std::uint32_t last = coder.finish() | static_cast<std::uint32_t>(upper) << 16;
-  if (root ? last != 0 : last >= n)
+  const std::uint32_t coded = coder.finish() | static_cast<std::uint32_t>(upper) << 16;
+  if (root ? coded != 0 : coded >= n)
     throw Damage("a cluster's representative is not one of its points");
+  const std::uint32_t last = layout.version > 3 && !root ? uncentred(coded, n) : coded;
   representative_ = last;
   deliver(entry, root ? n : last, out);
 
@@ -161,11 +162,12 @@ bool ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
                   {relative_[0].data(), relative_[1].data(), relative_[2].data()}, n);
     return true;
   }
-  if (!layout.grid && layout.version > 1) return false;
+  if (layout.has_point_columns()) return false;
   if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
     throw Damage("a cluster's box does not suit its form");
   }
-  grid_.positions(coder, static_cast<std::uint32_t>(box_.size[0]),
+  grid_.positions(coder, layout.version > 3 ? layout.border_context() : 0,
+                  static_cast<std::uint32_t>(box_.size[0]),
                   static_cast<std::uint32_t>(box_.size[1]), n, relative_[0].data(),
                   relative_[1].data());
   grid_.heights(coder, tables.predictor, box_.size[2], relative_[2].data());

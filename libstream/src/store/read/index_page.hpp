@@ -7,29 +7,87 @@
 #include <vector>
 
 #include "store/codec/layout.hpp"
+#include "store/codec/tables.hpp"
 
 namespace terrace::stream::store {
 
-/// Clusters per page, except the last page of a level. A page's ordinals follow by arithmetic.
-inline constexpr std::uint32_t kPageClusters = 128;
-/// Maximum bytes of a page: twelve columns and two for each attribute, each with its base, shift
-/// and width, and 64 bits per cluster.
+/// A box around all points of a page's clusters and below them, which the directory has: in
+/// 65535ths of the store's bounds.
+struct PageBox {
+  std::array<std::uint16_t, 3> low{UINT16_MAX, UINT16_MAX, UINT16_MAX}, high{};
+
+  [[nodiscard]] Box3 in(const Box3& bounds) const;
+  /// The least that holds what lies of `box` within `bounds`.
+  static PageBox around(const Box3& box, const Box3& bounds);
+};
+inline constexpr std::uint64_t kPageBoxBytes = 12;
+
+/// Maximum bytes of a page: twelve columns and two for each attribute. Before version 4 each has
+/// its base, shift and width, and at most 64 bits per cluster; from then on its shift, and a number
+/// takes at most 81 bits.
 constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
-  return 10 + (12 + 2 * std::uint64_t{attributes}) * (10 + 2 + 8 * kPageClusters) + 4;
+  return 18 + (12 + 2 * std::uint64_t{attributes}) * (10 + 2 + 11 * kMostPageClusters) + 4;
 }
 
-/// Appends the page of `entries` (1 to kPageClusters): packed columns, each a base, a shift and a
-/// width, then that many bits per cluster; and the CRC-32 of everything. types: of the attributes
-/// that have ranges. ranges: for each entry, attribute by attribute; they are widened to a few
-/// bits. offset: of the first cluster in the level's data file.
-void write_page(std::span<const Entry> entries, std::span<const ScalarType> types,
-                std::span<const KeyRange> ranges, std::uint64_t offset, Bytes& out);
+/// The columns of a page as unsigned integers: the fields of the entries, then the two ends of each
+/// attribute's range.
+class PageColumns {
+ public:
+  enum Field : unsigned {
+    kSizeX,
+    kSizeY,
+    kSizeZ,
+    kLowX,  ///< signed
+    kLowY,
+    kLowZ,
+    kBytes,
+    kPoints,
+    kError,
+    kDescendants,
+    kForms,
+    kChecksum,
+    kFields
+  };
 
-/// A checked page in its file format, with random access to entries.
+  /// clusters: 1 to kMostPageClusters. attributes: those with ranges.
+  PageColumns(std::uint32_t clusters, std::size_t attributes)
+      : clusters_(clusters), values_((kFields + 2 * attributes) * clusters) {}
+  /// ranges: for each entry, attribute by attribute; they are widened to a few bits.
+  PageColumns(std::span<const Entry> entries, std::span<const ScalarType> types,
+              std::span<const KeyRange> ranges);
+
+  [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
+  [[nodiscard]] std::size_t columns() const { return values_.size() / clusters_; }
+  [[nodiscard]] std::size_t attributes() const { return (columns() - kFields) / 2; }
+  [[nodiscard]] std::span<std::uint64_t> column(std::size_t number) {
+    return std::span(values_).subspan(number * clusters_, clusters_);
+  }
+  [[nodiscard]] std::span<const std::uint64_t> column(std::size_t number) const {
+    return std::span(values_).subspan(number * clusters_, clusters_);
+  }
+
+  /// Adds the symbols of the columns to `counts`, by the contexts of `layout`.
+  void count(const Layout& layout, std::span<std::array<std::uint32_t, kSymbols>> counts);
+  /// Appends a page of version 4. offset: of the first cluster in the level's data file.
+  void write(const Layout& layout, const EncodingTables& tables, std::uint64_t offset, Bytes& out);
+
+ private:
+  std::uint32_t clusters_;
+  std::vector<std::uint64_t> values_;  ///< column after column
+};
+
+/// The columns of a page as it is in the file, checksum included. tables: those of its first
+/// cluster, from version 4 on. offset: becomes that of the first cluster in the level's data file.
+/// Throws: Damage.
+PageColumns read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
+                      const DecodingTables* tables, std::uint64_t& offset);
+
+/// A checked page, with random access to entries.
 class IndexPage {
  public:
-  /// attributes: number of attributes with ranges. Throws: Damage.
-  IndexPage(Bytes bytes, std::uint32_t clusters, std::size_t attributes);
+  /// See read_page(). Throws: Damage.
+  IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layout,
+            const DecodingTables* tables);
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
@@ -41,38 +99,21 @@ class IndexPage {
   [[nodiscard]] std::uint64_t end() const { return offsets_[clusters_]; }
 
  private:
-  enum Field : unsigned {
-    kBytes,
-    kPoints,
-    kForms,
-    kLowX,
-    kLowY,
-    kLowZ,
-    kSizeX,
-    kSizeY,
-    kSizeZ,
-    kError,
-    kDescendants,
-    kChecksum,
-    kFields
-  };
+  using Field = PageColumns::Field;
+  /// Values above a base, in as few bytes as the largest takes.
   struct Column {
-    std::uint64_t base = 0;
+    std::uint64_t base = 0, mask = 0;  ///< mask: the bits that are in bytes_
+    std::uint32_t start = 0;           ///< of the first value, in bytes_
     std::uint8_t shift = 0, width = 0;
-    std::uint32_t start = 0;  ///< bit position of the first value
   };
 
-  /// A value of a column, above its base.
-  [[nodiscard]] std::uint64_t steps(std::size_t number, std::uint32_t i) const;
-  [[nodiscard]] std::uint64_t value(std::size_t number, std::uint32_t i) const;
-  friend void write_page(std::span<const Entry>, std::span<const ScalarType>,
-                         std::span<const KeyRange>, std::uint64_t, Bytes&);
-  static std::array<std::uint64_t, kFields> fields_of(const Entry& entry);
+  [[nodiscard]] std::uint64_t value(std::size_t column, std::uint32_t i) const;
+  void keep(const PageColumns& columns);
 
-  Bytes bytes_;
   std::uint32_t clusters_ = 0;
-  std::array<std::uint64_t, kPageClusters + 1> offsets_{};
-  std::vector<Column> columns_;  ///< by Field, then low and high of each attribute
+  std::array<std::uint64_t, kMostPageClusters + 1> offsets_{};
+  std::vector<Column> columns_;
+  Bytes bytes_;  ///< and eight more, so that a value is one load
 };
 
 }  // namespace terrace::stream::store

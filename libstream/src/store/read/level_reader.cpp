@@ -8,7 +8,7 @@ namespace terrace::stream::store {
 namespace {
 
 constexpr const char* kRestoreStore = "restore the file or build the store anew";
-/// About 1.5 KB each.
+/// About 2 KB each.
 constexpr std::uint64_t kCachedPages = 4096;
 /// About 100 KB each; one set is for about ten million points of level 0.
 constexpr std::uint64_t kCachedTables = 32;
@@ -41,7 +41,7 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
 LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
     : layout_(manifest.schema, level, manifest.version),
       clusters_(manifest.levels[level].clusters),
-      pages_(clusters_ / kPageClusters + (clusters_ % kPageClusters != 0)),
+      pages_(clusters_ / layout_.page_clusters() + (clusters_ % layout_.page_clusters() != 0)),
       most_points_(std::min(layout_.most_points(), manifest.levels[level].points)),
       top_(level + 1 == manifest.levels.size()),
       store_points_(manifest.points),
@@ -65,7 +65,8 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
 void LevelReader::read_directory(std::uint64_t bytes) {
   const std::uint64_t start = index_->size() - bytes;
   const std::uint64_t most_tables = 1 + clusters_ / kFewestClustersOfTables;
-  if (bytes > 8 * (pages_ + 1) + 8 + most_tables * (20 + Tables::most_bytes(layout_))) {
+  const std::uint64_t page_bytes = 8 + (layout_.version > 3 ? kPageBoxBytes : 0);
+  if (bytes > page_bytes * pages_ + 8 + 8 + most_tables * (20 + Tables::most_bytes(layout_))) {
     throw damaged_file(*index_, start, "the directory is too large for the level's clusters");
   }
   try {
@@ -77,20 +78,30 @@ void LevelReader::read_directory(std::uint64_t bytes) {
       throw Damage("the checksum of the directory is wrong");
     }
     ByteReader in(ByteView(tail_).first(size - 4));
-    if (in.left() / 8 <= pages_) throw Damage("the directory has too few pages");
+    if (in.left() < 8 || (in.left() - 8) / page_bytes < pages_) {
+      throw Damage("the directory has too few pages");
+    }
     std::uint64_t previous = 0;
     for (std::uint64_t p = 0; p < pages_; ++p) {
       directory_.push_back(in.get<std::uint64_t>());
       if (directory_.back() < previous ||
-          directory_.back() - previous > most_page_bytes(ranges()) || directory_.back() > start ||
-          (p == 0 && directory_[0] != 0)) {
+          directory_.back() - previous > most_page_bytes(layout_.ranges()) ||
+          directory_.back() > start || (p == 0 && directory_[0] != 0)) {
         throw Damage("the pages of the directory do not follow one another");
       }
       previous = directory_.back();
     }
     directory_.push_back(in.get<std::uint64_t>());
-    if (directory_.back() != start || start - previous > most_page_bytes(ranges())) {
+    if (directory_.back() != start || start - previous > most_page_bytes(layout_.ranges())) {
       throw Damage("the pages do not end where the directory begins");
+    }
+    for (std::uint64_t p = 0; layout_.version > 3 && p < pages_; ++p) {
+      PageBox box;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        box.low[axis] = in.get<std::uint16_t>();
+        box.high[axis] = in.get<std::uint16_t>();
+      }
+      boxes_.push_back(box.in(bounds_));
     }
     const auto count = in.get<std::uint32_t>();
     for (std::uint32_t t = 0; t < count; ++t) {
@@ -117,11 +128,10 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number) co
   Bytes bytes(static_cast<std::size_t>(page_offset(number + 1) - start));
   index_->read(start, std::as_writable_bytes(std::span(bytes)));
   try {
+    const std::uint64_t most = layout_.page_clusters(), first = number * most;
     return std::make_shared<const IndexPage>(
-        std::move(bytes),
-        static_cast<std::uint32_t>(
-            std::min<std::uint64_t>(kPageClusters, clusters_ - number * kPageClusters)),
-        ranges());
+        bytes, static_cast<std::uint32_t>(std::min(most, clusters_ - first)), layout_,
+        layout_.version > 3 ? tables(first).get() : nullptr);
   } catch (const Damage& damage) {
     throw damaged_file(*index_, start, damage.what());
   }
@@ -139,21 +149,21 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
                           std::to_string(ordinal) + ", the level has " + std::to_string(clusters_),
                  .remedy = {}});
   }
-  const auto page = this->page(ordinal / kPageClusters);
-  const auto i = static_cast<std::uint32_t>(ordinal % kPageClusters);
+  const auto page = this->page(ordinal / layout_.page_clusters());
+  const auto i = static_cast<std::uint32_t>(ordinal % layout_.page_clusters());
   try {
     offset = page->offset(i);
     return entry(*page, i);
   } catch (const Damage& damage) {
-    throw damaged_file(*index_, page_offset(ordinal / kPageClusters), damage.what());
+    throw damaged_file(*index_, page_offset(ordinal / layout_.page_clusters()), damage.what());
   }
 }
 
 void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
-  const auto page = this->page(ordinal / kPageClusters);
+  const auto page = this->page(ordinal / layout_.page_clusters());
   out.clear();
-  for (std::size_t a = 0; a < ranges(); ++a) {
-    out.push_back(page->range(static_cast<std::uint32_t>(ordinal % kPageClusters), a));
+  for (std::size_t a = 0; a < layout_.ranges(); ++a) {
+    out.push_back(page->range(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()), a));
   }
 }
 

@@ -67,16 +67,17 @@ class LevelReader {
     return directory_[static_cast<std::size_t>(page)];
   }
 
+  /// Of the page that has the cluster, or a larger one. Requires that the cluster exists.
+  [[nodiscard]] Box3 coarse_box(std::uint64_t ordinal) const {
+    const std::uint64_t page = ordinal / layout_.page_clusters();
+    return page < boxes_.size() ? boxes_[static_cast<std::size_t>(page)] : bounds_;
+  }
   /// Throws: Error.
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
   /// The entry and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
   /// The entry of the i-th cluster of `page`, checked against the manifest. Throws: Damage.
   [[nodiscard]] Entry entry(const IndexPage& page, std::uint32_t i) const;
-  /// Attributes whose ranges the index has: none in version 1.
-  [[nodiscard]] std::size_t ranges() const {
-    return layout_.version > 1 ? layout_.attributes.size() : 0;
-  }
   /// The ranges of a cluster that exists. Throws: Error.
   void ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const;
   /// Throws: Error.
@@ -92,11 +93,12 @@ class LevelReader {
     for (std::uint64_t number = 0; number < pages_; ++number) {
       const auto page = read_page(number);
       const std::uint64_t begin = page->offset(0);
-      check_range(number * kPageClusters, begin, page->end() - begin);
+      const std::uint64_t first = number * layout_.page_clusters();
+      check_range(first, begin, page->end() - begin);
       const std::size_t size = memory_size(page->end() - begin);
       bytes.resize(size + 2 * kPadding);
       data_->read(begin, std::as_writable_bytes(std::span(bytes).subspan(kPadding, size)));
-      visit(number * kPageClusters, *page, ByteView(bytes));
+      visit(first, *page, ByteView(bytes));
     }
   }
 
@@ -125,6 +127,7 @@ class LevelReader {
   std::unique_ptr<ByteSource> data_, index_;
   Bytes tail_;
   std::vector<std::uint64_t> directory_;  ///< pages_ + 1 offsets in the index file
+  std::vector<Box3> boxes_;               ///< of the pages, from version 4 on
   std::vector<TablesAt> tables_at_;
   mutable SlotCache<IndexPage> page_cache_;
   mutable SlotCache<DecodingTables> tables_cache_;

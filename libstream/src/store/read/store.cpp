@@ -102,6 +102,10 @@ ClusterRecord Store::record(ClusterId id) const {
   return record_of(entry, level_of(id), offset, level.top());
 }
 
+Box3 Store::coarse_box(ClusterId id) const {
+  return impl_->level(level_of(id)).coarse_box(ordinal_of(id));
+}
+
 std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
   check_stop();
   const LevelReader& level = impl_->level(level_of(id));

@@ -318,8 +318,8 @@ bool BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights
   order_.resize(n);
   scratch_.resize(n);
   if (grid) {
-    grid_.positions(coder, static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
-                    n, nullptr, nullptr);
+    grid_.positions(coder, layout_->border_context(), static_cast<std::uint32_t>(size[0]),
+                    static_cast<std::uint32_t>(size[1]), n, nullptr, nullptr);
     heights();
     for (std::uint32_t i = 0; i < n; ++i) order_[i] = grid_.point(i);
   } else if (sequence) {
@@ -448,7 +448,8 @@ std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
   if (point == UINT32_MAX) return 0;
   const auto found = std::find(coded_.begin(), coded_.end(), point);
   assert(found != coded_.end() && "a representative is a point of its cluster");
-  return static_cast<std::uint32_t>(found - coded_.begin());
+  return centred(static_cast<std::uint32_t>(found - coded_.begin()),
+                 static_cast<std::uint32_t>(coded_.size()));
 }
 
 void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
@@ -489,7 +490,7 @@ void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& by
     } else {
       ranges_.assign(attributes_.size(), {0, UINT64_MAX});
     }
-    if (layout_->version > 1) ranges.insert(ranges.end(), ranges_.begin(), ranges_.end());
+    ranges.insert(ranges.end(), ranges_.begin(), ranges_.end());
   }
   finish();
 }

@@ -59,7 +59,7 @@ class BlockEncoder {
   void load_numbers(Attribute& attribute);
   Entry enter(std::size_t cluster);
   void find_relative();
-  /// In the order of coding; 0 without one.
+  /// In the order of coding, centred(); 0 without one.
   [[nodiscard]] std::uint32_t place_of_representative(std::size_t cluster) const;
   void gather(const Attribute& attribute);
   /// Null for integers.

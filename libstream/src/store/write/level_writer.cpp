@@ -12,8 +12,9 @@
 namespace terrace::stream::store {
 namespace {
 
-/// At most so many of the blocks held back are used to choose how columns are coded.
-constexpr std::size_t kTrialBlocks = 8;
+/// At most so many of the blocks held back are used to choose how columns are coded. Rasters have
+/// them above level 0 alone, where little depends on it.
+constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
 /// The first attributes of 64 bits are tried as guides.
 constexpr std::size_t kMostGuides = 2;
 /// At least one in so many differences of a guide begins a line, and as many do not.
@@ -111,8 +112,8 @@ LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence,
   for (unsigned c = 0; c < kinds.size(); ++c) {
     if (!possible(kind, c, guide)) kinds[c] = ColumnKind::plain;
   }
-  return count(predictor, {sequence, guide, kinds},
-               (held_.size() + kTrialBlocks - 1) / kTrialBlocks);
+  const std::size_t most = layout_.grid && layout_.level > 0 ? kRasterTrialBlocks : kTrialBlocks;
+  return count(predictor, {sequence, guide, kinds}, (held_.size() + most - 1) / most);
 }
 
 /// Attributes that may tell scan lines: times are doubles or long integers. Takes for jumps what
@@ -155,16 +156,16 @@ std::vector<Guide> LevelWriter::find_guides() {
 /// first time also the order of points.
 void LevelWriter::choose_columns(Tables& tables) {
   tables.kinds.assign(layout_.columns(), ColumnKind::plain);
-  if (layout_.version == 1) {
+  if (layout_.attributes.empty() && !layout_.has_point_columns()) {
     sequence_ = false;
     return;
   }
   std::array<std::optional<Trial>, kColumnKinds> trials;
   std::vector<Guide> guides = find_guides();
   guides.emplace(guides.begin());
-  const std::vector<bool> orders = sequence_      ? std::vector<bool>{*sequence_}
-                                   : layout_.grid ? std::vector<bool>{false}
-                                                  : std::vector<bool>{false, true};
+  const std::vector<bool> orders = sequence_                     ? std::vector<bool>{*sequence_}
+                                   : layout_.has_point_columns() ? std::vector<bool>{false, true}
+                                                                 : std::vector<bool>{false};
   std::uint64_t least_bits = UINT64_MAX;
   for (const bool order : orders) {
     for (const Guide& guide : guides) {
@@ -208,8 +209,24 @@ void LevelWriter::train() {
   }
   choose_columns(tables);
   const Columns columns{*sequence_, tables.guide, tables.kinds};
-  const Counts counts = count(tables.predictor, columns, many ? 2 : 1).counts;
-  for (const auto& context : counts) tables.frequencies.push_back(normalised(context));
+  Counts counts = count(tables.predictor, columns, many ? 2 : 1).counts;
+  // A symbol costs its table two bytes and more. Where the tables are for what was counted alone,
+  // one that came once does not earn them.
+  const std::uint32_t least = many ? 1 : 2;
+  for (const auto& context : counts) tables.frequencies.push_back(normalised(context, least));
+
+  std::vector<PreparedBlock> prepared(held_.size());
+  const EncodingTables encoding(tables);
+  side_by_side(threads_, held_.size(), [&](std::size_t b, std::size_t worker) {
+    const ClusteredBlock view = held_[b].view();
+    PreparedBlock& block = prepared[b];
+    encoders_[worker].load(layout_, view);
+    encoders_[worker].encode(encoding, *sequence_, block.bytes, block.entries, block.ranges);
+  });
+  count_index(prepared, counts);
+  for (std::size_t c = layout_.index_context(); c < counts.size(); ++c) {
+    tables.frequencies[c] = normalised(counts[c], least);
+  }
 
   Bytes bytes;
   tables.write(bytes, layout_.version);
@@ -218,25 +235,38 @@ void LevelWriter::train() {
   table_bytes_.insert(table_bytes_.end(), bytes.begin(), bytes.end());
   ++table_count_;
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
-
-  std::vector<PreparedBlock> prepared(held_.size());
-  side_by_side(threads_, held_.size(), [&](std::size_t b, std::size_t worker) {
-    const ClusteredBlock view = held_[b].view();
-    PreparedBlock& block = prepared[b];
-    encoders_[worker].load(layout_, view);
-    encoders_[worker].encode(tables_->encoding, tables_->sequence, block.bytes, block.entries,
-                             block.ranges);
-  });
   for (const PreparedBlock& block : prepared) write(block);
   encoders_.resize(1);
   held_.clear();
   held_.shrink_to_fit();
 }
 
+/// As if the first of the blocks began a page.
+void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& counts) const {
+  std::vector<Entry> entries;
+  std::vector<KeyRange> ranges;
+  const std::size_t attributes = layout_.attributes.size();
+  const auto enter = [&] {
+    PageColumns(entries, layout_.attributes, ranges).count(layout_, counts);
+    entries.clear();
+    ranges.clear();
+  };
+  for (const PreparedBlock& block : blocks) {
+    for (std::size_t i = 0; i < block.entries.size(); ++i) {
+      entries.push_back(block.entries[i]);
+      for (std::size_t a = 0; a < attributes; ++a)
+        ranges.push_back(block.ranges[i * attributes + a]);
+      if (entries.size() == layout_.page_clusters()) enter();
+    }
+  }
+  if (!entries.empty()) enter();
+}
+
 void LevelWriter::write(const PreparedBlock& block) {
   data_.write(block.bytes);
-  const std::size_t attributes = layout_.version > 1 ? layout_.attributes.size() : 0;
+  const std::size_t attributes = layout_.attributes.size();
   for (std::size_t i = 0; i < block.entries.size(); ++i) {
+    if (page_.empty()) page_tables_ = tables_;
     const Entry& entry = block.entries[i];
     page_.push_back(entry);
     const auto ranges = block.ranges.begin() + static_cast<std::ptrdiff_t>(i * attributes);
@@ -244,26 +274,37 @@ void LevelWriter::write(const PreparedBlock& block) {
                         ranges + static_cast<std::ptrdiff_t>(attributes));
     data_end_ += entry.bytes;
     points_ += entry.points;
-    if (page_.size() == kPageClusters) write_full_page();
+    if (page_.size() == layout_.page_clusters()) write_page();
   }
 }
 
-void LevelWriter::write_full_page() {
+void LevelWriter::write_page() {
   put(directory_, index_.size());
+  Box3 box;
+  for (const Entry& entry : page_) {
+    if (entry.points > 0) box.include(record_of(entry, layout_.level, 0, false).summary.box);
+  }
+  page_boxes_.push_back(box);
   Bytes bytes;
-  write_page(page_,
-             layout_.version > 1 ? std::span(layout_.attributes) : std::span<const ScalarType>(),
-             page_ranges_, page_offset_, bytes);
+  PageColumns(page_, layout_.attributes, page_ranges_)
+      .write(layout_, page_tables_->encoding, page_offset_, bytes);
   index_.write(bytes);
   page_.clear();
   page_ranges_.clear();
   page_offset_ = data_end_;
 }
 
-LevelEntry LevelWriter::finish(bool root) {
+LevelEntry LevelWriter::finish(bool root, const Box3& bounds) {
   if (!held_.empty()) train();
-  if (!page_.empty()) write_full_page();
+  if (!page_.empty()) write_page();
   put(directory_, index_.size());
+  for (const Box3& page : page_boxes_) {
+    const PageBox box = page.empty() ? PageBox{} : PageBox::around(page, bounds);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      put(directory_, box.low[axis]);
+      put(directory_, box.high[axis]);
+    }
+  }
   put(directory_, table_count_);
   directory_.insert(directory_.end(), table_bytes_.begin(), table_bytes_.end());
   put(directory_, crc32(directory_));

@@ -57,7 +57,8 @@ class LevelWriter {
   std::uint64_t append(PreparedBlock block, bool root);
   /// Writes what is held back, the directory and the tables; syncs and closes. `members` of the
   /// result are the points of all clusters, representatives left out; `points` is not set.
-  LevelEntry finish(bool root);
+  /// bounds: of the store.
+  LevelEntry finish(bool root, const Box3& bounds);
 
   /// Whether the next block starts a segment: its tables are not those of the last.
   [[nodiscard]] bool at_segment_start() const { return blocks_ % kSegmentBlocks == 0; }
@@ -78,8 +79,9 @@ class LevelWriter {
   std::vector<Guide> find_guides();
   void choose_columns(Tables& tables);
   void train();
+  void count_index(std::span<const PreparedBlock> blocks, Counts& counts) const;
   void write(const PreparedBlock& block);
-  void write_full_page();
+  void write_page();
 
   Layout layout_;
   OutputFile data_, index_;
@@ -92,8 +94,10 @@ class LevelWriter {
   std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
+  SharedTablesPtr page_tables_;      ///< those of the page's first cluster
   std::vector<Entry> page_;
   std::vector<KeyRange> page_ranges_;
+  std::vector<Box3> page_boxes_;
   std::uint64_t page_offset_ = 0, data_end_ = 0;
   Bytes directory_, table_bytes_;
   std::uint32_t table_count_ = 0;

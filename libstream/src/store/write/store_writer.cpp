@@ -89,7 +89,7 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
   encoded->points = block.positions.size();
   if (block.level == 0) encoded->sum_up(block.positions);
   if (const SharedTablesPtr shared = tables(block.level)) {
-    const Layout layout(schema, block.level, version_to_write(schema));
+    const Layout layout(schema, block.level, kVersion);
     auto encoder = borrow();
     encoder->load(layout, block);
     encoder->encode(shared->encoding, shared->sequence, encoded->block.bytes,
@@ -115,8 +115,7 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   const unsigned level = encoded->level;
   while (levels.size() <= level) {
     levels.push_back(std::make_unique<LevelWriter>(
-        staging.folder(),
-        Layout(schema, static_cast<unsigned>(levels.size()), version_to_write(schema)), threads));
+        staging.folder(), Layout(schema, static_cast<unsigned>(levels.size()), kVersion), threads));
   }
   if (level == 0) {
     points += encoded->points;
@@ -194,14 +193,13 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   w.broken = true;
 
   Manifest manifest;
-  manifest.version = version_to_write(w.schema);
   manifest.points = w.points;
   manifest.bounds = w.bounds;
   manifest.mean_height = w.points == 0 ? 0.0 : w.height_sum / static_cast<double>(w.points);
   std::uint64_t bytes = 0;
   for (std::size_t l = 0; l < w.levels.size(); ++l) {
     const bool top = l == root.level;
-    manifest.levels.push_back(w.levels[l]->finish(top));
+    manifest.levels.push_back(w.levels[l]->finish(top, w.bounds));
     bytes += manifest.levels[l].data.bytes + manifest.levels[l].index.bytes;
   }
   for (std::size_t l = manifest.levels.size(); l-- > 0;) {
