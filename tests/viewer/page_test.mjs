@@ -71,8 +71,12 @@ test('a DEM: coarse, then fine, by ranges alone, as the native run', async () =>
   }
   const data = site.log.filter(({path}) => path.startsWith('/stores/')).reduce((sum, {bytes}) => sum + bytes, 0);
   assert.equal((await state(page)).bytes, data);
-  const flight = sites.flight('alps', MAX_POINTS);
-  for (const stop of flight) {
+  // Within its budget: a quarter of the store at this error, and no range twice.
+  assert.ok(data < 600_000, `${data} bytes`);
+  const ranges = site.log.filter(({range}) => range !== null).map(({path, range}) => path + range);
+  assert.equal(new Set(ranges).size, ranges.length);
+  // Software that draws a million triangles takes minutes; the worker's test flies all of it.
+  for (const stop of sites.flight('alps', MAX_POINTS).slice(0, 1)) {
     await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
     await settled(page);
     assert.equal((await state(page)).points, stop.points);
@@ -128,6 +132,14 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
     await page.mouse.click(x, 330);
     await page.waitForTimeout(100);
   }
+  // What belongs to the cluster is outlined, and the surface between the two places is drawn.
+  await page.waitForFunction(() => window.terrace.state.outlined >= 3);
+  await page.waitForSelector('#profile:not([hidden])');
+  const [drawn, lowest, highest] = await page.evaluate(() => [
+    document.querySelector('#profile path').getAttribute('d').split(' ').length,
+    parseFloat(document.getElementById('profile-low').textContent), parseFloat(document.getElementById('profile-high').textContent)
+  ]);
+  assert.ok(drawn > 6 && lowest >= 187 && highest <= 4173 && lowest < highest, `${drawn} ${lowest} ${highest}`);
   const before = (await state(page)).points;
   await page.click('#collapse');
   await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points < points, before);
@@ -148,6 +160,73 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   await again.page.screenshot({path: join(packages, 'viewer-level-dark.png')});
   assert.deepEqual([...errors, ...again.errors], []);
   await again.close();
+  await close();
+});
+
+test('a flight over a raster of cocircular points gives the hashes of the native run', async () => {
+  const {page, errors, close} = await open('#s=flat&q=32');
+  for (const stop of sites.flight('flat', MAX_POINTS)) {
+    await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
+    await settled(page);
+    assert.equal((await state(page)).points, stop.points);
+    assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
+  }
+  assert.deepEqual(errors, []);
+  await close();
+});
+
+test('a level that is shown everywhere, and the link keeps it', async () => {
+  const {page, errors, close} = await open('#s=flat&q=32');
+  const coarse = (await state(page)).points;
+  await page.focus('#level');
+  await page.keyboard.press('End');
+  await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points > points, coarse);
+  assert.equal((await state(page)).points, 200 * 180);
+  assert.equal(await page.textContent('#level-text'), 'level 0');
+  await page.waitForFunction(() => /l=0/.test(location.hash));
+  const again = await open(new URL(page.url()).hash);
+  assert.equal((await state(again.page)).points, 200 * 180);
+  await page.focus('#level');
+  await page.keyboard.press('Home');
+  await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points === points, coarse);
+  assert.deepEqual([...errors, ...again.errors], []);
+  await again.close();
+  await close();
+});
+
+for (const name of ['bunny', 'autzen']) {
+  test(`real data: ${name}`, {skip: name in sites.real ? false : 'TERRACE_DATA has no such file'}, async () => {
+    const {page, errors, outside, close} = await open(`#s=${name}&q=32`);
+    const flight = sites.flight(name, MAX_POINTS).slice(0, 3);
+    // The native flight begins with nothing expanded.
+    for (const stop of [{...flight[0], error: 1e6, points: null}, ...flight]) {
+      await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
+      await settled(page);
+      if (stop.points === null) continue;
+      assert.equal((await state(page)).points, stop.points);
+      assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
+    }
+    const spots = await pixels(page, Array.from({length: 900}, (_, i) => [0.3 + 0.4 * (i % 30) / 30, 0.3 + 0.4 * Math.floor(i / 30) / 30]));
+    assert.ok(new Set(spots.map(String)).size > 20, 'no points are drawn');
+    await page.screenshot({path: join(packages, `viewer-${name}.png`)});
+    assert.deepEqual([errors, outside], [[], []]);
+    await close();
+  });
+}
+
+test('a slow server: never blank, no message, and all there in the end', async () => {
+  site.fault = ({range}) => range === null ? null : 'slow';
+  const {page, errors, close} = await open('#s=alps&q=8', {settle: false});
+  await page.waitForFunction(() => window.terrace?.state.points > 100);
+  assert.equal((await state(page)).settled, false);
+  assert.match(await page.textContent('#status'), /refining/);
+  const [middle] = await pixels(page, [[0.5, 0.5]]), [sky] = await pixels(page, [[0.02, 0.3]]);
+  assert.ok(Math.hypot(...middle.map((c, i) => c - sky[i])) > 60, 'nothing is drawn');
+  await page.waitForTimeout(1800);
+  site.fault = () => null;
+  await settled(page);
+  assert.ok(!await page.isVisible('#message'));
+  assert.deepEqual(errors, []);
   await close();
 });
 

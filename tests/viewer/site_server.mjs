@@ -4,10 +4,12 @@ import {createServer} from 'node:http';
 import {createReadStream, existsSync, statSync} from 'node:fs';
 import {join, normalize} from 'node:path';
 
+/// Milliseconds before a slow server answers.
+const SLOW = 1500;
 const TYPES = {html: 'text/html', js: 'text/javascript', css: 'text/css', json: 'application/json', wasm: 'application/wasm'};
 
 /// Serves `folder` on a free port. `fault(request)` may return 'whole', 'short', 'missing', 'error', 'replaced',
-/// 'damaged' or 'dead' for a request {path, range}; log lists all requests.
+/// 'damaged', 'slow' or 'dead' for a request {path, range}; log lists all requests.
 export async function serveSite(folder) {
   const log = [];
   const site = {log, fault: () => null};
@@ -34,25 +36,30 @@ export async function serveSite(folder) {
       }
       return undefined;
     };
-    if (fault === 'dead') return request.socket.destroy();
-    if (fault === 'error') return send(500, {});
-    if (fault === 'missing' || !existsSync(file) || !statSync(file).isFile()) return send(404, {});
-    const {size} = statSync(file);
-    const type = {'Content-Type': TYPES[file.split('.').pop()] ?? 'application/octet-stream', ETag: fault === 'replaced' ? '"b"' : '"a"'};
-    const range = /^bytes=(\d+)-(\d+)$/.exec(entry.range ?? '');
-    if (!range || fault === 'whole') return send(200, {...type, 'Content-Length': size}, 0, size - 1);
-    const first = Number(range[1]), last = Math.min(Number(range[2]), size - 1);
-    if (first >= size) return send(416, {'Content-Range': `bytes */${size}`});
-    const told = fault === 'replaced' ? size + 1 : size;
-    const headers = {...type, 'Content-Range': `bytes ${first}-${last}/${told}`, 'Cache-Control': 'no-store'};
-    if (fault === 'short') {
-      // The connection ends in the middle of what was announced.
-      response.writeHead(206, {...headers, 'Content-Length': last - first + 1});
-      entry.status = 206;
-      response.write(Buffer.alloc(Math.floor((last - first + 1) / 2)), () => request.socket.destroy());
-      return undefined;
+    if (fault === 'slow') return setTimeout(answer, SLOW);
+    return answer();
+
+    function answer() {
+      if (fault === 'dead') return request.socket.destroy();
+      if (fault === 'error') return send(500, {});
+      if (fault === 'missing' || !existsSync(file) || !statSync(file).isFile()) return send(404, {});
+      const {size} = statSync(file);
+      const type = {'Content-Type': TYPES[file.split('.').pop()] ?? 'application/octet-stream', ETag: fault === 'replaced' ? '"b"' : '"a"'};
+      const range = /^bytes=(\d+)-(\d+)$/.exec(entry.range ?? '');
+      if (!range || fault === 'whole') return send(200, {...type, 'Content-Length': size}, 0, size - 1);
+      const first = Number(range[1]), last = Math.min(Number(range[2]), size - 1);
+      if (first >= size) return send(416, {'Content-Range': `bytes */${size}`});
+      const told = fault === 'replaced' ? size + 1 : size;
+      const headers = {...type, 'Content-Range': `bytes ${first}-${last}/${told}`, 'Cache-Control': 'no-store'};
+      if (fault === 'short') {
+        // The connection ends in the middle of what was announced.
+        response.writeHead(206, {...headers, 'Content-Length': last - first + 1});
+        entry.status = 206;
+        response.write(Buffer.alloc(Math.floor((last - first + 1) / 2)), () => request.socket.destroy());
+        return undefined;
+      }
+      return send(206, {...headers, 'Content-Length': last - first + 1}, first, last);
     }
-    return send(206, {...headers, 'Content-Length': last - first + 1}, first, last);
   });
   await new Promise(resolve => server.listen(0, '127.0.0.1', resolve));
   site.url = `http://127.0.0.1:${server.address().port}/`;

@@ -2,7 +2,7 @@
 // Published stores for the tests of the viewer, and the hashes of a flight over each.
 import assert from 'node:assert/strict';
 import {execFileSync, spawnSync} from 'node:child_process';
-import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {existsSync, mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {dirname, join} from 'node:path';
 import {fileURLToPath} from 'node:url';
@@ -14,6 +14,12 @@ export class Sites {
   constructor() {
     this.folder = mkdtempSync(join(tmpdir(), 'terrace-viewer-'));
     this.site = join(this.folder, 'site');
+  }
+  /// A scan and a laser cloud, where real data are at hand.
+  get real() {
+    const files = {bunny: 'scan/bun_zipper.ply', autzen: 'lidar/autzen_trim.laz'};
+    const there = Object.values(files).every(file => existsSync(join(process.env.TERRACE_DATA ?? '', file)));
+    return process.env.TERRACE_DATA && there ? files : {};
   }
   terrace(...args) {
     const {status, stderr, error} = spawnSync(process.env.TERRACE, args, {cwd: this.folder, encoding: 'utf8'});
@@ -38,7 +44,12 @@ export class Sites {
     }
     writeFileSync(join(this.folder, 'cloud.csv'), cloud);
     this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
-    this.terrace('publish', 'alps.store', 'flat.store', 'cloud.store', '-o', 'site', '-q');
+    const stores = ['alps.store', 'flat.store', 'cloud.store'];
+    for (const [name, file] of Object.entries(this.real)) {
+      this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
+      stores.push(`${name}.store`);
+    }
+    this.terrace('publish', ...stores, '-o', 'site', '-q');
   }
   flight(name, maxPoints = MAX_POINTS) {
     const out = execFileSync(process.env.FLIGHT_HASHES, [join(this.folder, `${name}.store`), String(maxPoints)],

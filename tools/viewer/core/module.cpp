@@ -160,7 +160,8 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
 }
 
 /// input: eye, direction, up; field of view in degrees, aspect, height in pixels; pixels of error;
-/// seconds to spend; the time. numbers: points, triangles, expanded clusters, slots of vertices and
+/// seconds to spend; the time; the level that is wanted everywhere, whatever the error (255: none).
+/// numbers: points, triangles, expanded clusters, slots of vertices and
 /// of triangles, whether it is settled, the worst demand, clusters and bytes read, whether the same
 /// is missing as after the last frame. text: what is missing.
 TERRACE_EXPORT(frame) int terrace_frame() {
@@ -171,6 +172,10 @@ TERRACE_EXPORT(frame) int terrace_frame() {
     view.camera = tri::perspective_camera({point_of(in), point_of(in + 3), point_of(in + 6)}, in[9],
                                           in[10], in[11]);
     view.pixel_error = in[12];
+    if (in[15] < tri::Detail::kTop) {
+      constexpr double kFar = 1e30;
+      view.focuses = {{{{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}}, static_cast<unsigned>(in[15])}};
+    }
     if (memory_left() < kLeastMemory) reserve_memory(8 * kLeastMemory);
     const viewer::SceneState s = m.scene->frame(view, in[13], in[14]);
     m.numbers = {static_cast<double>(s.points),
@@ -237,6 +242,34 @@ TERRACE_EXPORT(pick) int terrace_pick() {
                    static_cast<double>(tri::ordinal_of(m.hit->cluster)),
                    static_cast<double>(m.hit->attributes.size())};
       m.numbers.insert(m.numbers.end(), m.hit->attributes.begin(), m.hit->attributes.end());
+    }
+    return kDone;
+  });
+}
+
+/// input: two places in the view frame. numbers: how many points the profile between them has, and
+/// distance and height of each.
+TERRACE_EXPORT(profile) int terrace_profile() {
+  return guarded([&] {
+    Module& m = module();
+    const double* in = m.input.data();
+    const auto line = m.scene->profile(point_of(in), point_of(in + 3));
+    m.numbers = {static_cast<double>(line.size())};
+    for (const auto& [distance, height] : line)
+      m.numbers.insert(m.numbers.end(), {distance, height});
+    return kDone;
+  });
+}
+
+/// Level and ordinal of a cluster. numbers: how many lines its outline has, and both ends of each.
+TERRACE_EXPORT(outline) int terrace_outline(unsigned level, double ordinal) {
+  return guarded([&] {
+    Module& m = module();
+    const auto lines =
+        m.scene->outline(tri::cluster_id(level, static_cast<std::uint64_t>(ordinal)));
+    m.numbers = {static_cast<double>(lines.size())};
+    for (const auto& [a, b] : lines) {
+      m.numbers.insert(m.numbers.end(), {static_cast<double>(a), static_cast<double>(b)});
     }
     return kDone;
   });

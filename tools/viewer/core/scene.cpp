@@ -135,6 +135,10 @@ class SceneOf final : public Scene {
   [[nodiscard]] std::uint64_t hash() const override { return mesh().hash(); }
   [[nodiscard]] std::optional<SceneHit> pick(const Point3& origin, const Point3& direction,
                                              double angle) const override;
+  [[nodiscard]] std::vector<std::array<double, 2>> profile(const Point3& from,
+                                                           const Point3& to) const override;
+  [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> outline(
+      tri::ClusterId cluster) const override;
   void pin(const SceneHit& hit, tri::ViewPin how) override {
     std::vector<tri::ClusterId> clusters;
     if (how == tri::ViewPin::collapsed) {
@@ -388,6 +392,95 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     }
   }
   return hit;
+}
+
+template <class Shown>
+std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from,
+                                                           const Point3& to) const {
+  std::vector<std::array<double, 2>> line;
+  if constexpr (kTriangles) {
+    const double dx = to[0] - from[0], dy = to[1] - from[1];
+    const double length = std::sqrt(dx * dx + dy * dy);
+    if (!(length > 0)) return line;
+    for (const tri::TriangleId triangle : mesh().all_triangles()) {
+      const SceneTriangle& corners = triangles_[slot(triangle)];
+      std::array<Point3, 3> at;
+      // Of each corner: how far along the line and how far to its left.
+      std::array<double, 3> along, left;
+      for (std::size_t i = 0; i < 3; ++i) {
+        at[i] = position(corners[i]);
+        const double x = at[i][0] - from[0], y = at[i][1] - from[1];
+        along[i] = (x * dx + y * dy) / length;
+        left[i] = (dx * y - dy * x) / length;
+      }
+      if (std::min({left[0], left[1], left[2]}) > 0 || std::max({left[0], left[1], left[2]}) < 0 ||
+          std::min({along[0], along[1], along[2]}) > length ||
+          std::max({along[0], along[1], along[2]}) < 0) {
+        continue;
+      }
+      std::array<double, 2> first{1e300, 0}, last{-1e300, 0};
+      const auto meet = [&](double distance, double height) {
+        if (distance < first[0]) first = {distance, height};
+        if (distance > last[0]) last = {distance, height};
+      };
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::size_t j = (i + 1) % 3;
+        if (left[i] == 0) meet(along[i], at[i][2]);
+        if (left[i] * left[j] >= 0) continue;
+        const double t = left[i] / (left[i] - left[j]);
+        meet(along[i] + t * (along[j] - along[i]), at[i][2] + t * (at[j][2] - at[i][2]));
+      }
+      if (!(last[0] > first[0]) || last[0] < 0 || first[0] > length) continue;
+      const double slope = (last[1] - first[1]) / (last[0] - first[0]);
+      const double begin = std::max(first[0], 0.0), end = std::min(last[0], length);
+      line.push_back({begin, first[1] + slope * (begin - first[0])});
+      line.push_back({end, first[1] + slope * (end - first[0])});
+    }
+    std::sort(line.begin(), line.end());
+    // Neighbouring triangles meet the line at the same place, up to rounding.
+    const double same = 1e-6 * length;
+    line.erase(std::unique(line.begin(), line.end(),
+                           [&](const auto& a, const auto& b) { return b[0] - a[0] <= same; }),
+               line.end());
+  }
+  return line;
+}
+
+template <class Shown>
+std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId cluster) const {
+  std::vector<std::array<std::uint32_t, 2>> lines;
+  if constexpr (kTriangles) {
+    const auto& model = view_.model();
+    if (tri::level_of(cluster) >= model.top() || !model.is_expanded(cluster)) return lines;
+    std::vector<tri::ClusterId> below{cluster}, children;
+    for (std::size_t i = 0; i < below.size(); ++i) {
+      model.children(below[i], children);
+      for (const tri::ClusterId child : children) {
+        if (model.is_expanded(child)) below.push_back(child);
+      }
+    }
+    std::sort(below.begin(), below.end());
+    std::vector<bool> belongs(vertices_.size());
+    for (const tri::VertexId vertex : mesh().all_vertices()) {
+      belongs[slot(vertex)] =
+          std::binary_search(below.begin(), below.end(), model.point_id(vertex).cluster);
+    }
+    belongs[slot(model.head_vertex(cluster))] = true;
+    // An edge between two triangles inside comes twice, once each way.
+    std::vector<std::array<std::uint32_t, 2>> edges;
+    for (const tri::TriangleId triangle : mesh().all_triangles()) {
+      const SceneTriangle& c = triangles_[slot(triangle)];
+      if (!belongs[c[0]] || !belongs[c[1]] || !belongs[c[2]]) continue;
+      for (std::size_t i = 0; i < 3; ++i) edges.push_back({c[i], c[(i + 1) % 3]});
+    }
+    std::sort(edges.begin(), edges.end());
+    for (const auto& [a, b] : edges) {
+      if (!std::binary_search(edges.begin(), edges.end(), std::array<std::uint32_t, 2>{b, a})) {
+        lines.push_back({a, b});
+      }
+    }
+  }
+  return lines;
 }
 
 }  // namespace

@@ -96,6 +96,15 @@ class Scene {
   /// cluster that it is a member of. They stay so until release().
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
+  /// The surface along the straight line between two places of the view frame, from above: distance
+  /// in metres and height at each edge that it crosses. Empty for points. O(triangles).
+  [[nodiscard]] virtual std::vector<std::array<double, 2>> profile(
+      const stream::Point3& from, const stream::Point3& to) const = 0;
+  /// The lines, as slots of their ends, around the triangles whose corners all belong to a cluster:
+  /// its head and what lies below it. Empty for points and for clusters that are not expanded.
+  /// O(triangles).
+  [[nodiscard]] virtual std::vector<std::array<std::uint32_t, 2>> outline(
+      tri::ClusterId cluster) const = 0;
   /// What points can be drawn by; nothing for triangles.
   [[nodiscard]] virtual const CloudColours& colours() const = 0;
   /// The box of all points in the view frame.

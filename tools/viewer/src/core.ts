@@ -37,6 +37,7 @@ export interface Camera {
   aspect: number;
   height: number;  ///< pixels
   error: number;   ///< pixels
+  level?: number;  ///< wanted everywhere, whatever the error
 }
 
 export interface Hit {
@@ -82,6 +83,8 @@ interface Exports {
   changes(): number;
   hash(): number;
   pick(): number;
+  profile(): number;
+  outline(level: number, ordinal: number): number;
   pin(how: number): number;
 }
 
@@ -138,7 +141,7 @@ export class Core {
   frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[]} {
     this.writeNumbers([
       ...camera.eye, ...camera.direction, ...camera.up, camera.fov, camera.aspect, camera.height, camera.error, seconds,
-      time
+      time, camera.level ?? 255
     ]);
     this.check(this.wasm.frame());
     const n = this.numbers(10);
@@ -201,6 +204,18 @@ export class Core {
       clusterOrdinal: n[9],
       attributes: this.numbers(11 + n[10]).slice(11)
     };
+  }
+  /// Distances and heights, in metres, of the surface between two places of the view frame.
+  profile(from: number[], to: number[]): Array<[number, number]> {
+    this.writeNumbers([...from, ...to]);
+    this.check(this.wasm.profile());
+    const n = this.numbers(1 + 2 * this.numbers(1)[0]);
+    return Array.from({length: n[0]}, (_, i) => [n[1 + 2 * i], n[2 + 2 * i]]);
+  }
+  /// The ends, as slots, of the lines around a cluster.
+  outline(level: number, ordinal: number): Uint32Array {
+    this.check(this.wasm.outline(level, ordinal));
+    return Uint32Array.from(this.numbers(1 + 2 * this.numbers(1)[0]).slice(1));
   }
   /// Acts on what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
   pin(how: number): void {

@@ -11,6 +11,8 @@ export type ToWorker =
     |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
     |{type: 'pin', how: number}
+    |{type: 'profile', id: number, from: number[], to: number[]}
+    |{type: 'outline', level: number, ordinal: number}
     |{type: 'hash', id: number}
     |{type: 'retry'};
 
@@ -19,5 +21,7 @@ export type FromWorker =
     |{type: 'opened', manifest: Manifest, scene: Opened}
     |{type: 'frame', serial: number, state: State, changes: Changes, stats: Stats, milliseconds: number, loading: boolean, time: number}
     |{type: 'picked', id: number, hit: Hit|null}
+    |{type: 'profiled', id: number, line: Array<[number, number]>}
+    |{type: 'outlined', lines: Uint32Array}
     |{type: 'hashed', id: number, hash: string}
     |{type: 'failed', message: string};

@@ -26,6 +26,9 @@ const GREYS = [[0, 28, 30, 34], [1, 245, 245, 240]];
 export const CATEGORIES = [[68, 119, 170], [238, 153, 51], [51, 153, 85], [204, 68, 85], [136, 102, 187], [153, 119, 68],
                            [221, 136, 187], [119, 119, 119], [170, 170, 51], [85, 187, 204], [34, 85, 51], [136, 34, 51]];
 
+/// The lines around the cluster of a place.
+const OUTLINE = [214, 40, 110];
+
 const SLIDE_SECONDS = 0.45;
 
 const VERTEX = `#version 300 es
@@ -141,6 +144,9 @@ export class Renderer {
   private lines!: WebGLBuffer;
   private surface!: WebGLVertexArrayObject;
   private wires!: WebGLVertexArrayObject;
+  private rim!: WebGLBuffer;
+  private rims!: WebGLVertexArrayObject;
+  private rimCount = 0;
   private linesStale = true;
   private state: State|null = null;
   private box = [0, 0, 0, 1, 1, 1];
@@ -184,6 +190,9 @@ export class Renderer {
     this.lines = gl.createBuffer()!;
     this.surface = this.array(this.triangles.buffer);
     this.wires = this.array(this.lines);
+    this.rim = gl.createBuffer()!;
+    this.rims = this.array(this.rim);
+    this.rimCount = 0;
     this.linesStale = true;
     this.state = null;
   }
@@ -203,6 +212,17 @@ export class Renderer {
       this.triangles.put(changes.triangleBlocks, bytes, state.triangleSlots);
       this.linesStale = true;
     }
+  }
+  get outlined(): number {
+    return this.rimCount / 2;
+  }
+  /// The lines around a cluster, as slots of their ends.
+  outline(lines: Uint32Array): void {
+    const gl = this.gl;
+    this.rimCount = lines.length;
+    gl.bindVertexArray(null);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.rim);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, lines, gl.DYNAMIC_DRAW);
   }
   /// Whether vertices are on their way.
   sliding(time: number): boolean {
@@ -260,16 +280,22 @@ export class Renderer {
     gl.bindVertexArray(this.surface);
     gl.drawElements(gl.TRIANGLES, this.state.triangleSlots * 3, gl.UNSIGNED_INT, 0);
     gl.disable(gl.POLYGON_OFFSET_FILL);
-    if (!look.wire) return;
-    if (this.linesStale) this.makeLines();
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    gl.depthMask(false);
     gl.uniform1i(this.uniform('mode'), -1);
-    gl.bindVertexArray(this.wires);
-    gl.drawElements(gl.LINES, this.lineCount, gl.UNSIGNED_INT, 0);
-    gl.depthMask(true);
-    gl.disable(gl.BLEND);
+    if (look.wire) {
+      if (this.linesStale) this.makeLines();
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+      gl.depthMask(false);
+      gl.bindVertexArray(this.wires);
+      gl.drawElements(gl.LINES, this.lineCount, gl.UNSIGNED_INT, 0);
+      gl.depthMask(true);
+      gl.disable(gl.BLEND);
+    }
+    if (this.rimCount > 0) {
+      gl.uniform4f(this.uniform('wire'), OUTLINE[0] / 255, OUTLINE[1] / 255, OUTLINE[2] / 255, 1);
+      gl.bindVertexArray(this.rims);
+      gl.drawElements(gl.LINES, this.rimCount, gl.UNSIGNED_INT, 0);
+    }
   }
 
   private lineCount = 0;

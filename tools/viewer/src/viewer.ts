@@ -51,6 +51,9 @@ class Viewer {
   private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
   private picks = new Map<number, (hit: Hit|null) => void>();
   private hashes = new Map<number, (hash: string) => void>();
+  private profiles = new Map<number, (line: Array<[number, number]>) => void>();
+  private level = 255;  ///< shown everywhere; 255: none
+  private detailTimer = 0;  ///< of profile and outline, which follow the surface
   private next = 0;
   private serial = 0;  ///< of the last view
   private redraw = true;
@@ -110,7 +113,8 @@ class Viewer {
       points: this.status?.state.points ?? 0,
       triangles: this.status?.state.triangles ?? 0,
       bytes: this.status?.stats.bytes ?? 0,
-      requests: this.status?.stats.requests ?? 0
+      requests: this.status?.stats.requests ?? 0,
+      outlined: this.renderer.outlined
     };
   }
   /// For tests: the view of a recorded flight.
@@ -163,6 +167,9 @@ class Viewer {
         this.box = message.scene.box;
         this.asTriangles = message.scene.triangles;
         this.colours = message.scene.colours;
+        element<HTMLInputElement>('level').max = String(message.manifest.levels.length - 1);
+        element('with-level').hidden = message.manifest.levels.length < 2;
+        if (this.level !== 255) this.level = Math.min(this.level, message.manifest.levels.length - 1);
         this.renderer.show(this.box, message.manifest.levels.length - 1, this.asTriangles);
         this.camera.fit(this.box, this.aspect);
         if (first) this.applyLink();
@@ -181,6 +188,7 @@ class Viewer {
         if (this.asTriangles && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
         this.renderer.apply(message.state, message.changes, this.now);
         this.status = message;
+        if (this.hit && message.changes.vertexBlocks.length > 0) this.followSurface(400);
         element('progress').hidden = true;
         this.redraw = true;
         this.worker?.postMessage({type: 'drawn', buffer: message.changes.buffer} satisfies ToWorker, [message.changes.buffer]);
@@ -189,6 +197,14 @@ class Viewer {
       case 'picked':
         this.picks.get(message.id)?.(message.hit);
         this.picks.delete(message.id);
+        break;
+      case 'profiled':
+        this.profiles.get(message.id)?.(message.line);
+        this.profiles.delete(message.id);
+        break;
+      case 'outlined':
+        this.renderer.outline(this.hit ? message.lines : new Uint32Array());
+        this.redraw = true;
         break;
       case 'hashed':
         this.hashes.get(message.id)?.(message.hash);
@@ -266,7 +282,8 @@ class Viewer {
         fov: FOV,
         aspect: this.aspect,
         height: this.canvas.clientHeight,
-        error: this.error
+        error: this.error,
+        level: this.level
       }
     });
     clearTimeout(this.linkTimer);
@@ -345,20 +362,56 @@ class Viewer {
       return [dt, dd];
     }));
     element('place').hidden = false;
+    element('profile').hidden = true;
     this.redraw = true;
+    this.followSurface(0);
   }
   private closePlace(): void {
     this.hit = this.before = null;
     element('place').hidden = true;
-    element('mark').hidden = true;
+    this.renderer.outline(new Uint32Array());
+    this.redraw = true;
+  }
+  /// Outline and profile of the places, by the surface as it is after so many milliseconds.
+  private followSurface(delay: number): void {
+    if (this.detailTimer !== 0 && delay > 0) return;
+    clearTimeout(this.detailTimer);
+    this.detailTimer = window.setTimeout(() => {
+      this.detailTimer = 0;
+      if (!this.hit || !this.asTriangles) return;
+      this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
+      if (this.before) void this.showProfile(this.before.place, this.hit.place);
+    }, delay);
+  }
+  private async showProfile(from: number[], to: number[]): Promise<void> {
+    const line = await new Promise<Array<[number, number]>>(resolve => {
+      const id = ++this.next;
+      this.profiles.set(id, resolve);
+      this.tell({type: 'profile', id, from, to});
+    });
+    element('profile').hidden = line.length < 2 || !this.before;
+    if (line.length < 2) return;
+    const heights = line.map(point => point[1]), low = Math.min(...heights), high = Math.max(...heights);
+    const length = line[line.length - 1][0], rise = Math.max(high - low, 1e-9);
+    const path = line.map(([d, h]) => `${(256 * d / length).toFixed(2)},${(80 - 76 * (h - low) / rise).toFixed(2)}`);
+    const shape = document.createElementNS('http://www.w3.org/2000/svg', 'path');
+    shape.setAttribute('d', `M0,84 L${path.join(' ')} L256,84 Z`);
+    element('profile-plot').replaceChildren(shape);
+    element('profile-low').textContent = `${metres(low)} lowest`;
+    element('profile-length').textContent = metres(length);
+    element('profile-high').textContent = `${metres(high)} highest`;
   }
   private showMark(): void {
-    const mark = element('mark');
-    if (!this.hit) {
+    this.showMarkAt('mark', this.hit);
+    this.showMarkAt('mark-before', this.hit ? this.before : null);
+  }
+  private showMarkAt(id: string, hit: Hit|null): void {
+    const mark = element(id);
+    if (!hit) {
       mark.hidden = true;
       return;
     }
-    const to = add(this.hit.place as Vec3, this.camera.eye, -1);
+    const to = add(hit.place as Vec3, this.camera.eye, -1);
     const t = Math.tan(FOV / 2 * Math.PI / 180);
     const part = (axis: Vec3) => to[0] * axis[0] + to[1] * axis[1] + to[2] * axis[2];
     const depth = part(this.camera.direction);
@@ -375,6 +428,8 @@ class Viewer {
     const colour = this.link.get('c');
     if (COLOURS.includes(colour as Colour)) this.look.colour = colour as Colour;
     this.look.wire = this.link.get('w') === '1';
+    const level = this.link.get('l');
+    this.level = level !== null && /^\d{1,2}$/.test(level) ? Number(level) : 255;
     const error = Number(this.link.get('q'));
     if (error >= 0.5 && error <= 32) this.error = error;
   }
@@ -391,6 +446,7 @@ class Viewer {
     const view = [...c.target.map(n => n.toFixed(2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
     const parts = [`s=${encodeURIComponent(this.store)}`, `v=${view.join(',')}`, `c=${this.look.colour}`, `q=${this.error}`];
     if (this.look.wire) parts.push('w=1');
+    if (this.level !== 255) parts.push(`l=${this.level}`);
     history.replaceState(null, '', `#${parts.join('&')}`);
   }
 
@@ -409,6 +465,9 @@ class Viewer {
     element<HTMLInputElement>('wire').checked = this.look.wire;
     element<HTMLInputElement>('detail').value = String(4 - Math.log2(this.error));
     element('detail-text').textContent = `within ${this.error} px`;
+    const top = (this.manifest?.levels.length ?? 1) - 1;
+    element<HTMLInputElement>('level').value = String(this.level > top ? 0 : top - this.level);
+    element('level-text').textContent = this.level >= top ? 'the top' : `level ${this.level}`;
     this.legend();
   }
   private change(): void {
@@ -499,6 +558,12 @@ class Viewer {
     });
     element('detail').addEventListener('input', event => {
       this.error = Math.round(100 * 2 ** (4 - Number((event.target as HTMLInputElement).value))) / 100;
+      this.showControls();
+      this.moved = true;
+    });
+    element('level').addEventListener('input', event => {
+      const top = (this.manifest?.levels.length ?? 1) - 1, value = Number((event.target as HTMLInputElement).value);
+      this.level = value === 0 ? 255 : top - value;
       this.showControls();
       this.moved = true;
     });

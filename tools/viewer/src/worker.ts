@@ -102,6 +102,12 @@ class Session {
     const hit = this.opened ? this.core.pick(request.origin, request.direction, request.angle) : null;
     post({type: 'picked', id: request.id, hit});
   }
+  profile(request: ToWorker&{type: 'profile'}): void {
+    post({type: 'profiled', id: request.id, line: this.opened ? this.core.profile(request.from, request.to) : []});
+  }
+  outline(request: ToWorker&{type: 'outline'}): void {
+    if (this.opened) post({type: 'outlined', lines: this.core.outline(request.level, request.ordinal)});
+  }
   pin(how: number): void {
     if (this.opened) this.core.pin(how);
     this.wake();
@@ -201,6 +207,12 @@ self.onmessage = event => {
       break;
     case 'pick':
       session?.pick(message);
+      break;
+    case 'profile':
+      session?.profile(message);
+      break;
+    case 'outline':
+      session?.outline(message);
       break;
     case 'pin':
       session?.pin(message.how);

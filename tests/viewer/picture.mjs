@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// picture.mjs PACKAGES STORE LINK OUT.png [WIDTHxHEIGHT [dark]]: a picture of a store in the viewer, taken by headless
+// Chromium once all is there. TERRACE names the command, CHROMIUM the browser. The picture of README:
+//   tests/clients/clients_test.sh build "$PWD/tests/viewer/picture.mjs" alps.terrace LINK docs/viewer.png 1200x680
+import {mkdtempSync, rmSync} from 'node:fs';
+import {spawnSync} from 'node:child_process';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+
+import {launch} from '../clients/globe.mjs';
+import {serveSite} from './site_server.mjs';
+
+const [, , , store, link, out, size = '1200x680', theme = 'light'] = process.argv;
+const [width, height] = size.split('x').map(Number);
+const folder = mkdtempSync(join(tmpdir(), 'terrace-picture-'));
+let server, browser;
+try {
+  const {status, stderr} = spawnSync(process.env.TERRACE, ['publish', store, '-o', join(folder, 'site'), '-q'], {encoding: 'utf8'});
+  if (status !== 0) throw new Error(stderr);
+  server = await serveSite(join(folder, 'site'));
+  browser = await launch();
+  const context = await browser.newContext({viewport: {width, height}, colorScheme: theme});
+  const page = await context.newPage();
+  await page.goto(server.url + link);
+  await page.waitForFunction(() => window.terrace?.settled, null, {timeout: 120_000});
+  await page.waitForTimeout(1200);
+  await page.screenshot({path: out, ...(out.endsWith('.jpg') ? {type: 'jpeg', quality: 82} : {})});
+} finally {
+  await browser?.close();
+  await server?.close();
+  rmSync(folder, {recursive: true, force: true});
+}
