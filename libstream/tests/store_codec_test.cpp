@@ -284,7 +284,7 @@ TEST(StoreCodec, IndexPagesComeBack) {
     }
     for (const bool longer : {false, true}) {
       Bytes wrong(bytes.begin(), bytes.end() - 4);
-      wrong.resize(wrong.size() + (longer ? 1 : -1));
+      wrong.resize(longer ? wrong.size() + 1 : wrong.size() - 1);
       put(wrong, crc32(wrong));
       try {
         static_cast<void>(IndexPage(wrong, n, layout, &decoding));

@@ -19,9 +19,9 @@ namespace terrace::terrain {
 
 /// Whether vertices are on a lattice in the view frame.
 template <class Shown>
-inline constexpr bool is_surface = false;
+inline constexpr bool shows_surface = false;
 template <class Coord>
-inline constexpr bool is_surface<tri::DynamicSurface<Coord>> = true;
+inline constexpr bool shows_surface<tri::DynamicSurface<Coord>> = true;
 
 template <class Shown>
 struct StoreView<Shown>::Impl {
@@ -32,7 +32,7 @@ struct StoreView<Shown>::Impl {
       : store(given),
         frame(store, ground),
         lattice(store, frame),
-        source(store, frame, is_surface<Shown> ? &lattice : nullptr),
+        source(store, frame, shows_surface<Shown> ? &lattice : nullptr),
         control(source.counts(), load_root(), options),
         reader(make_reader(source)) {
     assert((!std::is_integral_v<Shown> || store.schema().grid));
@@ -126,7 +126,7 @@ stream::Point3 StoreView<Shown>::in_view_frame(const stream::Point3& stored) con
 
 template <class Shown>
 stream::Point3 StoreView<Shown>::in_view_frame(tri::VertexId vertex) const {
-  if constexpr (is_surface<Shown>) {
+  if constexpr (shows_surface<Shown>) {
     const auto p = model().triangulation().point(vertex);
     return impl_->lattice.in_view_frame(
         {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
@@ -137,7 +137,7 @@ stream::Point3 StoreView<Shown>::in_view_frame(tri::VertexId vertex) const {
 
 template <class Shown>
 stream::Point3 StoreView<Shown>::stored(tri::VertexId vertex) const {
-  if constexpr (is_surface<Shown>) {
+  if constexpr (shows_surface<Shown>) {
     return impl_->frame.stored(in_view_frame(vertex));
   } else {
     const auto p = model().triangulation().point(vertex);
