@@ -526,6 +526,24 @@ TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
                                    "dem.tif"));
 }
 
+TEST(GeoKeys, ThePlaneOfAMapStandsOnAGeographicSystem) {
+  for (const double base : {4978.0, 4389.0, 32632.0, 5703.0}) {  // geocentric, projected, heights
+    const stream::Crs crs = keys({{1024, {1}, ""},
+                                  {2048, {base}, ""},
+                                  {3072, {32767}, ""},
+                                  {3074, {32767}, ""},
+                                  {3075, {8}, ""},
+                                  {3076, {9001}, ""},
+                                  {3078, {49}, ""},
+                                  {3079, {46}, ""},
+                                  {3084, {13.3}, ""},
+                                  {3085, {47.5}, ""},
+                                  {3086, {400000}, ""},
+                                  {3087, {400000}, ""}});
+    EXPECT_THROW(CoordinateSystem::of(crs, "file"), stream::Error) << base;
+  }
+}
+
 TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
   for (const double code : {4326.5, -4326.0, 1e300}) {
     stream::Crs crs;

@@ -69,7 +69,8 @@ void ContourText::append(std::string& text, const ContourLine& line,
     throw stream::Error({.file = file_,
                          .where = {},
                          .cause = number_text(at[0]) + ',' + number_text(at[1]) +
-                                  " has no longitude and latitude in " + geography_->system().title(),
+                                  " has no longitude and latitude in " +
+                                  geography_->system().title(),
                          .remedy = "build the store with the right `crs`, or leave the "
                                    "place out with `region`"});
   }

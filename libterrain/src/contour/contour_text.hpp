@@ -40,7 +40,7 @@ class ContourText {
   std::string file_;
   GroundSlope ground_;
   std::optional<BoxGeography> geography_;  ///< nothing: places stay in the store's CRS
-  bool reverse_;  ///< higher ground is on the left in the CRS
+  bool reverse_;                           ///< higher ground is on the left in the CRS
   double interval_;
   unsigned threads_;
   std::function<void(std::string_view)> write_;

@@ -162,6 +162,16 @@ ProjObject object_of_code(int code, PJ_CATEGORY category) {
                                               category, 0, nullptr));
 }
 
+/// None for a CRS of another kind: PROJ identifies no projected CRS on, say, a geocentric one, but
+/// crashes.
+ProjObject geographic_of_code(int code) {
+  ProjObject found = object_of_code(code, PJ_CATEGORY_CRS);
+  if (found == nullptr) return nullptr;
+  const PJ_TYPE type = proj_get_type(found.get());
+  const bool good = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
+  return good ? std::move(found) : nullptr;
+}
+
 ProjObject required(ProjObject object, const std::string& what) {
   if (object == nullptr) fail_geo_keys(what);
   return object;
@@ -186,7 +196,7 @@ bool agrees(const GeoKeyValues& keys, const PJ* base) {
 ProjObject base_of(const GeoKeyValues& keys) {
   PJ_CONTEXT* const context = proj_context();
   if (const int code = keys.known_code(2048); code != 0) {
-    return required(object_of_code(code, PJ_CATEGORY_CRS),
+    return required(geographic_of_code(code),
                     "the geographic CRS EPSG:" + std::to_string(code) + " is not known");
   }
   const std::string citation = keys.text(2049);
@@ -196,7 +206,7 @@ ProjObject base_of(const GeoKeyValues& keys) {
   // Old files number the datum and mean the system on it: 6326 is that of 4326.
   const int datum_code = keys.known_code(2050);
   if (datum_code >= 6001 && datum_code < 6999 && degrees == 1) {
-    ProjObject base = object_of_code(datum_code - 2000, PJ_CATEGORY_CRS);
+    ProjObject base = geographic_of_code(datum_code - 2000);
     if (base != nullptr && agrees(keys, base.get())) return base;
   }
   double major = 0, inverse = 0;
