@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Regions and metrics: JSON files, and what the command line takes in their place. The first line
-// says which: "region" or "metric" for a file's text, "box" for a box or BOX:L.
+// says which: "region" or "metric" for a file's text, "box" for a box.
 #include <cmath>
 
 #include <nlohmann/json.hpp>

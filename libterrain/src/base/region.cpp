@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 
 #include <nlohmann/json.hpp>
 
 #include "base/orientation.hpp"
 #include "base/region_shape.hpp"
+#include "base/text_of_file.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
@@ -84,11 +84,11 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
 }
 
 std::vector<Polygon> read_geojson(const std::string& name) {
-  std::ifstream file(name);
-  if (!file) fail(name, "neither a box nor a file that can be read");
+  const std::optional<std::string> text = text_of_file(name);
+  if (!text) fail(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
   try {
-    collect_polygons(nlohmann::json::parse(file), name, 0, polygons);
+    collect_polygons(nlohmann::json::parse(*text), name, 0, polygons);
   } catch (const nlohmann::json::exception& error) {
     fail(name, std::string("not JSON (") + error.what() + ")");
   }

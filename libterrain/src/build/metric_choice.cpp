@@ -2,7 +2,6 @@
 #include "terrace/terrain/metric_choice.hpp"
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -10,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/portable_math.hpp"
+#include "base/text_of_file.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -109,14 +109,14 @@ MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
 }
 
 std::vector<MetricChoice::Region> read_regions(const std::string& file) {
-  std::ifstream stream(file);
-  if (!stream) {
+  const std::optional<std::string> text = text_of_file(file);
+  if (!text) {
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "cannot be read",
                          .remedy = "`metric` elliptical:FILE names a JSON file of regions"});
   }
-  const nlohmann::json json = nlohmann::json::parse(stream, nullptr, /* allow_exceptions= */ false);
+  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, /* allow_exceptions= */ false);
   if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
       json["regions"].empty()) {
     throw stream::Error(

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// More clusters are not asked for ahead of time in a step: it would take too much of its time.
-constexpr std::size_t kMostSoon = 512;
+constexpr std::size_t kMostSoon = 4096;
 
 }  // namespace
 

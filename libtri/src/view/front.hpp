@@ -63,7 +63,7 @@ class ViewFront {
   /// The collapsed cluster with the greatest demand, on ties the coarsest, then the smallest id;
   /// nullopt if no demand above 1 is left. Children of added clusters take part.
   [[nodiscard]] std::optional<Candidate> next();
-  /// Clusters that may be wanted soon, the greatest demand first, a few hundred at most. To be
+  /// Clusters that may be wanted soon, the greatest demand first, a few thousand at most. To be
   /// called when next() has no more.
   [[nodiscard]] std::span<const Candidate> soon();
   /// Points of expanded clusters whose demand is less than `below`.

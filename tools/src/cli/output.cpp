@@ -39,6 +39,8 @@ class Table {
   /// False as soon as it cannot be ours.
   bool take(std::string_view line) {
     if (ours_) return true;
+    const auto is_text = [](char c) { return c == '\t' || static_cast<unsigned char>(c) >= ' '; };
+    if (!std::ranges::all_of(line, is_text)) return false;
     if (columns_ > 0) return is_row(line);
     // What `sample` writes begins with the comments that the places had.
     if (line.empty() || line.front() == '#') {

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
 #include "base/file_marks.hpp"
+#include "base/text_of_file.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -142,16 +142,15 @@ std::string layer_json(const TileLayer& layer) {
 }
 
 TileLayer read_layer(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
+  const std::optional<std::string> text = text_of_file(path);
+  if (!text) {
     throw stream::Error({.file = path,
                          .where = {},
                          .cause = "cannot be read",
                          .remedy = "name the folder of a finished tile set"});
   }
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
   try {
-    return layer_from(Json::parse(text));
+    return layer_from(Json::parse(*text));
   } catch (const std::exception& error) {
     throw stream::Error(
         {.file = path,
