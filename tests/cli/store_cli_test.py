@@ -220,11 +220,11 @@ class StoreTest(unittest.TestCase):
 
     def test_mesh_of_a_cluster(self):
         """The vertices are the points of the cluster, the triangles cover their hull."""
-        for args in (['--cluster', '1:0'], ['--cluster', '1:0', '--level', 0], ['--cluster', '0:3']):
+        for cluster, *args in ('1:0',), ('1:0', '--level', 0), ('0:3',):
             out = self.path('cluster.obj')
-            summary = json.loads(self.run_ok('mesh', self.store, *args, '-o', out, '--json', '--force'))
+            summary = json.loads(self.run_ok('mesh', self.store, '--cluster', cluster, *args, '-o', out, '--json', '--force'))
             points = {tuple(map(float, line.split()[:3]))
-                      for line in self.run_ok('points', self.store, *args, '-o', '-').splitlines()}
+                      for line in self.run_ok('points', self.store, '--cluster', cluster, *args, '-o', '-').splitlines()}
             with open(out) as file:
                 lines = [line.split() for line in file]
             vertices = [tuple(map(float, line[1:4])) for line in lines if line and line[0] == 'v']
@@ -235,9 +235,9 @@ class StoreTest(unittest.TestCase):
                     self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(b)))
             self.assertGreater(summary['triangles'], 0)
             self.assertLess(summary['triangles'], 2 * len(vertices))
-        for wrong in (['--cluster', '77:0'], ['--cluster', '0:0', '--level', 1], ['--cluster', '0:0', '--region', '0,0,1,1'],
-                      ['--cluster', '0:0', '--max-error', 1], ['--cluster', '0:0', '--smooth', 'laplacian']):
-            self.expect_error(2, 'mesh', self.store, '-o', self.path('wrong.ply'), *wrong)
+        for cluster, *args in (('77:0',), ('0:0', '--level', 1), ('0:0', '--region', '0,0,1,1'),
+                               ('0:0', '--max-error', 1), ('0:0', '--smooth', 'laplacian')):
+            self.expect_error(2, 'mesh', self.store, '-o', self.path('wrong.ply'), '--cluster', cluster, *args)
 
     def test_mesh_in_every_format(self):
         for ending in ('ply', 'obj', 'glb'):
