@@ -13,6 +13,7 @@
 
 #include "delaunay3/access.hpp"
 #include "points3.hpp"
+#include "shape/nearby.hpp"
 #include "terrace/tri/shape.hpp"
 #include "view_world.hpp"
 
@@ -169,8 +170,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
   }
 }
 
-// At the border of detail a coarse vertex has tetrahedra with most of the fine ones: it is not
-// looked at as a whole, and still the surface is that of the shape, and nearly that from scratch.
+// Half of the body is fine, half coarse. Of large changes most tetrahedra are labelled without a
+// look at their surroundings.
 TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
   using Coord = TypeParam;
   std::mt19937_64 random(7);
@@ -192,10 +193,12 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
   Drawn<Coord> drawn(surface);
   typename DynamicSurface<Coord>::Changes changes;
   typename Delaunay3<Coord>::Changes tetrahedra;
-  std::size_t differing = 0;
+  std::size_t differing = 0, large = 0;
   for (int step = 0; step < 12; ++step) {
-    // A patch goes, and comes back.
-    const auto middle = fine[random() % fine.size()];
+    // A fine patch goes, small or large, or a few of the coarse points, and comes back.
+    const bool of_coarse = step % 3 == 2;
+    const double reach = step % 3 == 0 ? 0x1p16 : step % 3 == 1 ? 0x1p18 : 0x1p18;
+    const auto middle = of_coarse ? coarse[random() % 25] : fine[random() % fine.size()];
     std::vector<VertexId> patch;
     std::vector<std::array<Coord, 3>> points;
     for (const VertexId v : surface.all_vertices()) {
@@ -204,11 +207,11 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
         const double d = static_cast<double>(surface.point(v)[k]) - static_cast<double>(middle[k]);
         square += d * d;
       }
-      if (square > 0x1p32) continue;
+      const bool is_coarse = !(surface.point(v)[2] > 0x1p20);
+      if (square > reach * reach || is_coarse != of_coarse) continue;
       patch.push_back(v);
       points.push_back(surface.point(v));
     }
-    ASSERT_GT(patch.size(), 20u);
     for (const bool back : {false, true}) {
       if (back) {
         surface.insert(points, {});
@@ -220,6 +223,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
       surface.take_changes(changes);
       triangulation.take_changes(tetrahedra);
       shape.update_nearby(triangulation, tetrahedra);
+      large += tetrahedra.added_tetrahedra.size() > shape::kManyNew &&
+               2 * tetrahedra.added_tetrahedra.size() < triangulation.tetrahedron_count();
       ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
       ASSERT_EQ(drawn.triangles(), faces_of(shape, triangulation));
@@ -233,6 +238,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
     differing += changes.removed_triangles.size();
     shape.restore(triangulation);
   }
+  EXPECT_GT(large, 0u);
   EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A camera flies close over a body that was scanned in 20 million points, once round, with as tight
 // an error as keeps about 200,000 of them in the model: 600 frames, each moving by 0.2 % of the
-// width of what is seen, 12 ms at most per frame, reading, tetrahedra and surface included (the
+// width of what is seen, 10 ms at most per frame, reading, tetrahedra and surface included (the
 // files are in the page cache). In one thread, and with a second one that reads: then a frame is
 // what the first one does. And what a computation of the surface from scratch takes and changes
 // then.
@@ -36,7 +36,7 @@ using Surface = tri::DynamicSurface<std::int32_t>;
 using View = terrace::terrain::StoreView<Surface>;
 
 std::size_t active() { return small() ? 10'000 : 200'000; }
-constexpr double kBudget = 0.012, kShare = 0.002;
+constexpr double kBudget = 0.010, kShare = 0.002;
 
 Store open_store(const std::filesystem::path& folder) {
   const char* given = std::getenv("TERRACE_BENCH_SCAN");

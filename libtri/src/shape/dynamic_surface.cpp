@@ -77,7 +77,7 @@ struct DynamicSurface<Coord>::Impl {
   /// Brings labels up to date and lists the tetrahedra whose facets may have come or gone.
   void relabel(bool from_scratch, unsigned threads) {
     if (!from_scratch && shape::worth_updating(mesh(), state, changes)) {
-      shape::update_nearby(mesh(), state, changes, &examined);
+      examined = shape::update_nearby(mesh(), state, changes);
       return;
     }
     shape::restore_by_poles(mesh(), state, threads);

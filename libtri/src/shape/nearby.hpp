@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "poles.hpp"
@@ -12,6 +14,11 @@
 /// The poles rule after a local change, see BasicShape3::update_nearby().
 
 namespace terrace::tri::shape {
+
+/// With more new tetrahedra than this most are far from the surface, see settle_most(): where
+/// detail ends, a few points on the other side of a body have tetrahedra with thousands of the fine
+/// ones.
+inline constexpr std::size_t kManyNew = 2500;
 
 /// The tetrahedra around a change as a triangulation of their own, in local numbers: new ones and
 /// their neighbours, whose labels are sought, and all others that have a vertex with one of them,
@@ -30,16 +37,17 @@ class Nearby {
     widen(state.local_vertex, mesh.vertex.size());
   }
   ~Nearby() {
-    for (const std::uint32_t t : slots_) state_.local_tetrahedron[t] = spatial::kNone;
+    for (const auto* list : {&slots_, &examined_})
+      for (const std::uint32_t t : *list) state_.local_tetrahedron[t] = spatial::kNone;
     for (const std::uint32_t v : vertices_) state_.local_vertex[v] = spatial::kNone;
   }
   Nearby(const Nearby&) = delete;
   Nearby& operator=(const Nearby&) = delete;
 
-  /// examined: by slot, all tetrahedra whose label or whose neighbours may have changed; or null.
+  /// unlabelled: the new tetrahedra, less those that settle_most() has labelled.
   template <class Changes>
-  void relabel(const Changes& changes, std::vector<std::uint32_t>* examined) {
-    collect(changes);
+  void relabel(const Changes& changes, std::span<const TetrahedronId> unlabelled) {
+    collect(changes, unlabelled);
     number_vertices();
     const std::vector<spatial::Tetrahedron> tetrahedra = local_tetrahedra();
     const Spheres spheres(tetrahedra, local_places(), 1);
@@ -55,8 +63,30 @@ class Nearby {
     }
     smooth_and_sculpt(spheres, inside, part);
     write(tetrahedra, inside);
-    if (examined != nullptr) *examined = slots_;
   }
+  /// By slot, all tetrahedra whose label or whose neighbours may have changed: those looked at, and
+  /// those at vertices that lost some. To be called last.
+  template <class Changes>
+  std::vector<std::uint32_t> examined(const Changes& changes) {
+    examined_ = slots_;
+    for (const std::uint32_t v : vertices_) state_.local_vertex[v] = spatial::kNone;
+    vertices_.clear();
+    const auto take_too = [&](std::uint32_t t) {
+      if (std::exchange(state_.local_tetrahedron[t], 0) == spatial::kNone) examined_.push_back(t);
+    };
+    for (const TetrahedronId t : changes.added_tetrahedra) take_too(slot(t));
+    for (const auto& corners : changes.removed_corners) {
+      for (const VertexId v : corners) {
+        if (!mesh_.vertex_alive(slot(v))) continue;
+        if (std::exchange(state_.local_vertex[slot(v)], 0) != spatial::kNone) continue;
+        vertices_.push_back(slot(v));
+        take_too(mesh_.vertex[slot(v)].incident);
+      }
+    }
+    for_stars(examined_, take_too);
+    return examined_;
+  }
+  [[nodiscard]] const std::vector<std::uint32_t>& slots() const { return slots_; }
 
  private:
   void take(std::uint32_t t) {
@@ -64,12 +94,28 @@ class Nearby {
     state_.local_tetrahedron[t] = static_cast<std::uint32_t>(slots_.size());
     slots_.push_back(t);
   }
+  /// Calls take(t) for all tetrahedra at numbered vertices, ghosts too: joined to those listed,
+  /// which grow, by facets with such a corner.
+  template <class Take>
+  void for_stars(const std::vector<std::uint32_t>& listed, const Take& take_one) {
+    for (std::size_t i = 0; i < listed.size(); ++i) {
+      for (const spatial::Side mate : mesh_.tetrahedron[listed[i]].mate) {
+        const std::uint32_t t = spatial::tetrahedron_of(mate);
+        if (state_.local_tetrahedron[t] != spatial::kNone) continue;
+        const auto& corner = mesh_.tetrahedron[t].corner;
+        if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
+              return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
+            }))
+          take_one(t);
+      }
+    }
+  }
   template <class Changes>
-  void collect(const Changes& changes) {
+  void collect(const Changes& changes, std::span<const TetrahedronId> unlabelled) {
     const auto finite = [&](std::uint32_t t) {
       return spatial::is_finite(mesh_.tetrahedron[t].corner);
     };
-    for (const TetrahedronId id : changes.added_tetrahedra) take(slot(id));
+    for (const TetrahedronId id : unlabelled) take(slot(id));
     const std::size_t fresh = slots_.size();
     for (std::size_t i = 0; i < fresh; ++i)
       for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate)
@@ -82,26 +128,17 @@ class Nearby {
     };
     for (std::size_t i = 0; i < sought_; ++i)
       for (const std::uint32_t v : mesh_.tetrahedron[slots_[i]].corner) add(v);
-    // Vertices may have lost tetrahedra and gained none, at the hull.
+    // Vertices may have lost tetrahedra and gained none, at the hull; those at which only
+    // tetrahedra of one label were exchanged need no look.
     for (const auto& corners : changes.removed_corners) {
       for (const VertexId v : corners) {
         if (!mesh_.vertex_alive(slot(v))) continue;
+        if (const auto gone = state_.labels_gone[slot(v)]; gone == 1 || gone == 2) continue;
         add(slot(v));
         take(mesh_.vertex[slot(v)].incident);
       }
     }
-    // All tetrahedra at their corners, ghosts too: joined to them by facets with such a corner.
-    for (std::size_t i = 0; i < slots_.size(); ++i) {
-      for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate) {
-        const std::uint32_t t = spatial::tetrahedron_of(mate);
-        if (state_.local_tetrahedron[t] != spatial::kNone) continue;
-        const auto& corner = mesh_.tetrahedron[t].corner;
-        if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
-              return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
-            }))
-          take(t);
-      }
-    }
+    for_stars(slots_, [&](std::uint32_t t) { take(t); });
   }
   /// In lexicographic order, from 1.
   void number_vertices() {
@@ -176,6 +213,7 @@ class Nearby {
   const Mesh& mesh_;
   State& state_;
   std::vector<std::uint32_t> slots_;     ///< of tetrahedra, by local number
+  std::vector<std::uint32_t> examined_;  ///< see examined()
   std::size_t sought_ = 0;               ///< how many of these, from the first, are sought
   std::vector<std::uint32_t> vertices_;  ///< slots, by local number - 1
   std::vector<std::uint8_t> whole_;      ///< by local vertex: all tetrahedra at it are here
@@ -198,14 +236,45 @@ bool worth_updating(const Mesh& mesh, const State& state, const Changes& changes
   return !state.forest.empty() && 2 * changes.added_tetrahedra.size() < mesh.finite_count;
 }
 
-/// The state of the poles rule after changes; `forest` has the labels before. `examined` as in
-/// Nearby::relabel(). Requires a scope of the metric.
+/// Labels the new tetrahedra that are plainly far from the surface: those of which three corners or
+/// more are vertices where only tetrahedra of one label were removed, whose place they take there.
+/// Returns the others. Next to the surface one such corner would not tell.
+template <class Mesh>
+std::vector<TetrahedronId> settle_most(const Mesh& mesh, State& state,
+                                       std::span<const TetrahedronId> added) {
+  std::vector<TetrahedronId> others;
+  for (const TetrahedronId id : added) {
+    const std::uint32_t t = slot(id);
+    unsigned outside = 0, inside = 0;
+    for (const std::uint32_t v : mesh.tetrahedron[t].corner) {
+      outside += state.labels_gone[v] == 1;
+      inside += state.labels_gone[v] == 2;
+    }
+    if ((outside < 3 || inside > 0) && (inside < 3 || outside > 0)) {
+      others.push_back(id);
+      continue;
+    }
+    state.forest[t] = inside > 0;
+    state.of[t] = 0;
+    if (inside > 0) state.keep(mesh, t);
+  }
+  return others;
+}
+
+/// The state of the poles rule after changes; `forest` has the labels before. Returns, by slot, all
+/// tetrahedra whose label or whose neighbours may have changed. Requires a scope of the metric.
 template <class Changes, class Mesh>
-void update_nearby(const Mesh& mesh, State& state, const Changes& changes,
-                   std::vector<std::uint32_t>* examined = nullptr) {
+std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const Changes& changes) {
+  const bool many = changes.added_tetrahedra.size() > kManyNew;
+  state.labels_gone.resize(std::max<std::size_t>(state.labels_gone.size(), mesh.vertex.size()));
   for (std::size_t k = 0; k < changes.removed_tetrahedra.size(); ++k) {
     const std::uint32_t t = slot(changes.removed_tetrahedra[k]);
-    if (state.of[t] == kKept) {
+    const bool kept = state.of[t] == kKept;
+    // Labels that flips have changed count as both.
+    const std::uint8_t bits = kept != (state.forest[t] != 0) ? 3 : kept ? 2 : 1;
+    for (const VertexId v : changes.removed_corners[k])
+      state.labels_gone[slot(v)] |= many ? bits : std::uint8_t{3};
+    if (kept) {
       --state.kept_count;
       for (const VertexId v : changes.removed_corners[k]) --state.degree[slot(v)];
     }
@@ -214,7 +283,16 @@ void update_nearby(const Mesh& mesh, State& state, const Changes& changes,
   state.of.resize(std::max<std::size_t>(state.of.size(), mesh.tetrahedron.size()), kAbsent);
   state.forest.resize(state.of.size());
   state.degree.resize(std::max<std::size_t>(state.degree.size(), mesh.vertex.size()));
-  Nearby<Mesh>(mesh, state).relabel(changes, examined);
+  // Not of a vertex that had the slot before.
+  for (const VertexId v : changes.added_vertices) state.labels_gone[slot(v)] = 0;
+  std::vector<TetrahedronId> others;
+  std::span<const TetrahedronId> unlabelled = changes.added_tetrahedra;
+  if (many) unlabelled = others = settle_most(mesh, state, unlabelled);
+  Nearby<Mesh> nearby(mesh, state);
+  nearby.relabel(changes, unlabelled);
+  for (const auto& corners : changes.removed_corners)
+    for (const VertexId v : corners) state.labels_gone[slot(v)] = 0;
+  return many ? nearby.examined(changes) : nearby.slots();
 }
 
 }  // namespace terrace::tri::shape

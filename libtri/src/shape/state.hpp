@@ -36,6 +36,9 @@ struct State {
   std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
   std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
+  /// By vertex slot, bits: tetrahedra removed there were outside, 1; inside, 2. 0 between two
+  /// calls.
+  std::vector<std::uint8_t> labels_gone;
   /// Local numbers by slot, see nearby.hpp; kNone between two calls.
   Pool<std::uint32_t> local_tetrahedron, local_vertex;
 
@@ -54,8 +57,8 @@ struct State {
   [[nodiscard]] std::size_t bytes() const {
     const std::size_t words = degree.capacity() + lost.capacity() + rescued.capacity() +
                               queue.capacity() + pending.capacity() + touched.capacity();
-    return of.capacity() + forest.capacity() + words * sizeof(std::uint32_t) +
-           local_tetrahedron.bytes() + local_vertex.bytes();
+    return of.capacity() + forest.capacity() + labels_gone.capacity() +
+           words * sizeof(std::uint32_t) + local_tetrahedron.bytes() + local_vertex.bytes();
   }
   void forget_rescued() {
     for (const std::uint32_t t : rescued) of[t] &= static_cast<std::uint8_t>(~kRescuedBit);
