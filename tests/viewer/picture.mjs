@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// picture.mjs PACKAGES STORE LINK OUT.png [WIDTHxHEIGHT [dark]]: a picture of a store in the viewer, taken by headless
+// picture.mjs PACKAGES STORE LINK OUT [WIDTHxHEIGHT [dark]]: a picture of a store in the viewer, taken by headless
 // Chromium once all is there. TERRACE names the command, CHROMIUM the browser. The picture of README:
-//   tests/clients/clients_test.sh build "$PWD/tests/viewer/picture.mjs" alps.terrace LINK docs/viewer.png 1200x680
+//   tests/clients/clients_test.sh build "$PWD/tests/viewer/picture.mjs" alps.store
+//     '#s=alps&q=3&v=-3000,-9000,1500,25,24,42000&c=height' docs/viewer.jpg 1200x640
 import {mkdtempSync, rmSync} from 'node:fs';
 import {spawnSync} from 'node:child_process';
 import {tmpdir} from 'node:os';
