@@ -16,8 +16,8 @@ import re
 import sys
 
 # Reasons that no installation can mend (hardware, privileges, data that a machine need not have), and
-# Emscripten and QGIS, which take half a gigabyte or more.
-MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|QGIS|TERRACE_DATA', re.IGNORECASE)
+# Emscripten and QGIS, which take half a gigabyte or more; and what a registry that is away would give.
+MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|QGIS|cannot be downloaded|TERRACE_DATA', re.IGNORECASE)
 
 GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)
 GTEST_REASON = re.compile(r': Skipped\n(.*)\n')
