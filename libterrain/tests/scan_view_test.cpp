@@ -28,11 +28,11 @@ using ScanSurface3 = tri::DynamicSurface<std::int32_t>;
 using ScanView = StoreView<ScanSurface3>;
 
 /// What a renderer keeps: the corners of triangles as they were when it was told of them.
-class Drawn {
+class DrawnSurface {
  public:
   using Corners = std::array<ScanSurface3::Point, 3>;
 
-  explicit Drawn(const ScanSurface3& surface) : surface_(surface), drawn_(now()) {}
+  explicit DrawnSurface(const ScanSurface3& surface) : surface_(surface), drawn_(now()) {}
   void apply(const ScanSurface3::Changes& changes) {
     for (const tri::TriangleId t : changes.removed_triangles) ASSERT_EQ(drawn_.erase(t), 1u);
     for (const tri::TriangleId t : changes.added_triangles)
@@ -142,7 +142,7 @@ struct Flown {
 void fly(ScanView& view, const Round& round, int frames, double pixel_error, double seconds,
          Flown& flown) {
   const ScanSurface3& surface = view.model().triangulation();
-  Drawn drawn(surface);
+  DrawnSurface drawn(surface);
   const auto take = [&](double turns) {
     const ScanView::Step& step = view.frame(round.view(turns, pixel_error), seconds);
     flown.expanded += step.expanded;

@@ -4,7 +4,7 @@
 import type {ByteRange} from './core';
 
 /// Between ranges nearer than this fetching the gap is cheaper than another request.
-const GAP = 2048;
+const GAP = 1200;
 const MOST_BYTES = 256 * 1024;
 const MOST_REQUESTS = 6;
 const TRIES = 4;
