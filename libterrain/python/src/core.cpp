@@ -50,6 +50,10 @@ PYBIND11_MODULE(_core, module) {
   bind_tiles(module);
   bind_view(module);
   bind_delaunay(module);
+  bind_samples(module);
+  bind_shape(module);
+  bind_tin(module);
+  bind_trees(module);
   bind_cluster(module);
   bind_matching(module);
 }

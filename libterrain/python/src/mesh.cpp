@@ -40,13 +40,17 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   }));
 }
 
+/// As arrays_of(), and the tetrahedra inside the surface in place of its triangles if asked for.
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
-                  const std::string& where, const py::tuple& how) {
+                  const std::string& where, bool tetrahedra, const py::tuple& how) {
   const stream::Store store = open.get();
   const terrain::Detail detail = detail_of(store, level, region, py::list(), where);
-  return arrays_of(Job(how).run([&](const terrain::Context& context) {
-    return scan_surface(store, detail, {}, context).mesh;
-  }));
+  terrain::ScanSurface made = Job(how).run([&](const terrain::Context& context) {
+    return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
+  });
+  if (!tetrahedra) return arrays_of(std::move(made.mesh));
+  return py::make_tuple(to_array(std::move(made.mesh.positions)),
+                        to_array(std::move(made.tetrahedra)));
 }
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
