@@ -27,10 +27,10 @@ Errors: ``ValueError`` for arguments that make no sense, ``TypeError`` for objec
 (True, True)
 """
 
-from ._clustering import Clusters, KMeans, cluster, flat_clusters, kmeans, linkage
+from ._clustering import Clusters, KMeans, cluster, facility_location, flat_clusters, kmeans, linkage, spanning_tree
 from ._core import Error
 from ._delaunay import Delaunay2, Delaunay3, Shape, ellipse, ellipsoid
-from ._matching import Assignment, Matching, assignment, matching
+from ._matching import Assignment, Matching, assignment, edge_matching, matching
 from ._mesh import BoundedMesh, Mesh
 from ._raster import Raster
 from ._store import FeatureCollection, Store, build, xyz
@@ -43,6 +43,7 @@ __version__ = '0.1.0'
 __all__ = [
     'Assignment', 'BoundedMesh', 'Clusters', 'Delaunay2', 'Delaunay3', 'Error', 'FeatureCollection', 'KMeans',
     'Matching', 'MatchingTree', 'Mesh', 'PointTree', 'Raster', 'Shape', 'Store', 'TriangleTree', 'View',
-    'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'ellipse', 'ellipsoid', 'flat_clusters',
-    'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree', 'verify_tiles', 'xyz',
+    'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'edge_matching', 'ellipse', 'ellipsoid',
+    'facility_location', 'flat_clusters', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree',
+    'spanning_tree', 'verify_tiles', 'xyz',
 ]

@@ -11,8 +11,9 @@ __version__: str
 __all__ = [
     'Assignment', 'BoundedMesh', 'Clusters', 'Delaunay2', 'Delaunay3', 'Error', 'FeatureCollection', 'KMeans',
     'Matching', 'MatchingTree', 'Mesh', 'PointTree', 'Raster', 'Shape', 'Store', 'TriangleTree', 'View',
-    'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'ellipse', 'ellipsoid', 'flat_clusters',
-    'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree', 'verify_tiles', 'xyz',
+    'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'edge_matching', 'ellipse', 'ellipsoid',
+    'facility_location', 'flat_clusters', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree',
+    'spanning_tree', 'verify_tiles', 'xyz',
 ]
 
 class _GeoInterface(Protocol):
@@ -21,6 +22,9 @@ class _GeoInterface(Protocol):
 
 class _Dlpack(Protocol):
     def __dlpack__(self, *, stream: Any = ...) -> Any: ...
+
+class _Sparse(Protocol):
+    def tocsr(self) -> Any: ...
 
 class _Wkt(Protocol):
     def to_wkt(self) -> str: ...
@@ -226,6 +230,7 @@ def verify_tiles(folder: _Path, store: Store | None = ..., *, max_error: float |
                  progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> dict[str, Any]: ...
 
 def linkage(points: _Array, method: Literal['single', 'complete'] = ..., *, threads: int | None = ...) -> _Floats: ...
+def spanning_tree(points: _Array, *, threads: int | None = ...) -> tuple[npt.NDArray[np.uint32], _Floats]: ...
 def flat_clusters(rows: _Array, *, count: int | None = ..., height: float | None = ...) -> npt.NDArray[np.uint32]: ...
 
 class KMeans:
@@ -256,7 +261,10 @@ def cluster(points: _Array, facility_cost: float = ..., *, count: int | None = .
             method: Literal['fast', 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities',
                             'interchange', 'jain-vazirani', 'greedy-stars'] = ...,
             effort: _Effort = ..., metric: str = ..., weights: _Array | None = ..., outlier_price: float = ...,
-            seed: int = ..., threads: int | None = ...) -> Clusters: ...
+            seed: int = ..., bound_steps: int = ..., threads: int | None = ...) -> Clusters: ...
+def facility_location(connection: _Array, opening: _Array | None = ..., *, count: int | None = ...,
+                      method: Literal['interchange', 'jain-vazirani', 'greedy-stars'] = ..., effort: _Effort = ...,
+                      seed: int = ..., bound_steps: int = ..., threads: int | None = ...) -> Clusters: ...
 
 class Assignment:
     columns: _Indices
@@ -267,7 +275,7 @@ class Assignment:
                  column_duals: npt.NDArray[Any]) -> None: ...
     def __iter__(self) -> Iterator[_Indices]: ...
 
-def assignment(costs: _Array, columns: _Array | None = ...) -> Assignment: ...
+def assignment(costs: _Array | _Sparse, columns: _Array | None = ...) -> Assignment: ...
 
 class Matching:
     mates: _Indices
@@ -280,6 +288,8 @@ class Matching:
 
 def matching(points: _Array, *, exact_limit: int = ..., window: int = ..., rounds: int = ...,
              threads: int | None = ...) -> Matching: ...
+
+def edge_matching(edges: _Array, weights: _Array, count: int | None = ...) -> Matching: ...
 
 class MatchingTree:
     rows: _Floats
