@@ -126,6 +126,9 @@ class Store:
     def mesh(self, level: int | None = ..., region: _Region | None = ..., *, focus: Iterable[tuple[_Region, int]] = ...,
              where: str | None = ..., metric: str = ..., crs: _Crs | None = ..., max_points: int | None = ...,
              progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Mesh: ...
+    def lines(self, level: int = ..., region: _Region | None = ..., where: str | None = ..., *,
+              focus: Iterable[tuple[_Region, int]] = ..., progress: _Progress | None = ..., threads: int | None = ...,
+              memory: int | None = ...) -> tuple[list[_Floats], _Indices]: ...
     @overload
     def surface(self, level: int = ..., region: _Region | None = ..., where: str | None = ..., *,
                 tetrahedra: Literal[False] = ..., progress: _Progress | None = ..., threads: int | None = ...,
