@@ -21,10 +21,10 @@ def _weights(weights):
 def linkage(points, method='single', *, threads=None):
     """Single or complete linkage of points with Euclidean distances, or complete linkage of given distances.
 
-    points: shape (n, 2) or (n, 3), finite; or the distances of all pairs in one dimension, as scipy.spatial.distance.pdist. Returns: float64,
-    shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the two clusters of each merge, its height and the number of
-    points; the merges ascend. 'single' takes O(n log n); 'complete' O(n^2) and 4 n^2 bytes. Raises: ValueError. Source: J. Skala, 4.2.1,
-    7.6; O. Boruvka, 1926, over a kD-tree.
+    points: shape (n, 2) or (n, 3), finite; or the distances of all pairs in one dimension, as
+    scipy.spatial.distance.pdist. Returns: float64, shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the two clusters
+    of each merge, its height and the number of points; the merges ascend. 'single' takes O(n log n); 'complete' O(n^2)
+    and 4 n^2 bytes. Raises: ValueError. Source: J. Skala, 4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree.
 
     >>> linkage([[0, 0], [1, 0], [5, 0]])
     array([[0., 1., 1., 2.],
@@ -137,7 +137,7 @@ def cluster(points, facility_cost=1.0, *, count=None, method='fast', effort='def
     'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities'; on the matrix of distances (8 n^2 bytes) 'interchange',
     'jain-vazirani', 'greedy-stars'. effort: 'fast', 'default', 'fine', 'full'. metric: 'euclidean', 'squared',
     'minkowski:P', 'elliptical:FILE'. outlier_price: what leaving a point out costs, times the diagonal.
-    bound_steps: of a search for lower_bound, a subgradient's; 100 are plenty; not with ``count``.
+    bound_steps: subgradient steps of a search for lower_bound, some 100; 0: none. Not used with ``count``.
 
     Sources: J. Skala, 4.2.3, 7.1, 7.3; of k-median L. O'Callaghan et al., 2002.
 
@@ -155,9 +155,10 @@ def facility_location(connection, opening=None, *, count=None, method='interchan
                       threads=None):
     """Facility location with any costs: which facilities to open, and which of them serves each client.
 
-    connection: shape (facilities, clients), not negative: entities of any kind by a matrix of distances, for example. opening: of each facility, or
-    one cost for all. With ``count`` exactly so many, for nothing (k-median). method: 'interchange', 'jain-vazirani', 'greedy-stars'.
-    bound_steps: of a search for lower_bound; 0: none. O(facilities * clients) a step, 12 bytes an entry.
+    connection: shape (facilities, clients), not negative; a matrix of distances for entities of any kind. opening: the
+    cost of each facility, or one for all. With ``count`` exactly so many open, at no cost (k-median). method:
+    'interchange', 'jain-vazirani', 'greedy-stars'. bound_steps: the steps of a search for lower_bound; 0: none. Each takes
+    O(facilities * clients); 12 bytes per entry of the matrix.
 
     Returns: Clusters, whose facilities are rows and whose labels are of clients. Raises: ValueError. Sources: J. Skala,
     4.2.3, 7.3; D. Erlenkotter, 1978.

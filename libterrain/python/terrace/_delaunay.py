@@ -205,9 +205,10 @@ class Delaunay2(_Delaunay):
     def adapted(self, regions):
         """The triangles after flips of edges to suit a metric in each region.
 
-        regions: pairs of a box (min x, min y, max x, max y; infinities are allowed) and a metric, as ellipse(); where boxes overlap the
-        first counts, outside all the Euclidean one. Triangles across regions stay as they are. Returns: int32, shape
-        (m, 3), numbers of vertices, counter-clockwise. Raises: ValueError. Source: J. Skala, 7.4."""
+        regions: pairs of a box (min x, min y, max x, max y; infinities are allowed) and a metric such as ellipse(). Where
+        boxes overlap the first counts; outside all of them the metric is Euclidean. Triangles across regions stay as
+        they are. Returns: int32, shape (m, 3), numbers of vertices, counter-clockwise. Raises: ValueError. Source:
+        J. Skala, 7.4."""
         return self._euclidean().adapted(self._regions(regions))
 
     def _repr_svg_(self):
@@ -228,7 +229,8 @@ class Shape:
     euler_characteristic: int
 
     def __repr__(self):
-        return f'<terrace.Shape: {len(self.tetrahedra)} tetrahedra, {len(self.surface.triangles)} triangles, volume {self.volume:g}>'
+        return (f'<terrace.Shape: {len(self.tetrahedra)} tetrahedra, {len(self.surface.triangles)} triangles, '
+                f'volume {self.volume:g}>')
 
 
 class Delaunay3(_Delaunay):
@@ -251,9 +253,9 @@ class Delaunay3(_Delaunay):
     def shape(self, rule='poles', *, lids=False, threads=None):
         """The shape from whose surface the points were scanned: which tetrahedra are inside, and their surface.
 
-        rule: 'poles', by angles between circumspheres, for samples of any density; 'flood' and 'published' peel from the hull. lids: whether
-        what closes an open scan is part of the surface. Returns: a Shape, empty without tetrahedra. About 0.3 s per 100,000 points. Source:
-        J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
+        rule: 'poles', by angles between circumspheres, for samples of any density; 'flood' and 'published' peel from the
+        hull. lids: whether what closes an open scan is part of the surface. Returns: a Shape, empty if there are no
+        tetrahedra. Raises: ValueError. About 0.3 s per 100,000 points. Source: J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
 
         >>> Delaunay3([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).shape('flood')
         <terrace.Shape: 1 tetrahedra, 4 triangles, volume 0.166667>

@@ -34,8 +34,8 @@ def assignment(costs, columns=None):
     """The assignment of rows to columns of least cost (Kuhn-Munkres).
 
     costs: shape (rows, columns); float64, float32 and int32 are taken as they are. With two arguments: two sets of
-    points, shape (n, 2) or (n, 3), by Euclidean distance, whose matrix is never made. Of a sparse matrix of scipy.sparse only the stored
-    pairs may be chosen; it is a ValueError if they allow no assignment. O(n^3) at worst.
+    points, shape (n, 2) or (n, 3), by Euclidean distance, whose matrix is never made. Of a sparse matrix of
+    scipy.sparse only the stored pairs may be chosen; if they allow no assignment, ValueError is raised. O(n^3) at worst.
     Source: J. Skala, 4.3.1; R. Jonker, A. Volgenant, 1987.
 
     >>> assignment([[4, 1, 3], [2, 0, 5], [3, 2, 2]])
@@ -93,9 +93,10 @@ def matching(points, *, exact_limit=500_000, window=50_000, rounds=8, threads=No
 def edge_matching(edges, weights, count=None):
     """The perfect matching of least weight of a graph.
 
-    edges: whole numbers, shape (m, 2): vertices 0, 1, ..; parallel ones are allowed. weights: one an edge, of any sign. count: of vertices, by default
-    up to the largest number. Optimal for weights rounded to 2^-52 of the largest. Returns: a Matching. Raises: ValueError
-    where there is no perfect matching, naming a set that proves it. Source: J. Edmonds, 1965; V. Kolmogorov, 2009.
+    edges: whole numbers, shape (m, 2): vertices 0, 1, ..; parallel ones are allowed. weights: one for each edge, of any
+    sign. count: the number of vertices, by default the largest named and one. Optimal for weights rounded to 2^-52 of the
+    largest. Returns: a Matching. Raises: ValueError if there is no perfect matching. Source: J. Edmonds, 1965;
+    V. Kolmogorov, 2009.
 
     >>> edge_matching([[0, 1], [1, 2], [2, 3], [3, 0]], [5, 1, 5, 2])
     <terrace.Matching: 2 pairs, cost 3, optimal>

@@ -20,12 +20,12 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
     """The mesh with few triangles that is within ``max_error`` of every sample, verified on each, or the best of at
     most ``max_points`` vertices: of an array, without a store.
 
-    samples: points or a raster in memory, as build() takes them: shape (n, 3), or (rows, columns) with ``transform``, a Raster, an xarray.DataArray,
-    laspy's records. NaN and ``nodata``: no sample. A raster is upright (not rotated) and of at most 65,535 rows and columns.
-    quality: 'greedy', 'removal' or 'fitted' (rasters), each with fewer triangles and more time. duplicates: which of points at
-    one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'.
+    samples: points or a raster in memory, as build() takes them: shape (n, 3), or (rows, columns) with ``transform``, a
+    Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN and
+    ``nodata`` in it are no samples. quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time.
+    duplicates: which of several points at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'.
 
-    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError. About 1 us a vertex inserted.
+    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us per vertex inserted.
     Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than memory.
 
     >>> y, x = np.mgrid[0:60, 0:80]
@@ -63,9 +63,10 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
 def interpolate(samples, places, method='linear', *, threads=None):
     """Heights at places between scattered samples, as scipy.interpolate.griddata.
 
-    samples: shape (n, 3): x, y and the value; of samples at one place the last counts. places: shape (m, 2). method: 'linear' (in Delaunay's triangles), 'natural' (Sibson's
-    natural neighbours) or 'nearest'. Returns: float64, shape (m,); NaN outside the hull, but for 'nearest'. Raises: ValueError.
-    About a microsecond a sample and half of one a place. For gradients, or to ask again, see Delaunay2.heights().
+    samples: shape (n, 3): x, y and the value; of samples at one place the last counts. places: shape (m, 2). method:
+    'linear' (in Delaunay's triangles), 'natural' (Sibson's natural neighbours) or 'nearest'. Returns: float64, shape (m,);
+    NaN outside the hull, but for 'nearest'. Raises: ValueError. For gradients, or to ask more than once, see
+    Delaunay2.heights().
 
     >>> interpolate([[0, 0, 1], [1, 0, 2], [0, 1, 3]], [[0.25, 0.5], [2, 2]])
     array([2.25,  nan])

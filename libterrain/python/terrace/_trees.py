@@ -28,8 +28,8 @@ class MatchingTree:
 def matching_tree(points, *, weights=None, labels=None, threads=None):
     """The binary tree of repeated matching: points are matched, each pair becomes a point, and so on until one is left.
 
-    points: shape (n, 2) or (n, 3), finite. weights: positive, one a point. labels: whole numbers; each label's points become
-    a tree, then the roots are matched. Twice the time of one matching(). Raises: ValueError. Source: J. Skala, 7.5.1.
+    points: shape (n, 2) or (n, 3), finite. weights: positive, one for each point. labels: whole numbers; the points
+    of each label become a tree, then the roots are matched. About twice the time of one matching(). Raises: ValueError. Source: J. Skala, 7.5.1.
 
     >>> matching_tree([[0, 0], [5, 0], [0, 1], [5, 1]]).rows
     array([[0., 2., 1., 2.],
@@ -142,8 +142,8 @@ class TriangleTree(_Tree):
         self._core = _core.TriangleTree(_children(tree, middles), vertices, triangles)
 
     def nearest(self, places):
-        """The nearest triangle of each place, shape (m, 3), of equally near ones the first. Returns: (numbers, int64, and distances); -1 and infinity
-        if there is none. Raises: ValueError."""
+        """The nearest triangle of each place, shape (m, 3), of equally near ones the first. Returns: (numbers, int64, and
+        distances, float64); -1 and infinity if there are no triangles. Raises: ValueError."""
         return self._core.nearest(as_rows(places, 'places', (3,)))
 
     def hit(self, origins, directions):

@@ -127,7 +127,8 @@ class Queries(unittest.TestCase):
         mesh = terrace.bounded_mesh(np.sin(x / 3.0) + y / 9, 0.1)
         tree = terrace.TriangleTree(*mesh)
         found, t = tree.hit([[10.3, -10.4, 100]], [[0, 0, -1]])
-        height = terrace.interpolate(np.column_stack((x.ravel() + 0.5, -y.ravel() - 0.5, (np.sin(x / 3.0) + y / 9).ravel())), [[10.3, -10.4]])
+        samples = np.column_stack((x.ravel() + 0.5, -y.ravel() - 0.5, (np.sin(x / 3.0) + y / 9).ravel()))
+        height = terrace.interpolate(samples, [[10.3, -10.4]])
         self.assertAlmostEqual(100 - t[0], height[0], delta=0.2)
         self.assertIn('triangles', repr(tree))
 
