@@ -369,6 +369,19 @@ class Sources(StoreCase):
         self.assertEqual(len(terrace.build([text], self.path('text'))), 500)
 
 
+class Paths(StoreCase):
+    def test_an_empty_path_is_an_error_of_the_system(self):
+        with self.assertRaises((OSError, ValueError, terrace.Error)):
+            terrace.build(self.points, '')
+        here = os.getcwd()
+        os.chdir(self.folder)
+        try:
+            with self.assertRaises((OSError, ValueError, terrace.Error)):
+                terrace.build('cloud', '')
+        finally:
+            os.chdir(here)
+
+
 class Lines(StoreCase):
     def test_lines_come_back(self):
         random = np.random.default_rng(21)
