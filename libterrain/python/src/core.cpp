@@ -2,6 +2,7 @@
 #include "core.hpp"
 
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 
@@ -27,6 +28,9 @@ void translate(std::exception_ptr thrown) {
     }
   } catch (const terrain::UsageError& error) {
     PyErr_SetString(PyExc_ValueError, error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    const py::tuple arguments = py::make_tuple(error.code().value(), error.what());
+    PyErr_SetObject(PyExc_OSError, arguments.ptr());
   } catch (const py::cast_error&) {
     PyErr_SetString(PyExc_TypeError, "an argument has a type that cannot be used here");
   } catch (const stream::Stopped&) {
@@ -50,6 +54,10 @@ PYBIND11_MODULE(_core, module) {
   bind_tiles(module);
   bind_view(module);
   bind_delaunay(module);
+  bind_samples(module);
+  bind_shape(module);
+  bind_tin(module);
+  bind_trees(module);
   bind_cluster(module);
   bind_matching(module);
 }

@@ -17,6 +17,10 @@ void bind_mesh(py::module_& module);
 void bind_tiles(py::module_& module);
 void bind_view(py::module_& module);
 void bind_delaunay(py::module_& module);
+void bind_samples(py::module_& module);
+void bind_shape(py::module_& module);
+void bind_tin(py::module_& module);
+void bind_trees(py::module_& module);
 void bind_cluster(py::module_& module);
 void bind_matching(py::module_& module);
 

@@ -1,227 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <atomic>
-#include <limits>
-#include <mutex>
-#include <string>
-#include <vector>
+#include "delaunay.hpp"
 
-#include <terrace/tri/delaunay2.hpp>
-#include <terrace/tri/delaunay3.hpp>
+#include <optional>
+#include <tuple>
 
-#include "arrays.hpp"
-#include "call.hpp"
+#include <pybind11/stl.h>
 
 namespace terrace::python {
 namespace {
 
-template <std::size_t N>
-struct Triangulation;
-template <>
-struct Triangulation<2> {
-  using Type = tri::Delaunay2<double>;
-  using Simplex = tri::TriangleId;
-  static auto all(const Type& of) { return of.all_triangles(); }
-  static std::size_t count(const Type& of) { return of.triangle_count(); }
-  static std::uint32_t slots(const Type& of) { return of.triangle_slots(); }
-  static Simplex found(const Type& of, const Type::Point& p, tri::VertexId& hint) {
-    const tri::Location at = of.locate(p, hint);
-    hint = at.vertex;
-    return at.place == tri::Place::kOutside ? tri::kNoTriangle : at.triangle;
-  }
-};
-template <>
-struct Triangulation<3> {
-  using Type = tri::Delaunay3<double>;
-  using Simplex = tri::TetrahedronId;
-  static auto all(const Type& of) { return of.all_tetrahedra(); }
-  static std::size_t count(const Type& of) { return of.tetrahedron_count(); }
-  static std::uint32_t slots(const Type& of) { return of.tetrahedron_slots(); }
-  static Simplex found(const Type& of, const Type::Point& p, tri::VertexId& hint) {
-    const tri::Location3 at = of.locate(p, hint);
-    hint = at.vertex;
-    return at.place == tri::Place3::kOutside ? tri::kNoTetrahedron : at.tetrahedron;
-  }
-};
-
-/// A triangulation that Python's threads may share: one works on it at a time.
-template <std::size_t N>
-class SharedDelaunay {
- public:
-  using Kind = Triangulation<N>;
-  using Point = std::array<double, N>;
-
-  py::array_t<std::int32_t> insert(const Array<double>& given) {
-    const auto points = rows_of<N>(given, "points");
-    return to_array(locked(points.size(), [&] {
-      std::vector<std::int32_t> handles(points.size());
-      if (mesh_.vertex_count() == 0) {
-        const std::vector<tri::VertexId> made = mesh_.build(points);
-        for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i]);
-        return handles;
-      }
-      std::vector<typename Kind::Type::Insertion> made(points.size());
-      mesh_.insert(points, made);
-      for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i].vertex);
-      return handles;
-    }));
-  }
-
-  void remove(const Array<std::int32_t>& given) {
-    const auto handles = numbers_of(given, "vertices");
-    locked(handles.size(), [&] {
-      const std::vector<tri::VertexId> vertices = checked(handles);
-      std::vector<std::int32_t> sorted(handles.begin(), handles.end());
-      std::sort(sorted.begin(), sorted.end());
-      const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
-      if (twice != sorted.end()) {
-        throw std::invalid_argument("vertex " + std::to_string(*twice) + " is named twice");
-      }
-      mesh_.remove(vertices);
-      return 0;
-    });
-  }
-
-  [[nodiscard]] py::array_t<double> points() {
-    return to_array(locked(size_, [&] {
-      constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-      Point none;
-      none.fill(kNan);
-      std::vector<Point> places(mesh_.vertex_slots(), none);
-      for (const tri::VertexId v : mesh_.all_vertices()) places[slot(v)] = mesh_.point(v);
-      return places;
-    }));
-  }
-
-  [[nodiscard]] py::array_t<std::int32_t> vertices() {
-    return to_array(locked(size_, [&] {
-      std::vector<std::int32_t> handles;
-      handles.reserve(mesh_.vertex_count());
-      for (const tri::VertexId v : mesh_.all_vertices()) handles.push_back(handle(v));
-      return handles;
-    }));
-  }
-
-  [[nodiscard]] py::array_t<std::int32_t> simplices() {
-    return to_array(locked(size_, [&] {
-      std::vector<std::array<std::int32_t, N + 1>> rows;
-      rows.reserve(Kind::count(mesh_));
-      for (const auto s : Kind::all(mesh_)) {
-        const auto corners = mesh_.vertices(s);
-        auto& row = rows.emplace_back();
-        for (std::size_t i = 0; i <= N; ++i) row[i] = handle(corners[i]);
-      }
-      return rows;
-    }));
-  }
-
-  [[nodiscard]] py::array_t<std::int32_t> neighbours() {
-    return to_array(locked(size_, [&] {
-      const std::vector<std::int32_t> rank = rows_of_simplices();
-      std::vector<std::array<std::int32_t, N + 1>> rows;
-      rows.reserve(Kind::count(mesh_));
-      for (const auto s : Kind::all(mesh_)) {
-        const auto around = mesh_.neighbours(s);
-        auto& row = rows.emplace_back();
-        for (std::size_t i = 0; i <= N; ++i) {
-          row[i] = mesh_.alive(around[i]) ? rank[slot(around[i])] : -1;
-        }
-      }
-      return rows;
-    }));
-  }
-
-  [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& given) {
-    const auto places = rows_of<N>(given, "points");
-    return to_array(locked(places.size() + size_, [&] {
-      const std::vector<std::int32_t> rank = rows_of_simplices();
-      std::vector<std::int32_t> found(places.size(), -1);
-      tri::VertexId hint = tri::kNoVertex;
-      for (std::size_t i = 0; i < places.size(); ++i) {
-        if (!finite(places[i])) continue;
-        const auto s = Kind::found(mesh_, places[i], hint);
-        if (mesh_.alive(s)) found[i] = rank[slot(s)];
-      }
-      return found;
-    }));
-  }
-
-  [[nodiscard]] py::array_t<std::int32_t> nearest(const Array<double>& given) {
-    const auto places = rows_of<N>(given, "points");
-    return to_array(locked(places.size(), [&] {
-      std::vector<std::int32_t> found(places.size(), -1);
-      tri::VertexId last = tri::kNoVertex;
-      for (std::size_t i = 0; i < places.size(); ++i) {
-        if (!finite(places[i])) continue;
-        last = mesh_.nearest(places[i], last);
-        if (last != tri::kNoVertex) found[i] = handle(last);
-      }
-      return found;
-    }));
-  }
-
-  [[nodiscard]] std::size_t size() {
-    return locked(0, [&] { return mesh_.vertex_count(); });
-  }
-  [[nodiscard]] std::size_t count() {
-    return locked(0, [&] { return Kind::count(mesh_); });
-  }
-  [[nodiscard]] std::uint64_t hash() {
-    return locked(size_, [&] { return mesh_.hash(); });
-  }
-
- private:
-  static std::int32_t handle(tri::VertexId vertex) { return static_cast<std::int32_t>(vertex); }
-  static bool finite(const Point& p) {
-    return std::all_of(p.begin(), p.end(), [](double c) { return c - c == 0; });
-  }
-
-  /// For much work signals are looked for.
-  template <class Work>
-  auto locked(std::size_t items, Work&& work) {
-    constexpr std::size_t kMuch = 10000;
-    const auto alone = [&] {
-      const std::lock_guard lock(mutex_);
-      auto result = work();
-      size_ = mesh_.vertex_count();
-      return result;
-    };
-    if (items > kMuch) return released(alone);
-    const py::gil_scoped_release open;
-    return alone();
-  }
-
-  std::vector<tri::VertexId> checked(std::span<const std::int32_t> handles) const {
-    std::vector<tri::VertexId> vertices;
-    vertices.reserve(handles.size());
-    for (const std::int32_t number : handles) {
-      const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
-      if (number < 0 || !mesh_.alive(vertex)) {
-        throw std::invalid_argument("there is no vertex " + std::to_string(number));
-      }
-      vertices.push_back(vertex);
-    }
-    return vertices;
-  }
-
-  /// The row of each simplex in simplices(), by slot.
-  std::vector<std::int32_t> rows_of_simplices() const {
-    std::vector<std::int32_t> rank(Kind::slots(mesh_), -1);
-    std::int32_t next = 0;
-    for (const auto s : Kind::all(mesh_)) rank[slot(s)] = next++;
-    return rank;
-  }
-
-  std::mutex mutex_;
-  typename Kind::Type mesh_;           ///< under the mutex only
-  std::atomic<std::size_t> size_ = 0;  ///< vertices after the last piece of work
-};
-
-template <std::size_t N>
-void bind_triangulation(py::module_& module, const char* name) {
-  using Shared = SharedDelaunay<N>;
-  py::class_<Shared>(module, name)
-      .def(py::init<>())
+template <std::size_t N, class Metric>
+auto bind_triangulation(py::module_& module, const char* name) {
+  using Shared = SharedDelaunay<N, Metric>;
+  return py::class_<Shared>(module, name)
       .def("insert", &Shared::insert)
       .def("remove", &Shared::remove)
       .def("points", &Shared::points)
@@ -235,11 +26,72 @@ void bind_triangulation(py::module_& module, const char* name) {
       .def("hash", &Shared::hash);
 }
 
+/// Maps with their boxes (lower corner, upper corner).
+template <std::size_t N>
+using MetricRegions =
+    std::vector<std::tuple<std::array<double, N>, std::array<double, N>, tri::LinearMap<N>>>;
+
+template <std::size_t N>
+tri::MetricField<N> field_of(const MetricRegions<N>& given) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::vector<typename tri::MetricField<N>::Region> regions;
+  for (const auto& [lower, upper, map] : given) {
+    auto& region = regions.emplace_back();
+    region.box.min.fill(-kInfinity);
+    region.box.max.fill(kInfinity);
+    std::copy(lower.begin(), lower.end(), region.box.min.begin());
+    std::copy(upper.begin(), upper.end(), region.box.max.begin());
+    region.map = map;
+  }
+  return tri::MetricField<N>(std::move(regions));
+}
+
+template <class Id, std::size_t N>
+std::vector<std::array<std::int32_t, N>> numbers_of_corners(
+    const std::vector<std::array<Id, N>>& simplices) {
+  std::vector<std::array<std::int32_t, N>> rows(simplices.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = 0; k < N; ++k) {
+      rows[i][k] = static_cast<std::int32_t>(simplices[i][k]);
+    }
+  }
+  return rows;
+}
+
+/// Triangles adapted to a metric for each region.
+py::array adapted2(SharedDelaunay2& shared, const MetricRegions<2>& regions) {
+  const tri::MetricField2 field = field_of<2>(regions);
+  return to_array(shared.read(
+      0, [&](const auto& mesh) { return numbers_of_corners(metric_triangles(mesh, field)); }));
+}
+
+/// (tetrahedra, facets where no flip is possible)
+py::tuple adapted3(SharedDelaunay3& shared, const MetricRegions<3>& regions) {
+  const tri::MetricField3 field = field_of<3>(regions);
+  const tri::MetricTetrahedra made =
+      shared.read(0, [&](const auto& mesh) { return metric_tetrahedra(mesh, field); });
+  return py::make_tuple(to_array(numbers_of_corners(made.tetrahedra)), made.stuck);
+}
+
 }  // namespace
 
 void bind_delaunay(py::module_& module) {
-  bind_triangulation<2>(module, "SharedDelaunay2");
-  bind_triangulation<3>(module, "SharedDelaunay3");
+  bind_triangulation<2, tri::Euclidean>(module, "SharedDelaunay2")
+      .def(py::init<>())
+      .def("adapted", &adapted2);
+  bind_triangulation<3, tri::Euclidean>(module, "SharedDelaunay3")
+      .def(py::init<>())
+      .def("adapted", &adapted3);
+  bind_triangulation<2, tri::EllipticalMetric2>(module, "EllipticalDelaunay2")
+      .def(py::init([](const tri::LinearMap2& map) {
+        return std::make_unique<SharedDelaunay<2, tri::EllipticalMetric2>>(map);
+      }));
+  bind_triangulation<3, tri::EllipticalMetric3>(module, "EllipticalDelaunay3")
+      .def(py::init([](const tri::LinearMap3& map) {
+        return std::make_unique<SharedDelaunay<3, tri::EllipticalMetric3>>(map);
+      }));
+  module.def("ellipse_map", py::overload_cast<double, double, double>(&tri::ellipse_map));
+  module.def("ellipsoid_map", &tri::ellipsoid_map);
 }
 
 }  // namespace terrace::python

@@ -6,7 +6,9 @@
 
 #include <terrace/matching/assignment.hpp>
 #include <terrace/matching/large_matching.hpp>
+#include <terrace/matching/matching.hpp>
 #include <terrace/matching/point_assignment.hpp>
+#include <terrace/matching/sparse_assignment.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -51,12 +53,49 @@ py::tuple match(const Array<double>& given, std::size_t exact_limit, std::size_t
                         made.optimal);
 }
 
+/// Compressed rows; the same.
+py::tuple assign_sparse(const Array<std::uint64_t>& begin, const Array<std::uint32_t>& column,
+                        const Array<double>& cost, std::size_t columns) {
+  const auto offsets = numbers_of(begin, "offsets of rows");
+  const std::vector<std::size_t> starts(offsets.begin(), offsets.end());
+  const matching::SparseCosts costs{.columns = columns,
+                                    .begin = starts,
+                                    .column = numbers_of(column, "columns"),
+                                    .cost = numbers_of(cost, "costs")};
+  return arrays_of_assignment(released([&] { return matching::assign_sparse(costs); }));
+}
+
+/// As match(), of a graph.
+py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
+                      const Array<double>& weights) {
+  const auto pairs = rows_of<2>(ends, "edges");
+  const auto costs = numbers_of(weights, "weights");
+  if (pairs.size() != costs.size()) {
+    throw py::value_error("there are " + std::to_string(costs.size()) + " weights of " +
+                          std::to_string(pairs.size()) + " edges");
+  }
+  double bound = 0;
+  const matching::Matching made = released([&] {
+    std::vector<matching::WeightedEdge> edges;
+    edges.reserve(pairs.size());
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      edges.push_back({pairs[i][0], pairs[i][1], costs[i]});
+    }
+    matching::Matching result = matching::min_weight_perfect_matching(vertices, edges);
+    bound = result.dual_bound();
+    return result;
+  });
+  return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, bound, true);
+}
+
 }  // namespace
 
 void bind_matching(py::module_& module) {
   module.def("assign", &assign<double>, py::arg().noconvert());
   module.def("assign", &assign<float>, py::arg().noconvert());
   module.def("assign", &assign<std::int32_t>, py::arg().noconvert());
+  module.def("assign_sparse", &assign_sparse);
+  module.def("match_edges", &match_edges);
   module.def("assign_points", [](const Array<double>& a, const Array<double>& b) {
     return a.ndim() == 2 && a.shape(1) == 3 ? assign_places<3>(a, b) : assign_places<2>(a, b);
   });

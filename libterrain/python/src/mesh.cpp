@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <pybind11/stl.h>
 #include <terrace/stream/mesh_reader.hpp>
 #include <terrace/terrain/bounded_mesh.hpp>
+#include <terrace/terrain/detail_lines.hpp>
 #include <terrace/terrain/detail_mesh.hpp>
 #include <terrace/terrain/scan_surface.hpp>
 
@@ -40,13 +42,33 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   }));
 }
 
+/// As arrays_of(), and the tetrahedra inside the surface in place of its triangles if asked for.
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
-                  const std::string& where, const py::tuple& how) {
+                  const std::string& where, bool tetrahedra, const py::tuple& how) {
   const stream::Store store = open.get();
   const terrain::Detail detail = detail_of(store, level, region, py::list(), where);
-  return arrays_of(Job(how).run([&](const terrain::Context& context) {
-    return scan_surface(store, detail, {}, context).mesh;
-  }));
+  terrain::ScanSurface made = Job(how).run([&](const terrain::Context& context) {
+    return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
+  });
+  if (!tetrahedra) return arrays_of(std::move(made.mesh));
+  return py::make_tuple(to_array(std::move(made.mesh.positions)),
+                        to_array(std::move(made.tetrahedra)));
+}
+
+/// (vertices, the first vertex of each line and their number, the number of each line)
+py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
+                const py::list& focuses, const std::string& where, const py::tuple& how) {
+  const stream::Store store = open.get();
+  const terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  terrain::LineSet made = Job(how).run(
+      [&](const terrain::Context& context) { return detail_lines(store, detail, context); });
+  std::vector<std::int64_t> begins{0}, numbers;
+  for (const terrain::LineSet::Line& line : made.lines) {
+    begins.push_back(static_cast<std::int64_t>(line.end));
+    numbers.push_back(line.number);
+  }
+  return py::make_tuple(to_array(std::move(made.vertices)), to_array(std::move(begins)),
+                        to_array(std::move(numbers)));
 }
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
@@ -92,6 +114,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
 void bind_mesh(py::module_& module) {
   module.def("mesh", &mesh);
   module.def("surface", &surface);
+  module.def("lines", &lines);
   module.def("bounded_mesh", &bounded_mesh);
   module.def("read_mesh", [](const std::string& path) {
     auto file = released([&] { return stream::read_mesh(path); });

@@ -183,6 +183,10 @@ terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::
   return detail;
 }
 
+std::string text_of(const stream::Problem& problem) {
+  return problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what;
+}
+
 std::optional<terrain::Transformation> change_to(const stream::Store& store,
                                                  const std::string& crs) {
   if (crs.empty()) return std::nullopt;
@@ -202,8 +206,7 @@ void bind_store(py::module_& module) {
         return Job(how).run([&](const terrain::Context& context) {
           std::vector<std::string> faults;
           store.with_stop(context.stop).verify([&](const stream::Problem& problem) {
-            faults.push_back(problem.file + ": byte " + std::to_string(problem.offset) + ": " +
-                             problem.what);
+            faults.push_back(text_of(problem));
           });
           return faults;
         });

@@ -39,6 +39,9 @@ class OpenStore {
 terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
                           const py::list& focuses, const std::string& where);
 
+/// File, place and what is wrong there.
+std::string text_of(const stream::Problem& problem);
+
 /// To the CRS of that name; nullopt for an empty one.
 std::optional<terrain::Transformation> change_to(const stream::Store& store,
                                                  const std::string& crs);

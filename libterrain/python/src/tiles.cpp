@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <optional>
 #include <string>
 
 #include <pybind11/stl.h>
+#include <terrace/terrain/tile_check.hpp>
 #include <terrace/terrain/tiles.hpp>
 
 #include "arrays.hpp"
@@ -10,6 +12,15 @@
 
 namespace terrace::python {
 namespace {
+
+terrain::HeightReference reference_named(const std::string& name) {
+  using terrain::HeightReference;
+  return named<HeightReference>(name, "vertical",
+                                {{"recorded", HeightReference::recorded},
+                                 {"ellipsoidal", HeightReference::ellipsoidal},
+                                 {"orthometric", HeightReference::orthometric},
+                                 {"ignore", HeightReference::ignore}});
+}
 
 terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& given) {
   terrain::TilesRequest request{.folder = folder};
@@ -31,24 +42,55 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
     take_option(given, name, value);
     return value;
   };
-  using tri::TinQuality, terrain::Fill, terrain::HeightReference;
+  using tri::TinQuality, terrain::Fill;
   request.quality = named<TinQuality>(text("quality", "removal"), "quality",
                                       {{"greedy", TinQuality::kGreedy},
                                        {"removal", TinQuality::kRemoval},
                                        {"fitted", TinQuality::kFitted}});
-  request.vertical = named<HeightReference>(text("vertical", "recorded"), "vertical",
-                                            {{"recorded", HeightReference::recorded},
-                                             {"ellipsoidal", HeightReference::ellipsoidal},
-                                             {"orthometric", HeightReference::orthometric},
-                                             {"ignore", HeightReference::ignore}});
+  request.vertical = reference_named(text("vertical", "recorded"));
   request.fill = named<Fill>(text("fill", "interpolate"), "fill",
                              {{"flat", Fill::flat}, {"interpolate", Fill::interpolate}});
   return request;
 }
 
+/// open: the store to compare heights with, or null.
+py::dict check_tiles(const std::string& folder, const OpenStore* open,
+                     std::optional<double> max_error, const std::string& vertical,
+                     const std::string& geoid, const py::tuple& how) {
+  if (!terrain::is_tile_folder(folder)) throw py::value_error(folder + " holds no set of tiles");
+  std::optional<stream::Store> store;
+  if (open != nullptr) store = open->get();
+  const terrain::TileCheckRequest request{.folder = folder,
+                                          .max_error = max_error,
+                                          .store = store ? &*store : nullptr,
+                                          .vertical = reference_named(vertical),
+                                          .geoid = geoid};
+  const terrain::TileCheckResult made = Job(how).run(
+      [&](const terrain::Context& context) { return terrain::check_tiles(request, context); });
+  py::dict result;
+  py::list faults, zooms;
+  for (const stream::Problem& problem : made.problems) faults.append(text_of(problem));
+  for (const terrain::ZoomCheck& of : made.zooms) {
+    py::dict zoom;
+    zoom["zoom"] = of.zoom;
+    zoom["tiles"] = of.tiles;
+    zoom["samples"] = of.samples;
+    zoom["uncovered"] = of.uncovered;
+    zoom["max_error"] = of.max_error;
+    zooms.append(zoom);
+  }
+  result["faults"] = faults;
+  result["tiles"] = made.tiles;
+  result["samples"] = made.samples;
+  result["torn"] = made.torn;
+  result["zooms"] = zooms;
+  return result;
+}
+
 }  // namespace
 
 void bind_tiles(py::module_& module) {
+  module.def("check_tiles", &check_tiles);
   module.def("write_tiles", [](const OpenStore& open, const std::string& folder,
                                const py::dict& given, const py::tuple& how) {
     const stream::Store store = open.get();

@@ -3,8 +3,8 @@
 
 ``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters. From
 a ``Store`` come points, meshes, heights, contours, tiles and live views at any level of detail. Beside
-it stand the methods that it is made of: ``Delaunay2`` and ``Delaunay3``, ``linkage``, ``kmeans``,
-``cluster``, ``assignment`` and ``matching``.
+it stand the methods that it is made of: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
+``linkage``, ``kmeans``, ``cluster``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``.
 
 Long calls release the interpreter's lock, use all cores unless ``threads`` says otherwise, and end soon
 after Ctrl-C. Results depend on the input and the options alone, not on threads or machine.
@@ -27,18 +27,23 @@ Errors: ``ValueError`` for arguments that make no sense, ``TypeError`` for objec
 (True, True)
 """
 
-from ._clustering import Clusters, KMeans, cluster, flat_clusters, kmeans, linkage
+from ._clustering import Clusters, KMeans, cluster, facility_location, flat_clusters, kmeans, linkage, spanning_tree
 from ._core import Error
-from ._delaunay import Delaunay2, Delaunay3
-from ._matching import Assignment, Matching, assignment, matching
+from ._delaunay import Delaunay2, Delaunay3, Shape, ellipse, ellipsoid
+from ._matching import Assignment, Matching, assignment, edge_matching, matching
 from ._mesh import BoundedMesh, Mesh
 from ._raster import Raster
 from ._store import FeatureCollection, Store, build, xyz
+from ._tiles import verify_tiles
+from ._tin import bounded_mesh, interpolate
+from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree
 from ._view import View, ViewDelta
 
 __version__ = '0.1.0'
 __all__ = [
     'Assignment', 'BoundedMesh', 'Clusters', 'Delaunay2', 'Delaunay3', 'Error', 'FeatureCollection', 'KMeans',
-    'Matching', 'Mesh', 'Raster', 'Store', 'View', 'ViewDelta', 'assignment', 'build', 'cluster',
-    'flat_clusters', 'kmeans', 'linkage', 'matching', 'xyz',
+    'Matching', 'MatchingTree', 'Mesh', 'PointTree', 'Raster', 'Shape', 'Store', 'TriangleTree', 'View',
+    'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'edge_matching', 'ellipse', 'ellipsoid',
+    'facility_location', 'flat_clusters', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree',
+    'spanning_tree', 'verify_tiles', 'xyz',
 ]

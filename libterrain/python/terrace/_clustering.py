@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clustering in memory: facility location, linkage, k-means."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,17 +19,38 @@ def _weights(weights):
 
 
 def linkage(points, method='single', *, threads=None):
-    """Single or complete linkage of points with Euclidean distances.
+    """Single or complete linkage of points with Euclidean distances, or complete linkage of given distances.
 
-    points: shape (n, 2) or (n, 3), finite. Returns: float64, shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the
-    two clusters of each merge, its height and the number of points; the merges ascend. 'single' takes O(n log n);
-    'complete' O(n^2) and 4 n^2 bytes. Source: J. Skala, 4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree.
+    points: shape (n, 2) or (n, 3), finite; or the distances of all pairs in one dimension, as
+    scipy.spatial.distance.pdist. Returns: float64, shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the two clusters
+    of each merge, its height and the number of points; the merges ascend. 'single' takes O(n log n); 'complete' O(n^2)
+    and 4 n^2 bytes. Raises: ValueError. Source: J. Skala, 4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree.
 
     >>> linkage([[0, 0], [1, 0], [5, 0]])
     array([[0., 1., 1., 2.],
            [2., 3., 4., 3.]])
     """
-    return _core.linkage(as_rows(points, 'points'), method, _threads(threads))
+    array = as_numbers(points, 'points')
+    if array.ndim == 1 and array.size > 0:
+        if method != 'complete':
+            raise ValueError("of distances there is only method='complete'")
+        count = (1 + math.isqrt(1 + 8 * array.size)) // 2
+        if count * (count - 1) // 2 != array.size:
+            raise ValueError(f'{array.size} distances are not those of all pairs')
+        return _core.linkage_of_distances(count, array, _threads(threads))
+    return _core.linkage(as_rows(array, 'points'), method, _threads(threads))
+
+
+def spanning_tree(points, *, threads=None):
+    """The minimum spanning tree of points: the lines of least total length that connect all.
+
+    points: shape (n, 2) or (n, 3), finite. Returns: (edges, uint32, shape (n - 1, 2), numbers of points; their lengths,
+    float64), in no particular order. O(n log n). Raises: ValueError. Source: O. Boruvka, 1926.
+
+    >>> spanning_tree([[0, 0], [5, 0], [1, 0]])[1].sum()
+    5.0
+    """
+    return _core.spanning_tree(as_rows(points, 'points'), _threads(threads))
 
 
 def flat_clusters(rows, *, count=None, height=None):
@@ -104,7 +126,7 @@ class Clusters:
 
 
 def cluster(points, facility_cost=1.0, *, count=None, method='fast', effort='default', metric='euclidean', weights=None,
-            outlier_price=float('inf'), seed=1, threads=None):
+            outlier_price=float('inf'), seed=1, bound_steps=0, threads=None):
     """Facility location: clusters whose number is not given but costs; or, with ``count``, k-median: exactly so many.
 
     Each cluster costs ``facility_cost`` times the diagonal of the points' bounding box, each point its (weighted) distance
@@ -115,6 +137,7 @@ def cluster(points, facility_cost=1.0, *, count=None, method='fast', effort='def
     'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities'; on the matrix of distances (8 n^2 bytes) 'interchange',
     'jain-vazirani', 'greedy-stars'. effort: 'fast', 'default', 'fine', 'full'. metric: 'euclidean', 'squared',
     'minkowski:P', 'elliptical:FILE'. outlier_price: what leaving a point out costs, times the diagonal.
+    bound_steps: subgradient steps of a search for lower_bound, some 100; 0: none. Not used with ``count``.
 
     Sources: J. Skala, 4.2.3, 7.1, 7.3; of k-median L. O'Callaghan et al., 2002.
 
@@ -125,4 +148,34 @@ def cluster(points, facility_cost=1.0, *, count=None, method='fast', effort='def
     count = None if count is None else whole(count, 'count', 1)
     return Clusters(*_core.facility_location(as_rows(points, 'points'), float(facility_cost), count, method, effort, metric,
                                              _weights(weights), float(outlier_price), whole(seed, 'seed'),
-                                             _threads(threads)))
+                                             whole(bound_steps, 'bound_steps'), _threads(threads)))
+
+
+def facility_location(connection, opening=None, *, count=None, method='interchange', effort='default', seed=1, bound_steps=300,
+                      threads=None):
+    """Facility location with any costs: which facilities to open, and which of them serves each client.
+
+    connection: shape (facilities, clients), not negative; a matrix of distances for entities of any kind. opening: the
+    cost of each facility, or one for all. With ``count`` exactly so many open, at no cost (k-median). method:
+    'interchange', 'jain-vazirani', 'greedy-stars'. bound_steps: the steps of a search for lower_bound; 0: none. Each takes
+    O(facilities * clients); 12 bytes per entry of the matrix.
+
+    Returns: Clusters, whose facilities are rows and whose labels are of clients. Raises: ValueError. Sources: J. Skala,
+    4.2.3, 7.3; D. Erlenkotter, 1978.
+
+    >>> found = facility_location([[1, 9, 9], [9, 1, 2]], 3)
+    >>> found.facilities, found.labels, found.cost, found.lower_bound > 9.9
+    (array([0, 1], dtype=uint32), array([0, 1, 1]), 10.0, True)
+    """
+    connection = as_numbers(connection, 'connection')
+    if connection.ndim != 2:
+        raise ValueError(f'connection costs have two dimensions, not {connection.ndim}')
+    if opening is None:
+        if count is None:
+            raise ValueError('facility_location() needs `opening` or `count`')
+        opening = 0
+    if np.ndim(opening) == 0:
+        opening = np.full(len(connection), opening)
+    opening = as_numbers(opening, 'opening')
+    return Clusters(*_core.facility_matrix(connection, opening, None if count is None else whole(count, 'count', 1), method, effort,
+                                           whole(seed, 'seed'), whole(bound_steps, 'bound_steps'), _threads(threads)))

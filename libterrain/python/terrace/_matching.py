@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import _core
-from ._arrays import as_array, as_rows, whole
+from ._arrays import as_array, as_numbers, as_rows, whole
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ def assignment(costs, columns=None):
     """The assignment of rows to columns of least cost (Kuhn-Munkres).
 
     costs: shape (rows, columns); float64, float32 and int32 are taken as they are. With two arguments: two sets of
-    points, shape (n, 2) or (n, 3), by Euclidean distance, whose matrix is never made. O(n^3) at worst.
+    points, shape (n, 2) or (n, 3), by Euclidean distance, whose matrix is never made. Of a sparse matrix of
+    scipy.sparse only the stored pairs may be chosen; if they allow no assignment, ValueError is raised. O(n^3) at worst.
     Source: J. Skala, 4.3.1; R. Jonker, A. Volgenant, 1987.
 
     >>> assignment([[4, 1, 3], [2, 0, 5], [3, 2, 2]])
@@ -43,6 +44,9 @@ def assignment(costs, columns=None):
     if columns is not None:
         a = as_rows(costs, 'the rows\' points')
         return Assignment(*_core.assign_points(a, as_rows(columns, 'the columns\' points', a.shape[1:])))
+    if hasattr(costs, 'tocsr'):
+        rows = costs.tocsr()
+        return Assignment(*_core.assign_sparse(rows.indptr, rows.indices, as_numbers(rows.data, 'costs'), rows.shape[1]))
     array = as_array(costs, 'costs')
     if array.ndim != 2:
         raise ValueError(f'costs must have two dimensions, not {array.ndim}')
@@ -84,6 +88,31 @@ def matching(points, *, exact_limit=500_000, window=50_000, rounds=8, threads=No
     """
     return Matching(*_core.match_points(as_rows(points, 'points'), whole(exact_limit, 'exact_limit', 1), whole(window, 'window', 4),
                                         whole(rounds, 'rounds'), _threads(threads)))
+
+
+def edge_matching(edges, weights, count=None):
+    """The perfect matching of least weight of a graph.
+
+    edges: whole numbers, shape (m, 2): vertices 0, 1, ..; parallel ones are allowed. weights: one for each edge, of any
+    sign. count: the number of vertices, by default the largest named and one. Optimal for weights rounded to 2^-52 of the
+    largest. Returns: a Matching. Raises: ValueError if there is no perfect matching. Source: J. Edmonds, 1965;
+    V. Kolmogorov, 2009.
+
+    >>> edge_matching([[0, 1], [1, 2], [2, 3], [3, 0]], [5, 1, 5, 2])
+    <terrace.Matching: 2 pairs, cost 3, optimal>
+    """
+    edges = as_array(edges, 'edges')
+    if edges.size == 0:
+        edges = np.empty((0, 2), np.uint32)
+    if edges.dtype.kind not in 'iu':
+        raise TypeError(f'edges are whole numbers, not {edges.dtype}')
+    largest = int(edges.max()) if edges.size else -1
+    if edges.min(initial=0) < 0 or largest >= 2 ** 32 - 1:
+        raise ValueError('edges have ends that are no vertices')
+    count = largest + 1 if count is None else whole(count, 'count')
+    if count > 2 * len(edges):
+        raise ValueError(f'{len(edges)} edges cannot match {count} vertices')
+    return Matching(*_core.match_edges(count, edges.astype(np.uint32), as_numbers(weights, 'weights')))
 
 
 def _threads(threads):

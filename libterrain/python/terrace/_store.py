@@ -336,14 +336,27 @@ class Store:
         return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
                                 metric, (crs_text(crs) or ''), job(progress, threads, memory)))
 
-    def surface(self, level=0, region=None, where=None, *, progress=None, threads=None, memory=None):
+    def lines(self, level=0, region=None, where=None, *, focus=(), progress=None, threads=None, memory=None):
+        """The lines of a store that was built with ``entities`` 'segments' or 'polylines', of mixed levels of detail.
+
+        level, region, where, focus: as points(); a piece is where its first vertex is. Returns: (lines, a list of
+        float64 arrays of shape (n, 3), n >= 2; the number of each in the order in which they were read, int64): a line of which
+        something is not wanted comes in several. Raises: ValueError for a store of something else. All in memory.
+        """
+        vertices, begins, numbers = _core.lines(self._core, whole(level, 'level'), as_region(region), self._focuses(focus),
+                                                where or '', job(progress, threads, memory))
+        return np.split(vertices, begins[1:-1]) if len(numbers) else [], numbers
+
+    def surface(self, level=0, region=None, where=None, *, tetrahedra=False, progress=None, threads=None, memory=None):
         """The surface that a scan was taken from: of any shape, in space, through its points. All in memory.
 
         level, region, where: as points(). Returns: a Mesh, whose triangles are counter-clockwise seen from outside. Where
-        the scan does not go all round, the surface is open. Source: J. Skala, section 8.3.
+        the scan does not go all round, the surface is open. With ``tetrahedra`` (vertices, float64, shape (n, 3);
+        those inside the closed surface, uint32, shape (m, 4)). Source: J. Skala, section 8.3.
         """
-        return Mesh(*_core.surface(self._core, whole(level, 'level'), as_region(region), where or '',
-                                   job(progress, threads, memory)))
+        made = _core.surface(self._core, whole(level, 'level'), as_region(region), where or '', bool(tetrahedra),
+                             job(progress, threads, memory))
+        return made if tetrahedra else Mesh(*made)
 
     def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
                      region=None, where=None, path=None, replace=False, progress=None, threads=None, memory=None):

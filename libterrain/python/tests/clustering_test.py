@@ -14,7 +14,9 @@ try:
     from hypothesis.extra import numpy as arrays
     from scipy.cluster import hierarchy
     from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
+    from scipy import sparse
+    from scipy.sparse.csgraph import minimum_spanning_tree
+    from scipy.spatial.distance import cdist, pdist
 except ImportError as missing:
     raise unittest.SkipTest(f'{missing.name} is missing')
 
@@ -66,6 +68,25 @@ class Linkage(unittest.TestCase):
                 terrace.flat_clusters(rows, **wrong)
 
 
+    def test_of_distances(self):
+        points = np.random.default_rng(12).random((150, 3))
+        made = terrace.linkage(pdist(points, 'cityblock'), 'complete')
+        expected = hierarchy.linkage(pdist(points, 'cityblock'), 'complete')
+        np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
+        np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-12)
+        for wrong, method in ((np.ones(4), 'complete'), (np.ones(3), 'single'), (-np.ones(3), 'complete'), ([np.nan], 'complete')):
+            with self.assertRaises(ValueError):
+                terrace.linkage(wrong, method)
+
+    def test_spanning_tree_is_scipys(self):
+        points = np.random.default_rng(13).random((400, 2))
+        edges, lengths = terrace.spanning_tree(points)
+        np.testing.assert_allclose(lengths, np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1), rtol=1e-12)
+        expected = minimum_spanning_tree(cdist(points, points)).tocoo()
+        self.assertEqual({tuple(sorted(edge)) for edge in edges.tolist()},
+                         {tuple(sorted(edge)) for edge in zip(expected.row.tolist(), expected.col.tolist())})
+
+
 class KMeans(unittest.TestCase):
     @settings(max_examples=40, deadline=None, derandomize=True)
     @given(some_points(80, width=3, least=5), st.integers(1, 5))
@@ -109,6 +130,40 @@ class Facilities(unittest.TestCase):
                 self.assertGreaterEqual(cost, best - 1e-9)
                 self.assertLessEqual(cost, best * (1 + 1e-9 if method == 'interchange' else 1.9))
                 self.assertLessEqual(made.lower_bound, best + 1e-9)
+
+    def test_any_costs(self):
+        for seed in range(6):
+            random = np.random.default_rng(seed)
+            connection, opening = random.random((9, 14)), random.random(9)
+
+            def cost_of(chosen):
+                return connection[list(chosen)].min(axis=0).sum()
+
+            subsets = [chosen for size in range(1, 10) for chosen in itertools.combinations(range(9), size)]
+            best = min(opening[list(chosen)].sum() + cost_of(chosen) for chosen in subsets)
+            for method in ('interchange', 'jain-vazirani', 'greedy-stars'):
+                made = terrace.facility_location(connection, opening, method=method, effort='full')
+                cost = opening[made.facilities].sum() + connection[made.facilities[made.labels], np.arange(14)].sum()
+                self.assertAlmostEqual(made.cost, cost, places=9)
+                self.assertLessEqual(made.lower_bound, best + 1e-9)
+                self.assertGreater(made.lower_bound, 0.8 * best)
+                self.assertGreaterEqual(made.cost, best - 1e-9)
+            self.assertAlmostEqual(terrace.facility_location(connection, opening, effort='full').cost, best, places=9)
+            median = terrace.facility_location(connection, count=3)
+            self.assertEqual(len(median.facilities), 3)
+            self.assertAlmostEqual(median.cost, min(cost_of(chosen) for chosen in subsets if len(chosen) == 3), places=9)
+        for wrong in (lambda: terrace.facility_location(connection), lambda: terrace.facility_location(connection, opening[:3]),
+                      lambda: terrace.facility_location(-connection, 1), lambda: terrace.facility_location(opening, 1),
+                      lambda: terrace.facility_location(connection, 1, method='kd-tree '),
+                      lambda: terrace.facility_location(connection, count=10)):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    def test_bounds(self):
+        points = np.random.default_rng(6).random((300, 2))
+        plain, bounded = terrace.cluster(points, 0.05), terrace.cluster(points, 0.05, bound_steps=100)
+        self.assertEqual(plain.cost, bounded.cost)
+        self.assertTrue(0.9 * bounded.cost < bounded.lower_bound <= bounded.cost)
 
     def test_k_median(self):
         points = np.random.default_rng(5).random((12, 2))
@@ -157,6 +212,18 @@ class Assignments(unittest.TestCase):
             costs = cdist(a, b)
             self.assertAlmostEqual(terrace.assignment(a, b).cost, costs[linear_sum_assignment(costs)].sum(), places=9)
 
+    def test_sparse_costs(self):
+        random = np.random.default_rng(14)
+        for rows, columns in ((40, 60), (60, 40), (50, 50)):
+            costs = np.where(random.random((rows, columns)) < 0.2, random.random((rows, columns)) + 0.1, 0)
+            costs[np.arange(min(rows, columns)), np.arange(min(rows, columns))] = 1  # so that there is an assignment
+            made = terrace.assignment(sparse.csc_matrix(costs))
+            dear = np.where(costs > 0, costs, 1e6)
+            self.assertAlmostEqual(made.cost, dear[linear_sum_assignment(dear)].sum(), places=6)
+            self.assertTrue((costs[made.columns >= 0, made.columns[made.columns >= 0]] > 0).all())
+        with self.assertRaises(ValueError):
+            terrace.assignment(sparse.csr_matrix(([1.0, 1.0], ([0, 1], [0, 0])), shape=(2, 2)))
+
     def test_misuse(self):
         for wrong, kind in (([[1, np.nan]], ValueError), ([1, 2], ValueError), ([['a']], TypeError),
                             (np.zeros((2, 2), complex), TypeError), ([[np.inf]], ValueError)):
@@ -185,6 +252,23 @@ class Matchings(unittest.TestCase):
         self.assertTrue(made.optimal)
         np.testing.assert_array_equal(made.mates[made.mates], np.arange(2 * pairs))
         self.assertEqual(made.pairs.shape, (pairs, 2))
+
+    def test_of_edges(self):
+        random = np.random.default_rng(15)
+        for _ in range(20):
+            distances = np.round(random.normal(size=(8, 8)), 3)
+            distances = np.minimum(distances, distances.T)
+            edges = np.array([*itertools.combinations(range(8), 2)])
+            made = terrace.edge_matching(edges, distances[tuple(edges.T)])
+            self.assertAlmostEqual(made.cost, self.brute(distances), places=9)
+            self.assertAlmostEqual(made.bound, made.cost, places=9)
+            np.testing.assert_array_equal(made.mates[made.mates], np.arange(8))
+        self.assertEqual(terrace.edge_matching([], []).pairs.shape, (0, 2))
+        star = [[0, 1], [0, 2], [0, 3]]  # no perfect matching
+        for wrong in ((star, [1, 1, 1]), ([[0, 1]], [1, 2]), ([[0, 0]], [1]), ([[0, -1]], [1]), ([[0, 1]], [np.nan]),
+                      ([[0, 1]], [1], 3), ([[0, 1]], [1], 1), ([[0, 1, 2]], [1])):
+            with self.assertRaises(ValueError):
+                terrace.edge_matching(*wrong)
 
     def test_sizes(self):
         odd = terrace.matching(np.random.default_rng(1).random((101, 2)))

@@ -99,6 +99,12 @@ class Meshes(StoreCase):
         a, b, c = (vertices[triangles[:, i]] for i in range(3))
         self.assertAlmostEqual(np.einsum('ij,ij', a, np.cross(b, c)) / 6, 4 / 3 * np.pi * 100 ** 3, delta=2e4)
 
+        places, inside = terrace.Store.open(self.path('ball')).surface(tetrahedra=True)
+        a, b, c, d = (places[inside[:, i]] for i in range(4))
+        volumes = np.einsum('ij,ij->i', np.cross(b - a, c - a), d - a) / 6
+        self.assertGreater(volumes.min(), 0)
+        self.assertAlmostEqual(volumes.sum(), 4 / 3 * np.pi * 100 ** 3, delta=2e4)
+
     def test_files(self):
         mesh = self.raster.bounded_mesh(4, path=self.path('hills.ply'))
         from terrace import _core

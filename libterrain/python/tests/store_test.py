@@ -2,6 +2,7 @@
 """Stores: what goes in comes out, whole or in part."""
 
 import errno
+import json
 import logging
 import os
 import subprocess
@@ -366,6 +367,42 @@ class Sources(StoreCase):
         text = self.path('points.xyz')
         np.savetxt(text, cloud(500)[0])
         self.assertEqual(len(terrace.build([text], self.path('text'))), 500)
+
+
+class Paths(StoreCase):
+    def test_an_empty_path_is_an_error_of_the_system(self):
+        with self.assertRaises((OSError, ValueError, terrace.Error)):
+            terrace.build(self.points, '')
+        here = os.getcwd()
+        os.chdir(self.folder)
+        try:
+            with self.assertRaises((OSError, ValueError, terrace.Error)):
+                terrace.build('cloud', '')
+        finally:
+            os.chdir(here)
+
+
+class Lines(StoreCase):
+    def test_lines_come_back(self):
+        random = np.random.default_rng(21)
+        given = [np.round(random.random((random.integers(2, 9), 3)).cumsum(axis=0) * 100, 2) for _ in range(60)]
+        with open(self.path('lines.geojson'), 'w', encoding='ascii') as file:
+            json.dump({'type': 'FeatureCollection', 'features': [
+                {'type': 'Feature', 'properties': {}, 'geometry': {'type': 'LineString', 'coordinates': line.tolist()}}
+                for line in given]}, file)
+        store = terrace.build(self.path('lines.geojson'), self.path('lines'), entities='segments', block_points=60)
+        lines, numbers = store.lines()
+        np.testing.assert_array_equal(numbers, np.arange(60))
+        for line, expected in zip(lines, given):
+            np.testing.assert_array_equal(line, expected)
+        half = np.median([line[0, 0] for line in given])
+        pieces = [tuple(map(tuple, piece)) for line in store.lines(region=(-1, -1, half, 1e9))[0] for piece in zip(line, line[1:])]
+        expected = [tuple(map(tuple, piece)) for line in given for piece in zip(line, line[1:]) if piece[0][0] <= half]
+        self.assertEqual(sorted(pieces), sorted(expected))
+        self.assertGreater(store.top, 0)
+        self.assertLess(sum(map(len, store.lines(level=1)[0])), sum(map(len, given)))
+        with self.assertRaises(ValueError):
+            self.scan.lines()
 
 
 if __name__ == '__main__':

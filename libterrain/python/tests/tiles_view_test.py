@@ -39,6 +39,31 @@ class Tiles(StoreCase):
                 with open(tile, 'rb') as ours, open(os.path.join(other, os.path.relpath(tile, folder)), 'rb') as theirs:
                     self.assertEqual(ours.read(), theirs.read())
 
+    def test_the_check_of_a_set(self):
+        folder = self.path('checked')
+        told = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal', max_error=2)
+        sound = terrace.verify_tiles(folder, self.raster, vertical='ellipsoidal')
+        self.assertEqual((sound['faults'], sound['tiles'], sound['torn']), ([], told['tiles'], 0))
+        deepest = sound['zooms'][-1]
+        self.assertEqual(deepest['zoom'], 12)
+        self.assertTrue(0 < deepest['max_error'] <= 2)
+        self.assertGreaterEqual(sound['samples'], self.samples.size)
+        self.assertEqual(terrace.verify_tiles(folder)['samples'], 0)
+        strict = terrace.verify_tiles(folder, self.raster, vertical='ellipsoidal', max_error=deepest['max_error'] / 2)
+        self.assertTrue(strict['faults'])
+        tile = next(os.path.join(root, name) for root, _, names in os.walk(folder) for name in names
+                    if name.endswith('.terrain'))
+        with open(tile, 'r+b') as file:
+            file.truncate(60)
+        faults = terrace.verify_tiles(folder)['faults']
+        self.assertTrue(any(os.path.relpath(tile, folder) in fault for fault in faults), faults)
+        with self.assertRaises(ValueError):
+            terrace.verify_tiles(self.path('nothing'))
+        with self.assertRaises(TypeError):
+            terrace.verify_tiles(folder, 'hills')
+        with self.assertRaises(ValueError):
+            terrace.verify_tiles(folder, vertical='sideways')
+
     def test_options(self):
         folder = self.path('zipped')
         self.raster.tiles(folder, zooms=(8, 9), vertical='ignore', gzip=True, normals=True, name='hills', fill='flat')

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <mutex>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/delaunay3.hpp>
+#include <terrace/tri/metric.hpp>
+
+#include "arrays.hpp"
+#include "call.hpp"
+
+namespace terrace::python {
+
+template <std::size_t N, class Metric>
+struct Triangulation;
+template <class Metric>
+struct Triangulation<2, Metric> {
+  using Type = tri::Delaunay2<double, Metric>;
+  using Simplex = tri::TriangleId;
+  static auto all(const Type& of) { return of.all_triangles(); }
+  static std::size_t count(const Type& of) { return of.triangle_count(); }
+  static std::uint32_t slots(const Type& of) { return of.triangle_slots(); }
+  static Simplex found(const Type& of, const typename Type::Point& p, tri::VertexId& hint) {
+    const tri::Location at = of.locate(p, hint);
+    hint = at.vertex;
+    return at.place == tri::Place::kOutside ? tri::kNoTriangle : at.triangle;
+  }
+};
+template <class Metric>
+struct Triangulation<3, Metric> {
+  using Type = tri::Delaunay3<double, Metric>;
+  using Simplex = tri::TetrahedronId;
+  static auto all(const Type& of) { return of.all_tetrahedra(); }
+  static std::size_t count(const Type& of) { return of.tetrahedron_count(); }
+  static std::uint32_t slots(const Type& of) { return of.tetrahedron_slots(); }
+  static Simplex found(const Type& of, const typename Type::Point& p, tri::VertexId& hint) {
+    const tri::Location3 at = of.locate(p, hint);
+    hint = at.vertex;
+    return at.place == tri::Place3::kOutside ? tri::kNoTetrahedron : at.tetrahedron;
+  }
+};
+
+/// A triangulation that Python's threads may share: one works on it at a time.
+template <std::size_t N, class Metric = tri::Euclidean>
+class SharedDelaunay {
+ public:
+  using Kind = Triangulation<N, Metric>;
+  using Mesh = typename Kind::Type;
+  using Point = std::array<double, N>;
+
+  explicit SharedDelaunay(const Metric& metric = {}) : mesh_(metric) {}
+
+  /// work(mesh), which only reads it and takes about as long as a pass over it and so many items.
+  template <class Work>
+  auto read(std::size_t items, Work&& work) {
+    return locked(items + size_, [&] { return work(std::as_const(mesh_)); });
+  }
+
+  py::array_t<std::int32_t> insert(const Array<double>& given) {
+    const auto points = rows_of<N>(given, "points");
+    return to_array(locked(points.size(), [&] {
+      std::vector<std::int32_t> handles(points.size());
+      if (mesh_.vertex_count() == 0) {
+        const std::vector<tri::VertexId> made = mesh_.build(points);
+        for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i]);
+        return handles;
+      }
+      std::vector<typename Mesh::Insertion> made(points.size());
+      mesh_.insert(points, made);
+      for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i].vertex);
+      return handles;
+    }));
+  }
+
+  void remove(const Array<std::int32_t>& given) {
+    const auto handles = numbers_of(given, "vertices");
+    locked(handles.size(), [&] {
+      const std::vector<tri::VertexId> vertices = checked(handles);
+      std::vector<std::int32_t> sorted(handles.begin(), handles.end());
+      std::sort(sorted.begin(), sorted.end());
+      const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+      if (twice != sorted.end()) {
+        throw std::invalid_argument("vertex " + std::to_string(*twice) + " is named twice");
+      }
+      mesh_.remove(vertices);
+      return 0;
+    });
+  }
+
+  [[nodiscard]] py::array_t<double> points() {
+    return to_array(locked(size_, [&] {
+      constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+      Point none;
+      none.fill(kNan);
+      std::vector<Point> places(mesh_.vertex_slots(), none);
+      for (const tri::VertexId v : mesh_.all_vertices()) places[slot(v)] = mesh_.point(v);
+      return places;
+    }));
+  }
+
+  [[nodiscard]] py::array_t<std::int32_t> vertices() {
+    return to_array(locked(size_, [&] {
+      std::vector<std::int32_t> handles;
+      handles.reserve(mesh_.vertex_count());
+      for (const tri::VertexId v : mesh_.all_vertices()) handles.push_back(handle(v));
+      return handles;
+    }));
+  }
+
+  [[nodiscard]] py::array_t<std::int32_t> simplices() {
+    return to_array(locked(size_, [&] {
+      std::vector<std::array<std::int32_t, N + 1>> rows;
+      rows.reserve(Kind::count(mesh_));
+      for (const auto s : Kind::all(mesh_)) {
+        const auto corners = mesh_.vertices(s);
+        auto& row = rows.emplace_back();
+        for (std::size_t i = 0; i <= N; ++i) row[i] = handle(corners[i]);
+      }
+      return rows;
+    }));
+  }
+
+  [[nodiscard]] py::array_t<std::int32_t> neighbours() {
+    return to_array(locked(size_, [&] {
+      const std::vector<std::int32_t> rank = rows_of_simplices();
+      std::vector<std::array<std::int32_t, N + 1>> rows;
+      rows.reserve(Kind::count(mesh_));
+      for (const auto s : Kind::all(mesh_)) {
+        const auto around = mesh_.neighbours(s);
+        auto& row = rows.emplace_back();
+        for (std::size_t i = 0; i <= N; ++i) {
+          row[i] = mesh_.alive(around[i]) ? rank[slot(around[i])] : -1;
+        }
+      }
+      return rows;
+    }));
+  }
+
+  [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& given) {
+    const auto places = rows_of<N>(given, "points");
+    return to_array(locked(places.size() + size_, [&] {
+      const std::vector<std::int32_t> rank = rows_of_simplices();
+      std::vector<std::int32_t> found(places.size(), -1);
+      tri::VertexId hint = tri::kNoVertex;
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        if (!finite(places[i])) continue;
+        const auto s = Kind::found(mesh_, places[i], hint);
+        if (mesh_.alive(s)) found[i] = rank[slot(s)];
+      }
+      return found;
+    }));
+  }
+
+  [[nodiscard]] py::array_t<std::int32_t> nearest(const Array<double>& given) {
+    const auto places = rows_of<N>(given, "points");
+    return to_array(locked(places.size(), [&] {
+      std::vector<std::int32_t> found(places.size(), -1);
+      tri::VertexId last = tri::kNoVertex;
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        if (!finite(places[i])) continue;
+        last = mesh_.nearest(places[i], last);
+        if (last != tri::kNoVertex) found[i] = handle(last);
+      }
+      return found;
+    }));
+  }
+
+  [[nodiscard]] std::size_t size() {
+    return locked(0, [&] { return mesh_.vertex_count(); });
+  }
+  [[nodiscard]] std::size_t count() {
+    return locked(0, [&] { return Kind::count(mesh_); });
+  }
+  [[nodiscard]] std::uint64_t hash() {
+    return locked(size_, [&] { return mesh_.hash(); });
+  }
+
+  /// Under read() or a change. Throws: std::invalid_argument for a vertex that is not there.
+  std::vector<tri::VertexId> checked(std::span<const std::int32_t> handles) const {
+    std::vector<tri::VertexId> vertices;
+    vertices.reserve(handles.size());
+    for (const std::int32_t number : handles) {
+      const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
+      if (number < 0 || !mesh_.alive(vertex)) {
+        throw std::invalid_argument("there is no vertex " + std::to_string(number));
+      }
+      vertices.push_back(vertex);
+    }
+    return vertices;
+  }
+
+ private:
+  static std::int32_t handle(tri::VertexId vertex) { return static_cast<std::int32_t>(vertex); }
+  static bool finite(const Point& p) {
+    return std::all_of(p.begin(), p.end(), [](double c) { return c - c == 0; });
+  }
+
+  /// For much work signals are looked for.
+  template <class Work>
+  auto locked(std::size_t items, Work&& work) {
+    constexpr std::size_t kMuch = 10000;
+    const auto alone = [&] {
+      const std::lock_guard lock(mutex_);
+      auto result = work();
+      size_ = mesh_.vertex_count();
+      return result;
+    };
+    if (items > kMuch) return released(alone);
+    const py::gil_scoped_release open;
+    return alone();
+  }
+
+  /// The row of each simplex in simplices(), by slot.
+  std::vector<std::int32_t> rows_of_simplices() const {
+    std::vector<std::int32_t> rank(Kind::slots(mesh_), -1);
+    std::int32_t next = 0;
+    for (const auto s : Kind::all(mesh_)) rank[slot(s)] = next++;
+    return rank;
+  }
+
+  std::mutex mutex_;
+  Mesh mesh_;                          ///< under the mutex only
+  std::atomic<std::size_t> size_ = 0;  ///< vertices after the last piece of work
+};
+
+using SharedDelaunay2 = SharedDelaunay<2>;
+using SharedDelaunay3 = SharedDelaunay<3>;
+
+}  // namespace terrace::python

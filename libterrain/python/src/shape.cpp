@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <terrace/tri/shape.hpp>
+
+#include "delaunay.hpp"
+
+namespace terrace::python {
+namespace {
+
+/// (kept tetrahedra and triangles of the surface, as corners by number of vertex; volume; lids were
+/// left out; components; Euler characteristic)
+template <class Metric>
+py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule, bool lids,
+                unsigned threads) {
+  using tri::ShapeRule;
+  const tri::ShapeOptions options{.rule = named<ShapeRule>(rule, "rule",
+                                                           {{"poles", ShapeRule::kPoles},
+                                                            {"flood", ShapeRule::kFlood},
+                                                            {"published", ShapeRule::kPublished}})};
+  std::vector<std::array<std::int32_t, 4>> kept;
+  std::vector<std::array<std::int32_t, 3>> faces;
+  tri::ShapeParts parts;
+  bool open = false;
+  const double volume = shared.read(0, [&](const auto& mesh) {
+    tri::Shape3<double, Metric> made(options);
+    made.restore(mesh, threads);
+    for (const tri::TetrahedronId t : made.kept_tetrahedra()) {
+      auto& row = kept.emplace_back();
+      const auto corners = mesh.vertices(t);
+      for (std::size_t i = 0; i < 4; ++i) row[i] = static_cast<std::int32_t>(corners[i]);
+    }
+    const tri::ShapeSurface surface = lids ? made.surface(mesh) : made.surface_without_lids(mesh);
+    for (const auto& face : surface.surface.faces) {
+      auto& row = faces.emplace_back();
+      for (std::size_t i = 0; i < 3; ++i) {
+        row[i] = static_cast<std::int32_t>(surface.vertices[face[i]]);
+      }
+    }
+    open = surface.open;
+    parts = made.parts(mesh, surface);
+    return made.volume(mesh);
+  });
+  return py::make_tuple(to_array(std::move(kept)), to_array(std::move(faces)), volume, open,
+                        parts.components, parts.euler_characteristic);
+}
+
+}  // namespace
+
+void bind_shape(py::module_& module) {
+  module.def("shape", &shape<tri::Euclidean>);
+  module.def("shape", &shape<tri::EllipticalMetric3>);
+}
+
+}  // namespace terrace::python
