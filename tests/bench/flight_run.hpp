@@ -69,7 +69,8 @@ inline double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Of the calling thread: what a frame took, whatever else the machine did meanwhile.
+/// Processor time of the calling thread: what a frame took, whatever else the machine did
+/// meanwhile.
 inline double thread_seconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);

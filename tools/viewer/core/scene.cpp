@@ -405,7 +405,7 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from,
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
       const SceneTriangle& corners = triangles_[slot(triangle)];
       std::array<Point3, 3> at;
-      // Of each corner: how far along the line and how far to its left.
+      // For each corner, how far along the line it is and how far to its left.
       std::array<double, 3> along, left;
       for (std::size_t i = 0; i < 3; ++i) {
         at[i] = position(corners[i]);

@@ -62,7 +62,7 @@ export const VERTEX_BYTES = 24;
 
 export class CoreError extends Error {}
 
-/// Of changes: kept ones, and bytes.
+/// Buffers of changes that are kept for use again, and the bytes that one has at least.
 const MOST_BUFFERS = 8, LEAST_BUFFER = 1 << 20;
 
 const MISSING = 1;

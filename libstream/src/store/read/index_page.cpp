@@ -16,7 +16,7 @@ namespace {
 
 /// Bits of the ends of ranges: a page's clusters lie together, and so do their values.
 constexpr unsigned kRangeBits = 5;
-/// Of floating point: keys are as far apart from 0 to 1 as from 1 to 1e300.
+/// The same for floating types, whose keys are as far apart from 0 to 1 as from 1 to 1e300.
 constexpr std::array<unsigned, 4> kFloatingRangeBits{kRangeBits, 8, 11, 14};
 
 unsigned shift_of(std::uint64_t reach, unsigned bits) {
@@ -241,7 +241,7 @@ PageBox PageBox::around(const Box3& box, const Box3& bounds) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double low = bounds.min[axis], high = bounds.max[axis];
     const auto place = [&](double value) {
-      // Of halves, which do not overflow.
+      // Halves, so that no difference overflows.
       const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * 65535;
       return static_cast<std::uint16_t>(share > 0 ? std::min(share, 65535.0) : 0);
     };

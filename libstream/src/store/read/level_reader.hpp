@@ -67,7 +67,7 @@ class LevelReader {
     return directory_[static_cast<std::size_t>(page)];
   }
 
-  /// Of the page that has the cluster, or a larger one. Requires that the cluster exists.
+  /// The box of the page that has the cluster, or a larger one. Requires that the cluster exists.
   [[nodiscard]] Box3 coarse_box(std::uint64_t ordinal) const {
     const std::uint64_t page = ordinal / layout_.page_clusters();
     return page < boxes_.size() ? boxes_[static_cast<std::size_t>(page)] : bounds_;
