@@ -22,17 +22,6 @@ constexpr int kDecimals = 9, kOwnDecimals = 6;
 /// Points turned into text at a time.
 constexpr std::size_t kContourPoints = std::size_t{1} << 17;
 
-stream::Box3 world_box(const stream::Store& store, const GroundSlope& ground) {
-  const stream::Box3& bounds = store.bounds();
-  stream::Box3 box;
-  for (unsigned corner = 0; corner < 4; ++corner) {
-    const Point2 p = ground.world(
-        {(corner & 1 ? bounds.max : bounds.min)[0], (corner & 2 ? bounds.max : bounds.min)[1]});
-    box.include(stream::Point3{p[0], p[1], 0.0});
-  }
-  return box;
-}
-
 }  // namespace
 
 ContourText::ContourText(const stream::Store& store, const ContourRequest& request,
@@ -43,7 +32,9 @@ ContourText::ContourText(const stream::Store& store, const ContourRequest& reque
       threads_(std::max(1U, threads)),
       write_(std::move(write)),
       number_(request.own_crs ? kOwnDecimals : kDecimals) {
-  if (!request.own_crs) geography_.emplace(system_of(store), world_box(store, ground_));
+  if (!request.own_crs) {
+    geography_.emplace(system_of(store), world_box(store.schema(), store.bounds()));
+  }
   const std::array<double, 6>& m = store.schema().world.xy;
   reverse_ = m[0] * m[4] - m[1] * m[3] > 0;
 }
