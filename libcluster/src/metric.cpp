@@ -180,6 +180,13 @@ bool obeys_triangle_inequality(const Metric& metric) {
                     metric);
 }
 
+std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box) {
+  if (std::holds_alternative<Euclidean>(metric)) return kIdentityMap;
+  if (const auto* elliptical = std::get_if<Elliptical>(&metric)) return elliptical->map();
+  if (const auto* field = std::get_if<EllipticalField>(&metric)) return field->uniform_in(box);
+  return std::nullopt;
+}
+
 std::string name_of(const Metric& metric) {
   return std::visit(Overloaded{
                         [](const Euclidean&) -> std::string { return "euclidean"; },

@@ -251,11 +251,16 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
   const QueriedStore queried(schema, blocks, {.block_points = 500, .cluster_points = 40});
   StoreQuery query(queried.store());
   ClusterPoints points;
-  for (const FoundPoint& point : query.nearest({50, 50, 50}, 100)) {
+  const std::vector<FoundPoint> found = query.nearest({50, 50, 50}, 100);
+  const std::vector<std::byte> sums = query.attributes(found);
+  ASSERT_EQ(sums.size(), found.size() * sizeof(double));
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const FoundPoint& point = found[i];
     queried.store().read(point.cluster, points);
     EXPECT_EQ(points.positions[point.member], point.position);
-    EXPECT_EQ(queried.store().schema().view<double>(points.payload, 0)[point.member],
-              point.position[0] + point.position[1] + point.position[2]);
+    const double sum = point.position[0] + point.position[1] + point.position[2];
+    EXPECT_EQ(queried.store().schema().view<double>(points.payload, 0)[point.member], sum);
+    EXPECT_EQ(queried.store().schema().view<double>(sums, 0)[i], sum);
   }
 }
 

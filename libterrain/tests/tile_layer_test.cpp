@@ -10,6 +10,7 @@
 
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/tile_check.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -124,6 +125,17 @@ TEST_F(TileLayerFile, RefusesNumbersThatCountNothing) {
     bad["minzoom"] = number;
     write(bad.dump());
     EXPECT_THROW(read_layer(path_), stream::Error) << number;
+  }
+}
+
+TEST_F(TileLayerFile, AFolderWithoutTilesIsNotTakenForASetThatIsNotFinished) {
+  for (const fs::path& folder : {scratch_.path(), scratch_.path() / "none"}) {
+    try {
+      check_tiles({.folder = folder});
+      ADD_FAILURE() << "no error for " << folder;
+    } catch (const stream::Error& error) {
+      EXPECT_EQ(error.parts().cause, "holds no set of tiles");
+    }
   }
 }
 

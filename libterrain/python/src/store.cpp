@@ -119,29 +119,18 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
 }
 
 /// Records of found points, with their distance at the end.
-std::vector<std::byte> records_of(const stream::Store& store,
+std::vector<std::byte> records_of(const stream::StoreQuery& query,
                                   const std::vector<stream::FoundPoint>& found) {
-  const std::size_t payload = store.schema().payload_size();
-  const std::size_t record = sizeof(stream::Point3) + payload + sizeof(double);
-  std::vector<std::byte> bytes(found.size() * record);
-  std::vector<std::size_t> by_cluster(found.size());
+  const stream::StoreSchema& schema = query.store().schema();
+  const std::size_t payload = schema.payload_size();
+  const std::vector<std::byte> attributes = query.attributes(found);
+  std::vector<std::byte> bytes;
+  bytes.reserve(found.size() * (sizeof(stream::Point3) + payload + sizeof(double)));
   for (std::size_t i = 0; i < found.size(); ++i) {
-    by_cluster[i] = i;
-    const stream::Point3 place = world_point(store.schema(), found[i].position);
-    std::memcpy(bytes.data() + i * record, place.data(), sizeof place);
-    std::memcpy(bytes.data() + (i + 1) * record - sizeof(double), &found[i].distance,
-                sizeof(double));
-  }
-  if (payload == 0) return bytes;
-  std::sort(by_cluster.begin(), by_cluster.end(),
-            [&](std::size_t a, std::size_t b) { return found[a].cluster < found[b].cluster; });
-  stream::ClusterPoints points;
-  std::optional<stream::ClusterId> read;
-  for (const std::size_t i : by_cluster) {
-    if (read != found[i].cluster) store.read(found[i].cluster, points);
-    read = found[i].cluster;
-    std::memcpy(bytes.data() + i * record + sizeof(stream::Point3),
-                points.payload.data() + found[i].member * payload, payload);
+    append(bytes, world_point(schema, found[i].position),
+           std::span(attributes).subspan(i * payload, payload));
+    const auto distance = std::as_bytes(std::span(&found[i].distance, 1));
+    bytes.insert(bytes.end(), distance.begin(), distance.end());
   }
   return bytes;
 }
@@ -155,7 +144,7 @@ py::array near(const OpenStore& open, const std::vector<double>& place,
   if (place.size() == 3) wanted.z = place[2];
   std::vector<std::byte> records = released([&] {
     stream::StoreQuery query(store);
-    return records_of(store, count ? nearest_points(query, wanted, *count, level)
+    return records_of(query, count ? nearest_points(query, wanted, *count, level)
                                    : points_within(query, wanted, radius.value(), level));
   });
   return to_records(std::move(records), record_type(store.schema(), {"distance"}));

@@ -62,8 +62,20 @@ void PartOptions::define(CLI::App& app, const std::string& kept) {
   crs.define(app);
 }
 
+CLI::Option* PartOptions::define_cluster(CLI::App& app, const std::string& given) {
+  return app
+      .add_option("--cluster", cluster,
+                  "L:N, the cluster N of level L: " + given + ", itself included")
+      ->excludes("--region")
+      ->excludes("--focus");
+}
+
 Detail PartOptions::detail(const stream::Store& store, const CommonOptions& common) const {
-  return parse_detail(store, level, region, focuses, crs.regions(store, common));
+  Detail detail = parse_detail(store, level, region, focuses, crs.regions(store, common));
+  if (cluster.empty()) return detail;
+  detail.cluster = parse_cluster(cluster);
+  if (level.empty()) detail.level = stream::level_of(*detail.cluster);
+  return detail;
 }
 
 void SurfaceOptions::define(CLI::App& app) {

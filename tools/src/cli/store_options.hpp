@@ -14,6 +14,7 @@
 
 namespace CLI {
 class App;
+class Option;
 }
 
 /// Options that several verbs on stores have.
@@ -45,14 +46,17 @@ class CrsOptions {
   std::string region_, to_, shift_;
 };
 
-/// Which part of a store at which detail: the store, --level, --region, --focus and CrsOptions.
+/// Which part of a store at which detail: the store, --level, --region, --focus, --cluster and
+/// CrsOptions.
 struct PartOptions {
-  std::string path, level, region;
+  std::string path, level, region, cluster;
   std::vector<std::string> focuses;
   CrsOptions crs;
 
   /// kept: what a region keeps, as in "only points inside".
   void define(CLI::App& app, const std::string& kept);
+  /// Adds --cluster. given: what a cluster gives.
+  CLI::Option* define_cluster(CLI::App& app, const std::string& given);
   /// Throws: as parse_detail.
   [[nodiscard]] Detail detail(const stream::Store& store, const CommonOptions& common) const;
 };

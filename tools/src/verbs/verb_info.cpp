@@ -1,16 +1,393 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // info: what a store or a file holds.
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
 
 #include <CLI/CLI.hpp>
-#include <terrace/stream/store.hpp>
 
+#include "base/units.hpp"
+#include "cli/cli.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/option_names.hpp"
+#include "cli/terminal.hpp"
+#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/datum_change.hpp"
+#include "earth/source_crs.hpp"
+#include "tables/point_table.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
+#include "terrace/stream/store.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
-#include "verbs/info.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
 namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// {"min": [x, y, z], "max": [x, y, z]}; null for an empty box.
+Json json_of(const stream::Box3& box) {
+  if (box.empty()) return nullptr;
+  Json json;
+  json["min"] = box.min;
+  json["max"] = box.max;
+  return json;
+}
+
+/// null for an empty text.
+Json known(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+/// {"epsg": n, "name": ..., "wkt": ...}; null where nothing is known.
+Json json_of(const stream::Crs& crs) {
+  if (crs == stream::Crs{}) return nullptr;
+  Json json;
+  json["epsg"] = crs.epsg == 0 ? Json(nullptr) : Json(crs.epsg);
+  json["name"] = known(crs.name);
+  json["wkt"] = known(crs.wkt);
+  json["geographic"] = crs.geographic;
+  json["horizontal_unit"] = known(crs.horizontal_unit);
+  json["vertical_epsg"] = crs.vertical_epsg == 0 ? Json(nullptr) : Json(crs.vertical_epsg);
+  json["vertical_unit"] = known(crs.vertical_unit);
+  return json;
+}
+
+/// Where the points are, and the lattice of a raster.
+void add_placement(const stream::Schema& schema, const stream::Box3& bounds, const stream::Crs& crs,
+                   const std::string& vertical, Json& json) {
+  json["bounds"] = json_of(bounds);
+  json["crs"] = json_of(crs);
+  json["vertical"] = known(vertical);
+  if (schema.grid) {
+    json["columns"] = schema.columns;
+    json["rows"] = schema.rows;
+  }
+  if (schema.grid || schema.world != stream::WorldTransform{}) json["transform"] = schema.world.xy;
+}
+
+Json channels_of(const stream::Schema& schema) {
+  Json list = Json::array();
+  const auto add = [&](const stream::Channel& channel) {
+    list.push_back({{"name", channel.name},
+                    {"type", stream::name_of(channel.type)},
+                    {"scale", channel.scale},
+                    {"offset", channel.offset},
+                    {"unit", channel.unit}});
+  };
+  for (const stream::Channel& channel : schema.coordinates) add(channel);
+  for (const stream::Channel& channel : schema.attributes) add(channel);
+  return list;
+}
+
+/// "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", with the operation that leads to WGS 84 where
+/// the data lie. bounds: in the CRS.
+std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
+  std::string text = crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : "";
+  if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
+  if (text.empty()) text = crs.wkt.empty() ? "unknown" : crs.wkt.substr(0, 60) + "...";
+  if (crs.vertical_epsg != 0) text += " + EPSG:" + std::to_string(crs.vertical_epsg);
+  try {
+    const std::optional<CrsDefinition> known = definition_of(crs);
+    if (!known) return text;
+    const CoordinateSystem system = CoordinateSystem(*known).over(bounds);
+    const DatumChange& change = system.to_wgs84();
+    if (!change.possible()) {
+      text += ", datum " + known->datum + " without a way to WGS 84";
+      if (!change.better().empty()) text += ": " + change.better();
+    } else if (!change.identity()) {
+      text += ", to WGS 84 by " + change.description();
+    } else if (change.accuracy().value_or(0) > 0) {
+      text += ", counts as WGS 84 within " + number_text(*change.accuracy()) + " m";
+      if (!change.better().empty()) text += " (" + change.better() + ")";
+    }
+  } catch (const CrsError& error) {
+    text += std::string(", ") + error.what();
+  }
+  return text;
+}
+
+/// "1.5 2 3  to  4 5 6" or "none".
+std::string text_of(const stream::Box3& box) {
+  if (box.empty()) return "none";
+  const auto corner = [](const stream::Point3& p) {
+    // A nanodegree, or a millimetre of projected coordinates.
+    return readable_number(p[0], 10) + ' ' + readable_number(p[1], 10) + ' ' +
+           readable_number(p[2], 10);
+  };
+  return corner(box.min) + "  to  " + corner(box.max);
+}
+
+/// "height int16 (metre)", with scale and offset where they are not 1 and 0.
+std::string text_of(const stream::Channel& channel) {
+  std::string text = channel.name + ' ' + std::string(stream::name_of(channel.type));
+  if (channel.scale != 1) text += " x " + number_text(channel.scale);
+  if (channel.offset != 0) text += " + " + number_text(channel.offset);
+  if (!channel.unit.empty()) text += " (" + channel.unit + ")";
+  return text;
+}
+
+std::string raster_line(const stream::Schema& schema) {
+  return "raster:    " + std::to_string(schema.columns) + " x " + std::to_string(schema.rows) +
+         " cells of " + text_of(schema.coordinates[2]) + '\n';
+}
+
+std::string heights_line(double low, double high, double mean) {
+  return "heights:   " + readable_number(low, 6) + " to " + readable_number(high, 6) + ", mean " +
+         readable_number(mean, 6) + '\n';
+}
+
+std::string channels_line(const stream::Schema& schema) {
+  std::string text = "channels: ";
+  for (const stream::Channel& c : schema.coordinates)
+    text += ' ' + printable_line(text_of(c)) + ',';
+  for (const stream::Channel& c : schema.attributes) text += ' ' + printable_line(text_of(c)) + ',';
+  text.back() = '\n';
+  return text;
+}
+
+/// The sum of a long stream of doubles: without the compensation the mean of a billion heights
+/// would be off in its last digits (A. Neumaier 1974, doi:10.1002/zamm.19740540106).
+class Sum {
+ public:
+  void add(double value) {
+    const double sum = sum_ + value;
+    rest_ += std::abs(sum_) >= std::abs(value) ? (sum_ - sum) + value : (value - sum) + sum_;
+    sum_ = sum;
+  }
+  [[nodiscard]] double value() const { return sum_ + rest_; }
+
+ private:
+  double sum_ = 0, rest_ = 0;
+};
+
+struct Contents {
+  std::uint64_t points = 0, nodata = 0, withheld = 0;
+  stream::Box3 stored, world;
+  double mean = 0;  ///< stored coordinate 2
+};
+
+Contents stream_through(stream::PointSource& source, const CommonOptions& common) {
+  const stream::SourceInfo& info = source.info();
+  const stream::Placement& placement = info;
+  // Without rotation the box in the CRS is that of the stored box: points need not be transformed.
+  const bool upright = info.world.xy[1] == 0 && info.world.xy[3] == 0;
+  Contents contents;
+  Sum heights;
+  ProgressMeter meter(common.progress, "points");
+  stream::PointBlock block;
+  while (source.next(block)) {
+    check_interrupt();
+    for (const stream::Point3& p : block.positions) {
+      contents.stored.include(p);
+      heights.add(p[2]);
+      if (!upright) contents.world.include(world_point(placement, p));
+    }
+    contents.points += block.size();
+    const stream::Progress progress = source.progress();
+    meter.update(progress.points, progress.fraction);
+  }
+  contents.nodata = source.progress().nodata;
+  contents.withheld = source.progress().withheld;
+  if (upright) contents.world = world_box(placement, contents.stored);
+  if (contents.points > 0) contents.mean = heights.value() / static_cast<double>(contents.points);
+  return contents;
+}
+
+std::uint64_t bytes_of(const std::vector<std::string>& files) {
+  std::uint64_t bytes = 0;
+  for (const std::string& file : files) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(file, error);
+    if (!error) bytes += size;
+  }
+  return bytes;
+}
+
+/// Sizes of a level's clusters, representative included: 0, 5, 50, 95 and 100 percentiles.
+struct Sizes {
+  std::array<std::uint64_t, 5> percentiles{};
+  double mean = 0;
+};
+
+Sizes sizes_of(const stream::Store& store, const stream::LevelInfo& level) {
+  // Every n-th cluster is enough for a level with very many.
+  constexpr std::uint64_t kMost = 200000;
+  const std::uint64_t stride = level.clusters / kMost + 1;
+  const std::uint64_t representative = level.level == store.top() ? 0 : 1;
+  std::vector<std::uint64_t> sizes;
+  for (std::uint64_t i = 0; i < level.clusters; i += stride) {
+    check_interrupt();
+    sizes.push_back(store.record(stream::cluster_id(level.level, i)).points + representative);
+  }
+  Sizes result;
+  if (sizes.empty()) return result;
+  std::sort(sizes.begin(), sizes.end());
+  constexpr std::array<std::size_t, 5> kPercent{0, 5, 50, 95, 100};
+  for (std::size_t k = 0; k < kPercent.size(); ++k) {
+    result.percentiles[k] = sizes[(sizes.size() - 1) * kPercent[k] / 100];
+  }
+  std::uint64_t sum = 0;
+  for (const std::uint64_t size : sizes) sum += size;
+  result.mean = static_cast<double>(sum) / static_cast<double>(sizes.size());
+  return result;
+}
+
+std::string padded(const std::string& text, std::size_t width) {
+  return std::string(width - std::min(width, text.size()), ' ') + text;
+}
+
+/// What a file of points or cells holds, found by streaming it once. Throws: stream::Error.
+Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
+                     const CommonOptions& common) {
+  const std::array<std::string, 1> files{path};
+  const std::unique_ptr<stream::PointSource> source =
+      stream::open_source(files, {.memory_bytes = common.reading_memory(),
+                                  .heights_of_colour = colours,
+                                  .stop = stop_token(),
+                                  .blocks_ahead = 8,
+                                  .threads = common.threads});
+  reading_within_memory(*source, common.memory_or(0));
+  const Contents contents = stream_through(*source, common);
+  const stream::SourceInfo& info = source->info();
+  SourceCrs crs;
+  try {
+    crs = crs_of_source(info);
+  } catch (const stream::Error& error) {
+    // Where a build would fail, the error is reported with the rest of the file.
+    crs.crs = info.crs;
+    crs.note = error.what();
+  }
+  const stream::Channel& z = info.coordinates[2];
+  const auto real = [&z](double raw) { return raw * z.scale + z.offset; };
+
+  Summary summary;
+  summary.text_is_result = true;
+  Json& json = summary.json;
+  json["format"] = info.format;
+  json["version"] = nullptr;
+  json["points"] = contents.points;
+  json["nodata"] = contents.nodata;
+  if (contents.withheld > 0) json["withheld"] = contents.withheld;
+  if (info.octree) {
+    json["octree"] = {{"spacing", info.octree->spacing},
+                      {"depths", info.octree->depths},
+                      {"nodes", info.octree->nodes}};
+  }
+  json["levels"] = Json::array();
+  const std::string vertical = crs.heights == Heights::unknown ? "" : name_of(crs.heights);
+  add_placement(info, contents.world, crs.crs, vertical, json);
+  if (info.grid) json["nodata_value"] = info.nodata ? Json(*info.nodata) : Json(nullptr);
+  json["height"] = nullptr;
+  if (contents.points > 0) {
+    const auto [low, high] =
+        std::minmax({real(contents.stored.min[2]), real(contents.stored.max[2])});
+    json["height"] = {{"min", low}, {"max", high}, {"mean", real(contents.mean)}};
+  }
+  json["channels"] = channels_of(info);
+  json["parameters"] = Json::object();
+  json["comments"] = info.comments;
+  json["bytes"] = bytes_of(info.files);
+
+  std::string& text = summary.text;
+  text += "format:    " + info.format + ", " + readable_bytes(bytes_of(info.files)) + '\n';
+  if (info.grid) {
+    text += raster_line(info);
+    text += "cell:      " + readable_number(info.world.xy[0], 10) + ' ' +
+            readable_number(info.world.xy[4], 10) + '\n';
+    text += "nodata:    " + with_commas(contents.nodata) + " cells" +
+            (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
+  }
+  text += "points:    " + with_commas(contents.points) + '\n';
+  if (info.octree) {
+    text += "octree:    " + with_commas(info.octree->nodes) + " nodes of " +
+            std::to_string(info.octree->depths) + " depths, the root's points " +
+            readable_number(info.octree->spacing, 6) + " apart\n";
+  }
+  if (contents.withheld > 0) {
+    text += "withheld:  " + with_commas(contents.withheld) + " of them\n";
+  }
+  text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
+  if (!crs.note.empty()) text += "note:      " + printable_line(with_option_names(crs.note)) + '\n';
+  if (!vertical.empty()) text += "vertical:  " + vertical + '\n';
+  text += "bounds:    " + text_of(contents.world) + '\n';
+  if (contents.points > 0) {
+    text += heights_line(json["height"]["min"], json["height"]["max"], json["height"]["mean"]);
+  }
+  text += channels_line(info);
+  for (const std::string& comment : info.comments)
+    text += "comment:   " + printable_line(comment) + '\n';
+  return summary;
+}
+
+/// What a store holds; reads manifest and indices. Throws: stream::Error.
+Summary info_of_store(const std::string& path) {
+  const stream::Store store = open_store(path);
+  const stream::StoreSchema& schema = store.schema();
+  const stream::Placement& placement = schema;
+  const stream::Box3 bounds = world_box(placement, store.bounds());
+  const stream::Channel& z = schema.coordinates[2];
+  const double mean = store.mean_height() * z.scale + z.offset;
+
+  Summary summary;
+  summary.text_is_result = true;
+  Json& json = summary.json;
+  json["format"] = "terrace";
+  json["version"] = store.version();
+  json["source_format"] = schema.format;
+  json["points"] = store.points();
+  json["nodata"] = schema.nodata;
+  json["levels"] = Json::array();
+  add_placement(schema, bounds, schema.crs, schema.vertical, json);
+  json["height"] = {{"min", bounds.min[2]}, {"max", bounds.max[2]}, {"mean", mean}};
+  json["channels"] = channels_of(schema);
+  json["parameters"] = Json::object();
+  for (const auto& [name, value] : schema.parameters) json["parameters"][name] = value;
+  json["bytes"] = store.bytes();
+
+  std::string& text = summary.text;
+  text += "format:    terrace store, version " + std::to_string(store.version()) + ", " +
+          readable_bytes(store.bytes()) + " (from " + schema.format + ")\n";
+  if (schema.grid) text += raster_line(schema);
+  text +=
+      "points:    " + with_commas(store.points()) + ", nodata " + with_commas(schema.nodata) + '\n';
+  text += "crs:       " + printable_line(text_of(schema.crs, bounds)) + '\n';
+  text +=
+      "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
+  text += "bounds:    " + text_of(bounds) + '\n';
+  text += heights_line(bounds.min[2], bounds.max[2], mean);
+  text += channels_line(schema);
+  for (const auto& [name, value] : schema.parameters)
+    text += "parameter: " + printable_line(name + ' ' + value) + '\n';
+  text += "level          points    clusters        bytes   cluster sizes: 5 %  median   95 %\n";
+  for (const stream::LevelInfo& level : store.levels()) {
+    const Sizes sizes = sizes_of(store, level);
+    json["levels"].push_back({{"level", level.level},
+                              {"points", level.points},
+                              {"clusters", level.clusters},
+                              {"bytes", level.bytes},
+                              {"members", level.members},
+                              {"index_bytes", level.index_bytes},
+                              {"cluster_sizes",
+                               {{"min", sizes.percentiles[0]},
+                                {"p5", sizes.percentiles[1]},
+                                {"median", sizes.percentiles[2]},
+                                {"p95", sizes.percentiles[3]},
+                                {"max", sizes.percentiles[4]},
+                                {"mean", sizes.mean}}}});
+    text += padded(std::to_string(level.level), 5) + padded(with_commas(level.points), 16) +
+            padded(with_commas(level.clusters), 12) + padded(readable_bytes(level.bytes), 13) +
+            padded(std::to_string(sizes.percentiles[1]), 20) +
+            padded(std::to_string(sizes.percentiles[2]), 8) +
+            padded(std::to_string(sizes.percentiles[3]), 7) + '\n';
+  }
+  return summary;
+}
 
 class InfoCommand : public Command {
  public:

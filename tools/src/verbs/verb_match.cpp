@@ -4,15 +4,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <functional>
+#include <limits>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/cluster/hierarchy.hpp>
 #include <terrace/matching/bounding_volume_hierarchy.hpp>
+#include <terrace/matching/halving.hpp>
+#include <terrace/matching/large_matching.hpp>
+#include <terrace/matching/matching_tree.hpp>
+#include <terrace/matching/point.hpp>
+#include <terrace/matching/point_matching.hpp>
 
 #include "base/portable_math.hpp"
 #include "base/stored_entities.hpp"
@@ -21,14 +31,163 @@
 #include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "tables/label_file.hpp"
-#include "tables/match_run.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/sink.hpp"
 #include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using matching::Point3;
+
 namespace {
+
+enum class MatchMethod : std::uint8_t { automatic, exact, monotone, monte_carlo };
+
+/// Called now and then with the work done and the total, in any unit; may throw to stop.
+using MatchProgress = std::function<bool(std::uint64_t done, std::uint64_t total, double)>;
+
+/// The request of `terrace match`, for points on the ground.
+struct MatchRequest {
+  MatchMethod method = MatchMethod::automatic;
+  std::span<const std::uint32_t> labels{};  ///< the cluster of each point; empty: none given
+  std::uint64_t iterations = 0;             ///< of halving; 0: as many as points
+  double seconds = 0.0;                     ///< of halving; 0: no limit
+  std::uint64_t seed = 1;
+  unsigned threads = 1;
+  std::uint64_t memory_bytes = 0;
+};
+
+struct MatchOutcome {
+  std::vector<std::uint32_t> mate;  ///< of each point; matching::kNobody for the one left over
+  double cost = 0.0;
+  std::uint64_t iterations = 0;       ///< of halving, or rounds of windows
+  std::optional<double> lower_bound;  ///< where the method has one
+  bool optimal = false;
+  std::size_t clusters = 0;  ///< that were matched first; 0: none
+};
+
+struct TreeOutcome {
+  matching::MatchingTree<matching::Point3> tree;
+  std::size_t clusters = 0;  ///< with a tree of their own; 0: none
+};
+
+/// Size of the clusters that are matched first in large sets.
+constexpr double kClusterSize = 10000;
+/// Memory of an exact matching per point, measured.
+constexpr std::uint64_t kExactBytes = 800;
+/// Memory of windows per point, besides those at work.
+constexpr std::uint64_t kWindowBytes = 150;
+
+void check_memory(std::uint64_t needed, const MatchRequest& request, std::size_t points,
+                  const char* remedy) {
+  if (request.memory_bytes == 0 || needed <= request.memory_bytes) return;
+  throw std::runtime_error("matching " + with_commas(points) + " points takes about " +
+                           readable_bytes(needed) + " and --memory is " +
+                           readable_bytes(request.memory_bytes) + ": " + remedy);
+}
+
+std::size_t distinct(std::span<const std::uint32_t> labels) {
+  std::vector<std::uint32_t> sorted(labels.begin(), labels.end());
+  std::sort(sorted.begin(), sorted.end());
+  return static_cast<std::size_t>(std::unique(sorted.begin(), sorted.end()) - sorted.begin());
+}
+
+matching::HalvingOptions halving_options(const MatchRequest& request) {
+  matching::HalvingOptions options;
+  options.method = request.method == MatchMethod::monotone ? matching::Halving::monotone
+                                                           : matching::Halving::monte_carlo;
+  options.iterations = request.iterations;
+  if (request.seconds > 0) options.seconds = request.seconds;
+  options.seed = request.seed;
+  options.threads = request.threads;
+  options.memory_limit = request.memory_bytes;
+  return options;
+}
+
+bool halves(MatchMethod method) {
+  return method == MatchMethod::monotone || method == MatchMethod::monte_carlo;
+}
+
+/// The clusters that are matched first: the caller's, or by facility location if there are too many
+/// points to match at once.
+std::vector<std::uint32_t> clusters_of(const MatchRequest& request, std::span<const Point3> points,
+                                       const MatchProgress& progress) {
+  if (!request.labels.empty()) return {request.labels.begin(), request.labels.end()};
+  if (request.method != MatchMethod::automatic ||
+      points.size() <= matching::LargeMatchingOptions{}.exact_limit)
+    return {};
+  return cluster::clusters_of_size(points, kClusterSize, request.seed, request.threads,
+                                   [&](std::uint64_t done) { progress(done, points.size(), 0); });
+}
+
+/// Pairs points. Sets too large to match exactly are first clustered by facility location
+/// (`automatic`), unless there are labels.
+/// Throws: std::invalid_argument on bad data, std::runtime_error if the memory does not suffice;
+/// what `progress` throws.
+MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> points,
+                          const MatchProgress& progress) {
+  MatchOutcome outcome;
+  if (halves(request.method)) {
+    matching::HalvingOptions options = halving_options(request);
+    options.progress = progress;
+    matching::HalvingMatching matching = matching::match_by_halving(points, options);
+    outcome.mate = std::move(matching.mate);
+    outcome.cost = matching.cost;
+    outcome.iterations = matching.iterations;
+    return outcome;
+  }
+  const std::vector<std::uint32_t> labels = clusters_of(request, points, progress);
+  matching::LargeMatchingOptions options;
+  if (request.method == MatchMethod::exact) options.exact_limit = points.size();
+  const bool exact = labels.empty();
+  if (exact) {
+    check_memory(kExactBytes * points.size(), request, points.size(),
+                 "raise it, or name clusters with --labels");
+  } else {
+    check_memory(kWindowBytes * points.size() + kExactBytes * options.window * request.threads,
+                 request, points.size(), "raise it, or take fewer --threads");
+  }
+  options.labels = labels;
+  options.threads = request.threads;
+  options.progress = progress;
+  matching::LargeMatching matching = matching::match_large(points, options);
+  outcome.mate = std::move(matching.mate);
+  outcome.cost = matching.cost;
+  outcome.iterations = matching.rounds;
+  outcome.lower_bound = matching.dual_bound;
+  outcome.optimal = matching.optimal;
+  outcome.clusters = exact ? 0 : distinct(labels);
+  return outcome;
+}
+
+/// The tree of repeated matching, each level by the method of the request. Throws: as above.
+TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point3> points,
+                              const MatchProgress& progress) {
+  const std::vector<std::uint32_t> labels = clusters_of(request, points, progress);
+  matching::MatchingTreeOptions<Point3> options;
+  options.labels = labels;
+  options.threads = request.threads;
+  options.memory_limit = request.memory_bytes;
+  if (halves(request.method)) {
+    options.matcher = [&](std::span<const Point3> nodes) {
+      matching::HalvingOptions halving = halving_options(request);
+      // Clusters are matched in parallel already.
+      if (!labels.empty()) halving.threads = 1;
+      return std::move(matching::match_by_halving(nodes, halving).mate);
+    };
+  } else if (request.method == MatchMethod::exact) {
+    options.matcher = [](std::span<const Point3> nodes) {
+      return std::move(matching::match_points(nodes).mate);
+    };
+  }
+  // The tree, and the level being matched.
+  const std::uint64_t tree_bytes = 120 * points.size();
+  check_memory(labels.empty() ? tree_bytes + kExactBytes * points.size() : tree_bytes, request,
+               points.size(), "raise it, or name clusters with --labels");
+  options.progress = [&](std::size_t done, std::size_t total) { return progress(done, total, 0); };
+  return {matching::make_matching_tree(points, options), labels.empty() ? 0 : distinct(labels)};
+}
 
 class MatchCommand final : public Command {
  public:
@@ -90,9 +249,10 @@ class MatchCommand final : public Command {
     std::transform(table.positions.begin(), table.positions.end(), positions_.begin(), ground);
 
     ProgressMeter meter(common.progress, tree_ ? "pairs" : "steps");
-    const MatchProgress progress = [&](std::uint64_t done, std::uint64_t total) {
+    const MatchProgress progress = [&](std::uint64_t done, std::uint64_t total, double) {
       check_interrupt();
       meter.update(done, static_cast<double>(done) / static_cast<double>(total));
+      return true;
     };
     if (tree_) {
       TreeOutcome outcome;

@@ -48,11 +48,7 @@ class MeshCommand final : public Command {
     part_.define(app, "only triangles that reach inside");
     add_output(app, output_, "the file to write: .ply, .obj, .glb");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
-    app.add_option("--cluster", cluster_,
-                   "L:N, the cluster N of level L: the mesh of the points of --level (default: L) "
-                   "that it stands for, itself included")
-        ->excludes("--region")
-        ->excludes("--focus");
+    part_.define_cluster(app, "the mesh of the points of --level (default: L) that it stands for");
     app.add_option(
            "--smooth", smooth_,
            "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
@@ -110,7 +106,7 @@ class MeshCommand final : public Command {
     const Stopwatch watch;
     if ((!part_.level.empty() && part_.level != "0") || !part_.focuses.empty() ||
         !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty() ||
-        !cluster_.empty()) {
+        !part_.cluster.empty()) {
       throw UsageError(
           "--max-error and --max-points concern all samples: they exclude --level, --focus, "
           "--cluster, --smooth, --overlay and --metric");
@@ -206,11 +202,7 @@ class MeshCommand final : public Command {
       throw UsageError("--save-overlay and --output are the same file");
     }
     const stream::Store store = open_store(part_.path);
-    Detail detail = part_.detail(store, common);
-    if (!cluster_.empty()) {
-      detail.cluster = parse_cluster(cluster_);
-      if (part_.level.empty()) detail.level = stream::level_of(*detail.cluster);
-    }
+    const Detail detail = part_.detail(store, common);
     const PlaceConversion places = part_.crs.places(store, common);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;
@@ -242,7 +234,7 @@ class MeshCommand final : public Command {
 
   PartOptions part_;
   std::string output_, format_, smooth_, metric_ = "euclidean";
-  std::string overlay_, save_overlay_, where_, cluster_;
+  std::string overlay_, save_overlay_, where_;
   std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
   std::optional<double> max_error_;
 };

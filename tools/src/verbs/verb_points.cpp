@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
 #include <cstddef>
-#include <cstring>
 #include <memory>
 #include <optional>
 #include <span>
@@ -89,28 +87,17 @@ class PointOutput {
 };
 
 /// Writes the points found near a place, in order, with the distance in metres as a further column.
-void write_found(const stream::Store& store, const std::vector<stream::FoundPoint>& found,
+void write_found(const stream::StoreQuery& query, const std::vector<stream::FoundPoint>& found,
                  const PlaceConversion& places, stream::PointWriter& writer) {
-  const stream::StoreSchema& schema = store.schema();
-  const std::size_t own = schema.payload_size(), record = own + sizeof(double);
+  const stream::StoreSchema& schema = query.store().schema();
+  const std::size_t payload = schema.payload_size();
+  const std::vector<std::byte> attributes = query.attributes(found);
   stream::PointBlock block;
-  block.payload.resize(found.size() * record);
-  std::vector<std::size_t> by_cluster(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     block.positions.push_back(world_point(schema, found[i].position));
-    std::memcpy(block.payload.data() + i * record + own, &found[i].distance, sizeof(double));
-    by_cluster[i] = i;
-  }
-  if (own > 0) {
-    std::sort(by_cluster.begin(), by_cluster.end(),
-              [&](std::size_t a, std::size_t b) { return found[a].cluster < found[b].cluster; });
-    stream::ClusterPoints points;
-    std::optional<stream::ClusterId> read;
-    for (const std::size_t i : by_cluster) {
-      if (read != found[i].cluster) store.read(found[i].cluster, points);
-      read = found[i].cluster;
-      std::memcpy(block.payload.data() + i * record, points.payload.data() + found[i].member * own,
-                  own);
+    for (const auto bytes : {std::span(attributes).subspan(i * payload, payload),
+                             std::as_bytes(std::span(&found[i].distance, 1))}) {
+      block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
     }
   }
   places(block.positions);
@@ -138,11 +125,7 @@ class PointsCommand final : public Command {
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
         ->needs("--near")
         ->excludes("-k");
-    app.add_option("--cluster", cluster_,
-                   "L:N, the cluster N of level L: the points of --level (default: L) that it "
-                   "stands for, itself included")
-        ->excludes("--region")
-        ->excludes("--focus")
+    part_.define_cluster(app, "the points of --level (default: L) that it stands for")
         ->excludes("--near");
     add_where(app, where_);
     app.add_option("--overlay", overlay_,
@@ -157,10 +140,6 @@ class PointsCommand final : public Command {
     const Stopwatch watch;
     const stream::Store store = open_store(part_.path);
     Detail detail = part_.detail(store, common);
-    if (!cluster_.empty()) {
-      detail.cluster = parse_cluster(cluster_);
-      if (part_.level.empty()) detail.level = stream::level_of(*detail.cluster);
-    }
     if (!where_.empty()) detail.where.emplace(where_, store.schema());
     if (!near_.empty() && detail.where) {
       throw UsageError("--near finds the nearest of all points: without --where");
@@ -258,7 +237,7 @@ class PointsCommand final : public Command {
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
                                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
-    write_found(store, found, places(to), *writer);
+    write_found(query, found, places(to), *writer);
     writer->finish();
     Summary summary;
     summary.json = {{"vertices", found.size()}, {"triangles", 0}};
@@ -276,7 +255,7 @@ class PointsCommand final : public Command {
   }
 
   PartOptions part_;
-  std::string output_, format_, overlay_, near_, cluster_, where_;
+  std::string output_, format_, overlay_, near_, where_;
   std::optional<std::size_t> count_;
   std::optional<double> radius_;
 };

@@ -32,9 +32,8 @@ class PublishCommand final : public Command {
     Summary summary;
     summary.json = {{"stores", stores.size()},
                     {"files", published.files},
-                    {"bytes", published.bytes},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+                    {"bytes", published.bytes}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(published.files) + " files, " +
                    readable_bytes(published.bytes) + ", in " + readable_seconds(watch.seconds()) +
                    "; copy the folder to any web server\n";

@@ -63,10 +63,8 @@ class ViewCommand final : public Command {
     const Stopwatch watch;
     server.run([] { return interrupted(); });
     Summary summary;
-    summary.json = {{"address", address},
-                    {"stores", stores.size()},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.json = {{"address", address}, {"stores", stores.size()}};
+    summary.add_cost(watch);
     return summary;
   }
 

@@ -111,6 +111,8 @@ using Metric =
 /// Properties that a strategy may rely on.
 [[nodiscard]] bool is_symmetric(const Metric& metric);
 [[nodiscard]] bool obeys_triangle_inequality(const Metric& metric);
+/// The map that makes all distances between points of `box` Euclidean; nullopt if there is none.
+[[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box);
 
 /// The name for messages and files: "euclidean", "squared", "minkowski:P", "elliptical",
 /// "elliptical field", "custom".

@@ -108,13 +108,6 @@ void set_costs(SearchFrame& frame, double facility_cost, double outlier_price, i
 
 }  // namespace
 
-std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box) {
-  if (std::holds_alternative<Euclidean>(metric)) return kIdentityMap;
-  if (const auto* elliptical = std::get_if<Elliptical>(&metric)) return elliptical->map();
-  if (const auto* field = std::get_if<EllipticalField>(&metric)) return field->uniform_in(box);
-  return std::nullopt;
-}
-
 SearchFrame make_frame(const FacilityPoints& problem) {
   SearchFrame frame;
   const std::size_t count = problem.points.size();

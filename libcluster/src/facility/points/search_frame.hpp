@@ -23,10 +23,6 @@ struct SearchFrame {
   double true_facility_cost = 0.0;
 };
 
-/// The map that makes distances within the bounding box of the points Euclidean; nullopt if there
-/// is none.
-[[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box);
-
 /// Requires: check(problem) has passed. For entities there are no points.
 [[nodiscard]] SearchFrame make_frame(const FacilityPoints& problem);
 [[nodiscard]] SearchFrame make_frame(const FacilityEntities& problem);

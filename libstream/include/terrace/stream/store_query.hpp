@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <list>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -95,6 +96,9 @@ class StoreQuery {
   [[nodiscard]] std::vector<FoundPoint> nearest(const Point3& place, std::size_t count,
                                                 const LinearMap& metric = kIdentityMap,
                                                 unsigned level = 0);
+  /// The attributes of found points, in their order: Schema::payload_size() bytes each. Reads each
+  /// of their clusters once.
+  [[nodiscard]] std::vector<std::byte> attributes(std::span<const FoundPoint> found) const;
   /// The number of points (of level 0 and above) in the box. Only clusters that cross its border
   /// are read.
   [[nodiscard]] std::uint64_t count(const Box3& box);

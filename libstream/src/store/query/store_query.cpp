@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/stream/store_query.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <iterator>
+#include <numeric>
+#include <optional>
 #include <utility>
 
 #include "terrace/stream/error.hpp"
@@ -164,6 +168,24 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
   cache.by_id[key] = cache.nodes.begin();
   while (cache.held_bytes > cache.most_bytes && cache.nodes.size() > 1) cache.drop(gone);
   return cache.nodes.front();
+}
+
+std::vector<std::byte> StoreQuery::attributes(std::span<const FoundPoint> found) const {
+  const std::size_t size = store_.schema().payload_size();
+  std::vector<std::byte> values(found.size() * size);
+  if (values.empty()) return values;
+  std::vector<std::size_t> by_cluster(found.size());
+  std::iota(by_cluster.begin(), by_cluster.end(), std::size_t{0});
+  std::sort(by_cluster.begin(), by_cluster.end(),
+            [&](std::size_t a, std::size_t b) { return found[a].cluster < found[b].cluster; });
+  ClusterPoints points;
+  std::optional<ClusterId> read;
+  for (const std::size_t i : by_cluster) {
+    if (read != found[i].cluster) store_.read(found[i].cluster, points);
+    read = found[i].cluster;
+    std::memcpy(values.data() + i * size, points.payload.data() + found[i].member * size, size);
+  }
+  return values;
 }
 
 std::vector<FoundPoint> StoreQuery::in_box(const Box3& box, unsigned level) {

@@ -276,6 +276,12 @@ bool is_tile_folder(const std::string& folder) {
 }
 
 TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context) {
+  if (!is_tile_folder(request.folder)) {
+    throw stream::Error({.file = request.folder,
+                         .where = {},
+                         .cause = "holds no set of tiles",
+                         .remedy = "name the folder into which they were written"});
+  }
   const TileResources resources = tile_resources(context, request.folder);
   std::unique_ptr<TileSource> source;
   if (request.store != nullptr) {
