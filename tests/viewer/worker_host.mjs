@@ -61,6 +61,7 @@ export class Worker {
       AbortController,
       performance,
       setTimeout: (work, time) => setTimeout(work, time ?? 0),
+      clearTimeout,
       ArrayBuffer,
       Uint8Array,
       Uint32Array,

@@ -45,7 +45,6 @@ template class ViewControl<Delaunay2<std::int32_t>>;
 template class ViewControl<PointCloud>;
 #else
 template class ViewControl<Delaunay2<double>>;
-template class ViewControl<DynamicSurface<std::int32_t>>;
 template class ViewControl<DynamicSurface<double>>;
 #endif
 

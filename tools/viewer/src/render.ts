@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// Draws the scene by WebGL 2 from buffers that are indexed by the core's slots.
 
-import {BLOCK, type Changes, type State, VERTEX_BYTES} from './core';
-import type {OrbitCamera} from './camera';
+import {BLOCK, type Changes, type Kind, type State, VERTEX_BYTES} from './core';
+import {add, dot, type OrbitCamera, unit} from './camera';
 
-export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity'] as const;
+export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity', 'grey'] as const;
 export type Colour = typeof COLOURS[number];
 
 export interface Look {
@@ -26,6 +26,9 @@ const GREYS = [[0, 28, 30, 34], [1, 245, 245, 240]];
 export const CATEGORIES = [[68, 119, 170], [238, 153, 51], [51, 153, 85], [204, 68, 85], [136, 102, 187], [153, 119, 68],
                            [221, 136, 187], [119, 119, 119], [170, 170, 51], [85, 187, 204], [34, 85, 51], [136, 34, 51]];
 
+/// Surfaces without other colours, as `terrace render` draws them.
+const PLAIN = [[0, 205, 205, 200], [1, 205, 205, 200]];
+
 /// The lines around the cluster of a place.
 const OUTLINE = [214, 40, 110];
 
@@ -37,10 +40,10 @@ layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in float level;
 layout(location = 3) in vec2 start;
-layout(location = 4) in vec3 rgb;        // of points, in the bytes of the normal
-layout(location = 5) in vec2 attributes; // of points, in those of the start: class, intensity
+layout(location = 4) in vec3 rgb;        // of points and surfaces, in the bytes of the start
+layout(location = 5) in vec2 attributes; // likewise: class, intensity
 uniform mat4 matrix;
-uniform bool points;
+uniform bool slides;
 uniform float time, pointSize;
 out vec3 at;
 out vec3 up;
@@ -49,7 +52,7 @@ out vec3 own;
 out vec2 attributesOf;
 void main() {
   at = place;
-  if (!points) {
+  if (slides) {
     float t = clamp((time - start.y) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0);
     at.z = mix(start.x, place.z, t * t * (3.0 - 2.0 * t));
   }
@@ -72,7 +75,10 @@ uniform sampler2D ramp;
 uniform int mode;  // as in COLOURS; -1 for the wire
 uniform vec2 heights;
 uniform float top;
-uniform bool lit;
+uniform int lit;   // 0 not, 1 as a map, 2 as a body
+uniform vec3 axis;  // upward
+uniform vec3 lamp;
+uniform float flatLight;
 uniform vec4 wire;
 uniform vec3 sky;
 uniform vec3 eye;
@@ -83,15 +89,22 @@ void main() {
     colour = wire;
     return;
   }
-  vec3 n = lit ? normalize(up) : vec3(0.0, 0.0, 1.0);
-  float share = mode == 0 ? (at.z - heights.x) / max(heights.y - heights.x, 1e-6)
+  vec3 n = lit > 0 ? normalize(up) : vec3(0.0, 0.0, 1.0);
+  float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-6)
       : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
       : mode == 2 ? 1.0 - levelOf / max(top, 1.0)
       : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
       : attributesOf.y;
   vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
+  if (lit == 2) {
+    // From beside the camera, on both sides, as terrace render does it.
+    if (dot(n, eye - at) < 0.0) n = -n;
+    float light = 0.28 + 0.72 * 0.92 * max(dot(n, lamp), 0.0) / flatLight;
+    colour = vec4(light <= 1.0 ? base * light : base + (1.0 - base) * min(light - 1.0, 1.0), 1.0);
+    return;
+  }
   float light = 1.0;
-  if (lit) {
+  if (lit == 1) {
     // From the north-west, as maps have it, and a little from the sky.
     float sun = max(dot(n, normalize(vec3(-0.55, 0.55, 0.63))), 0.0);
     light = 0.36 + 0.78 * sun + 0.06 * n.z;
@@ -151,7 +164,7 @@ export class Renderer {
   private state: State|null = null;
   private box = [0, 0, 0, 1, 1, 1];
   private top = 1;
-  private asTriangles = true;
+  private kind: Kind = 'raster';
   private slidingUntil = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -176,7 +189,8 @@ export class Renderer {
       level: this.ramp(LEVELS),
       rgb: this.ramp(GREYS),
       class: this.ramp(categories),
-      intensity: this.ramp(GREYS)
+      intensity: this.ramp(GREYS),
+      grey: this.ramp(PLAIN)
     };
     gl.enable(gl.DEPTH_TEST);
     this.clear();
@@ -196,16 +210,16 @@ export class Renderer {
     this.linesStale = true;
     this.state = null;
   }
-  show(box: number[], top: number, triangles: boolean): void {
+  show(box: number[], top: number, kind: Kind): void {
     this.box = box;
     this.top = top;
-    this.asTriangles = triangles;
+    this.kind = kind;
   }
   apply(state: State, changes: Changes, time: number): void {
     this.state = state;
     if (changes.vertexBlocks.length > 0) {
       this.vertices.put(changes.vertexBlocks, changes.vertices, state.vertexSlots);
-      this.slidingUntil = time + SLIDE_SECONDS;
+      if (this.kind === 'raster') this.slidingUntil = time + SLIDE_SECONDS;
     }
     if (changes.triangleBlocks.length > 0) {
       const bytes = new Uint8Array(changes.triangles.buffer, changes.triangles.byteOffset, changes.triangles.byteLength);
@@ -259,18 +273,24 @@ export class Renderer {
     gl.uniformMatrix4fv(this.uniform('matrix'), false, camera.matrix(aspect, near, far));
     gl.uniform1f(this.uniform('time'), time);
     gl.uniform1f(this.uniform('pointSize'), look.pointSize);
-    gl.uniform2f(this.uniform('heights'), box[2], box[5]);
+    const yUp = camera.body && camera.yUp;
+    gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
+    gl.uniform2f(this.uniform('heights'), yUp ? box[1] : box[2], yUp ? box[4] : box[5]);
     gl.uniform1f(this.uniform('top'), this.top);
-    gl.uniform1i(this.uniform('lit'), this.asTriangles ? 1 : 0);
+    gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);
+    const toward = add([0, 0, 0], camera.direction, -1);
+    const lamp = unit(add(add(toward, camera.up, 0.45), camera.right, -0.45));
+    gl.uniform3f(this.uniform('lamp'), lamp[0], lamp[1], lamp[2]);
+    gl.uniform1f(this.uniform('flatLight'), dot(lamp, toward));
     gl.uniform3f(this.uniform('sky'), sky[0], sky[1], sky[2]);
     gl.uniform3f(this.uniform('eye'), eye[0], eye[1], eye[2]);
     gl.uniform1f(this.uniform('haze'), extent * 2.5);
     const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
     gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
-    gl.uniform1i(this.uniform('points'), this.asTriangles ? 0 : 1);
+    gl.uniform1i(this.uniform('slides'), this.kind === 'raster' ? 1 : 0);
     gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
-    if (!this.asTriangles) {
+    if (this.kind === 'points') {
       gl.bindVertexArray(this.surface);
       gl.drawArrays(gl.POINTS, 0, this.state.vertexSlots);
       return;
@@ -328,8 +348,8 @@ export class Renderer {
     gl.vertexAttribPointer(1, 3, gl.BYTE, true, VERTEX_BYTES, 12);
     gl.vertexAttribPointer(2, 1, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 15);
     gl.vertexAttribPointer(3, 2, gl.FLOAT, false, VERTEX_BYTES, 16);
-    gl.vertexAttribPointer(4, 3, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 12);
-    gl.vertexAttribPointer(5, 2, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 16);
+    gl.vertexAttribPointer(4, 3, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 16);
+    gl.vertexAttribPointer(5, 2, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 19);
     for (let i = 0; i < 6; ++i) gl.enableVertexAttribArray(i);
     gl.bindVertexArray(null);
     return array;
