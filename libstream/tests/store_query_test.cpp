@@ -237,7 +237,8 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
   }
 }
 
-TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
+/// A cloud whose points have the sum of their coordinates as an attribute.
+QueriedStore store_of_sums() {
   StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("sum"));
   auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 3000, 500, 3);
@@ -248,7 +249,11 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
       block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
     }
   }
-  const QueriedStore queried(schema, blocks, {.block_points = 500, .cluster_points = 40});
+  return {schema, blocks, {.block_points = 500, .cluster_points = 40}};
+}
+
+TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
+  const QueriedStore queried = store_of_sums();
   StoreQuery query(queried.store());
   ClusterPoints points;
   const std::vector<FoundPoint> found = query.nearest({50, 50, 50}, 100);
@@ -261,6 +266,57 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
     const double sum = point.position[0] + point.position[1] + point.position[2];
     EXPECT_EQ(queried.store().schema().view<double>(points.payload, 0)[point.member], sum);
     EXPECT_EQ(queried.store().schema().view<double>(sums, 0)[i], sum);
+  }
+}
+
+TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
+  const QueriedStore queried = store_of_sums();
+  std::vector<double> sums;
+  for (const FoundPoint& point : queried.points()) {
+    sums.push_back(point.position[0] + point.position[1] + point.position[2]);
+  }
+  std::sort(sums.begin(), sums.end());
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  for (const double share : {0.0, 0.001, 0.5, 0.999, 1.0}) {
+    const double least =
+        sums[static_cast<std::size_t>(share * static_cast<double>(sums.size() - 1))];
+    StoreQuery query(queried.store(), 1 << 16,
+                     Where("sum > " + std::to_string(least), queried.store().schema()));
+    const auto meets = [&](const Point3& p) {
+      return p[0] + p[1] + p[2] > std::stod(std::to_string(least));
+    };
+    for (int round = 0; round < 20; ++round) {
+      const Box3 all = queried.store().bounds();
+      Point3 place, other;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        place[axis] = all.min[axis] + uniform(random) * (all.max[axis] - all.min[axis]);
+        other[axis] = all.min[axis] + uniform(random) * (all.max[axis] - all.min[axis]);
+      }
+      Box3 box;
+      box.include(place);
+      box.include(other);
+      std::vector<FoundPoint> inside, near;
+      for (const FoundPoint& point : queried.points()) {
+        if (!meets(point.position)) continue;
+        if (box.contains(point.position)) inside.push_back(point);
+        const double x = point.position[0] - place[0], y = point.position[1] - place[1],
+                     z = point.position[2] - place[2];
+        near.push_back(point);
+        near.back().distance = std::sqrt(x * x + y * y + z * z);
+      }
+      EXPECT_EQ(query.in_box(box).size(), inside.size());
+      EXPECT_EQ(query.count(box), inside.size());
+      std::sort(near.begin(), near.end(),
+                [](const FoundPoint& a, const FoundPoint& b) { return key_of(a) < key_of(b); });
+      near.resize(std::min<std::size_t>(near.size(), 7));
+      const std::vector<FoundPoint> found = query.nearest(place, 7);
+      ASSERT_EQ(found.size(), near.size());
+      for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(key_of(found[i]), key_of(near[i]));
+      if (near.empty()) continue;
+      EXPECT_GE(query.within(place, near.back().distance).size(), near.size());
+    }
   }
 }
 

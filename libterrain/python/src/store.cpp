@@ -136,14 +136,17 @@ std::vector<std::byte> records_of(const stream::StoreQuery& query,
 }
 
 py::array near(const OpenStore& open, const std::vector<double>& place,
-               std::optional<std::size_t> count, std::optional<double> radius, unsigned level) {
+               std::optional<std::size_t> count, std::optional<double> radius, unsigned level,
+               const std::string& where) {
   const stream::Store store = open.get();
   if (place.size() != 2 && place.size() != 3)
     throw py::value_error("`near` has two or three numbers");
   terrain::NearPlace wanted{.xy = {place[0], place[1]}};
   if (place.size() == 3) wanted.z = place[2];
   std::vector<std::byte> records = released([&] {
-    stream::StoreQuery query(store);
+    std::optional<stream::Where> condition;
+    if (!where.empty()) condition.emplace(where, store.schema());
+    stream::StoreQuery query(store, 0, std::move(condition));
     return records_of(query, count ? nearest_points(query, wanted, *count, level)
                                    : points_within(query, wanted, radius.value(), level));
   });

@@ -226,12 +226,12 @@ class Store:
     def _focuses(focus):
         return [(as_region(place), whole(level, 'level')) for place, level in focus]
 
-    def query(self, *, box=None, near=None, k=None, radius=None, level=0):
+    def query(self, *, box=None, near=None, k=None, radius=None, level=0, where=''):
         """The points in a box, or near a place: the ``k`` nearest, or all within a ``radius`` in metres.
 
         near: (x, y) or (x, y, z) in the store's CRS; without z heights do not count in distances, which are in metres
-        on the ground. Returns: a structured array as points() does; near a place the nearest first, with a field
-        ``distance``.
+        on the ground. where: a condition as in points(). Returns: a structured array as points() does; near a place
+        the nearest first, with a field ``distance``.
         """
         if (box is None) == (near is None):
             raise ValueError('query() needs either `box` or `near`')
@@ -239,13 +239,13 @@ class Store:
         if box is not None:
             if k is not None or radius is not None:
                 raise ValueError('`k` and `radius` go with `near`')
-            return self.points(region=box, level=level)
+            return self.points(region=box, level=level, where=where)
         if (k is None) == (radius is None):
             raise ValueError('`near` needs either `k` or `radius`')
         place = [float(number) for number in near]
         if k is not None:
             k = whole(k, 'k')
-        return _real_values(self._core.near(place, k, radius, level), self._info)
+        return _real_values(self._core.near(place, k, radius, level, where), self._info)
 
     def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):
         return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, whole(level, 'level'), max_edge, (crs_text(crs) or ''),

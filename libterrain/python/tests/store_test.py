@@ -99,6 +99,13 @@ class Stores(StoreCase):
         within = self.scan.query(near=place, radius=50.0)
         self.assertTrue((within['distance'] <= 50).all())
         self.assertAlmostEqual(len(within), (distances <= 50).sum(), delta=2)
+        one = self.classes[0]
+        some = self.scan.query(near=place, k=25, where=f'class == {one}')
+        np.testing.assert_array_equal(terrace.xyz(some), self.points[order := np.argsort(
+            np.where(self.classes == one, distances, np.inf))[:25]])
+        self.assertTrue((self.classes[order] == one).all())
+        with self.assertRaises(ValueError):
+            self.scan.query(near=place, k=1, where='height of')
 
     def test_other_reference_systems(self):
         got = self.scan.points(crs='EPSG:4326')

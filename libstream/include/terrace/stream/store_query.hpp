@@ -7,11 +7,13 @@
 #include <cstdint>
 #include <limits>
 #include <list>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "terrace/stream/store.hpp"
+#include "terrace/stream/where.hpp"
 
 namespace terrace::stream {
 
@@ -53,9 +55,13 @@ class StoreQuery {
   class Node {
    public:
     ClusterId id{};
-    std::vector<Point3> positions;  ///< of the members
+    std::vector<Point3> positions;      ///< of the members
+    std::vector<std::uint8_t> matches;  ///< 1 for members that meet the condition; empty: all do
     std::uint64_t bytes = 0;
 
+    [[nodiscard]] bool match(std::size_t member) const {
+      return matches.empty() || matches[member] != 0;
+    }
     [[nodiscard]] unsigned level() const { return level_of(id); }
     /// The cluster that a member heads on a level below this node's. Throws: Error.
     [[nodiscard]] const Branch& branch(std::size_t member, unsigned below) const {
@@ -78,7 +84,10 @@ class StoreQuery {
 
   /// leaf_bytes: cache for decoded clusters of level 0 (LRU), for callers that query nearby places
   /// repeatedly. Without it, ranges that do not overlap are read fastest.
-  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0);
+  /// where: only points that meet it are found and counted; clusters of level 0 in which none can
+  /// are not read, and are nodes without members.
+  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0,
+                      std::optional<Where> where = std::nullopt);
   StoreQuery(const StoreQuery&) = delete;
   StoreQuery& operator=(const StoreQuery&) = delete;
 
@@ -99,11 +108,12 @@ class StoreQuery {
   /// The attributes of found points, in their order: Schema::payload_size() bytes each. Reads each
   /// of their clusters once.
   [[nodiscard]] std::vector<std::byte> attributes(std::span<const FoundPoint> found) const;
-  /// The number of points (of level 0 and above) in the box. Only clusters that cross its border
-  /// are read.
+  /// The number of points (of level 0 and above) in the box. Without a condition only clusters that
+  /// cross its border are read.
   [[nodiscard]] std::uint64_t count(const Box3& box);
-  /// An estimate of count() from the index alone: of clusters that cross the border, the share of
-  /// their boxes inside counts. Ends early with any number above `limit` if there are more.
+  /// An estimate of count() without the condition, from the index alone: of clusters that cross the
+  /// border, the share of their boxes inside counts. Ends early with any number above `limit` if
+  /// there are more.
   [[nodiscard]] double estimate(const Box3& box,
                                 double limit = std::numeric_limits<double>::infinity());
 
@@ -153,6 +163,7 @@ class StoreQuery {
   void check_looked(std::uint64_t clusters) const;
 
   const Store& store_;
+  std::optional<Where> where_;
   std::uint64_t clusters_ = 0;  ///< of all levels
   Node root_, passing_;         ///< passing: the node that is not cached
   Cache leaves_, inner_;
