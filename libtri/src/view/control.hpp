@@ -28,7 +28,8 @@ ViewOptions checked(ViewOptions options);
 
 template <class Triangulation>
 struct ViewControl<Triangulation>::Impl {
-  Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options);
+  Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options,
+       Triangulation empty);
 
   const Step& step(const View& view, const StepBudget& budget);
   [[nodiscard]] ClusterTree& tree() { return model_.impl_->tree_; }
@@ -73,7 +74,7 @@ struct ViewControl<Triangulation>::Impl {
 
 template <class Triangulation>
 ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenCluster root,
-                                       ViewOptions options)
+                                       ViewOptions options, Triangulation empty)
     : options_(detail::checked(std::move(options))),
       cache_([&] {
         if (root.cluster != cluster_id(static_cast<unsigned>(counts.size()), 0)) {
@@ -85,7 +86,7 @@ ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenC
         cache.give(root);
         return cache;
       }()),
-      model_(cache_, Detail{}, options_.model),
+      model_(cache_, Detail{}, options_.model, std::move(empty)),
       front_(tree(), options_) {
   front_.add(ClusterTree::kRoot, root.child_records, nullptr);
   cache_.drop(root.cluster);
@@ -280,8 +281,9 @@ void ViewControl<Triangulation>::Impl::withdraw() {
 
 template <class Triangulation>
 ViewControl<Triangulation>::ViewControl(std::vector<std::uint64_t> counts, GivenCluster root,
-                                        ViewOptions options)
-    : impl_(std::make_unique<Impl>(std::move(counts), std::move(root), std::move(options))) {}
+                                        ViewOptions options, Triangulation empty)
+    : impl_(std::make_unique<Impl>(std::move(counts), std::move(root), std::move(options),
+                                   std::move(empty))) {}
 template <class Triangulation>
 ViewControl<Triangulation>::~ViewControl() = default;
 template <class Triangulation>

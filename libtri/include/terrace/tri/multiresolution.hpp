@@ -157,7 +157,8 @@ struct ModelOptions {
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
 /// vertex.
 ///
-/// Triangulation: Delaunay2 or Delaunay3, in any metric, DynamicSurface, or PointCloud.
+/// Triangulation: Delaunay2 or Delaunay3, in any metric; RegionalDelaunay2, with a metric per
+/// region; DynamicSurface, or PointCloud.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -177,7 +178,7 @@ class MultiresolutionModel {
   /// Starts with the points of the given detail, built in one go. The first delta covers the
   /// changes after that: begin by reading the whole triangulation. The source must outlive the
   /// model.
-  /// `empty`: the triangulation to fill, which supplies the metric.
+  /// `empty`: the triangulation to fill, which supplies the metric or the field of metrics.
   /// Throws: what the source throws, HierarchyError, std::length_error.
   explicit MultiresolutionModel(ClusterSource& source, const Detail& start = {},
                                 ModelOptions options = {}, Triangulation empty = Triangulation());

@@ -220,7 +220,8 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
 /// (with outlines 32 more each), and the given clusters that are kept.
 ///
-/// Triangulation: Delaunay2, for points in the plane with heights; DynamicSurface, for scans of
+/// Triangulation: Delaunay2, for points in the plane with heights; RegionalDelaunay2, for the same
+/// with elliptical metrics in regions; DynamicSurface, for scans of
 /// surfaces in space, whose shape is then part of what a step may spend; PointCloud, for points in
 /// space alone.
 template <class Triangulation>
@@ -258,9 +259,10 @@ class ViewControl {
   };
 
   /// counts: clusters of each level below the top, as from ClusterSource::cluster_count. root:
-  /// everything about cluster_id(counts.size(), 0).
+  /// everything about cluster_id(counts.size(), 0). empty: as in MultiresolutionModel.
   /// Throws: HierarchyError, std::length_error; std::invalid_argument for options out of range.
-  ViewControl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options = {});
+  ViewControl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options = {},
+              Triangulation empty = Triangulation());
   ~ViewControl();
   ViewControl(const ViewControl&) = delete;
   ViewControl& operator=(const ViewControl&) = delete;
