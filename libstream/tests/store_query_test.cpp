@@ -81,6 +81,45 @@ TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
   EXPECT_LT(read, index / 20);
 }
 
+/// Of a store whose index has many chapters, the contents of those that are near are read, once.
+TEST(StoreQuery, ReadsTheContentsOfTheIndexThatAreNearAlone) {
+  const TemporaryFolder folder;
+  const std::vector<testing::Block> blocks =
+      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 1200, 1200, 30, 1);
+  testing::write_store(folder.path() / "s", testing::grid_schema(ScalarType::i16), blocks,
+                       {.block_points = 900, .cluster_points = 6});
+  std::uint64_t reads = 0, read = 0;
+  const Store store = Store::open("s", [&](const std::string& name) {
+    const std::shared_ptr<ByteSource> file = open_file(folder.path() / "s" / name);
+    const bool counted = name == "level-0.0.index";
+    return bytes_by_function(
+        name, file->size(),
+        [file, counted, &read, &reads](std::uint64_t offset, std::span<std::byte> out) {
+          file->read(offset, out);
+          if (!counted) return;
+          read += out.size();
+          ++reads;
+        });
+  });
+  // The directory is small, and all that has been read.
+  ASSERT_GT(store.levels()[0].clusters, 150000u);
+  EXPECT_EQ(reads, 1u);
+  EXPECT_LT(read, 10000u);
+  StoreQuery query(store);
+  const Box3 box{{300, 200, -1e9}, {304, 204, 1e9}};
+  std::size_t inside = 0;
+  for (const testing::Block& block : blocks) {
+    for (const Point3& p : block.positions) inside += box.contains(p) ? 1 : 0;
+  }
+  EXPECT_EQ(query.in_box(box).size(), inside);
+  EXPECT_LT(read, store.levels()[0].index_bytes / 20);
+  const std::uint64_t before = reads;
+  EXPECT_EQ(query.in_box(box).size(), inside);
+  EXPECT_EQ(reads, before);
+  EXPECT_EQ(query.count({{-1, -1, -1e9}, {5000, 5000, 1e9}}), store.points());
+  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+}
+
 constexpr double kFarAway = std::numeric_limits<double>::infinity();
 
 using Key = std::tuple<double, Point3, ClusterId, std::uint32_t>;

@@ -48,7 +48,7 @@ class StoreQuery {
     Box3 box;
     std::uint64_t ordinal = 0;
     /// Points of level 0 below, including the representative; 0 if the index has not been read for
-    /// this one yet, and the box is Store::coarse_box().
+    /// this one yet, and the box is Store::coarse_box() or page_box().
     std::uint64_t descendants = 0;
   };
   /// A decoded cluster and the clusters that its members head.
@@ -69,7 +69,16 @@ class StoreQuery {
       if (branch.descendants == 0) look_up(branch, below);
       return branch;
     }
-    /// The same as far as it is known without reading the index.
+    /// The same, but its box may be that of its page of the index, which is not read. Throws:
+    /// Error.
+    [[nodiscard]] const Branch& near_branch(std::size_t member, unsigned below) const {
+      Branch& branch = branches_[member * level() + below];
+      if (branch.descendants == 0) {
+        branch.box = store_->page_box(cluster_id(below, branch.ordinal));
+      }
+      return branch;
+    }
+    /// The same as far as it is known without reading.
     [[nodiscard]] const Branch& known_branch(std::size_t member, unsigned below) const {
       return branches_[member * level() + below];
     }
@@ -122,7 +131,7 @@ class StoreQuery {
 
   /// Visits the root and then, level by level down to `level` and within a level by id, each
   /// cluster for which wants(level, branch) is true. A branch is tested only if that of the same
-  /// point on the level above was wanted, since it lies within that; and with a larger box first,
+  /// point on the level above was wanted, since it lies within that; and with larger boxes first,
   /// for which wants() must be true too where it is for the branch's.
   template <class Wants, class Visit>
   void descend(unsigned level, const Wants& wants, const Visit& visit);
@@ -185,7 +194,10 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
         const Branch& branch = node.known_branch(i, below);
         const bool known = branch.descendants > 0;
         if (!wants(below, branch)) break;
-        if (!known && !wants(below, node.branch(i, below))) break;
+        if (!known &&
+            !(wants(below, node.near_branch(i, below)) && wants(below, node.branch(i, below)))) {
+          break;
+        }
         wanted_[below].push_back(branch.ordinal);
       }
     }
@@ -215,6 +227,7 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
           return distance > bound || distance == std::numeric_limits<double>::infinity();
         };
         if (beyond(least(node.known_branch(i, below).box))) continue;
+        if (beyond(least(node.near_branch(i, below).box))) continue;
         const Branch& branch = node.branch(i, below);
         const double distance = least(branch.box);
         if (beyond(distance)) continue;
@@ -253,6 +266,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
       // What a point heads on a level lies within what it heads on the level above.
       for (unsigned below = at.level(); below-- > 0;) {
         if (!box.intersects(at.known_branch(i, below).box)) break;
+        if (!box.intersects(at.near_branch(i, below).box)) break;
         const Branch& branch = at.branch(i, below);
         if (!box.intersects(branch.box)) break;
         if (below == 0 || (box.contains(branch.box.min) && box.contains(branch.box.max))) {
