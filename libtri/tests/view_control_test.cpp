@@ -63,6 +63,61 @@ TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
   EXPECT_GT(mixed, 50) << "the views show everything or nothing";
 }
 
+// Bounds in place of records lead to the same clusters, and records of what is out of sight are
+// never asked for.
+TEST(ViewControl, RecordsMayComeLater) {
+  using T = Delaunay2<std::int32_t>;
+  std::size_t asked = 0, known_later = 0;
+  for (std::uint64_t seed = 1; seed <= 25; ++seed) {
+    for (const Shape shape : kWorldShapes) {
+      World world(seed, shape);
+      TRACE(world);
+      const WholeTree tree(world.source);
+      const ViewOptions options = random_options(world);
+      ViewControl<T> control(counts(world.source), load_root(world.source), options);
+      const auto with_bounds = [&](GivenCluster cluster) {
+        for (ClusterRecord& record : cluster.child_records) {
+          if (below(world.random, 4) == 0) continue;
+          for (std::size_t k = 0; k < 3; ++k) {
+            record.box.min[k] -= 3.0 * unit(world.random);
+            record.box.max[k] += 3.0 * unit(world.random);
+          }
+          record.error = std::numeric_limits<double>::infinity();
+          record.members = ClusterRecord::kUnread;
+          ++known_later;
+        }
+        return cluster;
+      };
+      for (int views = 0; views < 4; ++views) {
+        SCOPED_TRACE(views);
+        const View view = world.view();
+        const ClusterSet goal = wanted_by(tree, world.source, view, options, expanded_set(control));
+        for (int steps = 0;; ++steps) {
+          ASSERT_LT(steps, 5000);
+          const auto& step = control.step(view);
+          const std::vector<ViewRequest> wanted = step.wanted;
+          if (step.settled && wanted.empty()) break;
+          double least = std::numeric_limits<double>::infinity();
+          for (const ViewRequest& r : wanted) {
+            ASSERT_LE(r.importance, least);
+            least = r.importance;
+            if (r.members == ClusterRecord::kUnread) {
+              control.give_record(r.cluster, world.source.at(r.cluster).record);
+              ++asked;
+            } else {
+              control.give(with_bounds(load(world.source, r)));
+            }
+          }
+        }
+        ASSERT_NO_FATAL_FAILURE(check_model(control.model(), world.source, goal));
+      }
+      control.give_record(cluster_id(0, 1u << 30), {});  // of a cluster that is not there
+    }
+  }
+  EXPECT_GT(asked, 200u);
+  EXPECT_LT(asked, known_later);
+}
+
 // However steps are interrupted, and in whatever portions clusters arrive, the triangulation is
 // valid in between and the end is the same.
 TEST(ViewControl, InterruptedStepsEndAtTheSame) {
