@@ -75,16 +75,23 @@ TEST(ViewControl, RecordsMayComeLater) {
       const WholeTree tree(world.source);
       const ViewOptions options = random_options(world);
       ViewControl<T> control(counts(world.source), load_root(world.source), options);
+      ClusterSet bounded, read;
       const auto with_bounds = [&](GivenCluster cluster) {
-        for (ClusterRecord& record : cluster.child_records) {
+        const std::size_t level = level_of(cluster.cluster);
+        for (std::size_t i = 0; i < cluster.child_records.size(); ++i) {
+          ClusterRecord& record = cluster.child_records[i];
           if (below(world.random, 4) == 0) continue;
+          // The last one is the head's.
+          if (i < cluster.positions.size()) {
+            bounded.insert(cluster_id(static_cast<unsigned>(level) - 1,
+                                      cluster.children[i * level + level - 1]));
+          }
           for (std::size_t k = 0; k < 3; ++k) {
             record.box.min[k] -= 3.0 * unit(world.random);
             record.box.max[k] += 3.0 * unit(world.random);
           }
           record.error = std::numeric_limits<double>::infinity();
           record.members = ClusterRecord::kUnread;
-          ++known_later;
         }
         return cluster;
       };
@@ -103,7 +110,7 @@ TEST(ViewControl, RecordsMayComeLater) {
             least = r.importance;
             if (r.members == ClusterRecord::kUnread) {
               control.give_record(r.cluster, world.source.at(r.cluster).record);
-              ++asked;
+              if (bounded.count(r.cluster)) read.insert(r.cluster);
             } else {
               control.give(with_bounds(load(world.source, r)));
             }
@@ -112,6 +119,8 @@ TEST(ViewControl, RecordsMayComeLater) {
         ASSERT_NO_FATAL_FAILURE(check_model(control.model(), world.source, goal));
       }
       control.give_record(cluster_id(0, 1u << 30), {});  // of a cluster that is not there
+      asked += read.size();
+      known_later += bounded.size();
     }
   }
   EXPECT_GT(asked, 200u);
