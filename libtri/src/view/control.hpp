@@ -52,6 +52,7 @@ struct ViewControl<Triangulation>::Impl {
   [[nodiscard]] Room make_room(const Candidate& candidate);
   void ask(const Candidate& candidate);
   void ask_soon();
+  void ask_for_records();
   void request(const Candidate& candidate, double importance, double bytes);
   void expand(const Candidate& candidate, const GivenCluster& given);
   void collapse(Slot slot);
@@ -110,6 +111,7 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   model_.open_step();
   expand_wanted();
   ask_soon();
+  ask_for_records();
   meter_.fixed();
   const bool done = collapse_unwanted(0);
   withdraw();
@@ -226,6 +228,26 @@ void ViewControl<Triangulation>::Impl::ask_soon() {
   }
 }
 
+// Both lists are ordered by importance.
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::ask_for_records() {
+  const auto unread = front_.unread();
+  if (unread.empty()) return;
+  std::vector<ViewRequest> clusters;
+  clusters.swap(result_.wanted);
+  std::size_t next = 0;
+  const auto records_above = [&](double importance) {
+    for (; next < unread.size() && unread[next].keep > importance; ++next) {
+      result_.wanted.push_back({unread[next].id, {}, ClusterRecord::kUnread, unread[next].keep});
+    }
+  };
+  for (const ViewRequest& cluster : clusters) {
+    records_above(cluster.importance);
+    result_.wanted.push_back(cluster);
+  }
+  records_above(-1.0);
+}
+
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::request(const Candidate& candidate, double importance,
                                                double bytes) {
@@ -312,6 +334,10 @@ bool ViewControl<Triangulation>::give(GivenCluster cluster) {
 template <class Triangulation>
 const GivenCluster* ViewControl<Triangulation>::given(ClusterId cluster) const {
   return std::as_const(impl_->cache_).find(cluster);
+}
+template <class Triangulation>
+void ViewControl<Triangulation>::give_record(ClusterId cluster, const ClusterRecord& record) {
+  if (const auto place = impl_->tree().find(cluster)) impl_->front_.set_record(*place, record);
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::forget(ClusterId cluster) {

@@ -3,6 +3,7 @@
 
 import {BLOCK, type Changes, type State, VERTEX_BYTES} from './core';
 import type {OrbitCamera} from './camera';
+import {CATEGORIES, GREYS, heightStops, LEVELS, LIGHT, SLOPE, type Stop, texels} from './ramps';
 
 export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity'] as const;
 export type Colour = typeof COLOURS[number];
@@ -13,18 +14,6 @@ export interface Look {
   dark: boolean;
   pointSize: number;
 }
-
-/// The ramps of `terrace render`.
-const LAND = [[0.00, 96, 145, 92], [0.18, 150, 178, 110], [0.36, 212, 201, 140], [0.54, 196, 160, 105],
-              [0.70, 160, 122, 92], [0.85, 178, 166, 158], [1.00, 250, 250, 250]];
-const SLOPE = [[0, 250, 250, 245], [15, 250, 215, 110], [35, 205, 70, 45], [60, 75, 15, 30]];
-/// From the coarsest level to level 0.
-const LEVELS = [[0, 68, 34, 112], [0.25, 49, 104, 142], [0.5, 53, 183, 121], [0.75, 180, 221, 44], [1, 253, 231, 80]];
-
-const GREYS = [[0, 28, 30, 34], [1, 245, 245, 240]];
-/// The colours of classes; after the last they begin again.
-export const CATEGORIES = [[68, 119, 170], [238, 153, 51], [51, 153, 85], [204, 68, 85], [136, 102, 187], [153, 119, 68],
-                           [221, 136, 187], [119, 119, 119], [170, 170, 51], [85, 187, 204], [34, 85, 51], [136, 34, 51]];
 
 /// The lines around the cluster of a place.
 const OUTLINE = [214, 40, 110];
@@ -74,6 +63,7 @@ uniform vec2 heights;
 uniform float top;
 uniform bool lit;
 uniform vec4 wire;
+uniform vec3 sun;
 uniform vec3 sky;
 uniform vec3 eye;
 uniform float haze;
@@ -90,14 +80,13 @@ void main() {
       : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
       : attributesOf.y;
   vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
-  float light = 1.0;
   if (lit) {
-    // From the north-west, as maps have it, and a little from the sky.
-    float sun = max(dot(n, normalize(vec3(-0.55, 0.55, 0.63))), 0.0);
-    light = 0.36 + 0.78 * sun + 0.06 * n.z;
+    // As the command's pictures have it: flat ground keeps its tint, slopes toward the light grow paler, the others darker.
+    float light = ${LIGHT.ambient.toFixed(2)} + ${((1 - LIGHT.ambient) * LIGHT.strength).toFixed(4)} * max(dot(n, sun), 0.0) / sun.z;
+    base = light <= 1.0 ? base * light : base + (1.0 - base) * min(light - 1.0, 1.0);
   }
   float far = 1.0 - exp(-pow(distance(at, eye) / haze, 2.0));
-  colour = vec4(mix(base * light, sky, 0.55 * far), 1.0);
+  colour = vec4(mix(base, sky, 0.55 * far), 1.0);
 }`;
 
 class GrowingBuffer {
@@ -171,7 +160,7 @@ export class Renderer {
     }
     const categories = CATEGORIES.flatMap((c, i) => [[i, ...c], [i + 0.999, ...c]]);
     this.ramps = {
-      height: this.ramp(LAND),
+      height: gl.createTexture()!,
       slope: this.ramp(SLOPE),
       level: this.ramp(LEVELS),
       rgb: this.ramp(GREYS),
@@ -200,6 +189,7 @@ export class Renderer {
     this.box = box;
     this.top = top;
     this.asTriangles = triangles;
+    this.fill(this.ramps.height, heightStops(box[2], box[5]));
   }
   apply(state: State, changes: Changes, time: number): void {
     this.state = state;
@@ -262,6 +252,9 @@ export class Renderer {
     gl.uniform2f(this.uniform('heights'), box[2], box[5]);
     gl.uniform1f(this.uniform('top'), this.top);
     gl.uniform1i(this.uniform('lit'), this.asTriangles ? 1 : 0);
+    // Cartographic light from the upper left, turned with the viewer.
+    const turn = (camera.azimuth + LIGHT.turn) * Math.PI / 180, elevation = LIGHT.elevation * Math.PI / 180;
+    gl.uniform3f(this.uniform('sun'), Math.sin(turn) * Math.cos(elevation), Math.cos(turn) * Math.cos(elevation), Math.sin(elevation));
     gl.uniform3f(this.uniform('sky'), sky[0], sky[1], sky[2]);
     gl.uniform3f(this.uniform('eye'), eye[0], eye[1], eye[2]);
     gl.uniform1f(this.uniform('haze'), extent * 2.5);
@@ -334,21 +327,17 @@ export class Renderer {
     gl.bindVertexArray(null);
     return array;
   }
-  private ramp(stops: number[][]): WebGLTexture {
-    const gl = this.gl, texels = new Uint8Array(256 * 4), last = stops[stops.length - 1][0];
-    for (let i = 0; i < 256; ++i) {
-      const place = i / 255 * last;
-      const next = Math.max(1, stops.findIndex(stop => stop[0] >= place));
-      const a = stops[next - 1], b = stops[next], t = (place - a[0]) / (b[0] - a[0]);
-      for (let c = 1; c < 4; ++c) texels[4 * i + c - 1] = Math.round((1 - t) * a[c] + t * b[c]);
-      texels[4 * i + 3] = 255;
-    }
-    const texture = gl.createTexture()!;
+  private ramp(stops: Stop[]): WebGLTexture {
+    const texture = this.gl.createTexture()!;
+    this.fill(texture, stops);
+    return texture;
+  }
+  private fill(texture: WebGLTexture, stops: Stop[]): void {
+    const gl = this.gl;
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, texels);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, texels(stops, 256));
     for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
-    return texture;
   }
   private uniform(name: string): WebGLUniformLocation|null {
     if (!this.uniforms.has(name)) this.uniforms.set(name, this.gl.getUniformLocation(this.program, name));

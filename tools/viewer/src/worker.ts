@@ -21,7 +21,7 @@ function post(message: FromWorker, transfer: Transferable[] = []): void {
   self.postMessage(message, transfer);
 }
 
-async function fetchWhole(url: string, what: string): Promise<Uint8Array> {
+async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
   let response: Response;
   try {
     response = await fetch(url);
@@ -55,7 +55,7 @@ class Session {
       this.core = await Core.load(wasm as BufferSource);
       let start;
       try {
-        start = parseStart(bytes);
+        start = await parseStart(bytes);
       } catch (error) {
         throw new FetchFault(`the start file of the store is damaged: ${(error as Error).message}`, false);
       }

@@ -64,6 +64,9 @@ struct ClusterRecord {
   /// ground metres; upper bound of the distance of any descendant from the head
   double error = 0.0;
   std::uint64_t members = 0;  ///< the number that read() will deliver
+
+  /// In place of the number: box and error are bounds, and the record itself has not been read.
+  static constexpr std::uint64_t kUnread = ~std::uint64_t{0};
 };
 
 /// The members of a cluster, in the order that defines their ids. They are inserted in this order:

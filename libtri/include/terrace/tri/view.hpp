@@ -177,7 +177,9 @@ struct GivenCluster {
   std::vector<std::uint64_t> children;
   std::vector<std::byte> values{};
   /// Above level 0: the records of the clusters one level down headed by each member, in order,
-  /// then by the cluster's own head (ViewRequest::head_child); the root has no head.
+  /// then by the cluster's own head (ViewRequest::head_child); the root has no head. Those that
+  /// are slow to come by may be bounds (ClusterRecord::kUnread), unless there are outlines to be
+  /// told (ViewOptions::silhouette).
   std::vector<ClusterRecord> child_records;
 };
 
@@ -185,8 +187,10 @@ struct GivenCluster {
 struct ViewRequest {
   ClusterId cluster{};
   ClusterId head_child{};     ///< above level 0: the cluster that its head heads one level down
-  std::uint64_t members = 0;  ///< from its record
-  double importance = 0.0;    ///< its error over the tolerance
+  /// From its record. ClusterRecord::kUnread: that is what is missing, by which it may be seen that
+  /// the cluster is wanted; see ViewControl::give_record().
+  std::uint64_t members = 0;
+  double importance = 0.0;  ///< its error over the tolerance
 };
 
 /// Reads a cluster from a source, with everything that give() needs; blocks while the source does.
@@ -247,7 +251,8 @@ class ViewControl {
     /// Whether another step with the same view and no new clusters would change nothing.
     bool settled = false;
     /// The missing clusters that are worth loading, most important first, as far as max_points and
-    /// max_cached_bytes leave room for them; then those that may be wanted soon.
+    /// max_cached_bytes leave room for them; then those that may be wanted soon. Among them the
+    /// clusters of which only the record is missing, by an estimate of their importance.
     std::vector<ViewRequest> wanted;
     /// The ones among these that no step has named before, or only before they were withdrawn or
     /// forgotten: for a caller that starts loading at once.
@@ -285,6 +290,9 @@ class ViewControl {
   /// A cluster that is kept, null for others. What a step has expanded is kept until the next
   /// give(). O(1).
   [[nodiscard]] const GivenCluster* given(ClusterId cluster) const;
+  /// Delivers the record of a cluster of which only bounds were given. Nothing happens if it is no
+  /// longer needed. O(log n).
+  void give_record(ClusterId cluster, const ClusterRecord& record);
   /// Loading failed or was cancelled: the cluster may be requested again.
   void forget(ClusterId cluster);
 
