@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "call.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -59,7 +58,7 @@ void run_apart(const std::function<void()>& work, std::stop_source& stop) {
 Job::Job(const py::tuple& how) : progress_(how[0]), note_(how[1]) {
   const auto threads = how[2].cast<unsigned>();
   const auto memory = how[3].cast<std::uint64_t>();
-  context_.threads = threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
+  context_.threads = all_or(threads);
   if (memory > 0) context_.memory_bytes = memory;
   context_.stop = stop_.get_token();
   if (!progress_.is_none()) {

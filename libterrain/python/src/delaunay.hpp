@@ -16,6 +16,7 @@
 
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/delaunay3.hpp>
+#include <terrace/tri/dynamic_surface.hpp>
 #include <terrace/tri/metric.hpp>
 
 #include "arrays.hpp"
@@ -23,12 +24,22 @@
 
 namespace terrace::python {
 
+template <class Number, std::size_t N>
+bool finite(const std::array<Number, N>& p) {
+  return std::all_of(p.begin(), p.end(), [](Number c) { return c - c == 0; });
+}
+
+/// What differs between kinds of meshes: kCorners of a simplex, ids of simplices and access to
+/// them.
 template <std::size_t N, class Metric>
 struct Triangulation;
 template <class Metric>
 struct Triangulation<2, Metric> {
   using Type = tri::Delaunay2<double, Metric>;
   using Simplex = tri::TriangleId;
+  static constexpr std::size_t kCorners = 3;
+  static void settle(Type&) {}
+  static const auto& added(const typename Type::Changes& of) { return of.added_triangles; }
   static auto all(const Type& of) { return of.all_triangles(); }
   static std::size_t count(const Type& of) { return of.triangle_count(); }
   static std::uint32_t slots(const Type& of) { return of.triangle_slots(); }
@@ -42,6 +53,9 @@ template <class Metric>
 struct Triangulation<3, Metric> {
   using Type = tri::Delaunay3<double, Metric>;
   using Simplex = tri::TetrahedronId;
+  static constexpr std::size_t kCorners = 4;
+  static void settle(Type&) {}
+  static const auto& added(const typename Type::Changes& of) { return of.added_tetrahedra; }
   static auto all(const Type& of) { return of.all_tetrahedra(); }
   static std::size_t count(const Type& of) { return of.tetrahedron_count(); }
   static std::uint32_t slots(const Type& of) { return of.tetrahedron_slots(); }
@@ -52,15 +66,33 @@ struct Triangulation<3, Metric> {
   }
 };
 
+/// The surface of points in space.
+struct SurfaceKind {
+  using Type = tri::DynamicSurface<double>;
+  static constexpr std::size_t kCorners = 3;
+  static void settle(Type& of) { of.follow(); }
+  static const auto& added(const Type::Changes& of) { return of.added_triangles; }
+  static auto all(const Type& of) { return of.all_triangles(); }
+  static std::size_t count(const Type& of) { return of.triangle_count(); }
+};
+
 /// A triangulation that Python's threads may share: one works on it at a time.
-template <std::size_t N, class Metric = tri::Euclidean>
+template <std::size_t N, class Metric = tri::Euclidean, class Kind_ = Triangulation<N, Metric>>
 class SharedDelaunay {
  public:
-  using Kind = Triangulation<N, Metric>;
+  using Kind = Kind_;
   using Mesh = typename Kind::Type;
   using Point = std::array<double, N>;
+  using Row = std::array<std::int32_t, Kind::kCorners>;
 
-  explicit SharedDelaunay(const Metric& metric = {}) : mesh_(metric) {}
+  SharedDelaunay() = default;
+  explicit SharedDelaunay(const Metric& metric) : mesh_(metric) {}
+
+  /// work(mesh), which changes it as a whole.
+  template <class Work>
+  auto change(std::size_t items, Work&& work) {
+    return locked(items + size_, [&] { return work(mesh_); });
+  }
 
   /// work(mesh), which only reads it and takes about as long as a pass over it and so many items.
   template <class Work>
@@ -75,10 +107,12 @@ class SharedDelaunay {
       if (mesh_.vertex_count() == 0) {
         const std::vector<tri::VertexId> made = mesh_.build(points);
         for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i]);
+        Kind::settle(mesh_);
         return handles;
       }
       std::vector<typename Mesh::Insertion> made(points.size());
       mesh_.insert(points, made);
+      Kind::settle(mesh_);
       for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i].vertex);
       return handles;
     }));
@@ -95,6 +129,7 @@ class SharedDelaunay {
         throw std::invalid_argument("vertex " + std::to_string(*twice) + " is named twice");
       }
       mesh_.remove(vertices);
+      Kind::settle(mesh_);
       return 0;
     });
   }
@@ -121,13 +156,9 @@ class SharedDelaunay {
 
   [[nodiscard]] py::array_t<std::int32_t> simplices() {
     return to_array(locked(size_, [&] {
-      std::vector<std::array<std::int32_t, N + 1>> rows;
+      std::vector<Row> rows;
       rows.reserve(Kind::count(mesh_));
-      for (const auto s : Kind::all(mesh_)) {
-        const auto corners = mesh_.vertices(s);
-        auto& row = rows.emplace_back();
-        for (std::size_t i = 0; i <= N; ++i) row[i] = handle(corners[i]);
-      }
+      for (const auto s : Kind::all(mesh_)) rows.push_back(row_of(mesh_.vertices(s)));
       return rows;
     }));
   }
@@ -135,17 +166,71 @@ class SharedDelaunay {
   [[nodiscard]] py::array_t<std::int32_t> neighbours() {
     return to_array(locked(size_, [&] {
       const std::vector<std::int32_t> rank = rows_of_simplices();
-      std::vector<std::array<std::int32_t, N + 1>> rows;
+      std::vector<Row> rows;
       rows.reserve(Kind::count(mesh_));
       for (const auto s : Kind::all(mesh_)) {
         const auto around = mesh_.neighbours(s);
         auto& row = rows.emplace_back();
-        for (std::size_t i = 0; i <= N; ++i) {
+        for (std::size_t i = 0; i < row.size(); ++i) {
           row[i] = mesh_.alive(around[i]) ? rank[slot(around[i])] : -1;
         }
       }
       return rows;
     }));
+  }
+
+  /// Compressed rows by number of vertex: where each begins, the vertices joined to it.
+  [[nodiscard]] py::tuple adjacent() {
+    std::vector<std::int32_t> joined;
+    auto begins = locked(size_, [&] {
+      std::vector<std::int64_t> rows{0};
+      std::vector<tri::VertexId> around;
+      for (std::uint32_t v = 0; v < mesh_.vertex_slots(); ++v) {
+        if (mesh_.alive(tri::VertexId{v})) {
+          mesh_.adjacent(tri::VertexId{v}, around);
+          for (const tri::VertexId other : around) joined.push_back(handle(other));
+        }
+        rows.push_back(static_cast<std::int64_t>(joined.size()));
+      }
+      return rows;
+    });
+    return py::make_tuple(to_array(std::move(begins)), to_array(std::move(joined)));
+  }
+
+  void start_journal() {
+    locked(0, [&] {
+      mesh_.start_journal();
+      recording_ = true;
+      return 0;
+    });
+  }
+
+  /// What came and went since then or the last call. Throws: std::invalid_argument unless a journal
+  /// was started.
+  [[nodiscard]] py::dict take_changes() {
+    std::vector<std::int32_t> added, removed;
+    std::vector<Point> removed_points;
+    std::vector<Row> added_rows, removed_rows;
+    locked(size_, [&] {
+      if (!recording_) throw std::invalid_argument("record() has not been called");
+      typename Mesh::Changes changes;
+      mesh_.take_changes(changes);
+      for (const tri::VertexId v : changes.added_vertices) added.push_back(handle(v));
+      for (const tri::VertexId v : changes.removed_vertices) removed.push_back(handle(v));
+      removed_points = std::move(changes.removed_points);
+      for (const auto s : Kind::added(changes)) added_rows.push_back(row_of(mesh_.vertices(s)));
+      for (const auto& corners : changes.removed_corners) {
+        removed_rows.push_back(row_of(corners));
+      }
+      return 0;
+    });
+    py::dict result;
+    result["added_vertices"] = to_array(std::move(added));
+    result["removed_vertices"] = to_array(std::move(removed));
+    result["removed_points"] = to_array(std::move(removed_points));
+    result["added_simplices"] = to_array(std::move(added_rows));
+    result["removed_simplices"] = to_array(std::move(removed_rows));
+    return result;
   }
 
   [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& given) {
@@ -203,8 +288,10 @@ class SharedDelaunay {
 
  private:
   static std::int32_t handle(tri::VertexId vertex) { return static_cast<std::int32_t>(vertex); }
-  static bool finite(const Point& p) {
-    return std::all_of(p.begin(), p.end(), [](double c) { return c - c == 0; });
+  static Row row_of(const std::array<tri::VertexId, Kind::kCorners>& corners) {
+    Row row{};
+    std::transform(corners.begin(), corners.end(), row.begin(), handle);
+    return row;
   }
 
   /// For much work signals are looked for.
@@ -232,10 +319,12 @@ class SharedDelaunay {
 
   std::mutex mutex_;
   Mesh mesh_;                          ///< under the mutex only
+  bool recording_ = false;             ///< likewise
   std::atomic<std::size_t> size_ = 0;  ///< vertices after the last piece of work
 };
 
 using SharedDelaunay2 = SharedDelaunay<2>;
 using SharedDelaunay3 = SharedDelaunay<3>;
+using SharedSurface = SharedDelaunay<3, tri::Euclidean, SurfaceKind>;
 
 }  // namespace terrace::python
