@@ -18,7 +18,7 @@ class Transformation:
     Source: PROJ's definitions and operations, GeographicLib's projections.
 
     >>> Transformation('EPSG:4326', 'EPSG:32632').forward([[9, 48]]).round(2)
-    array([[ 500000.  , 5316300.09]])
+    array([[ 500000.  , 5316300.22]])
     """
 
     def __init__(self, source, target, *, area=None, datum_shift=None):

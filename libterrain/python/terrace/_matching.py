@@ -140,7 +140,7 @@ def edge_matching(edges, weights, count=None):
     <terrace.Matching: 2 pairs, cost 3, optimal>
     """
     edges = as_numbered(edges, 'edges', 2)
-    largest = int(edges.max(initial=-1))
+    largest = int(edges.max()) if edges.size else -1
     count = largest + 1 if count is None else whole(count, 'count')
     if count > 2 * len(edges):
         raise ValueError(f'{len(edges)} edges cannot match {count} vertices')
