@@ -26,25 +26,23 @@ terrain::Transformation transformation(const std::string& from, const std::strin
   return {own, other};
 }
 
-/// A region of another CRS as one of the store's: its box, or its polygons.
-py::object own_region(const OpenStore& open, const py::object& region, const std::string& crs) {
+/// A region of another CRS as polygons of the store's.
+std::vector<terrain::Polygon> own_region(const OpenStore& open, const py::object& region, const std::string& crs) {
   const stream::Store store = open.get();
   const auto given = region_of(region);
   const terrain::Region made = released([&]() -> std::optional<terrain::Region> {
                                  return terrain::RegionConversion(
                                      store, terrain::transformation_to(store, crs))(given.value());
                                }).value();
-  py::list polygons;
-  for (const terrain::Polygon& polygon : made.polygons()) {
-    py::list rings;
-    for (const std::vector<terrain::Point2>& ring : polygon) {
-      rings.append(to_array(std::vector<terrain::Point2>(ring)));
-    }
-    polygons.append(rings);
-  }
   const stream::Box3& box = made.box();
-  if (!made.polygons().empty()) return polygons;
-  return py::make_tuple(box.min[0], box.min[1], box.min[2], box.max[0], box.max[1], box.max[2]);
+  std::vector<terrain::Polygon> polygons = made.polygons();
+  if (polygons.empty()) {
+    polygons = {{{{box.min[0], box.min[1]},
+                  {box.max[0], box.min[1]},
+                  {box.max[0], box.max[1]},
+                  {box.min[0], box.max[1]}}}};
+  }
+  return polygons;
 }
 
 }  // namespace

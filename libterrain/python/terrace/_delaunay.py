@@ -229,8 +229,9 @@ class Delaunay2(_Delaunay):
         none, but for 'nearest'. Raises: ValueError. Source: R. Sibson, 1980.
 
         >>> d = Delaunay2([[0, 0], [1, 0], [0, 1]])
-        >>> d.weights([[0.25, 0.5], [9, 9]])
-        (array([0.25, 0.25, 0.5 ]), array([0, 1, 2], dtype=int32), array([0, 3, 3]))
+        >>> weights, vertices, begins = d.weights([[0.25, 0.5], [9, 9]])
+        >>> weights @ d.points[vertices], begins
+        (array([0.25, 0.5 ]), array([0, 3, 3]))
         """
         return _core.weights_at(self._euclidean(), as_rows(places, 'places', (2,)), method)
 

@@ -26,7 +26,9 @@ class Mesh:
     @classmethod
     def read(cls, path):
         """The triangles of a file: .ply, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without triangles; OSError; Error."""
-        return Mesh(*_core.read_mesh(os.fspath(path)))
+        path = os.fspath(path)
+        with open(path, 'rb'):  # what is not there is an error of the system
+            return Mesh(*_core.read_mesh(path))
 
     def save(self, path, replace=False):
         """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk, whole or not at all; or .svg, a picture from above."""

@@ -237,7 +237,7 @@ class Store:
         return [(as_region(place), whole(level, 'level')) for place, level in focus]
 
     def clusters(self, level=0, *, progress=None, threads=None):
-        """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS, of all points below), error (metres; no point below is farther
+        """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS that hold all points below, a little more than they need), error (metres; no point below is farther
         from the representative), descendants (points of level 0 below), members. The number of a row is that of ``points(cluster=(level, number))``."""
         made = self._core.clusters(whole(level, 'level'), job(progress, threads))
         return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
@@ -251,15 +251,13 @@ class Store:
         return self._core.count(box)
 
     def own_region(self, region, crs):
-        """A region of another CRS in that of the store: a box of six numbers, or a GeoJSON dict of a MultiPolygon, with so many corners that outlines are within a
-        millionth of their length. Raises: Error where nothing leads from there."""
+        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon, with so many corners that outlines are within a
+        millionth of their length; without the heights of a box. Raises: Error where nothing leads from there."""
         text = crs_text(crs)
         if region is None or text is None:
             raise ValueError('own_region() needs a region and its CRS')
-        made = _core.own_region(self._core, as_region(region), text)
-        if isinstance(made, tuple):
-            return made
-        return {'type': 'MultiPolygon', 'coordinates': [[ring.tolist() for ring in polygon] for polygon in made]}
+        polygons = _core.own_region(self._core, as_region(region), text)
+        return {'type': 'MultiPolygon', 'coordinates': [[ring + ring[:1] for ring in polygon] for polygon in polygons]}
 
     def query(self, *, box=None, near=None, k=None, radius=None, level=0):
         """The points in a box, or near a place: the ``k`` nearest, or all within a ``radius`` in metres.

@@ -230,7 +230,7 @@ class Multiresolution:
         return self._core.children((self._top, 0) if cluster is None else self._cluster(cluster))
 
     def cluster_info(self, cluster):
-        """A dict of what is known of a cluster that is, or can be, expanded: bounds (six numbers in the CRS, of all points below), error (metres; no point below is
+        """A dict of what is known of a cluster that is, or can be, expanded: bounds (six numbers in the CRS that hold all points below), error (metres; no point below is
         farther from its representative), members."""
         return dict(zip(('bounds', 'error', 'members'), self._core.record(self._cluster(cluster))))
 
