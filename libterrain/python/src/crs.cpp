@@ -27,7 +27,8 @@ terrain::Transformation transformation(const std::string& from, const std::strin
 }
 
 /// A region of another CRS as polygons of the store's.
-std::vector<terrain::Polygon> own_region(const OpenStore& open, const py::object& region, const std::string& crs) {
+std::vector<terrain::Polygon> own_region(const OpenStore& open, const py::object& region,
+                                         const std::string& crs) {
   const stream::Store store = open.get();
   const auto given = region_of(region);
   const terrain::Region made = released([&]() -> std::optional<terrain::Region> {

@@ -4,7 +4,8 @@
 ``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters. From
 a ``Store`` come points, meshes, heights, contours, tiles and live views at any level of detail. Beside
 it stand the methods that it is made of: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
-``linkage``, ``kmeans``, ``cluster``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``.
+``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``;
+and what it reads: ``read_points``, ``write_points``, ``Transformation``.
 
 Long calls release the interpreter's lock, use all cores unless ``threads`` says otherwise, and end soon
 after Ctrl-C. Results depend on the input and the options alone, not on threads or machine.

@@ -24,12 +24,12 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
     """Single or complete linkage of points with Euclidean distances, or complete linkage of given distances.
 
     points: shape (n, 2) or (n, 3), finite; or the distances of all pairs in one dimension, as
-    scipy.spatial.distance.pdist. Returns: float64, shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the two clusters
-    of each merge, its height and the number of points; the merges ascend. 'single' takes O(n log n); 'complete' O(n^2)
-    and 4 n^2 bytes, half of that with ``single_precision``, at most ``memory`` bytes. edges: whole numbers, shape (m, 2): single
-    linkage looks at these pairs alone, which suffices if those of a Delaunay triangulation are among them. gpu: on the first CUDA
-    device, if the module was built with CUDA. Raises: ValueError; RuntimeError without such a device. Source: J. Skala, 4.2.1,
-    7.6; O. Boruvka, 1926, over a kD-tree.
+    scipy.spatial.distance.pdist. Returns: float64, shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the two
+    clusters of each merge, its height and the number of points; the merges ascend. 'single' takes O(n log n);
+    'complete' O(n^2) and 4 n^2 bytes, half of that with ``single_precision``, at most ``memory`` bytes. edges: whole
+    numbers, shape (m, 2): single linkage looks at these pairs alone, which suffices if those of a Delaunay
+    triangulation are among them. gpu: on the first CUDA device, if the module was built with CUDA. Raises: ValueError;
+    RuntimeError without such a device. Source: J. Skala, 4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree.
 
     >>> linkage([[0, 0], [1, 0], [5, 0]])
     array([[0., 1., 1., 2.],
@@ -57,8 +57,8 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
 def tree_linkage(edges, lengths):
     """The linkage whose merges are the edges of a tree by ascending length, as of spanning_tree() in any metric.
 
-    edges: whole numbers, shape (n - 1, 2), in any order, that connect the points 0 .. n - 1. lengths: not negative. Returns: rows as linkage().
-    O(n log n). Raises: ValueError, naming an edge that closes a circle.
+    edges: whole numbers, shape (n - 1, 2), in any order, that connect the points 0 .. n - 1. lengths: not negative.
+    Returns: rows as linkage(). O(n log n). Raises: ValueError, naming an edge that closes a circle.
 
     >>> tree_linkage([[1, 2], [0, 1]], [4, 1])
     array([[0., 1., 1., 2.],
@@ -169,15 +169,16 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
     Each cluster costs ``facility_cost`` times the diagonal of the points' bounding box, each point its (weighted) distance
     to its cluster's representative, which is one of the points; the sum is minimised.
 
-    points: shape (n, 2) or (n, 3); or entities of k corners each, shape (n, k, 2) or (n, k, 3): segments, triangles, polylines, by
-    entity_distances(). count: in place of facility_cost, method and effort; O(n^2) for a round of exchanges, the best of
-    ``restarts``. method: 'fast', the default for points (not with outliers or channels); the thesis's local searches 'automatic',
-    'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities'; on the matrix of distances (8 n^2 bytes) 'interchange',
-    'jain-vazirani', 'greedy-stars', and 'lp-rounding' where GLPK was built in. effort: 'fast', 'default', 'fine', 'full'. metric: 'euclidean', 'squared',
-    'minkowski:P', 'elliptical:FILE'. outlier_price: what leaving a point out costs, times the diagonal.
-    channels: shape (n, c): attributes as further axes of distances, in the unit of the coordinates; the diagonal has them too.
-    bound_steps: subgradient steps of a search for lower_bound, some 100; 0: none. Not used with ``count``. Local searches:
-    ``steps`` candidates in place of what effort says; start: Clusters to begin with; assign_nearest: at the end each point goes to its nearest
+    points: shape (n, 2) or (n, 3); or entities of k corners each, shape (n, k, 2) or (n, k, 3): segments, triangles,
+    polylines, by entity_distances(). count: in place of facility_cost, method and effort; O(n^2) for a round of
+    exchanges, the best of ``restarts``. method: 'fast', the default for points (not with outliers or channels); the
+    thesis's local searches 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities'; on the matrix of
+    distances (8 n^2 bytes) 'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' where GLPK was built in.
+    effort: 'fast', 'default', 'fine', 'full'. metric: 'euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'.
+    outlier_price: what leaving a point out costs, times the diagonal. channels: shape (n, c): attributes as further
+    axes of distances, in the unit of the coordinates; the diagonal has them too. bound_steps: subgradient steps of a
+    search for lower_bound, some 100; 0: none. Not used with ``count``. Local searches: ``steps`` candidates in place of
+    what effort says; start: Clusters to begin with; assign_nearest: at the end each point goes to its nearest
     representative. ordered: entities of three corners are polylines, not triangles. Ctrl-C ends local searches soon.
 
     Returns: Clusters. Raises: ValueError. Sources: J. Skala, 4.2.3, 7.1, 7.3, 9; of k-median L. O'Callaghan et al., 2002.
@@ -210,9 +211,10 @@ def entity_distances(a, b=None, *, ordered=False):
     """How far the corners of one entity must move to coincide with those of another: the root mean square under the best of the
     correspondences.
 
-    a, b: shape (n, k, 2) or (n, k, 3): segments (k = 2), triangles (3), or polylines, whose corners keep their order or its reverse;
-    of three corners if ``ordered``. b: ``a`` itself by default. Returns: float64, shape (len(a), len(b)): a metric, which
-    facility_location() and, above the diagonal, linkage() take. Raises: ValueError. Source: J. Skala, chapter 9.
+    a, b: shape (n, k, 2) or (n, k, 3): segments (k = 2), triangles (3), or polylines, whose corners keep their order or
+    its reverse; of three corners if ``ordered``. b: ``a`` itself by default. Returns: float64, shape (len(a), len(b)):
+    a metric, which facility_location() and, above the diagonal, linkage() take. Raises: ValueError. Source: J. Skala,
+    chapter 9.
 
     >>> entity_distances([[[0, 0], [1, 0]]], [[[1, 2], [0, 2]]])
     array([[2.]])
@@ -223,11 +225,11 @@ def entity_distances(a, b=None, *, ordered=False):
 
 
 def clusters_of_size(points, size, *, seed=1, progress=None, threads=None):
-    """The clusters of a hierarchy's level, that whose mean size is nearest to ``size`` (as a factor): of some 85 points, of 7,000, and so on; all
-    points are one cluster up to 10,000. To cut large sets into compact parts.
+    """The clusters of a hierarchy's level, that whose mean size is nearest to ``size`` (as a factor): of some 85
+    points, of 7,000, and so on; all points are one cluster up to 10,000. To cut large sets into compact parts.
 
-    points: shape (n, 2) or (n, 3), finite. Returns: uint32, shape (n,): the cluster of each point, from 0 without gaps. O(n log n); Ctrl-C ends it soon.
-    Raises: ValueError. Source: J. Skala, 7.1.
+    points: shape (n, 2) or (n, 3), finite. Returns: uint32, shape (n,): the cluster of each point, from 0 without gaps.
+    O(n log n); Ctrl-C ends it soon. Raises: ValueError. Source: J. Skala, 7.1.
 
     >>> labels = clusters_of_size(np.random.default_rng(1).random((20000, 2)), 100)
     >>> 150 < labels.max() < 300
@@ -242,9 +244,9 @@ def facility_location(connection, opening=None, *, count=None, method='interchan
 
     connection: shape (facilities, clients), not negative; a matrix of distances for entities of any kind. opening: the
     cost of each facility, or one for all. With ``count`` exactly so many open, at no cost (k-median). method:
-    'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' where GLPK was built in. restarts: independent searches
-    in place of what effort says; seconds: none is perturbed after so long. bound_steps: the steps of a search for lower_bound; 0: none. Each takes
-    O(facilities * clients); 12 bytes per entry of the matrix.
+    'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' where GLPK was built in. restarts: independent
+    searches in place of what effort says; seconds: none is perturbed after so long. bound_steps: the steps of a search
+    for lower_bound; 0: none. Each takes O(facilities * clients); 12 bytes per entry of the matrix.
 
     Returns: Clusters, whose facilities are rows and whose labels are of clients. Raises: ValueError. Sources: J. Skala,
     4.2.3, 7.3; D. Erlenkotter, 1978.
@@ -289,15 +291,18 @@ class ClusterBlock:
 
 def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, effort='default', method='automatic',
                     metric='euclidean', seed=1, threads=None):
-    """The hierarchy of clusters that stores are made of, of any number of points in one pass and constant memory, for a sink of the caller's.
+    """The hierarchy of clusters that stores are made of, of any number of points in one pass and constant memory, for a
+    sink of the caller's.
 
     batches: an iterable of arrays of shape (n, 2) or (n, 3), or of structured arrays with x, y, z (such as points of a
-    Store), all of one type; further fields travel with the points. At best those of a batch lie together. sink: called as sink(block) with each
-    ClusterBlock as soon as it is finished, those of a level in order: their clusters are numbered on, from 0. The points of the top level
-    come last, as one cluster without a representative. Options: as of build(); distances are those of the coordinates.
+    Store), all of one type; further fields travel with the points. At best those of a batch lie together. sink: called
+    as sink(block) with each ClusterBlock as soon as it is finished, those of a level in order: their clusters are
+    numbered on, from 0. The points of the top level come last, as one cluster without a representative. Options: as of
+    build(); distances are those of the coordinates.
 
-    Returns: a dict: points, top, level_points, level_clusters (the root counts as a cluster of the top). What the iterable or the sink raises
-    ends the work. Raises: ValueError, TypeError. Threads do not change the result. Source: J. Skala, 4.3, 7.1.2, 7.2.
+    Returns: a dict: points, top, level_points, level_clusters (the root counts as a cluster of the top). What the
+    iterable or the sink raises ends the work. Raises: ValueError, TypeError. Threads do not change the result. Source:
+    J. Skala, 4.3, 7.1.2, 7.2.
 
     >>> random, sizes = np.random.default_rng(1), []
     >>> made = stream_clusters((random.random((5000, 2)) for _ in range(4)), lambda block: sizes.append(len(block.points)))

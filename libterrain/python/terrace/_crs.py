@@ -12,10 +12,12 @@ from ._sources import crs_text
 class Transformation:
     """From one coordinate reference system to another, by one operation between their datums.
 
-    source, target: 'EPSG:n', a name, WKT, PROJJSON, a .prj file, or an object with to_wkt(). x is always the longitude or easting, y the latitude or northing.
-    area: a box of the source in which the coordinates lie; the operation is chosen for it. datum_shift: to WGS 84, seven numbers as TOWGS84 has them, for the
-    system whose datum has no way there. Threads may share one. 0.6 to 5 million places a second. Raises: ValueError for a system that is not known; Error where nothing leads from one datum to the other.
-    Source: PROJ's definitions and operations, GeographicLib's projections.
+    source, target: 'EPSG:n', a name, WKT, PROJJSON, a .prj file, or an object with to_wkt(). x is always the longitude
+    or easting, y the latitude or northing. area: a box of the source in which the coordinates lie; the operation is
+    chosen for it. datum_shift: to WGS 84, seven numbers as TOWGS84 has them, for the system whose datum has no way
+    there. Threads may share one. 0.6 to 5 million places a second. Raises: ValueError for a system that is not known;
+    Error where nothing leads from one datum to the other. Source: PROJ's definitions and operations, GeographicLib's
+    projections.
 
     >>> Transformation('EPSG:4326', 'EPSG:32632').forward([[9, 48]]).round(2)
     array([[ 500000.  , 5316300.22]])
@@ -41,8 +43,8 @@ class Transformation:
         return made if places.shape[1] == 2 else np.column_stack((made, places[:, 2]))
 
     def forward(self, places):
-        """Places of the source in the target. places: shape (n, 2) or (n, 3), whose heights stay. Returns: float64, the same shape; NaN where the target
-        shows no such place. Raises: ValueError."""
+        """Places of the source in the target. places: shape (n, 2) or (n, 3), whose heights stay. Returns: float64, the
+        same shape; NaN where the target shows no such place. Raises: ValueError."""
         return self._convert(places, False)
 
     def reverse(self, places):

@@ -109,7 +109,8 @@ class _PointMesh:
         self._core.start_journal()
 
     def changes(self):
-        """The net MeshChanges since record() or the last call. Raises: ValueError unless record() was called before. O(what changed)."""
+        """The net MeshChanges since record() or the last call. Raises: ValueError unless record() was called before.
+        O(what changed)."""
         return MeshChanges(**self._core.take_changes())
 
     def digest(self):
@@ -135,8 +136,8 @@ class _Delaunay(_PointMesh):
 
     @property
     def vertex_neighbor_vertices(self):
-        """The vertices joined to each by an edge, as SciPy's: (where those of each number of vertex begin, int64; vertices, int32). In
-        the plane counter-clockwise."""
+        """The vertices joined to each by an edge, as SciPy's: (where those of each number of vertex begin, int64;
+        vertices, int32). In the plane counter-clockwise."""
         return self._core.adjacent()
 
     @property
@@ -183,8 +184,8 @@ class Delaunay2(_Delaunay):
     Ties of cocircular points are broken by a symbolic perturbation, so a removal after an insertion gives back the very
     triangles. About a microsecond per point. Threads may share one.
 
-    metric: None, or an invertible map of shape (2, 2), such as ellipse(): lengths are those of mapped vectors, and the triangles
-    exactly those of the points mapped without rounding.
+    metric: None, or an invertible map of shape (2, 2), such as ellipse(): lengths are those of mapped vectors, and the
+    triangles exactly those of the points mapped without rounding.
 
     >>> d = Delaunay2([[0, 0], [1, 0], [0, 1], [1, 1]])
     >>> d
@@ -206,8 +207,8 @@ class Delaunay2(_Delaunay):
     def of_grid(cls, columns, rows, origin=(0.0, 0.0), step=1.0):
         """The triangulation of a complete grid, written directly: O(n). The vertex of column i and row j is j * columns + i.
 
-        origin: of column 0 and row 0; step: between neighbours, positive, also to the next row, to +y. Raises: ValueError unless
-        doubles hold all coordinates exactly.
+        origin: of column 0 and row 0; step: between neighbours, positive, also to the next row, to +y. Raises:
+        ValueError unless doubles hold all coordinates exactly.
 
         >>> Delaunay2.of_grid(3, 2)
         <terrace.Delaunay2: 6 vertices, 4 triangles>
@@ -224,9 +225,10 @@ class Delaunay2(_Delaunay):
     def weights(self, places, method='linear'):
         """The weights of the vertices that interpolate at places: heights() is their sum of products with values.
 
-        places, method: as of heights(). Returns: (weights, float64; vertices, int32; where those of each place begin, int64): the data of
-        a ``scipy.sparse.csr_matrix`` of shape (len(places), len(points)). Weights are not negative and add up to 1; outside the hull there are
-        none, but for 'nearest'. Raises: ValueError. Source: R. Sibson, 1980.
+        places, method: as of heights(). Returns: (weights, float64; vertices, int32; where those of each place begin,
+        int64): the data of a ``scipy.sparse.csr_matrix`` of shape (len(places), len(points)). Weights are not negative
+        and add up to 1; outside the hull there are none, but for 'nearest'. Raises: ValueError. Source: R. Sibson,
+        1980.
 
         >>> d = Delaunay2([[0, 0], [1, 0], [0, 1]])
         >>> weights, vertices, begins = d.weights([[0.25, 0.5], [9, 9]])
@@ -238,8 +240,9 @@ class Delaunay2(_Delaunay):
     def vertical_distances(self, values, samples, method='linear', *, threads=None):
         """How far samples that are not in the triangulation lie above or below its surface.
 
-        values, method: as of heights(). samples: shape (n, 3). Returns: a dict: count (of those measured), outside (the hull, or where a height is
-        NaN), max, mean and rms of distances without sign, bias (the mean of sample minus surface), worst (the sample at ``max``, -1 for none). Raises: ValueError.
+        values, method: as of heights(). samples: shape (n, 3). Returns: a dict: count (of those measured), outside (the
+        hull, or where a height is NaN), max, mean and rms of distances without sign, bias (the mean of sample minus
+        surface), worst (the sample at ``max``, -1 for none). Raises: ValueError.
 
         >>> d = Delaunay2([[0, 0], [1, 0], [0, 1]])
         >>> d.vertical_distances(d.by_vertex([1, 2, 3]), [[0.25, 0.5, 3]])['bias']
@@ -282,12 +285,13 @@ class Delaunay2(_Delaunay):
         """Angles (degrees) and edges in the plane, areas, and the volumes between the surface and ``datum``.
 
         values: as of heights(). Returns: a dict: triangles, min_angle, mean_min_angle, max_aspect, mean_aspect, edges,
-        min_edge, max_edge, mean_edge, edge_histogram (counts in ``bins`` equal intervals from min_edge to max_edge), area, surface_area, volume_above, volume_below."""
+        min_edge, max_edge, mean_edge, edge_histogram (counts in ``bins`` equal intervals from min_edge to max_edge),
+        area, surface_area, volume_above, volume_below."""
         return _core.mesh_quality(self._euclidean(), as_numbers(values, 'values'), float(datum), whole(bins, 'bins', 1))
 
     def triangle_quality(self, values, datum=0.0):
-        """The same of each triangle, in the order of simplices. Returns: a structured array: min_angle (degrees), aspect (1 for an equilateral
-        triangle, otherwise larger), area, surface_area, volume_above, volume_below."""
+        """The same of each triangle, in the order of simplices. Returns: a structured array: min_angle (degrees),
+        aspect (1 for an equilateral triangle, otherwise larger), area, surface_area, volume_above, volume_below."""
         made = _core.triangle_quality(self._euclidean(), as_numbers(values, 'values'), float(datum))
         names = ('min_angle', 'aspect', 'area', 'surface_area', 'volume_above', 'volume_below')
         return made.view([(name, 'f8') for name in names]).reshape(-1)
@@ -308,8 +312,8 @@ class Delaunay2(_Delaunay):
 @dataclass(frozen=True)
 class Shape:
     """The inside of a shape and its surface. tetrahedra: int32, shape (k, 4), and surface: a Mesh over
-    ``Delaunay3.points``, counter-clockwise seen from outside. volume: of the tetrahedra. open: lids were left out of the surface.
-    components, euler_characteristic: of the surface; 2 for a sphere, 0 for a torus."""
+    ``Delaunay3.points``, counter-clockwise seen from outside. volume: of the tetrahedra. open: lids were left out of
+    the surface. components, euler_characteristic: of the surface; 2 for a sphere, 0 for a torus."""
 
     tetrahedra: np.ndarray
     surface: Mesh
@@ -343,10 +347,11 @@ class Delaunay3(_Delaunay):
     def shape(self, rule='poles', *, criterion='gabriel', edge_factor=0.5, keep_vertices=True, lids=False, threads=None):
         """The shape from whose surface the points were scanned: which tetrahedra are inside, and their surface.
 
-        rule: 'poles', by angles between circumspheres, for samples of any density; 'flood' and 'published' peel from the
-        hull where facets do not meet the ``criterion``: 'gabriel', or 'edge-length' with ``edge_factor``; no vertex then loses all its tetrahedra
-        unless ``keep_vertices`` is false. lids: whether what closes an open scan is part of the surface. Returns: a Shape, empty if there are no
-        tetrahedra. Raises: ValueError. About 0.3 s per 100,000 points. Source: J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
+        rule: 'poles', by angles between circumspheres, for samples of any density; 'flood' and 'published' peel from
+        the hull where facets do not meet the ``criterion``: 'gabriel', or 'edge-length' with ``edge_factor``; no vertex
+        then loses all its tetrahedra unless ``keep_vertices`` is false. lids: whether what closes an open scan is part
+        of the surface. Returns: a Shape, empty if there are no tetrahedra. Raises: ValueError. About 0.3 s per 100,000
+        points. Source: J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
 
         >>> Delaunay3([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).shape('flood')
         <terrace.Shape: 1 tetrahedra, 4 triangles, volume 0.166667>
@@ -357,11 +362,12 @@ class Delaunay3(_Delaunay):
 
 
 class DynamicSurface(_PointMesh):
-    """The surface from which a changing set of points in space was scanned, by the poles rule of Delaunay3.shape(): ``simplices`` are its
-    triangles, counter-clockwise seen from outside.
+    """The surface from which a changing set of points in space was scanned, by the poles rule of Delaunay3.shape():
+    ``simplices`` are its triangles, counter-clockwise seen from outside.
 
-    It follows insertions and removals, about 12 us per point, where tetrahedra are new; restore() computes it afresh. Closed: open scans have
-    lids. Threads may share one. Raises: ValueError. Source: J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
+    It follows insertions and removals, about 12 us per point, where tetrahedra are new; restore() computes it afresh.
+    Closed: open scans have lids. Threads may share one. Raises: ValueError. Source: J. Skala, section 8.3; N. Amenta,
+    M. Bern, 1999.
 
     >>> angles, heights = np.random.default_rng(1).random((2, 500))
     >>> radii = np.sqrt(1 - (2 * heights - 1) ** 2)

@@ -88,8 +88,9 @@ def matching(points, *, labels=None, exact_limit=500_000, window=50_000, rounds=
     """Pairs of points with the least sum of Euclidean distances; of an odd number one is left over.
 
     points: shape (n, 2) or (n, 3). Up to ``exact_limit`` points the optimum, beyond it windows of ``window`` points
-    matched in ``rounds``, with a proven bound, until a round gains less than the share ``tolerance``. labels: whole numbers; the
-    points of each label are matched first, then those left over, then windows. About n^1.2. Source: J. Skala, 4.3.2, 7.5; J. Edmonds, 1965; W. Cook, A. Rohe, 1999.
+    matched in ``rounds``, with a proven bound, until a round gains less than the share ``tolerance``. labels: whole
+    numbers; the points of each label are matched first, then those left over, then windows. About n^1.2. Source: J.
+    Skala, 4.3.2, 7.5; J. Edmonds, 1965; W. Cook, A. Rohe, 1999.
 
     >>> matching([[0, 0], [5, 0], [0, 1], [5, 2]])
     <terrace.Matching: 2 pairs, cost 3, optimal>
@@ -110,8 +111,8 @@ class HalvingMatching(Matching):
 
 
 def halving_matching(points, *, method='monotone', distances=False, iterations=None, seconds=float('inf'), seed=1, threads=None):
-    """Pairs by halving: the points are repeatedly divided into two halves at random, which are matched at the least total distance.
-    Neither method is exact; matching() is.
+    """Pairs by halving: the points are repeatedly divided into two halves at random, which are matched at the least
+    total distance. Neither method is exact; matching() is.
 
     points: shape (n, 2) or (n, 3); with ``distances=True`` the symmetric matrix of distances of any things. method: 'monotone'
     divides each current pair, so no iteration makes the matching worse; 'monte-carlo', as published, takes the best of

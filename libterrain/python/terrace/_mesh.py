@@ -25,7 +25,8 @@ class Mesh:
 
     @classmethod
     def read(cls, path):
-        """The triangles of a file: .ply, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without triangles; OSError; Error."""
+        """The triangles of a file: .ply, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without
+        triangles; OSError; Error."""
         path = os.fspath(path)
         with open(path, 'rb'):  # what is not there is an error of the system
             return Mesh(*_core.read_mesh(path))
@@ -44,8 +45,9 @@ class Mesh:
         return vertices, as_numbered(self.triangles, 'triangles', 3, most=len(vertices) - 1)
 
     def measures(self):
-        """A dict: faces, vertices (with a face), edges, area, volume (enclosed, negative inside out), components, euler_characteristic (2 for a sphere, 2 less
-        for each handle), border_edges, non_manifold_edges, closed. Raises: ValueError. O(n log n)."""
+        """A dict: faces, vertices (with a face), edges, area, volume (enclosed, negative inside out), components,
+        euler_characteristic (2 for a sphere, 2 less for each handle), border_edges, non_manifold_edges, closed. Raises:
+        ValueError. O(n log n)."""
         return _core.measure(*self._parts())
 
     def turned_outward(self):
@@ -55,8 +57,8 @@ class Mesh:
     def errors(self, samples):
         """Vertical distances of samples from the mesh, whose triangles must not overlap seen from above.
 
-        samples: shape (n, 3). Returns: a dict: samples, uncovered (on no triangle: not measured), max_error, rms_error, worst (the sample with the largest
-        error, -1 for none). Raises: ValueError. O(n).
+        samples: shape (n, 3). Returns: a dict: samples, uncovered (on no triangle: not measured), max_error, rms_error,
+        worst (the sample with the largest error, -1 for none). Raises: ValueError. O(n).
 
         >>> flat = Mesh(np.array([[0., 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
         >>> flat.errors([[0.2, 0.2, 3], [1, 1, 0]])

@@ -29,7 +29,8 @@ def _reading(sources, transform, crs, nodata, attributes, options, function):
 
 
 class PointReader:
-    """Points in batches, from point_batches(). dtype: of the batches; crs: a dict of what the source says, as Store.info has it. Threads may share one."""
+    """Points in batches, from point_batches(). dtype: of the batches; crs: a dict of what the source says, as
+    Store.info has it. Threads may share one."""
 
     def __init__(self, core):
         self._core = core
@@ -53,9 +54,10 @@ class PointReader:
 def point_batches(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
     """Points of files or arrays, batch by batch in constant memory, those of a batch close together as the source has them.
 
-    sources, transform, crs, nodata, attributes: as of build(). Options: ``where``, ``region``, ``keep``, ``drop``, ``resolution``, ``input_format``,
-    ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` as of build(); ``block_points`` (10000), the most in a batch. Returns: a
-    PointReader, an iterator of structured arrays: x, y, z in the CRS, then attributes as Store.points() gives them. Raises: Error for bad data, OSError, ValueError.
+    sources, transform, crs, nodata, attributes: as of build(). Options: ``where``, ``region``, ``keep``, ``drop``,
+    ``resolution``, ``input_format``, ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` as of
+    build(); ``block_points`` (10000), the most in a batch. Returns: a PointReader, an iterator of structured arrays: x,
+    y, z in the CRS, then attributes as Store.points() gives them. Raises: Error for bad data, OSError, ValueError.
 
     >>> [len(batch) for batch in point_batches(np.zeros((25000, 3)))]
     [10000, 10000, 5000]
@@ -78,9 +80,10 @@ def write_points(path, points, *, transform=None, crs=None, nodata=None, attribu
                  threads=None, **options):
     """Writes points to a file by its ending: .laz, .las, .copc.laz, .ply, .csv, .xyz; whole or not at all.
 
-    points, transform, crs, nodata, attributes, options: as of point_batches(): files too, which are converted in constant memory. format: in place of the
-    ending: 'xyz', 'csv', 'ply', 'ply-ascii', 'las', 'laz', 'copc'. Returns: a dict: points, rounding (how far a coordinate was moved, at most, to the
-    lattice of LAS). Raises: FileExistsError or another OSError; Error; ValueError; KeyboardInterrupt on Ctrl-C, and then no file stands.
+    points, transform, crs, nodata, attributes, options: as of point_batches(): files too, which are converted in
+    constant memory. format: in place of the ending: 'xyz', 'csv', 'ply', 'ply-ascii', 'las', 'laz', 'copc'. Returns: a
+    dict: points, rounding (how far a coordinate was moved, at most, to the lattice of LAS). Raises: FileExistsError or
+    another OSError; Error; ValueError; KeyboardInterrupt on Ctrl-C, and then no file stands.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

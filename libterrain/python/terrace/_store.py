@@ -88,11 +88,12 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
 
     Options: ``replace`` an existing store; ``where`` ('classification == 2'), ``region`` (box, polygons), ``keep``,
     ``drop`` (names of attributes) say what is read; ``block_points`` (10000) are clustered together, at
-    ``facility_cost`` (3.0, times a block's diagonal), with ``effort`` 'fast', 'default', 'fine' or 'full',
-    ``z_weight`` of heights, a ``metric`` ('euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'), ``channels``
-    (pairs of an attribute and metres per unit) and ``outlier_price``, by a ``method`` of cluster(); ``order`` 'auto', 'stream' or 'spatial';
-    ``vertical`` 'ellipsoidal' or 'orthometric'; ``seed``; of files ``input_format``, ``entities``, ``skip_damaged``,
-    ``band``, ``cell``, ``heights_of_colour`` ('mapbox', 'terrarium'), ``resolution``, ``datum_shift``.
+    ``facility_cost`` (3.0, times a block's diagonal), with ``effort`` 'fast', 'default', 'fine' or 'full', ``z_weight``
+    of heights, a ``metric`` ('euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'), ``channels`` (pairs of an
+    attribute and metres per unit) and ``outlier_price``, by a ``method`` of cluster(); ``order`` 'auto', 'stream' or
+    'spatial'; ``vertical`` 'ellipsoidal' or 'orthometric'; ``seed``; of files ``input_format``, ``entities``,
+    ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` ('mapbox', 'terrarium'), ``resolution``,
+    ``datum_shift``.
 
     progress: None, True for a bar (tqdm's where it is), or a function called as progress(what, count, fraction,
     ended). threads: all cores unless given. memory: bytes, 256 MiB unless given. The store depends on the source,
@@ -237,22 +238,25 @@ class Store:
         return [(as_region(place), whole(level, 'level')) for place, level in focus]
 
     def clusters(self, level=0, *, progress=None, threads=None):
-        """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS that hold all points below, a little more than they need), error (metres; no point below is farther
-        from the representative), descendants (points of level 0 below), members. The number of a row is that of ``points(cluster=(level, number))``."""
+        """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS that
+        hold all points below, a little more than they need), error (metres; no point below is farther from the
+        representative), descendants (points of level 0 below), members. The number of a row is that of
+        ``points(cluster=(level, number))``."""
         made = self._core.clusters(whole(level, 'level'), job(progress, threads))
         return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
 
     def count(self, box):
-        """The number of points in a box of four or six numbers, of which only the border is read. Points within rounding of the border may count or
-        not. Raises: ValueError for a rotated raster."""
+        """The number of points in a box of four or six numbers, of which only the border is read. Points within
+        rounding of the border may count or not. Raises: ValueError for a rotated raster."""
         box = as_region(box)
         if not isinstance(box, tuple):
             raise ValueError('count() takes a box')
         return self._core.count(box)
 
     def own_region(self, region, crs):
-        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon, with so many corners that outlines are within a
-        millionth of their length; without the heights of a box. Raises: Error where nothing leads from there."""
+        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon, with so many corners that
+        outlines are within a millionth of their length; without the heights of a box. Raises: Error where nothing leads
+        from there."""
         text = crs_text(crs)
         if region is None or text is None:
             raise ValueError('own_region() needs a region and its CRS')
@@ -357,10 +361,11 @@ class Store:
              smoothing=None, overlay=None, save_overlay=None, replace=False, progress=None, threads=None, memory=None):
         """The Delaunay triangulation of a level, with finer detail in focuses.
 
-        level: by default the finest of at most ``max_points`` (100,000). region, focus, where, cluster, crs: as points(); the
-        triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow it. smoothing: a method of
-        Delaunay2.smooth(), or a dict of ``method`` and its options; with a region inside it only. overlay: a file of other heights, which
-        ``save_overlay`` writes: those that are not the store's, which never changes; with ``replace`` over what is there.
+        level: by default the finest of at most ``max_points`` (100,000). region, focus, where, cluster, crs: as
+        points(); the triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow
+        it. smoothing: a method of Delaunay2.smooth(), or a dict of ``method`` and its options; with a region inside it
+        only. overlay: a file of other heights, which ``save_overlay`` writes: those that are not the store's, which
+        never changes; with ``replace`` over what is there.
 
         Returns: a Mesh, which unpacks as (vertices, triangles).
         """

@@ -22,14 +22,15 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
     most ``max_points`` vertices: of an array, without a store.
 
     samples: points or a raster in memory, as build() takes them: shape (n, 3), or (rows, columns) with ``transform``, a
-    Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN and
-    ``nodata`` in it are no samples. quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time.
-    duplicates: which of several points at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. For points: ``min_angle``, degrees, below
-    which removal makes no triangle; frame: shape (k, 3), a convex polygon, counter-clockwise, in place of their hull, kept exactly;
-    points outside do not count.
+    Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN
+    and ``nodata`` in it are no samples. quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more
+    time. duplicates: which of several points at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. For
+    points: ``min_angle``, degrees, below which removal makes no triangle; frame: shape (k, 3), a convex polygon,
+    counter-clockwise, in place of their hull, kept exactly; points outside do not count.
 
-    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us per vertex inserted.
-    Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than memory.
+    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us
+    per vertex inserted. Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than
+    memory.
 
     >>> y, x = np.mgrid[0:60, 0:80]
     >>> mesh = bounded_mesh(20 * np.sin(x / 9) * np.cos(y / 7), 0.5, transform=(10, 0, 0, 0, -10, 0))
@@ -83,11 +84,13 @@ def interpolate(samples, places, method='linear', *, threads=None):
 
 
 def simplify_line(t, heights, max_error):
-    """A chain of few of the samples along a line within ``max_error`` of each: the ends, then the sample of greatest error, and so on.
+    """A chain of few of the samples along a line within ``max_error`` of each: the ends, then the sample of greatest
+    error, and so on.
 
-    t: positions along the line, ascending, shape (n,); of equal ones the first counts. heights: one for each. Returns: (the samples that are kept, int64,
-    ascending; the largest error). It depends on these samples alone, so both sides of a border get the same chain. Usually O(n log n).
-    Raises: ValueError. Source: D. Douglas, T. Peucker, 1973, with vertical distances.
+    t: positions along the line, ascending, shape (n,); of equal ones the first counts. heights: one for each. Returns:
+    (the samples that are kept, int64, ascending; the largest error). It depends on these samples alone, so both sides
+    of a border get the same chain. Usually O(n log n). Raises: ValueError. Source: D. Douglas, T. Peucker, 1973, with
+    vertical distances.
 
     >>> simplify_line([0, 1, 2, 3], [0, 0.1, 0, 5], 0.5)
     (array([0, 2, 3]), 0.1)

@@ -50,12 +50,12 @@ def matching_tree(points, *, weights=None, labels=None, matcher=None, threads=No
 
 
 def rotate_tree(tree, lower, upper=None, *, passes=16):
-    """A tree whose boxes are smaller, by rotations from the leaves upward: a child changes places with a child of its sibling where
-    that helps.
+    """A tree whose boxes are smaller, by rotations from the leaves upward: a child changes places with a child of its
+    sibling where that helps.
 
-    tree: the rows of a MatchingTree, of any linkage, or two columns of children. lower, upper: the corners of the boxes of its
-    leaves, shape (n, 2) or (n, 3); for points ``lower`` alone. Returns: the children of each node, uint32, shape (n - 1, 2), which PointTree and
-    TriangleTree take. Raises: ValueError. About 0.5 us a box. Source: A. Kensler, 2008.
+    tree: the rows of a MatchingTree, of any linkage, or two columns of children. lower, upper: the corners of the boxes
+    of its leaves, shape (n, 2) or (n, 3); for points ``lower`` alone. Returns: the children of each node, uint32, shape
+    (n - 1, 2), which PointTree and TriangleTree take. Raises: ValueError. About 0.5 us a box. Source: A. Kensler, 2008.
 
     >>> points = np.random.default_rng(1).random((500, 2))
     >>> tree = linkage(points)

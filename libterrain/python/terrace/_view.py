@@ -61,9 +61,10 @@ class View:
     Frames are in metres east, north and up, with the origin above the middle of the store at height 0. The first
     frame's delta has all that there is.
 
-    kind: 'mesh'; 'points' for a cloud without triangles; 'surface' for scans: the surface in space that the points lie on. reader: 'thread' reads ahead while frames go on, 'frame'
-    within the frames' time. max_points: the most points at a time; max_bytes: of clusters that are kept in memory. collapse_below: a
-    cluster collapses below this share of the error at which it expands. guard: how far outside the picture clusters stay, as a share of their distance.
+    kind: 'mesh'; 'points' for a cloud without triangles; 'surface' for scans: the surface in space that the points lie
+    on. reader: 'thread' reads ahead while frames go on, 'frame' within the frames' time. max_points: the most points at
+    a time; max_bytes: of clusters that are kept in memory. collapse_below: a cluster collapses below this share of the
+    error at which it expands. guard: how far outside the picture clusters stay, as a share of their distance.
     silhouette: outlines are held to this share of the error.
 
     Threads may share a view, one works on it at a time. After a fork it is of no use: ValueError.
@@ -89,10 +90,12 @@ class View:
               ground_height=None, matrix=None, pixel_error=2.0, ground_error=float('inf'), focus=(), regions=(), seconds=0.01):
         """Brings the mesh nearer to what a camera asks for, in about ``seconds`` at most.
 
-        position, direction, up: of the eye, three numbers each. fov: degrees from bottom to top. size: of the picture in
-        pixels, width and height. ground_height: of the picture in metres, for a camera without perspective. matrix: in place of these, shape (4, 4), from metres to clip coordinates, row-major.
-        pixel_error: the most that an error may measure in the picture. ground_error: metres, everywhere. focus: pairs of a box (four or six
-        numbers, metres, least first) and the level that is wanted there. regions: pairs of a box and the most metres of error there.
+        position, direction, up: of the eye, three numbers each. fov: degrees from bottom to top. size: of the picture
+        in pixels, width and height. ground_height: of the picture in metres, for a camera without perspective. matrix:
+        in place of these, shape (4, 4), from metres to clip coordinates, row-major. pixel_error: the most that an error
+        may measure in the picture. ground_error: metres, everywhere. focus: pairs of a box (four or six numbers,
+        metres, least first) and the level that is wanted there. regions: pairs of a box and the most metres of error
+        there.
 
         Returns: a ViewDelta. Raises: Error if a cluster is damaged.
         """
@@ -118,19 +121,19 @@ class View:
         return ViewDelta(**delta)
 
     def restore(self, *, threads=None):
-        """Computes the surface of a scan afresh, which frames only follow, for a camera that rests. Returns: the ViewDelta to it; of other kinds
-        an empty one."""
+        """Computes the surface of a scan afresh, which frames only follow, for a camera that rests. Returns: the
+        ViewDelta to it; of other kinds an empty one."""
         return ViewDelta(**self._core.restore(_threads(threads)))
 
     def pin(self, cluster, expanded):
-        """Keeps a cluster, (level, number), expanded (True) or collapsed (False) whatever the camera asks; None leaves it to the camera. Raises: ValueError
-        for one that the store does not have."""
+        """Keeps a cluster, (level, number), expanded (True) or collapsed (False) whatever the camera asks; None leaves
+        it to the camera. Raises: ValueError for one that the store does not have."""
         level, number = cluster
         self._core.pin(whole(level, 'cluster'), whole(number, 'cluster'), None if expanded is None else bool(expanded))
 
     def attributes(self, vertices):
-        """The attributes of vertices as they are stored, a structured array. Raises: ValueError for a vertex that is not there or whose attributes are no
-        longer kept; those of what a frame has added are there until the next."""
+        """The attributes of vertices as they are stored, a structured array. Raises: ValueError for a vertex that is
+        not there or whose attributes are no longer kept; those of what a frame has added are there until the next."""
         return self._core.attributes(as_numbered(vertices, 'vertices', most=2 ** 31 - 1))
 
     def to_metres(self, points):
@@ -151,12 +154,13 @@ class View:
 
 
 class Multiresolution:
-    """The triangulation of a store's points at mixed levels, cluster by cluster: expand() adds the members of a cluster, collapse() takes
-    them out again, and what was before is back, triangle by triangle. In the store's CRS, of points in x and y (rasters in column and row, exactly). A View does
-    this for a camera, by itself.
+    """The triangulation of a store's points at mixed levels, cluster by cluster: expand() adds the members of a
+    cluster, collapse() takes them out again, and what was before is back, triangle by triangle. In the store's CRS, of
+    points in x and y (rasters in column and row, exactly). A View does this for a camera, by itself.
 
-    level: of the start, the top by default. focus: as set_detail(). Every change returns a MeshDelta; the first one follows snapshot(). Threads may share one. Clusters are pairs
-    (level, number). Raises: ValueError; Error for a damaged store, and then nothing has changed. Source: J. Skala, chapter 8.
+    level: of the start, the top by default. focus: as set_detail(). Every change returns a MeshDelta; the first one
+    follows snapshot(). Threads may share one. Clusters are pairs (level, number). Raises: ValueError; Error for a
+    damaged store, and then nothing has changed. Source: J. Skala, chapter 8.
 
     >>> import tempfile, terrace
     >>> folder = tempfile.TemporaryDirectory()
@@ -205,8 +209,8 @@ class Multiresolution:
         return MeshDelta(**self._core.set_region(self._flat(box), whole(level, 'level'), False, True))
 
     def set_detail(self, level, *, focus=()):
-        """All points of ``level`` and above, and in each focus, a pair (box, level), those of its level; and no others but those that share
-        their clusters."""
+        """All points of ``level`` and above, and in each focus, a pair (box, level), those of its level; and no others
+        but those that share their clusters."""
         return MeshDelta(**self._core.set_detail(whole(level, 'level'), self._focuses(focus)))
 
     def snapshot(self):
@@ -230,8 +234,8 @@ class Multiresolution:
         return self._core.children((self._top, 0) if cluster is None else self._cluster(cluster))
 
     def cluster_info(self, cluster):
-        """A dict of what is known of a cluster that is, or can be, expanded: bounds (six numbers in the CRS that hold all points below), error (metres; no point below is
-        farther from its representative), members."""
+        """A dict of what is known of a cluster that is, or can be, expanded: bounds (six numbers in the CRS that hold
+        all points below), error (metres; no point below is farther from its representative), members."""
         return dict(zip(('bounds', 'error', 'members'), self._core.record(self._cluster(cluster))))
 
     def __len__(self):
