@@ -29,6 +29,42 @@ bool finite(const std::array<Number, N>& p) {
   return std::all_of(p.begin(), p.end(), [](Number c) { return c - c == 0; });
 }
 
+/// The places in an order in which the next one is mostly near the last (Morton's): a walk from
+/// there is short.
+template <std::size_t N>
+std::vector<std::size_t> near_order(std::span<const std::array<double, N>> places) {
+  constexpr unsigned kBits = 16;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::array<double, N> low, high;
+  low.fill(kInfinity);
+  high.fill(-kInfinity);
+  for (const auto& p : places) {
+    for (std::size_t i = 0; i < N && finite(p); ++i) {
+      low[i] = std::min(low[i], p[i]);
+      high[i] = std::max(high[i], p[i]);
+    }
+  }
+  std::vector<std::pair<std::uint64_t, std::size_t>> keys(places.size());
+  for (std::size_t at = 0; at < places.size(); ++at) {
+    keys[at].second = at;
+    if (!finite(places[at])) continue;
+    std::array<std::uint32_t, N> cell{};
+    for (std::size_t i = 0; i < N; ++i) {
+      // Halves, so that no difference overflows.
+      const double share = (places[at][i] / 2 - low[i] / 2) / (high[i] / 2 - low[i] / 2);
+      cell[i] = share > 0 ? static_cast<std::uint32_t>(share * ((1U << kBits) - 1)) : 0;
+    }
+    for (unsigned bit = kBits; bit-- > 0;) {
+      for (const std::uint32_t c : cell) keys[at].first = keys[at].first << 1 | (c >> bit & 1);
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::size_t> order;
+  order.reserve(keys.size());
+  for (const auto& [key, at] : keys) order.push_back(at);
+  return order;
+}
+
 /// What differs between kinds of meshes: kCorners of a simplex, ids of simplices and access to
 /// them.
 template <std::size_t N, class Metric>
@@ -239,7 +275,7 @@ class SharedDelaunay {
       const std::vector<std::int32_t> rank = rows_of_simplices();
       std::vector<std::int32_t> found(places.size(), -1);
       tri::VertexId hint = tri::kNoVertex;
-      for (std::size_t i = 0; i < places.size(); ++i) {
+      for (const std::size_t i : near_order(places)) {
         if (!finite(places[i])) continue;
         const auto s = Kind::found(mesh_, places[i], hint);
         if (mesh_.alive(s)) found[i] = rank[slot(s)];
@@ -253,7 +289,7 @@ class SharedDelaunay {
     return to_array(locked(places.size(), [&] {
       std::vector<std::int32_t> found(places.size(), -1);
       tri::VertexId last = tri::kNoVertex;
-      for (std::size_t i = 0; i < places.size(); ++i) {
+      for (const std::size_t i : near_order(places)) {
         if (!finite(places[i])) continue;
         last = mesh_.nearest(places[i], last);
         if (last != tri::kNoVertex) found[i] = handle(last);

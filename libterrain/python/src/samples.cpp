@@ -34,20 +34,29 @@ py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const st
   std::vector<double> shares;
   std::vector<std::int32_t> vertices;
   auto begins = shared.read(asked.size(), [&](const auto& mesh) {
-    std::vector<std::int64_t> rows{0};
-    std::vector<tri::VertexWeight> found;
+    // As they are found, and where those of each place are among them.
+    std::vector<tri::VertexWeight> all, found;
+    std::vector<std::size_t> first(asked.size());
+    std::vector<std::int64_t> rows(asked.size() + 1, 0);
     tri::VertexId near = tri::kNoVertex;
-    for (std::size_t i = 0; i < asked.size(); ++i) {
+    for (const std::size_t i : near_order(asked)) {
       if (!finite(asked[i])) {
         throw std::invalid_argument("place " + std::to_string(i) + " is not finite");
       }
       weights_at(mesh, asked[i], how, found, near);
-      for (const tri::VertexWeight& of : found) {
-        shares.push_back(of.weight);
-        vertices.push_back(static_cast<std::int32_t>(of.vertex));
-      }
       if (!found.empty()) near = found.front().vertex;
-      rows.push_back(static_cast<std::int64_t>(vertices.size()));
+      first[i] = all.size();
+      rows[i + 1] = static_cast<std::int64_t>(found.size());
+      all.insert(all.end(), found.begin(), found.end());
+    }
+    shares.reserve(all.size());
+    vertices.reserve(all.size());
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      for (std::size_t k = first[i]; k < first[i] + static_cast<std::size_t>(rows[i + 1]); ++k) {
+        shares.push_back(all[k].weight);
+        vertices.push_back(static_cast<std::int32_t>(all[k].vertex));
+      }
+      rows[i + 1] += rows[i];
     }
     return rows;
   });
