@@ -65,11 +65,14 @@ Job::Job(const py::tuple& how) : progress_(how[0]), note_(how[1]) {
     context_.progress = [this](const terrain::Progress& at) {
       constexpr double kBetweenReports = 0.05;
       const double time = now();
+      // The last report of a piece of work need not say how far it came.
+      if (at.count > 0) last_count_ = at.count, last_fraction_ = at.fraction;
       if (!at.ended && time - last_report_ < kBetweenReports) return;
       last_report_ = time;
       call_python([&] {
-        progress_(py::str(at.what.data(), at.what.size()), at.count, at.fraction, at.ended);
+        progress_(py::str(at.what.data(), at.what.size()), last_count_, last_fraction_, at.ended);
       });
+      if (at.ended) last_count_ = 0, last_fraction_ = 0;
     };
   }
   if (!note_.is_none()) {

@@ -80,6 +80,8 @@ class Job {
   std::stop_source stop_;
   std::exception_ptr raised_;  ///< by progress or note
   double last_report_ = 0;
+  std::uint64_t last_count_ = 0;  ///< and
+  double last_fraction_ = 0;      ///< of the piece of work that goes on
 };
 
 }  // namespace terrace::python

@@ -24,6 +24,7 @@ class Jobs(StoreCase):
         terrace.build(ALPS, self.path('alps'), progress=lambda *at: seen.append(at))
         self.assertTrue(all(at[0] == 'points' for at in seen))
         self.assertTrue(seen[-1][3])
+        self.assertEqual(seen[-1][1:3], (1338658, 1.0))
         counts = [at[1] for at in seen if not at[3]]
         self.assertEqual(counts, sorted(counts))
         with self.assertRaises(TypeError):
