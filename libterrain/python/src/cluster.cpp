@@ -219,6 +219,7 @@ Search search_of(const py::dict& given) {
   set("seconds", search.options.seconds);
   set("count", search.count);
   set("bound_steps", search.bound_steps);
+  if (search.options.restarts) search.median.restarts = *search.options.restarts;
   search.median.seed = search.options.seed;
   search.median.threads = search.options.threads;
   search.median.bound_steps = static_cast<std::uint32_t>(
@@ -247,7 +248,7 @@ py::tuple facility_location(const Array<double>& given, double facility_cost,
                             const std::optional<Array<double>>& channels, double outlier_price,
                             const py::dict& how) {
   Search search = search_of(how);
-  search.median.restarts = search.options.restarts.value_or(1);
+  if (!search.options.restarts) search.median.restarts = 1;
   search.median.bound_steps = 0;
   const std::vector<cluster::Point3> points = points3_of(given);
   cluster::FacilityPoints problem{
@@ -335,8 +336,7 @@ py::array entity_distances(const Array<double>& a, const Array<double>& b, bool 
 py::tuple facility_matrix(const Array<double>& connection, const Array<double>& opening,
                           const py::dict& how) {
   if (connection.ndim() != 2) throw py::value_error("connection costs have two dimensions");
-  Search search = search_of(how);
-  if (search.options.restarts) search.median.restarts = *search.options.restarts;
+  const Search search = search_of(how);
   return search.solve(cluster::FacilityMatrix{
       .facilities = static_cast<std::size_t>(connection.shape(0)),
       .clients = static_cast<std::size_t>(connection.shape(1)),

@@ -58,7 +58,7 @@ def tree_linkage(edges, lengths):
     """The linkage whose merges are the edges of a tree by ascending length, as of spanning_tree() in any metric.
 
     edges: whole numbers, shape (n - 1, 2), in any order, that connect the points 0 .. n - 1. lengths: not negative.
-    Returns: rows as linkage(). O(n log n). Raises: ValueError, naming an edge that closes a circle.
+    Returns: rows as linkage(). O(n log n). Raises: ValueError, naming an edge that closes a cycle.
 
     >>> tree_linkage([[1, 2], [0, 1]], [4, 1])
     array([[0., 1., 1., 2.],
@@ -181,7 +181,7 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
     what effort says; start: Clusters to begin with; assign_nearest: at the end each point goes to its nearest
     representative. ordered: entities of three corners are polylines, not triangles. Ctrl-C ends local searches soon.
 
-    Returns: Clusters. Raises: ValueError. Sources: J. Skala, 4.2.3, 7.1, 7.3, 9; of k-median L. O'Callaghan et al., 2002.
+    Returns: Clusters. Raises: ValueError. Sources: J. Skala, 4.2.3, 7.1, 7.3, chapter 9; for k-median L. O'Callaghan et al., 2002.
 
     >>> found = cluster([[0, 0], [0, 1], [9, 0], [9, 1]], facility_cost=0.2)
     >>> found.labels
@@ -208,8 +208,8 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
 
 
 def entity_distances(a, b=None, *, ordered=False):
-    """How far the corners of one entity must move to coincide with those of another: the root mean square under the best of the
-    correspondences.
+    """How far the corners of one entity must move to coincide with those of another: the root mean square under the
+    best correspondence.
 
     a, b: shape (n, k, 2) or (n, k, 3): segments (k = 2), triangles (3), or polylines, whose corners keep their order or
     its reverse; of three corners if ``ordered``. b: ``a`` itself by default. Returns: float64, shape (len(a), len(b)):
@@ -225,8 +225,8 @@ def entity_distances(a, b=None, *, ordered=False):
 
 
 def clusters_of_size(points, size, *, seed=1, progress=None, threads=None):
-    """The clusters of a hierarchy's level, that whose mean size is nearest to ``size`` (as a factor): of some 85
-    points, of 7,000, and so on; all points are one cluster up to 10,000. To cut large sets into compact parts.
+    """Cuts a large set into compact parts: the clusters of that level of a hierarchy whose mean size is nearest to
+    ``size`` (as a factor). Levels have clusters of some 85 points, 7,000, and so on; up to 10,000 points are one cluster.
 
     points: shape (n, 2) or (n, 3), finite. Returns: uint32, shape (n,): the cluster of each point, from 0 without gaps.
     O(n log n); Ctrl-C ends it soon. Raises: ValueError. Source: J. Skala, 7.1.
@@ -276,7 +276,7 @@ class ClusterBlock:
     level: int
     number: int  #: of the block on its level
     points: np.ndarray  #: float64, shape (n, 3)
-    values: np.ndarray  #: structured, the other fields of the points; of no fields if there are none
+    values: np.ndarray  #: structured, the other fields of the points; without fields if they have none
     children: np.ndarray  #: uint64, shape (n, level): the clusters that each point heads on levels 0, 1, ..
     first: np.ndarray  #: cluster c has the points order[first[c]:first[c + 1]], its representative among them
     order: np.ndarray
@@ -291,13 +291,13 @@ class ClusterBlock:
 
 def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, effort='default', method='automatic',
                     metric='euclidean', seed=1, threads=None):
-    """The hierarchy of clusters that stores are made of, of any number of points in one pass and constant memory, for a
-    sink of the caller's.
+    """Builds the hierarchy of clusters that stores are made of, from any number of points in one pass and constant
+    memory, and hands it to the caller's sink.
 
     batches: an iterable of arrays of shape (n, 2) or (n, 3), or of structured arrays with x, y, z (such as points of a
     Store), all of one type; further fields travel with the points. At best those of a batch lie together. sink: called
     as sink(block) with each ClusterBlock as soon as it is finished, those of a level in order: their clusters are
-    numbered on, from 0. The points of the top level come last, as one cluster without a representative. Options: as of
+    numbered consecutively from 0. The points of the top level come last, as one cluster without a representative. Options: as of
     build(); distances are those of the coordinates.
 
     Returns: a dict: points, top, level_points, level_clusters (the root counts as a cluster of the top). What the

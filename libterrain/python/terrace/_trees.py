@@ -7,7 +7,6 @@ import numpy as np
 
 from . import _core
 from ._arrays import as_labels, as_numbered, as_numbers, as_rows, whole
-from ._clustering import linkage  # noqa: F401, of examples
 from ._matching import _threads
 
 
@@ -58,7 +57,7 @@ def rotate_tree(tree, lower, upper=None, *, passes=16):
     (n - 1, 2), which PointTree and TriangleTree take. Raises: ValueError. About 0.5 us a box. Source: A. Kensler, 2008.
 
     >>> points = np.random.default_rng(1).random((500, 2))
-    >>> tree = linkage(points)
+    >>> tree = matching_tree(points)
     >>> PointTree(points, rotate_tree(tree, points)).cost < PointTree(points, tree).cost
     True
     """

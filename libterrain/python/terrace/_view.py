@@ -122,7 +122,7 @@ class View:
 
     def restore(self, *, threads=None):
         """Computes the surface of a scan afresh, which frames only follow, for a camera that rests. Returns: the
-        ViewDelta to it; of other kinds an empty one."""
+        ViewDelta that leads there; for other kinds an empty one."""
         return ViewDelta(**self._core.restore(_threads(threads)))
 
     def pin(self, cluster, expanded):
@@ -155,8 +155,8 @@ class View:
 
 class Multiresolution:
     """The triangulation of a store's points at mixed levels, cluster by cluster: expand() adds the members of a
-    cluster, collapse() takes them out again, and what was before is back, triangle by triangle. In the store's CRS, of
-    points in x and y (rasters in column and row, exactly). A View does this for a camera, by itself.
+    cluster, collapse() takes them out again and restores exactly the triangles that were there before. Positions are in
+    the store's CRS; points are triangulated in x and y, rasters in column and row. A View does this for a camera.
 
     level: of the start, the top by default. focus: as set_detail(). Every change returns a MeshDelta; the first one
     follows snapshot(). Threads may share one. Clusters are pairs (level, number). Raises: ValueError; Error for a
