@@ -223,7 +223,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
       surface.take_changes(changes);
       triangulation.take_changes(tetrahedra);
       shape.update_nearby(triangulation, tetrahedra);
-      large += tetrahedra.added_tetrahedra.size() > shape::kManyNew &&
+      large += shape::far_reaching(tetrahedra) &&
                2 * tetrahedra.added_tetrahedra.size() < triangulation.tetrahedron_count();
       ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
