@@ -55,8 +55,19 @@ struct ViewControl<Triangulation>::Impl {
   void ask_for_records();
   void request(const Candidate& candidate, double importance, double bytes);
   void expand(const Candidate& candidate, const GivenCluster& given);
+  /// In points of an ordinary place.
+  [[nodiscard]] std::size_t work_to_collapse(Slot slot) {
+    if constexpr (kTellsWork) return model_.triangulation().removal_work(tree().vertices(slot));
+    return tree().size(slot);
+  }
+  [[nodiscard]] bool has_time_to_collapse(Slot slot) {
+    if constexpr (kTellsWork) return meter_.has(work_to_collapse(slot), StepMeter::kCollapse);
+    return meter_.has_usual(StepMeter::kCollapse);
+  }
   void collapse(Slot slot);
   void withdraw();
+
+  static constexpr bool kTellsWork = requires(const Triangulation& t) { t.removal_work({}); };
 
   ViewOptions options_;
   ViewCache cache_;
@@ -126,9 +137,9 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
   while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
-    if (!meter_.has_usual(StepMeter::kCollapse)) return false;
     const Slot slot = front_.next_to_collapse(options_.collapse_below);
     if (slot == ClusterTree::kNoSlot) break;
+    if (!has_time_to_collapse(slot)) return false;
     collapse(slot);
   }
   return true;
@@ -182,9 +193,9 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
     if (!could_fit(candidate, members)) return Room::none;
     const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
     while (lacking(members) > 0) {
-      if (!meter_.has_usual(StepMeter::kCollapse)) return Room::later;
       const Slot slot = front_.next_to_collapse(below);
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
+      if (!has_time_to_collapse(slot)) return Room::later;
       collapse(slot);
     }
   }
@@ -280,12 +291,12 @@ template <class Triangulation>
 void ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   const ClusterId id = tree().id(slot);
   const ChildRef place = tree().place(slot);
-  const std::size_t points = tree().size(slot);
+  const std::size_t work = work_to_collapse(slot);
   model_.collapse(id);
   front_.drop(slot, place);
   cache_.find(id, true);  // likely to come back
   ++result_.collapsed;
-  meter_.spend(points, StepMeter::kCollapse);
+  meter_.spend(work, StepMeter::kCollapse);
 }
 
 // Clusters that were requested and are neither wanted now nor within the band of hysteresis.

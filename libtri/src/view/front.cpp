@@ -69,6 +69,7 @@ void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
 }
 
 void ViewFront::drop(Slot slot, ChildRef place) {
+  if (collapsed_ < order_.size() && order_[collapsed_].slot == slot) ++collapsed_;
   const std::uint32_t group = group_of_[slot];
   group_of_[slot] = kNone;
   if (group != kNone) {
@@ -349,10 +350,10 @@ std::size_t ViewFront::points_below(double below) {
 ViewFront::Slot ViewFront::next_to_collapse(double below) {
   sort(below);
   while (collapsed_ + 1 < order_.size() && order_[collapsed_].key < below) {
-    const Ordered& entry = order_[collapsed_++];
     // Pins can hold a child of a cluster that is not wanted.
-    if (tree_->has_expanded_children(entry.slot)) continue;
-    return entry.slot;
+    const Slot slot = order_[collapsed_].slot;
+    if (!tree_->has_expanded_children(slot)) return slot;
+    ++collapsed_;
   }
   return ClusterTree::kNoSlot;
 }

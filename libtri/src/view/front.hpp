@@ -75,7 +75,7 @@ class ViewFront {
   [[nodiscard]] std::size_t points_below(double below);
   /// The expanded cluster to collapse first, if its demand is less than `below`: out of view before
   /// in view, then the farthest; in view the least demand, then the farthest. Children before
-  /// parents. kNoSlot if there is none.
+  /// parents. kNoSlot if there is none. The same one until it is dropped.
   [[nodiscard]] Slot next_to_collapse(double below);
   /// The demand of a child by the widened view, computed now.
   [[nodiscard]] double keep(ChildRef child);
