@@ -86,27 +86,30 @@ void decode_cluster(ByteReader in, bool grid, unsigned level, int version = 1,
   require(points.children.size() == points.size() * level);
 }
 
-void read_page(ByteReader in, int version) {
-  const Layout layout(schema_for(false, version), 0, version);
+void decode_page(ByteReader in, int version, bool grid = false) {
+  const Layout layout(schema_for(grid, version), 0, version);
   const auto clusters =
       static_cast<std::uint32_t>(1 + in.get<std::uint8_t>() % layout.page_clusters());
   const ByteView rest = in.take(in.left());
   Bytes bytes(rest.begin(), rest.end());
-  put(bytes, crc32(bytes));  // a fuzzer cannot guess a checksum: the parser after it is the target
-  const IndexPage page(bytes, clusters, layout, &tables_of(version, ColumnKind::plain));
-  std::vector<Entry> entries;
-  std::vector<KeyRange> ranges;
-  for (std::uint32_t i = 0; i < clusters; ++i) {
-    for (std::size_t a = 0; a < layout.ranges(); ++a) ranges.push_back(page.range(i, a));
-    entries.push_back(page.entry(i));
+  // A fuzzer cannot guess a checksum: the parser after it is the target.
+  if (version < 5) {
+    put(bytes, crc32(bytes));
+  } else {
+    put(bytes, crc16(bytes));
   }
-  static_cast<void>(page.end());
-  if (version < 4) return;
-  // Written again they are the same, and ranges no narrower.
+  const IndexPage page(bytes, clusters, layout, &tables_of(version, ColumnKind::plain));
+  const RangeColumns ranges = page.ranges(layout, &tables_of(version, ColumnKind::plain));
+  std::vector<Entry> entries;
+  for (std::uint32_t i = 0; i < clusters; ++i) entries.push_back(page.entry(i));
+  static_cast<void>(page.end(clusters - 1));
+  if (version < 5) return;
+  // Written again they are the same.
   Bytes again;
-  PageColumns(entries, layout.attributes, ranges)
-      .write(layout, EncodingTables(even_tables(layout, ColumnKind::plain)), page.offset(0), again);
+  PageContent{page.offset(0), PageColumns(entries), ranges}.write(
+      layout, EncodingTables(even_tables(layout, ColumnKind::plain)), again);
   const IndexPage second(again, clusters, layout, &tables_of(version, ColumnKind::plain));
+  const RangeColumns after = second.ranges(layout, &tables_of(version, ColumnKind::plain));
   for (std::uint32_t i = 0; i < clusters; ++i) {
     const Entry entry = second.entry(i);
     require(second.offset(i) == page.offset(i) && entry.points == entries[i].points);
@@ -114,8 +117,8 @@ void read_page(ByteReader in, int version) {
     require(entry.size == entries[i].size && entry.error == entries[i].error);
     require(entry.descendants == entries[i].descendants && entry.checksum == entries[i].checksum);
     for (std::size_t a = 0; a < layout.ranges(); ++a) {
-      const KeyRange before = ranges[i * layout.ranges() + a], after = second.range(i, a);
-      require(after.low <= before.low && before.high <= after.high);
+      require(after.range(i, a).low == ranges.range(i, a).low);
+      require(after.range(i, a).high == ranges.range(i, a).high);
     }
   }
 }
@@ -148,7 +151,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   try {
     const ByteReader rest({data + 1, size - 1});
-    switch (data[0] % 22) {
+    switch (data[0] % 23) {
       case 0:
         decode_cluster(rest, true, 0);
         break;
@@ -159,7 +162,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, true, 2);
         break;
       case 3:
-        read_page(rest, 1);
+        decode_page(rest, 1);
         break;
       case 4:
         read_tables(rest, 1);
@@ -174,7 +177,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, false, 0, 2, ColumnKind::beside);
         break;
       case 9:
-        read_page(rest, 2);
+        decode_page(rest, 2);
         break;
       case 10:
         read_tables(rest, 2);
@@ -198,19 +201,22 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         read_tables(rest, 3);
         break;
       case 17:
-        decode_cluster(rest, true, 0, 4);
+        decode_cluster(rest, true, 0, 5);
         break;
       case 18:
-        decode_cluster(rest, true, 1, 4, ColumnKind::recent);
+        decode_cluster(rest, true, 1, 5, ColumnKind::recent);
         break;
       case 19:
-        decode_cluster(rest, false, 0, 4, ColumnKind::line_recent);
+        decode_cluster(rest, false, 0, 5, ColumnKind::line_recent);
         break;
       case 20:
-        read_page(rest, 4);
+        decode_page(rest, 5);
         break;
       case 21:
-        read_tables(rest, 4);
+        read_tables(rest, 5);
+        break;
+      case 22:
+        decode_page(rest, 5, /*grid=*/true);
         break;
       default: {
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);

@@ -39,6 +39,15 @@ def step_of(number_class):
     return sum(number_class > last for last in STEPS)
 
 
+def crc8(data):
+    state = 0
+    for byte in data:
+        state ^= byte
+        for _ in range(8):
+            state = (state << 1 ^ (0x107 if state & 0x80 else 0)) & 0xFF
+    return state
+
+
 def crc16(data):
     state = 0xFFFF
     for byte in data:
@@ -95,8 +104,8 @@ class Tables:
         self.version = version
         self.per_column = 18 if version > 2 else 10
         contexts = self.border = 148 + self.per_column * columns
-        if version > 3:
-            contexts += 50 + 88 + 1 + 2 * len(schema)
+        if version > 4:
+            contexts += 50 + 96 + 1 + 2 * len(schema)
         source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
         given = source.number(8)
         self.coefficients = {}
@@ -121,7 +130,7 @@ class Tables:
         while len(self.symbols) < contexts:
             slots, symbol = [], 0
             used = source.varint()
-            if used == 0 and version > 3:
+            if used == 0 and version > 4:
                 self.symbols += [[(ESCAPE, 0, 2048)] * 2048] * (1 + source.varint())
                 continue
             for _ in range(used):
@@ -139,7 +148,7 @@ class Symbols:
     """The two ends of a cluster's bytes."""
 
     def __init__(self, data, tables):
-        require(len(data) >= (4 if tables.version < 4 else 1), "too few bytes")
+        require(len(data) >= (4 if tables.version < 5 else 1), "too few bytes")
         self.data, self.tables = data, tables
         self.front = min(4, len(data))
         self.state = int.from_bytes(data[:self.front], "little")
@@ -156,7 +165,7 @@ class Symbols:
     def symbol(self, context):
         symbol, start, frequency = self.tables.symbols[context][self.state % 2048]
         self.state = frequency * (self.state // 2048) + self.state % 2048 - start
-        if self.state < 65536 and (self.tables.version < 4 or self.front < len(self.data)):
+        if self.state < 65536 and (self.tables.version < 5 or self.front < len(self.data)):
             self.state = self.state * 65536 + struct.unpack_from("<H", self.data, self.front)[0]
             self.front += 2
         return self.raw(8) if symbol == ESCAPE else symbol
@@ -178,7 +187,7 @@ class Symbols:
     def end(self):
         rest = self.left - 8 * self.front
         require(0 <= rest < 8 and self.bits >> 8 * self.front & ((1 << rest) - 1) == 0, "the two ends do not meet")
-        if self.tables.version > 3 and self.left == 8 * len(self.data):
+        if self.tables.version > 4 and self.left == 8 * len(self.data):
             require(self.state < 65536, "rANS state")
             return self.state
         require(65536 <= self.state < 131072, "rANS state")
@@ -212,7 +221,7 @@ def rows(source, size, points):
             elif begin is None:
                 first = source.number(9)[0]
                 at = first + 1 + source.number(15)[0]
-            elif source.tables.version > 3:
+            elif source.tables.version > 4:
                 steps[0] = outwards(steps[0], row, begin)
                 first = begin - steps[0]
                 if row == size[1] - 1 and count == 1:
@@ -420,7 +429,8 @@ class Cluster:
     the representative (None in the root)."""
 
     def __init__(self, data, entry, tables, schema, level, root, grid):
-        require(crc16(data) == entry["checksum"], "cluster checksum")
+        small = grid and level == 0 and tables.version > 4
+        require((crc8 if small else crc16)(data) == entry["checksum"], "cluster checksum")
         source = Symbols(data, tables)
         count = entry["points"]
         form = source.symbol(0)
@@ -436,7 +446,7 @@ class Cluster:
         if form & 1:
             places = []
             split(source, (0, 0, 0), size, count, places)
-        elif not grid or level > 0 and tables.version > 3:
+        elif not grid or level > 0 and tables.version > 4:
             require(tables.kinds is not None, "columns in version 1")
             guided = follow() if tables.guide >= 0 else None
             distances = [column(source, len(schema) + axis, count, False, None, guided and guided[2])[1] for axis in range(3)]
@@ -459,7 +469,7 @@ class Cluster:
         upper = source.raw(16) if count >= 65536 else 0
         place = upper << 16 | source.end()
         require(place < count and (not root or place == 0), "representative")
-        if tables.version > 3:
+        if tables.version > 4:
             place = count // 2 + unzigzag(place)
         self.representative = None if root else place
 
@@ -480,21 +490,30 @@ class Level:
         directory = Bytes(index[-segment["directory_bytes"]:], "directory checksum")
         clusters = segment["clusters"]
         version, bounds = manifest["version"], manifest["bounds"]
-        each = 64 if version > 3 else 128
+        each = 128 if version < 5 else 4 if number > 0 else 16 if grid else 64
         pages = (clusters + each - 1) // each
-        offsets = [directory.number(8) for _ in range(pages + 1)]
-        boxes = [[directory.number(2) for _ in range(6)] for _ in range(pages if version > 3 else 0)]
-        require(offsets[0] == 0 and offsets[-1] == len(index) - segment["directory_bytes"], "page offsets")
+        start = len(index) - segment["directory_bytes"]
+        if version > 4:
+            offsets, boxes, at = self.chapters(index, directory, pages, bounds)
+        else:
+            offsets, boxes = [directory.number(8) for _ in range(pages + 1)], None
+            require(offsets[0] == 0 and offsets[-1] == start, "page offsets")
         sets = []
-        for _ in range(directory.number(4)):
-            first = directory.varint()
-            sets.append((first, Tables(directory.take(directory.varint()), schema, manifest["version"])))
+        for _ in range(directory.varint() if version > 4 else directory.number(4)):
+            first, size = directory.varint(), directory.varint()
+            if version > 4:
+                data_of = Bytes(index[at:at + size + 4], "tables checksum").data
+                at += size + 4
+            else:
+                data_of = directory.take(size)
+            sets.append((first, Tables(data_of, schema, version)))
+        require(version < 5 or at == start, "tables")
         directory.done()
         for page in range(pages):
             data_of, count = index[offsets[page]:offsets[page + 1]], min(each, clusters - each * page)
-            if version > 3:
+            if version > 4:
                 tables = [tables for first, tables in sets if first <= each * page][-1]
-                self.entries += self.page(data_of, count, tables, len(schema))
+                self.entries += self.page(data_of, count, tables, len(schema), grid and number == 0)
             else:
                 self.entries += self.old_page(data_of, count, len(schema) if version > 1 else 0)
         self.clusters = []
@@ -505,64 +524,104 @@ class Level:
             self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
 
         for ordinal, cluster in enumerate(self.clusters):
-            if version > 3 and cluster:
-                self.check_box(boxes[ordinal // each], bounds, cluster.points)
+            if version > 4 and cluster:
+                for box in boxes[ordinal // each]:
+                    require(all(low <= place <= high for point in cluster.points
+                                for place, low, high in zip(point, *box)), "a page's box")
 
     @staticmethod
-    def check_box(box, bounds, points):
-        for axis in range(3):
-            low, high = (bounds["min"][axis] * (1 - q / 65535) + bounds["max"][axis] * (q / 65535)
-                         for q in box[2 * axis:2 * axis + 2])
-            require(all(low <= point[axis] <= high for point in points), "a page's box")
+    def chapters(index, directory, pages, bounds):
+        """The offsets of pages; the boxes of each, and of its chapter; where the tables begin."""
+        def box(source, size, outer):
+            most = 256 ** size - 1
+            ends = [source.number(size) for _ in range(6)]
+            return [[low * (1 - q / most) + high * (q / most) for low, high, q in zip(*outer, ends[side::2])]
+                    for side in range(2)]
+
+        outer = (bounds["min"], bounds["max"]) if bounds else ([0] * 3, [0] * 3)
+        chapters = [(directory.varint(), directory.varint(), box(directory, 2, outer)) for _ in range((pages + 63) // 64)]
+        at = sum(size for size, _, _ in chapters)
+        offsets, boxes = [0], []
+        for number, (size, of_contents, chapter) in enumerate(chapters):
+            contents = Bytes(index[at:at + of_contents], "contents of a chapter")
+            at += of_contents
+            end = offsets[-1] + size
+            for _ in range(min(64, pages - 64 * number)):
+                offsets.append(offsets[-1] + contents.varint())
+                boxes.append((box(contents, 1, chapter), chapter))
+            contents.done()
+            require(offsets[-1] == end, "the end of a chapter")
+        return offsets, boxes, at
 
     @staticmethod
-    def page(data, count, tables, attributes):
-        source = Bytes(data, "page checksum")
-        offset = source.varint()
-        symbols = Symbols(source.take(len(source.data) - source.at), tables)
+    def page(data, count, tables, attributes, raster):
+        require(len(data) > 2 and crc16(data[:-2]) == int.from_bytes(data[-2:], "little"), "page checksum")
+        source = Bytes(data[:-2] + struct.pack("<I", zlib.crc32(data[:-2])), "a page")
+        offset = source.varint() << 16
+        of_ranges = source.varint() if attributes else 0
+        symbols = Symbols(source.take(len(source.data) - source.at - of_ranges), tables)
         first = tables.border + 50
+        rows = [None] * 11 + [[0] * count]
 
-        def numbers(column, steps=None):
-            values, c = [], 0
+        def numbers(column, contexts=None):
+            """The numbers of a column, and their steps."""
+            values, steps = [], [0]
             for k in range(count):
-                value, c = symbols.number(first + 8 * column + (steps[k] if steps else step_of(c)))
+                value, c = symbols.number(first + 8 * column + (contexts[k] if contexts else steps[-1]))
                 values.append(value)
-                classes[column].append(step_of(c))
-            return values
+                steps.append(step_of(c))
+            return values, steps[1:]
 
-        def sums(differences):
-            value, values = 0, []
+        def sums(differences, value=0):
+            values = []
             for difference in differences:
                 value = signed(value + unzigzag(difference))
                 values.append(value)
             return values
 
+        def guessed(column, guess):
+            rows[column] = []
+            for k, difference in enumerate(numbers(column)[0]):
+                rows[column].append((guess(k) + unzigzag(difference)) % WORD)
+
         def shift():
-            s = symbols.number(first + 88)[0]
+            s = symbols.number(first + 96)[0]
             require(s < 64, "shift")
             return s
 
-        classes = [[] for _ in range(11)]
-        rows = [None] * 11
+        steps = None
         for axis in range(3):
             s = shift()
-            rows[axis] = [(size + 1 << s) % WORD for size in numbers(axis)]
-            rows[3 + axis] = [signed(low << s) for low in sums(numbers(3 + axis, classes[2] if axis == 2 else None))]
-        rows[6] = numbers(6, classes[2])
-        rows[7] = numbers(7)
-        rows[9] = numbers(9)
-        rows[8] = sums(numbers(8))
-        rows[10] = sums(numbers(10))
-        checksums = [symbols.raw(16) for _ in range(count)]
+            sizes, size_steps = numbers(axis)
+            rows[axis] = [(size + 1 << s) % WORD for size in sizes]
+            lows, steps = numbers(3 + axis, (None, steps, size_steps)[axis])
+            rows[3 + axis] = [signed(low << s) for low in sums(lows)]
+        area = [x * y % WORD for x, y in zip(rows[0], rows[1])]
+        guessed(7, lambda k: area[k] * 45 % WORD >> 6 if raster else rows[7][k - 1] if k else 0)
+        guessed(6, lambda k: rows[6][k - 1] * rows[7][k] % WORD // max(rows[7][k - 1], 1) if k else 0)
+        rows[9] = numbers(9)[0]
+
+        def extent(k):
+            double = struct.pack("<d", (rows[0][k] + rows[1][k]) % WORD)
+            return int.from_bytes(double, "little") + (1 << 47) - 1 >> 47
+
+        guessed(8, lambda k: rows[8][k - 1] + extent(k) - extent(k - 1) if k else extent(k))
+        rows[10] = sums(numbers(10)[0])
+        if raster:
+            rows[11] = sums(numbers(11)[0])
+        checksums = [symbols.raw(8 if raster else 16) for _ in range(count)]
+        offset += symbols.end()
         ends = []
+        symbols = Symbols(source.take(of_ranges), tables) if attributes else symbols
         for end in range(2 * attributes):
             s = shift()
             ones = (1 << s) - 1 if end % 2 else 0
-            ends.append([(key << s | ones) % WORD
-                         for key in sums([symbols.number(first + 89 + end)[0] for _ in range(count)])])
-        require(symbols.end() == 0, "end of a page")
+            keys = sums([symbols.number(first + 97 + end)[0] for _ in range(count)], -(1 << 63) >> s)
+            ends.append([(key << s | ones) % WORD for key in keys])
+        require(not attributes or symbols.end() == 0, "end of the ranges")
         entries = []
         for k in range(count):
+            offset += rows[11][k]
             entries.append({"offset": offset, "bytes": rows[6][k], "points": rows[7][k], "forms": rows[10][k],
                             "low": [rows[3 + axis][k] for axis in range(3)], "size": [rows[axis][k] for axis in range(3)],
                             "error": struct.unpack("<d", (rows[8][k] << 47).to_bytes(8, "little"))[0],
@@ -604,7 +663,7 @@ class Store:
         folder = pathlib.Path(folder)
         text = (folder / "manifest.json").read_bytes()
         self.manifest = json.loads(text)
-        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2, 3, 4), "not a store")
+        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2, 3, 5), "not a store")
         self.checksum = self.manifest["checksum"]
         require(text[-12:] == b"%s\"\n}\n" % self.checksum.encode(), "end of the manifest")
         self.checksum = int(self.checksum, 16)

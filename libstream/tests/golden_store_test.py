@@ -40,7 +40,7 @@ class GoldenStoreTest(unittest.TestCase):
     def test_version_3(self):
         self.check_points('lines')
 
-    def test_version_4(self):
+    def test_version_5(self):
         self.check_points('island')
         self.check_points('swath')
 

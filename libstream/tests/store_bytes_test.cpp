@@ -38,6 +38,23 @@ TEST(Crc16, EqualsTheDefinitionForEveryLength) {
   }
 }
 
+TEST(Crc8, HasThePublishedCheckValueAndEqualsTheDefinition) {
+  constexpr std::string_view kText = "123456789";
+  EXPECT_EQ(crc8({reinterpret_cast<const std::uint8_t*>(kText.data()), kText.size()}), 0xF4);
+  std::mt19937_64 random(3);
+  for (std::size_t size = 0; size < 100; ++size) {
+    SCOPED_TRACE(size);
+    std::vector<std::uint8_t> bytes(size);
+    unsigned crc = 0;
+    for (std::uint8_t& byte : bytes) {
+      byte = static_cast<std::uint8_t>(random());
+      crc ^= byte;
+      for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc & 0x80) != 0 ? 0x107u : 0u);
+    }
+    EXPECT_EQ(crc8(bytes), crc);
+  }
+}
+
 TEST(Crc32, PortableEqualsTheLibrarysInOneAndInParts) {
   std::mt19937_64 random(2);
   for (std::size_t size = 1; size < 300; ++size) {

@@ -154,7 +154,7 @@ TEST(StoreInvariants, ManifestsWhoseCountsCannotBeAreRefused) {
          level(m, 0)["segments"][0]["clusters"] = many;
          level(m, 0)["members"] = 0;
        }},
-      {"more clusters than its file",
+      {"more clusters than its index",
        [&](auto& m) {
          const std::uint64_t many = std::uint64_t{1} << 40;
          m["points"] = level(m, 0)["points"] = 2 * many;
@@ -356,7 +356,7 @@ TEST(StoreInvariants, IndexEntriesThatCannotBeAreNotRead) {
 TEST(StoreInvariants, PagesThatDoNotFollowOneAnotherAreFound) {
   StoreFiles files = grid_files();
   testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { ++offset; });
-  expect_problem(files, "do not follow those of the page before");
+  expect_problem(files, "do not follow those before");
   files = grid_files();
   testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { offset = UINT64_MAX - 9; });
   expect_unreadable(files, "an index entry is out of range");
@@ -369,78 +369,92 @@ TEST(StoreInvariants, PagesThatDoNotFollowOneAnotherAreFound) {
   expect_problem(files, "the clusters do not end where the file does");
 }
 
-/// The bytes of level 0's index, and what can be done to them.
-TEST(StoreInvariants, DirectoriesThatCannotBeAreRefused) {
-  struct Case {
-    const char* expected;
-    std::function<void(testing::LevelBytes&)> edit;
-  };
-  const auto put = [](testing::LevelBytes& level, std::size_t at, std::uint64_t value,
-                      std::size_t n) {
-    std::memcpy(level.index.data() + level.directory() + at, &value, n);
-  };
-  const auto tables = [](const testing::LevelBytes& level) { return level.sets(); };
-  const std::vector<Case> cases{
-      {"do not follow one another", [&](auto& level) { put(level, 0, 1, 8); }},
-      {"do not follow one another", [&](auto& level) { put(level, 8, UINT64_MAX, 8); }},
-      {"do not follow one another",
-       [&](auto& level) { put(level, 16, level.page_offset(1) - 1, 8); }},
-      {"do not end where the directory begins",
-       [&](auto& level) {
-         put(level, 8 * level.pages(), level.page_offset(level.pages()) - 1, 8);
-       }},
-      {"the level has no tables",
-       [&](auto& level) {
-         put(level, tables(level), 0, 4);
-         level.index.resize(level.directory() + tables(level) + 8);
-       }},
-      {"the data end too early", [&](auto& level) { put(level, tables(level), 2, 4); }},
-      {"the tables do not follow one another",
-       [&](auto& level) { put(level, tables(level) + 4, 1, 1); }},
-      {"bytes follow the directory",
-       [&](auto& level) { level.index.insert(level.index.size() - 4, 1, '\0'); }},
-      {"too large for the level's clusters",
-       [&](auto& level) { level.index.insert(level.index.size() - 4, 4u << 20, '\0'); }},
-  };
-  for (const Case& c : cases) {
-    SCOPED_TRACE(c.expected);
-    StoreFiles files = grid_files();
-    auto manifest = ordered_json::parse(files["manifest.json"]);
-    bool first = true;
-    testing::for_each_level(files, manifest,
-                            [&](testing::LevelBytes& level, ordered_json& segment) {
-                              if (!std::exchange(first, false)) return;
-                              const std::size_t directory = level.directory();
-                              c.edit(level);
-                              segment["directory_bytes"] = level.index.size() - directory;
-                            });
-    files["manifest.json"] = manifest.dump(2) + "\n";
-    testing::mend(files);
-    expect_refused(files, c.expected);
-  }
-}
-
-/// A second set of tables, from cluster `first` on, is put behind that of level 0.
-StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
+/// Calls edit(level 0) on a store of rasters, and mends.
+StoreFiles with_edited_index(const std::function<void(testing::LevelBytes&)>& edit) {
   StoreFiles files = grid_files();
   auto manifest = ordered_json::parse(files["manifest.json"]);
   bool done = false;
   testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json& segment) {
     if (std::exchange(done, true)) return;
-    const std::size_t directory = level.directory(), count_at = directory + level.sets();
-    const std::uint32_t two = 2;
-    std::memcpy(level.index.data() + count_at, &two, 4);
-    // Behind the first's ordinal.
-    std::string set = level.index.substr(count_at + 5, level.index.size() - 4 - (count_at + 5));
-    if (damaged) set.back() = static_cast<char>(0x7f);
-    store::Bytes ordinal;
-    store::put_varint(ordinal, first);
-    level.index.insert(level.index.size() - 4, std::string(ordinal.begin(), ordinal.end()) + set);
-    segment["directory_bytes"] = level.index.size() - directory;
+    edit(level);
+    segment["directory_bytes"] = level.directory_bytes;
   });
   files["manifest.json"] = manifest.dump(2) + "\n";
   testing::mend(files);
   return files;
+}
+
+/// The same, calls edit(parts of the index).
+StoreFiles with_edited_parts(const std::function<void(testing::IndexParts&)>& edit) {
+  return with_edited_index([&](testing::LevelBytes& level) {
+    testing::IndexParts parts(level);
+    edit(parts);
+    parts.put_together(level);
+  });
+}
+
+TEST(StoreInvariants, DirectoriesThatCannotBeAreRefused) {
+  using Edit = std::function<void(testing::LevelBytes&)>;
+  // One chapter: bytes of its pages, bytes of its contents, its box, number of sets, the first
+  // one's ordinal and bytes.
+  enum Field { kPages, kContents, kSets, kOrdinal };
+  /// Puts a byte in the place of a field's first.
+  const auto put = [](Field field, char byte) -> Edit {
+    return [field, byte](testing::LevelBytes& level) {
+      store::ByteReader in(level.bytes({level.directory(), level.index.size()}));
+      if (field > kPages) in.varint();
+      if (field > kContents) in.varint();
+      if (field > kContents) in.take(12);
+      if (field > kSets) in.varint();
+      level.index[level.directory() + in.offset()] = byte;
+    };
+  };
+  const auto parts = [](const std::function<void(testing::IndexParts&)>& edit) -> Edit {
+    return [edit](testing::LevelBytes& level) {
+      testing::IndexParts found(level);
+      edit(found);
+      found.put_together(level);
+    };
+  };
+  const auto more = [](std::size_t bytes) -> Edit {
+    return [bytes](testing::LevelBytes& level) {
+      level.index.insert(level.index.size() - 4, bytes, '\0');
+      level.directory_bytes += bytes;
+    };
+  };
+  const std::vector<std::pair<const char*, Edit>> cases{
+      {"the contents of a chapter have an impossible size", put(kPages, '\xff')},
+      {"the contents of a chapter have an impossible size", put(kContents, '\x0a')},
+      {"the level has no tables", parts([](auto& index) { index.sets.clear(); })},
+      {"the data end too early", put(kSets, '\x02')},
+      {"the tables do not follow one another", put(kOrdinal, '\x01')},
+      {"the tables do not end where the directory begins",
+       [](auto& level) { level.index.insert(0, "more"); }},
+      {"bytes follow the directory", more(1)},
+      {"too large for the level's clusters", more(4u << 20)},
+  };
+  for (const auto& [expected, edit] : cases) {
+    SCOPED_TRACE(expected);
+    expect_refused(with_edited_index(edit), expected);
+  }
+}
+
+TEST(StoreInvariants, ContentsOfChaptersThatCannotBeAreNotRead) {
+  for (const int more : {-1, 1}) {
+    const StoreFiles files = with_edited_index([&](testing::LevelBytes& level) {
+      char& size_of_first = level.index[level.contents[0].begin];
+      size_of_first = static_cast<char>(size_of_first + more);
+    });
+    expect_unreadable(files, "the pages of a chapter do not");
+  }
+}
+
+/// A second set of tables, from cluster `first` on, is put behind that of level 0.
+StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
+  return with_edited_parts([&](testing::IndexParts& index) {
+    index.sets.emplace_back(first, index.sets.front().second);
+    if (damaged) index.sets.back().second.back() = '\x7f';
+  });
 }
 
 TEST(StoreInvariants, SecondTablesServeClustersOfTheirOwn) {
@@ -454,20 +468,18 @@ TEST(StoreInvariants, SecondTablesServeClustersOfTheirOwn) {
 
 TEST(StoreInvariants, BoxesOfPagesThatLeaveClustersOutAreFound) {
   for (std::size_t place = 0; place < 6; ++place) {
-    StoreFiles files = grid_files();
-    auto manifest = ordered_json::parse(files["manifest.json"]);
-    bool done = false;
-    testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json&) {
-      if (std::exchange(done, true)) return;
-      // The second page's box: a low end upwards, a high end downwards.
-      const std::size_t at = level.directory() + 8 * (level.pages() + 1) + 12 + 2 * place;
-      std::uint16_t end = 0;
-      std::memcpy(&end, &level.index[at], 2);
-      end = static_cast<std::uint16_t>(place % 2 == 0 ? end + 2000 : end - 2000);
-      std::memcpy(&level.index[at], &end, 2);
-    });
-    testing::mend(files);
-    expect_problem(files, "the box reaches out of its page's");
+    // The second page's box: a low end upwards, a high end downwards.
+    expect_problem(with_edited_parts([&](testing::IndexParts& index) {
+                     char& end = index.pages[1].box[place];
+                     end = static_cast<char>(end + (place % 2 == 0 ? 8 : -8));
+                   }),
+                   "the box reaches out of its page's");
+    // That of its chapter.
+    expect_problem(with_edited_parts([&](testing::IndexParts& index) {
+                     char& end = index.chapter_boxes[0][2 * place + 1];
+                     end = static_cast<char>(end + (place % 2 == 0 ? 8 : -8));
+                   }),
+                   "the box reaches out of its page's");
   }
 }
 
@@ -483,7 +495,7 @@ TEST(StoreInvariants, OldPagesWithBitsThatMeanNothingAreNotRead) {
       testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json&) {
         if (!std::exchange(first, false) || page >= level.pages()) return;
         // The last bit of the last column's bytes.
-        char& last = level.index[level.page_offset(page + 1) - 5];
+        char& last = level.index[level.page_parts[page].end - 5];
         last = static_cast<char>(last | 0x80);
         padded = level.clusters_of(page) % 8 != 0;  // 16 bits each: else there is no padding
       });

@@ -9,12 +9,14 @@
 #include <iterator>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "store/codec/tables.hpp"
 #include "store/manifest.hpp"
+#include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
 
 /// Stores as bytes in memory that can be modified arbitrarily: mend() recomputes all checksums, so
@@ -51,13 +53,21 @@ inline void sign(std::string& bytes, std::size_t begin, std::size_t end) {
   std::memcpy(bytes.data() + end - 4, &checksum, 4);
 }
 
+/// A part of the index: where it begins, and where it ends, its checksum included.
+struct Part {
+  std::size_t begin = 0, end = 0;
+};
+
 /// One level's index and data as far as they can be found.
 struct LevelBytes {
   std::string& data;
   std::string& index;
   std::size_t clusters = 0, directory_bytes = 0;
   store::Layout layout;
+  std::vector<Part> page_parts{}, contents{}, sets{};  ///< before version 5 sets have no checksums
+  std::vector<std::uint64_t> set_firsts{};             ///< the clusters that they begin with
 
+  [[nodiscard]] bool old() const { return layout.version < 5; }
   [[nodiscard]] std::size_t pages() const {
     return (clusters + layout.page_clusters() - 1) / layout.page_clusters();
   }
@@ -66,43 +76,161 @@ struct LevelBytes {
     return static_cast<std::uint32_t>(
         std::min<std::size_t>(layout.page_clusters(), clusters - layout.page_clusters() * page));
   }
-  [[nodiscard]] std::uint64_t page_offset(std::size_t page) const {
-    std::uint64_t offset = 0;
-    std::memcpy(&offset, index.data() + directory() + 8 * page, 8);
-    return offset;
-  }
-  /// Whether the directory has an offset for this page, and the page lies before the directory.
-  [[nodiscard]] bool has_page(std::size_t page) const {
-    return 8 * page + 20 <= directory_bytes && page_offset(page) <= page_offset(page + 1) &&
-           page_offset(page + 1) <= directory() && page_offset(page + 1) - page_offset(page) >= 4;
-  }
-  [[nodiscard]] store::ByteView page_bytes(std::size_t page) const {
+  [[nodiscard]] store::ByteView bytes(const Part& part) const {
     const auto* const begin = reinterpret_cast<const std::uint8_t*>(index.data());
-    return {begin + page_offset(page), begin + page_offset(page + 1)};
-  }
-  /// Where the number of sets of tables is, within the directory.
-  [[nodiscard]] std::size_t sets() const {
-    return 8 * (pages() + 1) + (layout.version > 3 ? store::kPageBoxBytes * pages() : 0);
+    return {begin + part.begin, begin + part.end};
   }
   /// The tables of the page's first cluster. Throws: Damage.
   [[nodiscard]] store::Tables tables_of(std::size_t page) const {
-    store::ByteReader in(
-        {reinterpret_cast<const std::uint8_t*>(index.data()) + directory(), directory_bytes});
-    in.take(sets());
-    store::ByteView found;
-    for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
-      if (in.varint() > layout.page_clusters() * page) break;
-      found = in.take(store::memory_size(in.varint()));
+    std::size_t set = 0;
+    while (set + 1 < sets.size() && set_firsts[set + 1] <= layout.page_clusters() * page) ++set;
+    if (sets.empty()) throw store::Damage("no tables");
+    const store::ByteView found = bytes(sets[set]);
+    return store::Tables::read(found.first(found.size() - (old() ? 0 : 4)), layout);
+  }
+
+  /// Writes the checksum of a page.
+  void sign_page(std::size_t page) {
+    const Part part = page_parts[page];
+    if (old()) return sign(index, part.begin, part.end);
+    const std::uint16_t checksum = store::crc16(bytes({part.begin, part.end - 2}));
+    std::memcpy(&index[part.end - 2], &checksum, 2);
+  }
+  /// Finds the parts, up to where the bytes make no sense.
+  void find() {
+    try {
+      store::ByteReader in(bytes({directory(), index.size()}));
+      old() ? find_old(in) : find_new(in);
+    } catch (const store::Damage&) {
     }
-    return store::Tables::read(found, layout);
+  }
+
+ private:
+  Part part(std::uint64_t begin, std::uint64_t bytes, std::uint64_t least) const {
+    if (bytes < least || begin > index.size() || bytes > index.size() - begin)
+      throw store::Damage("not in the file");
+    return {static_cast<std::size_t>(begin), static_cast<std::size_t>(begin + bytes)};
+  }
+  void find_old(store::ByteReader& in) {
+    auto begin = in.get<std::uint64_t>();
+    for (std::size_t p = 0; p < pages(); ++p) {
+      const auto end = in.get<std::uint64_t>();
+      if (end < begin || end > directory()) throw store::Damage("not in the file");
+      page_parts.push_back(part(begin, end - begin, 4));
+      begin = end;
+    }
+    for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
+      set_firsts.push_back(in.varint());
+      const std::size_t size = store::memory_size(in.varint());
+      sets.push_back(part(directory() + in.offset(), size, 0));
+      in.take(size);
+    }
+  }
+  void find_new(store::ByteReader& in) {
+    const std::size_t chapters = (pages() + store::kChapterPages - 1) / store::kChapterPages;
+    std::uint64_t at = 0;
+    std::vector<std::uint64_t> of_contents;
+    for (std::size_t c = 0; c < chapters; ++c) {
+      at = part(at, in.varint(), 0).end;
+      of_contents.push_back(in.varint());
+      in.take(12);
+    }
+    for (const std::uint64_t size : of_contents) {
+      contents.push_back(part(at, size, 4));
+      at += size;
+    }
+    for (auto left = in.varint(); left > 0; --left) {
+      set_firsts.push_back(in.varint());
+      sets.push_back(part(at, in.varint() + 4, 4));
+      at = sets.back().end;
+    }
+    std::uint64_t page_at = 0;
+    for (const Part& chapter : contents) {
+      store::ByteReader of(bytes(chapter).first(chapter.end - chapter.begin - 4));
+      for (std::size_t p = 0; p < store::kChapterPages && page_parts.size() < pages(); ++p) {
+        page_parts.push_back(part(page_at, of.varint(), 4));
+        page_at = page_parts.back().end;
+        of.take(6);
+      }
+    }
+  }
+};
+
+/// An index of the version that is written, to be changed and put together again.
+struct IndexParts {
+  struct Page {
+    std::string bytes, box;
+  };
+  std::vector<Page> pages;
+  std::vector<std::string> chapter_boxes;
+  std::vector<std::pair<std::uint64_t, std::string>> sets;  ///< of tables, without checksums
+
+  explicit IndexParts(const LevelBytes& level) {
+    const auto text = [&](const Part& part) {
+      return level.index.substr(part.begin, part.end - part.begin);
+    };
+    store::ByteReader in(level.bytes({level.directory(), level.index.size()}));
+    for (const Part& chapter : level.contents) {
+      in.varint();
+      in.varint();
+      chapter_boxes.emplace_back(level.index, level.directory() + in.offset(), 12);
+      in.take(12);
+      store::ByteReader of(level.bytes(chapter));
+      while (of.left() > 4) {
+        of.varint();
+        const std::string box(level.index, chapter.begin + of.offset(), 6);
+        of.take(6);
+        pages.push_back({text(level.page_parts[pages.size()]), box});
+      }
+    }
+    for (std::size_t s = 0; s < level.sets.size(); ++s) {
+      const std::string set = text(level.sets[s]);
+      sets.emplace_back(level.set_firsts[s], set.substr(0, set.size() - 4));
+    }
+  }
+  /// Changes index and directory_bytes of `level`.
+  void put_together(LevelBytes& level) const {
+    std::string all_pages, all_contents, all_sets;
+    store::Bytes directory;
+    const auto append = [](std::string& to, const store::Bytes& bytes) {
+      to.append(bytes.begin(), bytes.end());
+    };
+    for (std::size_t c = 0; c < chapter_boxes.size(); ++c) {
+      store::Bytes contents;
+      std::size_t size = 0;
+      for (std::size_t p = c * store::kChapterPages;
+           p < std::min<std::size_t>(pages.size(), (c + 1) * store::kChapterPages); ++p) {
+        store::put_varint(contents, pages[p].bytes.size());
+        contents.insert(contents.end(), pages[p].box.begin(), pages[p].box.end());
+        all_pages += pages[p].bytes;
+        size += pages[p].bytes.size();
+      }
+      store::put(contents, store::crc32(contents));
+      append(all_contents, contents);
+      store::put_varint(directory, size);
+      store::put_varint(directory, contents.size());
+      directory.insert(directory.end(), chapter_boxes[c].begin(), chapter_boxes[c].end());
+    }
+    store::put_varint(directory, sets.size());
+    for (const auto& [first, set] : sets) {
+      store::put_varint(directory, first);
+      store::put_varint(directory, set.size());
+      store::Bytes bytes(set.begin(), set.end());
+      store::put(bytes, store::crc32(bytes));
+      append(all_sets, bytes);
+    }
+    store::put(directory, store::crc32(directory));
+    level.index = all_pages + all_contents + all_sets;
+    append(level.index, directory);
+    level.directory_bytes = directory.size();
   }
 };
 
 /// In old pages the checksum column, the twelfth, is 16 bits wide in everything the library wrote.
 inline void mend_old_checksums(LevelBytes& level, std::size_t page, const store::Bytes& checksums) {
-  const std::size_t begin = level.page_offset(page), count = level.clusters_of(page);
+  const std::size_t begin = level.page_parts[page].begin, count = level.clusters_of(page);
   // Where the columns begin, and how many bits precede the checksums.
-  store::ByteReader in(level.page_bytes(page));
+  store::ByteReader in(level.bytes(level.page_parts[page]));
   in.varint();
   std::size_t bits = 0;
   std::uint64_t base = 0;
@@ -126,37 +254,40 @@ inline void mend_old_checksums(LevelBytes& level, std::size_t page, const store:
 }
 
 inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
-  const std::size_t begin = level.page_offset(page), end = level.page_offset(page + 1);
+  const Part part = level.page_parts[page];
   try {
-    const bool old = level.layout.version < 4;
-    const store::Tables tables = old ? store::Tables() : level.tables_of(page);
+    const store::Tables tables = level.old() ? store::Tables() : level.tables_of(page);
     const store::DecodingTables decoding(tables);
-    std::uint64_t from = 0;
-    store::PageColumns columns = store::read_page(level.page_bytes(page), level.clusters_of(page),
-                                                  level.layout, &decoding, from);
-    const std::uint64_t offset = from;
+    const std::uint32_t clusters = level.clusters_of(page);
+    store::CodedPage coded = store::read_page(level.bytes(part), clusters, level.layout, &decoding);
+    std::uint64_t from = coded.offset;
     store::Bytes checksums;
-    for (std::uint32_t i = 0; i < columns.clusters(); ++i) {
-      const std::uint64_t size = columns.column(store::PageColumns::kBytes)[i];
+    for (std::uint32_t i = 0; i < clusters; ++i) {
+      const std::uint64_t size = coded.entries.column(store::PageColumns::kBytes)[i];
       const bool there = from <= level.data.size() && size <= level.data.size() - from;
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
       const auto checksum =
-          there ? store::crc16({bytes + from, static_cast<std::size_t>(size)}) : std::uint16_t{0};
+          there ? level.layout.checksum({bytes + from, static_cast<std::size_t>(size)})
+                : std::uint16_t{0};
       store::put(checksums, checksum);
-      columns.column(store::PageColumns::kChecksum)[i] = checksum;
+      coded.entries.column(store::PageColumns::kChecksum)[i] = checksum;
       from += size;
     }
-    if (old) {
+    if (level.old()) {
       mend_old_checksums(level, page, checksums);
     } else {
       store::Bytes fresh;
-      columns.write(level.layout, store::EncodingTables(tables), offset, fresh);
-      if (fresh.size() == end - begin) std::memcpy(&level.index[begin], fresh.data(), fresh.size());
+      store::PageContent{coded.offset, coded.entries,
+                         store::read_ranges(coded.ranges, clusters, level.layout, &decoding)}
+          .write(level.layout, store::EncodingTables(tables), fresh);
+      if (fresh.size() == part.end - part.begin) {
+        std::memcpy(&level.index[part.begin], fresh.data(), fresh.size());
+      }
     }
   } catch (const store::Damage&) {
     return;  // no page: nothing to mend
   }
-  sign(level.index, begin, end);
+  level.sign_page(page);
 }
 
 /// The levels whose files exist. `manifest`: as JSON; its size of a directory and its number of
@@ -188,6 +319,7 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
       LevelBytes bytes{data->second, index->second, level.at("clusters").get<std::size_t>(),
                        segment.at("directory_bytes").get<std::size_t>(), layout};
       if (bytes.directory_bytes < 4 || bytes.directory_bytes > bytes.index.size()) continue;
+      bytes.find();
       use(bytes, segment);
     } catch (const nlohmann::json::exception&) {
       continue;  // not a level
@@ -202,9 +334,13 @@ inline void mend(StoreFiles& files) {
   auto manifest = nlohmann::ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!manifest.is_object()) return;
   for_each_level(files, manifest, [](LevelBytes& level, nlohmann::ordered_json& segment) {
-    for (std::size_t page = 0; page < level.pages() && level.has_page(page); ++page) {
-      sign(level.index, level.page_offset(page), level.page_offset(page + 1));
+    for (std::size_t page = 0; page < level.page_parts.size(); ++page) {
+      level.sign_page(page);
       mend_cluster_checksums(level, page);
+    }
+    for (const Part& part : level.contents) sign(level.index, part.begin, part.end);
+    for (const Part& part : level.sets) {
+      if (!level.old()) sign(level.index, part.begin, part.end);
     }
     sign(level.index, level.directory(), level.index.size());
     for (const auto& [name, bytes] :
@@ -236,34 +372,25 @@ inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
                       const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
   unsigned number = 0;
-  for_each_level(files, manifest, [&](LevelBytes& bytes, nlohmann::ordered_json&) {
+  for_each_level(files, manifest, [&](LevelBytes& bytes, nlohmann::ordered_json& segment) {
     if (number++ != level) return;
     const store::Tables tables = bytes.tables_of(page);
     const store::DecodingTables decoding(tables);
-    const store::IndexPage old(bytes.page_bytes(page), bytes.clusters_of(page), bytes.layout,
-                               &decoding);
-    const std::size_t attributes = bytes.layout.ranges();
+    const store::IndexPage old(bytes.bytes(bytes.page_parts[page]), bytes.clusters_of(page),
+                               bytes.layout, &decoding);
     std::vector<store::Entry> entries;
-    std::vector<store::KeyRange> ranges;
-    for (std::uint32_t i = 0; i < old.clusters(); ++i) {
-      entries.push_back(old.entry(i));
-      for (std::size_t a = 0; a < attributes; ++a) ranges.push_back(old.range(i, a));
-    }
+    for (std::uint32_t i = 0; i < old.clusters(); ++i) entries.push_back(old.entry(i));
     std::uint64_t offset = old.offset(0);
     edit(entries, offset);
-    ranges.resize(entries.size() * attributes);
     store::Bytes fresh;
-    const std::vector<ScalarType> types(attributes, ScalarType::i64);
-    store::PageColumns(entries, types, ranges)
-        .write(bytes.layout, store::EncodingTables(tables), offset, fresh);
-    const std::size_t begin = bytes.page_offset(page), end = bytes.page_offset(page + 1);
-    for (std::size_t p = page + 1; p <= bytes.pages(); ++p) {
-      const std::uint64_t moved = bytes.page_offset(p) - (end - begin) + fresh.size();
-      std::memcpy(bytes.index.data() + bytes.directory() + 8 * p, &moved, 8);
-    }
-    bytes.index.replace(begin, end - begin, reinterpret_cast<const char*>(fresh.data()),
-                        fresh.size());
+    store::PageContent{offset, store::PageColumns(entries), old.ranges(bytes.layout, &decoding)}
+        .write(bytes.layout, store::EncodingTables(tables), fresh);
+    IndexParts parts(bytes);
+    parts.pages[page].bytes.assign(fresh.begin(), fresh.end());
+    parts.put_together(bytes);
+    segment["directory_bytes"] = bytes.directory_bytes;
   });
+  files[kManifestName] = manifest.dump(2) + "\n";
   mend(files);
 }
 

@@ -81,6 +81,45 @@ TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
   EXPECT_LT(read, index / 20);
 }
 
+/// Of a store whose index has many chapters, the contents of those that are near are read, once.
+TEST(StoreQuery, ReadsTheContentsOfTheIndexThatAreNearAlone) {
+  const TemporaryFolder folder;
+  const std::vector<testing::Block> blocks =
+      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 1200, 1200, 30, 1);
+  testing::write_store(folder.path() / "s", testing::grid_schema(ScalarType::i16), blocks,
+                       {.block_points = 900, .cluster_points = 6});
+  std::uint64_t reads = 0, read = 0;
+  const Store store = Store::open("s", [&](const std::string& name) {
+    const std::shared_ptr<ByteSource> file = open_file(folder.path() / "s" / name);
+    const bool counted = name == "level-0.0.index";
+    return bytes_by_function(
+        name, file->size(),
+        [file, counted, &read, &reads](std::uint64_t offset, std::span<std::byte> out) {
+          file->read(offset, out);
+          if (!counted) return;
+          read += out.size();
+          ++reads;
+        });
+  });
+  // The directory is small, and all that has been read.
+  ASSERT_GT(store.levels()[0].clusters, 150000u);
+  EXPECT_EQ(reads, 1u);
+  EXPECT_LT(read, 10000u);
+  StoreQuery query(store);
+  const Box3 box{{300, 200, -1e9}, {304, 204, 1e9}};
+  std::size_t inside = 0;
+  for (const testing::Block& block : blocks) {
+    for (const Point3& p : block.positions) inside += box.contains(p) ? 1 : 0;
+  }
+  EXPECT_EQ(query.in_box(box).size(), inside);
+  EXPECT_LT(read, store.levels()[0].index_bytes / 20);
+  const std::uint64_t before = reads;
+  EXPECT_EQ(query.in_box(box).size(), inside);
+  EXPECT_EQ(reads, before);
+  EXPECT_EQ(query.count({{-1, -1, -1e9}, {5000, 5000, 1e9}}), store.points());
+  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+}
+
 constexpr double kFarAway = std::numeric_limits<double>::infinity();
 
 using Key = std::tuple<double, Point3, ClusterId, std::uint32_t>;
@@ -237,7 +276,8 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
   }
 }
 
-TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
+/// A cloud whose points have the sum of their coordinates as an attribute.
+QueriedStore store_of_sums() {
   StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("sum"));
   auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 3000, 500, 3);
@@ -248,7 +288,11 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
       block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
     }
   }
-  const QueriedStore queried(schema, blocks, {.block_points = 500, .cluster_points = 40});
+  return {schema, blocks, {.block_points = 500, .cluster_points = 40}};
+}
+
+TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
+  const QueriedStore queried = store_of_sums();
   StoreQuery query(queried.store());
   ClusterPoints points;
   const std::vector<FoundPoint> found = query.nearest({50, 50, 50}, 100);
@@ -261,6 +305,57 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
     const double sum = point.position[0] + point.position[1] + point.position[2];
     EXPECT_EQ(queried.store().schema().view<double>(points.payload, 0)[point.member], sum);
     EXPECT_EQ(queried.store().schema().view<double>(sums, 0)[i], sum);
+  }
+}
+
+TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
+  const QueriedStore queried = store_of_sums();
+  std::vector<double> sums;
+  for (const FoundPoint& point : queried.points()) {
+    sums.push_back(point.position[0] + point.position[1] + point.position[2]);
+  }
+  std::sort(sums.begin(), sums.end());
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  for (const double share : {0.0, 0.001, 0.5, 0.999, 1.0}) {
+    const double least =
+        sums[static_cast<std::size_t>(share * static_cast<double>(sums.size() - 1))];
+    StoreQuery query(queried.store(), 1 << 16,
+                     Where("sum > " + std::to_string(least), queried.store().schema()));
+    const auto meets = [&](const Point3& p) {
+      return p[0] + p[1] + p[2] > std::stod(std::to_string(least));
+    };
+    for (int round = 0; round < 20; ++round) {
+      const Box3 all = queried.store().bounds();
+      Point3 place, other;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        place[axis] = all.min[axis] + uniform(random) * (all.max[axis] - all.min[axis]);
+        other[axis] = all.min[axis] + uniform(random) * (all.max[axis] - all.min[axis]);
+      }
+      Box3 box;
+      box.include(place);
+      box.include(other);
+      std::vector<FoundPoint> inside, near;
+      for (const FoundPoint& point : queried.points()) {
+        if (!meets(point.position)) continue;
+        if (box.contains(point.position)) inside.push_back(point);
+        const double x = point.position[0] - place[0], y = point.position[1] - place[1],
+                     z = point.position[2] - place[2];
+        near.push_back(point);
+        near.back().distance = std::sqrt(x * x + y * y + z * z);
+      }
+      EXPECT_EQ(query.in_box(box).size(), inside.size());
+      EXPECT_EQ(query.count(box), inside.size());
+      std::sort(near.begin(), near.end(),
+                [](const FoundPoint& a, const FoundPoint& b) { return key_of(a) < key_of(b); });
+      near.resize(std::min<std::size_t>(near.size(), 7));
+      const std::vector<FoundPoint> found = query.nearest(place, 7);
+      ASSERT_EQ(found.size(), near.size());
+      for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(key_of(found[i]), key_of(near[i]));
+      if (near.empty()) continue;
+      EXPECT_GE(query.within(place, near.back().distance).size(), near.size());
+    }
   }
 }
 

@@ -247,6 +247,35 @@ TEST(TileMesher, HeightsBeyondTheStepsAreTold) {
                HeightsTooFar);
 }
 
+TEST(TileMesher, SharedSidesChangeNothing) {
+  AnalyticSurface surface = alps();
+  for (const unsigned zoom : {7u, 9u}) {
+    SCOPED_TRACE(zoom);
+    const ZoomPlan plan = plan_of(zoom, 10, surface);
+    const TileRange range = tiles_in(surface.bounds(), zoom);
+    SharedSides shared;
+    for (std::uint32_t y = range.y0; y <= std::min(range.y1, range.y0 + 2); ++y) {
+      for (std::uint32_t x = range.x0; x <= std::min(range.x1, range.x0 + 2); ++x) {
+        const MadeTile alone = make_tile({zoom, x, y}, plan, surface, {});
+        const MadeTile beside = make_tile({zoom, x, y}, plan, surface, {}, &shared);
+        EXPECT_EQ(encode_tile(alone.mesh, alone.header), encode_tile(beside.mesh, beside.header));
+      }
+    }
+    // The tiles took sides from each other.
+    EXPECT_TRUE(shared.find({true, 0, range.y0 + 1, range.x0}) ||
+                shared.find({true, 1, range.y0 + 1, 2 * std::uint64_t{range.x0}}));
+  }
+}
+
+TEST(SharedSides, ForgetTheOldest) {
+  SharedSides shared;
+  const std::vector<TileSideVertex> side(1000);
+  for (std::uint32_t line = 0; line < 2000; ++line) shared.keep({true, 0, line, 0}, side);
+  EXPECT_TRUE(shared.find({true, 0, 1999, 0}));
+  EXPECT_TRUE(shared.find({true, 0, 1800, 0}));
+  EXPECT_FALSE(shared.find({true, 0, 0, 0}));
+}
+
 TEST(TileLeaves, CoverTheTileOnce) {
   AnalyticSurface surface = alps();
   for (unsigned zoom = 0; zoom < 12; ++zoom) {

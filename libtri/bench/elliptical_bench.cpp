@@ -2,7 +2,7 @@
 // Compares the elliptical triangulation with the Euclidean one, and with CGAL's
 // Delaunay_triangulation_2 with EPICK on points that were mapped and rounded, in one run on the
 // same points: 200,000 uniform ones, or the complete grid of 447 x 447 in random order. Then flips
-// to three regions.
+// to three regions, of the whole and following compact sets of 140 points that go and come.
 //
 // items_per_second counts points; CPU time, median of 5 rounds.
 #include <algorithm>
@@ -16,7 +16,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
 
-#include "terrace/tri/metric.hpp"
+#include "terrace/tri/regional_delaunay2.hpp"
 
 namespace {
 
@@ -108,14 +108,17 @@ void cgal_mapped(benchmark::State& state) {
 }
 
 /// Three boxes that cover most of the square, ellipses of the given ratio.
-void regions(benchmark::State& state) {
-  const auto points = input_points(static_cast<Input>(state.range(0)));
-  const auto ratio = static_cast<double>(state.range(1));
+tri::MetricField2 three_regions(double ratio) {
   const double side = kSide;
-  const tri::MetricField2 field(
+  return tri::MetricField2(
       {{tri::box2(0, 0, 0.5 * side, 0.6 * side), tri::ellipse_map(ratio, 1, 30)},
        {tri::box2(0.5 * side, 0, side, 0.6 * side), tri::ellipse_map(ratio, 1, 90)},
        {tri::box2(0, 0.7 * side, side, side), tri::ellipse_map(ratio, 1, -45)}});
+}
+
+void regions(benchmark::State& state) {
+  const auto points = input_points(static_cast<Input>(state.range(0)));
+  const tri::MetricField2 field = three_regions(static_cast<double>(state.range(1)));
   tri::Delaunay2<double> triangulation;
   triangulation.build(points);
   measure(state, points.size(), [&] {
@@ -123,6 +126,43 @@ void regions(benchmark::State& state) {
     benchmark::DoNotOptimize(tri::metric_triangles(triangulation, field));
     return now() - start;
   });
+}
+
+/// Compact sets of 140 points go and come back, the changes taken each time. Items are points that
+/// went and came.
+template <class Triangulation>
+void sets(benchmark::State& state, Triangulation triangulation) {
+  const auto points = input_points(static_cast<Input>(state.range(0)));
+  const std::vector<tri::VertexId> built = triangulation.build(points);
+  triangulation.start_journal();
+  const std::size_t side = kSmall ? 3 : 37;  // of a square in which sets of 12 x 12 cells lie
+  std::vector<std::vector<tri::VertexId>> all(side * side);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto column = static_cast<std::size_t>(points[i][0] / 12);
+    const auto row = static_cast<std::size_t>(points[i][1] / 12);
+    if (column < side && row < side) all[row * side + column].push_back(built[i]);
+  }
+  std::size_t count = 0;
+  for (const auto& set : all) count += 2 * set.size();
+  typename Triangulation::Changes changes;
+  measure(state, count, [&] {
+    const double start = now();
+    for (auto& set : all) {
+      std::vector<Point> places;
+      for (const tri::VertexId v : set) places.push_back(triangulation.point(v));
+      triangulation.remove(set);
+      triangulation.take_changes(changes);
+      std::vector<typename Triangulation::Insertion> inserted(set.size());
+      triangulation.insert(places, inserted);
+      triangulation.take_changes(changes);
+      for (std::size_t i = 0; i < set.size(); ++i) set[i] = inserted[i].vertex;
+    }
+    return now() - start;
+  });
+}
+void plain_sets(benchmark::State& state) { sets(state, tri::Delaunay2<double>()); }
+void sets_in_regions(benchmark::State& state) {
+  sets(state, tri::RegionalDelaunay2<double>(three_regions(static_cast<double>(state.range(1)))));
 }
 
 void once(benchmark::internal::Benchmark* row) {
@@ -139,6 +179,11 @@ BENCHMARK(elliptical)->Apply(once)->ArgNames({"grid", "metric"})->Args({kGrid, k
 BENCHMARK(elliptical)->Apply(metrics);
 BENCHMARK(cgal_mapped)->Apply(metrics);
 BENCHMARK(regions)
+    ->Apply(once)
+    ->ArgNames({"grid", "ratio"})
+    ->ArgsProduct({{kUniform, kGrid}, {3, 10, 100}});
+BENCHMARK(plain_sets)->Apply(once)->ArgName("grid")->Arg(kUniform)->Arg(kGrid);
+BENCHMARK(sets_in_regions)
     ->Apply(once)
     ->ArgNames({"grid", "ratio"})
     ->ArgsProduct({{kUniform, kGrid}, {3, 10, 100}});

@@ -48,6 +48,11 @@ class Journal {
     if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, before});
   }
 
+  /// Calls visit(slot, before) for each cell that was touched.
+  template <class Visit>
+  void for_each_cell(const Visit& visit) const {
+    for (const CellRecord& record : cells_.records) visit(record.slot, record.before);
+  }
   /// Turns the records into net changes and empties the journal. The current state: point(slot) is
   /// that of a living vertex, corners(slot) those of a finite cell, otherwise nullptr;
   /// is_finite(corners) classifies recorded ones. `changes`: a triangulation's, empty; the last two

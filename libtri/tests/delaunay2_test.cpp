@@ -343,6 +343,81 @@ TYPED_TEST(Delaunay2Test, NeighboursOfAVertexAreInOrder) {
   EXPECT_EQ(triangulation.triangle_count() + 2 + ends, 2 * triangulation.vertex_count());
 }
 
+// Clusters of rasters: what is complete around is written at once, and must be what one by one
+// gives.
+TEST(Delaunay2, SetsOnTheLatticeAreInsertedAsOneByOne) {
+  using Point = std::array<std::int32_t, 2>;
+  for (std::uint32_t seed = 0; seed < 300; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto below = [&](std::int32_t n) {
+      return static_cast<std::int32_t>(random() % static_cast<std::uint32_t>(n));
+    };
+    // A blob of rows, with holes or in two parts, at the origin or elsewhere.
+    const Point at = seed % 3 == 0 ? Point{0, 0} : Point{below(1 << 20), below(1 << 20)};
+    std::set<Point> blob;
+    const std::int32_t rows = 3 + below(30);
+    for (std::int32_t y = 0; y < rows; ++y) {
+      const std::int32_t begin = below(4), end = 4 + below(30);
+      for (std::int32_t x = begin; x < end; ++x) {
+        if (seed % 5 == 1 && below(40) == 0) continue;
+        if (seed % 7 == 2 && (x == 12 || y == 9)) continue;
+        blob.insert({at[0] + x, at[1] + y});
+      }
+    }
+    std::vector<Point> points(blob.begin(), blob.end());
+    std::shuffle(points.begin(), points.end(), random);
+    // Around it a coarse triangulation, some of whose vertices are in the blob too.
+    std::vector<Point> base{{at[0] > 100 ? at[0] - 100 : 0, at[1] > 90 ? at[1] - 90 : 0},
+                            {at[0] + 200, at[1] > 50 ? at[1] - 50 : 0},
+                            {at[0] + 90, at[1] + 170}};
+    for (int i = 0; i < 40; ++i) base.push_back({at[0] + below(60), at[1] + below(60)});
+    // The head is a vertex that the set lacks.
+    const Point head = points.back();
+    points.pop_back();
+    if (seed % 2 == 0) base.push_back(head);
+    Delaunay2<std::int32_t> together, alone;
+    together.build(base);
+    alone.build(base);
+    together.start_journal();
+    std::map<TriangleId, std::array<VertexId, 3>> triangles;
+    for (const TriangleId t : together.all_triangles()) triangles[t] = together.vertices(t);
+    std::vector<Delaunay2<std::int32_t>::Insertion> inserted(points.size());
+    together.insert(points, inserted, together.nearest(head));
+    ASSERT_EQ(find_fault(together), "");
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto one = alone.insert(points[i]);
+      ASSERT_EQ(one.created, inserted[i].created) << i;
+      ASSERT_EQ(together.point(inserted[i].vertex), points[i]) << i;
+    }
+    ASSERT_EQ(together.hash(), alone.hash());
+    ASSERT_EQ(together.vertex_count(), alone.vertex_count());
+    // The journal leads from one to the other.
+    Delaunay2<std::int32_t>::Changes changes;
+    together.take_changes(changes);
+    for (const TriangleId t : changes.removed_triangles) ASSERT_EQ(triangles.erase(t), 1u);
+    for (const TriangleId t : changes.added_triangles) {
+      ASSERT_TRUE(triangles.emplace(t, together.vertices(t)).second);
+    }
+    std::size_t count = 0;
+    for (const TriangleId t : together.all_triangles()) {
+      ++count;
+      ASSERT_EQ(triangles.at(t), together.vertices(t));
+    }
+    ASSERT_EQ(count, triangles.size());
+    // And it goes as it came.
+    std::vector<VertexId> created;
+    for (const auto& i : inserted) {
+      if (i.created) created.push_back(i.vertex);
+    }
+    together.remove(created);
+    ASSERT_EQ(find_fault(together), "");
+    Delaunay2<std::int32_t> before;
+    before.build(base);
+    ASSERT_EQ(together.hash(), before.hash());
+  }
+}
+
 TEST(Delaunay2, RefusesBadCoordinatesAndStaysUnchanged) {
   Delaunay2<std::int32_t> integers;
   EXPECT_THROW(integers.build(std::vector<std::array<std::int32_t, 2>>{{1, 2}, {-1, 0}}),

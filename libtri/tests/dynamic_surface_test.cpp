@@ -194,6 +194,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
   typename DynamicSurface<Coord>::Changes changes;
   typename Delaunay3<Coord>::Changes tetrahedra;
   std::size_t differing = 0, large = 0;
+  std::array<double, 2> work{}, gone{};  // of the fine points, of the coarse ones
   for (int step = 0; step < 12; ++step) {
     // A fine patch goes, small or large, or a few of the coarse points, and comes back.
     const bool of_coarse = step % 3 == 2;
@@ -212,6 +213,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
       patch.push_back(v);
       points.push_back(surface.point(v));
     }
+    work[of_coarse] += static_cast<double>(surface.removal_work(patch));
+    gone[of_coarse] += static_cast<double>(patch.size());
     for (const bool back : {false, true}) {
       if (back) {
         surface.insert(points, {});
@@ -223,7 +226,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
       surface.take_changes(changes);
       triangulation.take_changes(tetrahedra);
       shape.update_nearby(triangulation, tetrahedra);
-      large += tetrahedra.added_tetrahedra.size() > shape::kManyNew &&
+      large += shape::far_reaching(tetrahedra) &&
                2 * tetrahedra.added_tetrahedra.size() < triangulation.tetrahedron_count();
       ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
@@ -239,6 +242,9 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
     shape.restore(triangulation);
   }
   EXPECT_GT(large, 0u);
+  // A coarse point is foreseen to be more work than a fine one.
+  EXPECT_GE(work[0], gone[0]);
+  EXPECT_GT(work[1] / gone[1], 1.5 * work[0] / gone[0]);
   EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
 }
 

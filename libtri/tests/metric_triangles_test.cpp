@@ -16,27 +16,6 @@
 namespace terrace::tri::test {
 namespace {
 
-/// Three boxes with different ellipses within the bounding box of the points, two of them
-/// overlapping.
-template <class Coord>
-MetricField2 three_regions(const std::vector<std::array<Coord, 2>>& points) {
-  PlanePoint low{}, high{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    low[k] = high[k] = static_cast<double>(points[0][k]);
-    for (const auto& p : points) {
-      low[k] = std::min(low[k], static_cast<double>(p[k]));
-      high[k] = std::max(high[k], static_cast<double>(p[k]));
-    }
-  }
-  const auto box = [&](double x0, double y0, double x1, double y1) {
-    const auto at = [&](std::size_t k, double part) { return low[k] + (high[k] - low[k]) * part; };
-    return box2(at(0, x0), at(1, y0), at(0, x1), at(1, y1));
-  };
-  return MetricField2({{box(0, 0, 0.5, 0.6), ellipse_map(5, 1, 30)},
-                       {box(0.4, 0.3, 1, 0.7), ellipse_map(1, 3, 0)},
-                       {box(0.2, 0.7, 0.9, 1), ellipse_map(20, 1, -45)}});
-}
-
 template <class Triangulation>
 std::vector<Corners> corners_of_all(const Triangulation& triangulation,
                                     const std::vector<std::array<VertexId, 3>>& triangles) {

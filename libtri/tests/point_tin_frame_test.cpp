@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "point_tin_oracle.hpp"
 #include "terrace/tri/point_tin.hpp"
+#include "tin/point/mesh.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -118,6 +120,60 @@ TEST(PointTin, KeepsTheErrorOnALattice) {
       }
       EXPECT_LE(above, tin.stuck);
     }
+  }
+}
+
+/// On few whole numbers many places are on one line or circle.
+TEST(PointTin, PredicatesOfWholeNumbersAreThoseOfDoubles) {
+  using tin::points::Kernel, tin::points::Place2, tin::points::WholeKernel;
+  std::mt19937_64 random(9);
+  std::array<std::size_t, 2> ties{};
+  for (const std::uint64_t size : {4u, 30u, 1000u, 32768u}) {
+    for (int i = 0; i < 20000; ++i) {
+      std::array<Place2, 4> p;
+      for (Place2& place : p) {
+        for (double& c : place) {
+          c = static_cast<double>(random() % (size + 1));
+          // The corners of the largest square are the largest products.
+          if (i % 4 == 0) c = c < static_cast<double>(size) / 2 ? 0 : static_cast<double>(size);
+        }
+      }
+      const int side = Kernel::orientation(p[0], p[1], p[2]);
+      ASSERT_EQ(WholeKernel::orientation(p[0], p[1], p[2]), side);
+      ties[0] += side == 0 ? 1 : 0;
+      if (side <= 0) continue;
+      const int inside = Kernel::in_circle(p[0], p[1], p[2], p[3]);
+      ASSERT_EQ(WholeKernel::in_circle(p[0], p[1], p[2], p[3]), inside);
+      ties[1] += inside == 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(ties[0], 1000U);
+  EXPECT_GT(ties[1], 1000U);
+}
+
+/// The first vertices have more triangles than bits in a word.
+TEST(PointTin, KeepsTheErrorInAFrameOfManyVertices) {
+  for (const std::uint64_t seed : {1u, 2u}) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const std::vector<Point3> frame = square_frame(32767, 700, seed);
+    Cloud cloud;
+    std::mt19937_64 random(seed);
+    for (std::size_t i = 0; i < 6000; ++i) {
+      const double x = 32767 * to_unit(random()), y = 32767 * to_unit(random());
+      cloud.add(x, y, 20 * to_unit(random()));
+    }
+    PointTinOptions options;
+    options.max_error = 3;
+    options.lattice = TinLattice{0.0, 0x1p-8};
+    const PointTin tin = make(cloud, frame, options);
+    check_frame(tin, frame);
+    const TinErrors errors =
+        measure_surface(cloud.x, cloud.y, cloud.z, tin.vertices, tin.triangles);
+    EXPECT_EQ(errors.covered, cloud.x.size());
+    EXPECT_NEAR(errors.largest, tin.errors.largest, 1e-9);
+    EXPECT_TRUE(tin.stuck > 0 || errors.largest <= options.max_error) << errors.largest;
+    EXPECT_LT(tin.stuck, 20U);
+    EXPECT_GT(tin.removed, 0U);
   }
 }
 

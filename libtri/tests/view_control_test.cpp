@@ -63,6 +63,70 @@ TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
   EXPECT_GT(mixed, 50) << "the views show everything or nothing";
 }
 
+// Bounds in place of records lead to the same clusters, and records of what is out of sight are
+// never asked for.
+TEST(ViewControl, RecordsMayComeLater) {
+  using T = Delaunay2<std::int32_t>;
+  std::size_t asked = 0, known_later = 0;
+  for (std::uint64_t seed = 1; seed <= 25; ++seed) {
+    for (const Shape shape : kWorldShapes) {
+      World world(seed, shape);
+      TRACE(world);
+      const WholeTree tree(world.source);
+      const ViewOptions options = random_options(world);
+      ViewControl<T> control(counts(world.source), load_root(world.source), options);
+      ClusterSet bounded, read;
+      const auto with_bounds = [&](GivenCluster cluster) {
+        const std::size_t level = level_of(cluster.cluster);
+        for (std::size_t i = 0; i < cluster.child_records.size(); ++i) {
+          ClusterRecord& record = cluster.child_records[i];
+          if (below(world.random, 4) == 0) continue;
+          // The last one is the head's.
+          if (i < cluster.positions.size()) {
+            bounded.insert(cluster_id(static_cast<unsigned>(level) - 1,
+                                      cluster.children[i * level + level - 1]));
+          }
+          for (std::size_t k = 0; k < 3; ++k) {
+            record.box.min[k] -= 3.0 * unit(world.random);
+            record.box.max[k] += 3.0 * unit(world.random);
+          }
+          record.error = std::numeric_limits<double>::infinity();
+          record.members = ClusterRecord::kUnread;
+        }
+        return cluster;
+      };
+      for (int views = 0; views < 4; ++views) {
+        SCOPED_TRACE(views);
+        const View view = world.view();
+        const ClusterSet goal = wanted_by(tree, world.source, view, options, expanded_set(control));
+        for (int steps = 0;; ++steps) {
+          ASSERT_LT(steps, 5000);
+          const auto& step = control.step(view);
+          const std::vector<ViewRequest> wanted = step.wanted;
+          if (step.settled && wanted.empty()) break;
+          double least = std::numeric_limits<double>::infinity();
+          for (const ViewRequest& r : wanted) {
+            ASSERT_LE(r.importance, least);
+            least = r.importance;
+            if (r.members == ClusterRecord::kUnread) {
+              control.give_record(r.cluster, world.source.at(r.cluster).record);
+              if (bounded.count(r.cluster)) read.insert(r.cluster);
+            } else {
+              control.give(with_bounds(load(world.source, r)));
+            }
+          }
+        }
+        ASSERT_NO_FATAL_FAILURE(check_model(control.model(), world.source, goal));
+      }
+      control.give_record(cluster_id(0, 1u << 30), {});  // of a cluster that is not there
+      asked += read.size();
+      known_later += bounded.size();
+    }
+  }
+  EXPECT_GT(asked, 200u);
+  EXPECT_LT(asked, known_later);
+}
+
 // However steps are interrupted, and in whatever portions clusters arrive, the triangulation is
 // valid in between and the end is the same.
 TEST(ViewControl, InterruptedStepsEndAtTheSame) {

@@ -177,15 +177,16 @@ terrace::stream::OpenByName counting(const std::filesystem::path& folder, std::u
 
 /// What it takes to read all points inside a square from a store that has just been opened: the
 /// argument is its share of the area in parts of ten thousand. The counters are means over the
-/// squares; `delivered` and `bytes` are per point inside, `least` is what would be delivered by
-/// those clusters alone that have points inside, and `read` the bytes read, index included, per
-/// byte of these. The root, of any size up to a block, is left out: whoever asks often keeps it.
+/// squares. Per point inside: `delivered` are the points that a caller gets, `decoded` those of the
+/// clusters that are read for them, `least` those of the clusters that have points inside, `bytes`
+/// the bytes of clusters. `read` are the bytes read, index included, per byte of clusters that have
+/// points inside. The root, of any size up to a block, is left out: whoever asks often keeps it.
 void region(benchmark::State& state) {
   const Store& source = store();
   const terrace::stream::Placement placement = source.schema();
   const double share = static_cast<double>(state.range(0)) / 10000;
   const std::uint64_t squares = small() ? 2 : share < 0.005 ? 200 : share < 0.05 ? 40 : 10;
-  std::uint64_t inside = 0, delivered = 0, clusters = 0, bytes = 0, reads = 0;
+  std::uint64_t inside = 0, delivered = 0, decoded = 0, clusters = 0, bytes = 0, reads = 0;
   std::uint64_t read = 0, needed = 0, least = 0;
   for (auto _ : state) {
     for (std::uint64_t square = 1; square <= squares; ++square) {
@@ -209,13 +210,16 @@ void region(benchmark::State& state) {
             if (id == fresh.root()) return;
             ++clusters;
             bytes += record.bytes;
-            delivered += points.size();
+            decoded += points.size();
             if (within == 0) return;
             needed += record.bytes;
             least += points.size();
           });
       read += counted - fresh.record(fresh.root()).bytes;
       ++reads;
+      state.PauseTiming();
+      terrace::terrain::for_each_wanted_point(fresh, detail, [&](auto&&...) { ++delivered; });
+      state.ResumeTiming();
     }
   }
   const auto count = static_cast<double>(reads);
@@ -224,6 +228,7 @@ void region(benchmark::State& state) {
   state.counters["clusters"] = static_cast<double>(clusters) / count;
   state.counters["KB"] = static_cast<double>(bytes) / count / 1000;
   state.counters["delivered"] = static_cast<double>(delivered) / within;
+  state.counters["decoded"] = static_cast<double>(decoded) / within;
   state.counters["least"] = static_cast<double>(least) / within;
   state.counters["bytes"] = static_cast<double>(bytes) / within;
   state.counters["read"] =

@@ -132,7 +132,9 @@ int run() {
   int status = 0;
   for (const View::Reader reader : {View::Reader::in_frame, View::Reader::thread}) {
     const char* name = reader == View::Reader::thread ? "scan, reader thread" : "scan, one thread";
-    View viewer(store, {}, reader);
+    tri::ViewOptions options;
+    options.model.reserve = 3 * active() / 2;
+    View viewer(store, options, reader);
     std::string what = fly(name, orbit, viewer, reader, store, kBudget, kShare);
     if (what.empty()) what = rest(viewer);
     if (what.empty()) continue;

@@ -241,6 +241,17 @@ class SelectionTest(unittest.TestCase):
         self.expect('p.csv', lambda p: p['classification'] != 2 and 100 <= p['x'] <= 400 and
                     100 <= p['y'] <= 500.5, NAMES)
 
+    def test_nearest_of_those_that_meet_a_condition(self):
+        """Law: the nearest points that meet a condition are the nearest of a store of these points alone."""
+        self.run_ok('build', self.file, '-o', self.path('n.st'), '-q', '--where', 'classification == 2')
+        for how in (['-k', '12'], ['--within', '60']):
+            for store, more in (('n.st', []), ('all.st', ['--where', 'classification == 2'])):
+                self.run_ok('points', self.path(store), '-o', self.path(f'near-{store}.csv'), '-q', '--force',
+                            '--near', '300,400', *how, *more)
+            wanted = self.rows('near-n.st.csv')
+            self.assertGreaterEqual(len(wanted[1]), 5)
+            self.assertEqual(self.rows('near-all.st.csv'), wanted)
+
     def test_mesh_of_a_part_is_that_of_a_store_of_the_part(self):
         """Law: what does not meet the condition has no influence at all."""
         self.run_ok('build', self.file, '-o', self.path('part.st'), '-q', '--where', 'return_number == first')
@@ -267,8 +278,7 @@ class SelectionTest(unittest.TestCase):
                 (['convert', self.file, '-o', self.path('e.csv'), '--region', 'nowhere.geojson'], 1, 'neither a box nor a file'),
                 (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '1'], 1, 'has no octree'),
                 (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '0'], 2, '--resolution'),
-                (['mesh', self.path('all.st'), '-o', self.path('e.ply'), '--where', 'z > 1'], 2, '--max-error'),
-                (['points', self.path('all.st'), '-o', self.path('e.csv'), '--near', '1,2', '-k', '3', '--where', 'z > 1'], 2, 'without --where')):
+                (['mesh', self.path('all.st'), '-o', self.path('e.ply'), '--where', 'z > 1'], 2, '--max-error')):
             with self.subTest(args=args):
                 result = self.terrace(*args)
                 self.assertEqual(result.returncode, code, result.stderr)

@@ -16,6 +16,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import zlib
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 ALPS = os.path.join(os.path.dirname(__file__), '..', '..', 'libterrain', 'examples', 'alps.tif')
@@ -238,7 +239,8 @@ class PublishTest(Stores):
         with open(self.path('started', 'stores', 'alps.start'), 'rb') as file:
             head, _, data = file.read().partition(b'\n')
         head = json.loads(head)
-        self.assertEqual((head['format'], head['version'], len(head['ground'])), ('terrace-start', 1, 9))
+        self.assertEqual((head['format'], head['version'], len(head['ground'])), ('terrace-start', 2, 9))
+        data = zlib.decompress(data)
         for name, offset, size in head['parts']:
             with open(os.path.join(self.store, name), 'rb') as file:
                 file.seek(offset)

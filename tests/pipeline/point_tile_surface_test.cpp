@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <numbers>
 #include <set>
 #include <string>
 #include <tuple>
@@ -100,8 +101,7 @@ struct CloudStore {
       });
     }
     for (const stream::Point3& p : firsts) globe.push_back({p[0], p[1]});
-    crs.to_geographic(globe);
-    for (Point2& p : globe) p[0] = terrain::wrapped_longitude(p[0]);
+    terrain::StoredPlaces(store, crs).to_geographic(globe);
   }
 
   /// is_whole: as if all of it fitted into memory.
@@ -146,6 +146,29 @@ GeographicBox some_box(const CloudStore& cloud, Random& random, int i) {
 
 bool inside(const GeographicBox& box, const Point2& p) {
   return p[0] >= box.west && p[0] <= box.east && p[1] >= box.south && p[1] <= box.north;
+}
+
+/// By polynomials, where points are projected.
+TEST(StoredPlaces, AreThoseOfTheSystemWithinAHundredthOfAMillimetre) {
+  for (const CloudCase& cloud : cases()) {
+    SCOPED_TRACE(cloud.name);
+    const CloudStore all(cloud);
+    const terrain::StoredPlaces places(all.store, all.crs);
+    std::vector<Point2> exact, stored = all.globe;
+    for (const stream::Point3& p : all.firsts) exact.push_back({p[0], p[1]});
+    all.crs.to_geographic(exact);
+    places.to_stored(stored);
+    const bool degrees = all.crs.is_geographic();
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      // Near a pole longitudes say little.
+      const double round = std::cos(exact[i][1] * std::numbers::pi / 180);
+      ASSERT_NEAR(std::remainder(all.globe[i][0] - exact[i][0], 360.0) * round, 0, 1e-10);
+      ASSERT_NEAR(all.globe[i][1], exact[i][1], 1e-10);
+      for (std::size_t k = 0; k < 2 && !degrees; ++k) {
+        ASSERT_NEAR(stored[i][k], all.firsts[i][k], 3e-5 / all.crs.metres_per_unit());
+      }
+    }
+  }
 }
 
 TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {

@@ -4,10 +4,11 @@
 // playwright-core) node alone is measured. STORE: a store, or a published folder, whose first store is taken; without it a made
 // raster of 8192 x 8192 cells.
 //
-// The first flight keeps some 500,000 points, 600 frames. The second goes down from the whole to full detail of 1 % of the
+// The first flight keeps 500,000 points in the mean, 600 frames. The second goes down from the whole to full detail of 1 % of the
 // area. Times are of the worker (the model's step, normals, slides and copies of what has changed), measured by the worker
-// itself, bytes those of requests, the start file included, against the stored bytes of all clusters read.
-import {existsSync, mkdtempSync, readFileSync, rmSync} from 'node:fs';
+// itself, bytes those of requests, the start file included, against the stored bytes of all clusters read; start file, pages
+// of the index and clusters are shares of the ratio.
+import {existsSync, mkdtempSync, readFileSync, rmSync, statSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join, resolve} from 'node:path';
 import {spawnSync} from 'node:child_process';
@@ -51,6 +52,16 @@ async function inChromium(browser, url, call, ...args) {
   }
 }
 
+/// Bytes of the requests for files with this ending.
+function fetched(log, ending) {
+  let bytes = 0;
+  for (const {path, range} of log.filter(request => request.path.endsWith(ending))) {
+    const [first, last] = /(\d+)-(\d+)$/.exec(range ?? '')?.slice(1).map(Number) ?? [0, statSync(join(site, path)).size - 1];
+    bytes += last - first + 1;
+  }
+  return bytes;
+}
+
 const quantile = (times, q) => times.toSorted((a, b) => a - b)[Math.min(times.length - 1, Math.floor(q * times.length))];
 const count = n => n.toLocaleString('en');
 
@@ -69,14 +80,18 @@ try {
   }
   const {name} = JSON.parse(readFileSync(join(site, 'stores.json'), 'utf8')).stores[0];
 
-  const inNode = (fly, ...args) =>
-      fly(heard => new Worker(join(site, 'worker.js'), folderFetch(site).fetch, heard), 'http://folder/', name, ...args);
-  const hosts = [['node', inNode]];
+  // A log of each flight: the worker of the one before may go on for a while.
+  let files;
+  const inNode = (fly, ...args) => {
+    files = folderFetch(site);
+    return fly(heard => new Worker(join(site, 'worker.js'), files.fetch, heard), 'http://folder/', name, ...args);
+  };
+  const hosts = [['node', inNode, () => files.log]];
   if (process.env.CHROMIUM && process.argv[2]) {
     const {launch} = await import('../clients/globe.mjs');
     server = await serveSite(site);
     browser = await launch();
-    hosts.push(['Chromium', (fly, ...args) => inChromium(browser, server.url, fly.name, name, ...args)]);
+    hosts.push(['Chromium', (fly, ...args) => inChromium(browser, server.url, fly.name, name, ...args), () => server.log]);
   }
   console.log('| frames of the worker | frames | p50, ms | p99, ms | worst, ms | points in the mean | pixels of error |\n|---|---|---|---|---|---|---|');
   for (const [host, fly] of hosts) {
@@ -84,11 +99,14 @@ try {
     console.log(`| ${host} | ${milliseconds.length} | ${quantile(milliseconds, 0.5).toFixed(1)} | ` +
                 `${quantile(milliseconds, 0.99).toFixed(1)} | ${Math.max(...milliseconds).toFixed(1)} | ${count(points)} | ${error.toFixed(2)} |`);
   }
-  console.log('\n| down to 1 % of the area | points | requests | fetched | clusters read | ratio |\n|---|---|---|---|---|---|');
-  for (const [host, fly] of hosts) {
+  console.log('\n| down to 1 % of the area | points | requests | fetched | clusters read | ratio | start file | index | clusters |\n' +
+              '|---|---|---|---|---|---|---|---|---|');
+  for (const [host, fly, log] of hosts) {
+    if (server) server.log.length = 0;
     const {state, stats} = await fly(dive);
+    const share = ending => (fetched(log(), ending) / state.storedBytes).toFixed(2);
     console.log(`| ${host} | ${count(state.points)} | ${stats.requests} | ${count(stats.bytes)} | ${count(state.storedBytes)} | ` +
-                `${(stats.bytes / state.storedBytes).toFixed(2)} |`);
+                `${(stats.bytes / state.storedBytes).toFixed(2)} | ${share('.start')} | ${share('.index')} | ${share('.clusters')} |`);
   }
 } finally {
   await browser?.close();

@@ -247,8 +247,8 @@ void check_counts(const Manifest& m) {
     if (level.clusters != (top ? 1 : above)) {
       throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
     }
-    if (m.points > 0 && level.clusters > level.data.bytes / fewest_cluster_bytes(m.version)) {
-      throw Damage("level " + std::to_string(l) + " has more clusters than its file can hold");
+    if (level.clusters / kMostPageClusters > level.index.bytes / kLeastPageBytes) {
+      throw Damage("level " + std::to_string(l) + " has more clusters than its index can hold");
     }
     if (level.points / kMostPoints > level.clusters) {
       throw Damage("level " + std::to_string(l) + " has more points than its clusters can hold");
@@ -341,6 +341,12 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
                             " was written by a newer terrace; this one reads up to version " +
                             std::to_string(kVersion),
                    .remedy = "update"});
+    }
+    if (version == kDroppedVersion) {
+      throw Error({.file = file,
+                   .where = {},
+                   .cause = "store version " + std::to_string(version) + " was never released",
+                   .remedy = "build the store anew"});
     }
     if (version < 1) damaged(file, "the version is impossible");
 

@@ -132,12 +132,14 @@ class Verification {
     const LevelReader& level = *levels_[l];
     std::uint64_t data_end = 0;
     for (std::uint64_t p = 0; p < level.pages(); ++p) {
+      std::uint64_t offset = 0;
       try {
+        offset = level.page_offset(p);
         check_page(l, p, data_end);
       } catch (const Error& error) {
-        problem(level.index().name(), level.page_offset(p), error.what());
+        problem(level.index().name(), offset, error.what());
       } catch (const Damage& damage) {
-        problem(level.index().name(), level.page_offset(p), damage.what());
+        problem(level.index().name(), offset, damage.what());
       }
     }
     if (data_end != level.data().size()) {
@@ -154,13 +156,15 @@ class Verification {
     check_stop();
     const LevelReader& level = *levels_[l];
     const auto page = level.page(number);
-    if (page->offset(0) != data_end) {
-      problem(level.index().name(), level.page_offset(number),
-              "the page's clusters do not follow those of the page before");
-    }
-    data_end = page->end();
     for (std::uint32_t i = 0; i < page->clusters(); ++i) {
       const std::uint64_t ordinal = number * level.layout().page_clusters() + i;
+      // Bytes that clusters before have are read again, the others follow one another.
+      const bool follows =
+          page->offset(i) == data_end || (level.layout().small() && page->end(i) <= data_end);
+      if (!follows) {
+        cluster_problem(l, ordinal, page->offset(i), "its bytes do not follow those before");
+      }
+      data_end = std::max(data_end, page->end(i));
       try {
         std::uint64_t offset = 0;
         const Entry entry = level.entry(ordinal, offset);
@@ -210,7 +214,7 @@ class Verification {
       within.max[axis] = std::min(within.max[axis], manifest_.bounds.max[axis]);
     }
     if (points_.size() + points_.has_representative > 0 &&
-        !holds(levels_[l]->coarse_box(ordinal), within)) {
+        !holds(levels_[l]->page_box(ordinal), within)) {
       cluster_problem(l, ordinal, record.offset, "the box reaches out of its page's");
     }
     if (!(summary.error >= 0)) {

@@ -45,11 +45,58 @@ py::dtype record_type(const stream::Schema& schema, const std::vector<std::strin
   return py::dtype::from_args(fields);
 }
 
+py::dtype attributes_type(const stream::Schema& schema) {
+  py::list fields = py::list(record_type(schema).attr("descr"));
+  return py::dtype::from_args(fields[py::slice(3, static_cast<py::ssize_t>(fields.size()), 1)]);
+}
+
+py::list attributes_info(const stream::Schema& schema) {
+  py::list attributes;
+  const py::list fields = record_type(schema).attr("names");
+  for (std::size_t i = 0; i < schema.attributes.size(); ++i) {
+    const stream::Channel& channel = schema.attributes[i];
+    py::dict attribute;
+    attribute["name"] = fields[3 + i];
+    attribute["dtype"] = type_name(channel.type);
+    attribute["scale"] = channel.scale;
+    attribute["offset"] = channel.offset;
+    attribute["unit"] = channel.unit;
+    attributes.append(attribute);
+  }
+  return attributes;
+}
+
+py::dict crs_info(const stream::Crs& crs) {
+  py::dict result;
+  result["epsg"] = crs.epsg;
+  result["vertical_epsg"] = crs.vertical_epsg;
+  result["name"] = crs.name;
+  result["wkt"] = crs.wkt;
+  result["geographic"] = crs.geographic;
+  result["unit"] = crs.horizontal_unit;
+  result["vertical_unit"] = crs.vertical_unit;
+  return result;
+}
+
 py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type) {
   auto* const kept = new std::vector<std::byte>(std::move(bytes));
   const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<std::byte>*>(p); });
   return {type, std::vector<py::ssize_t>{static_cast<py::ssize_t>(kept->size()) / type.itemsize()},
           std::vector<py::ssize_t>{type.itemsize()}, kept->data(), owner};
+}
+
+std::vector<std::array<double, 3>> points3_of(const Array<double>& given) {
+  if (given.ndim() == 2 && given.shape(1) == 2) {
+    std::vector<std::array<double, 3>> points;
+    points.reserve(static_cast<std::size_t>(given.shape(0)));
+    for (const auto& p : rows_of<2>(given, "points")) points.push_back({p[0], p[1], 0});
+    return points;
+  }
+  if (given.ndim() != 2 || given.shape(1) != 3) {
+    throw py::value_error("points must have the shape (n, 2) or (n, 3)");
+  }
+  const auto rows = rows_of<3>(given, "points");
+  return {rows.begin(), rows.end()};
 }
 
 std::optional<terrain::Region> region_of(const py::object& given) {

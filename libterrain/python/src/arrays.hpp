@@ -38,6 +38,9 @@ std::span<const std::array<T, N>> rows_of(const Array<T>& array, const char* wha
           static_cast<std::size_t>(array.shape(0))};
 }
 
+/// Points of space, or of the plane, which get z = 0. Throws: ValueError for another shape.
+std::vector<std::array<double, 3>> points3_of(const Array<double>& given);
+
 /// A one-dimensional array. Throws: ValueError for another shape, naming `what`.
 template <class T>
 std::span<const T> numbers_of(const Array<T>& array, const char* what) {
@@ -101,6 +104,11 @@ stream::ScalarType scalar_type(const py::dtype& type, const std::string& what);
 /// Coordinates and attributes of points as numpy's structured type: x, y, z as doubles, then the
 /// attributes as they are stored, packed; `more` doubles at the end.
 py::dtype record_type(const stream::Schema& schema, const std::vector<std::string>& more = {});
+/// The attributes alone, as records hold them.
+py::dtype attributes_type(const stream::Schema& schema);
+/// Dicts of name, dtype, scale, offset and unit; of what is known of a CRS.
+py::list attributes_info(const stream::Schema& schema);
+py::dict crs_info(const stream::Crs& crs);
 /// Records of such a type.
 py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "call.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -59,18 +58,21 @@ void run_apart(const std::function<void()>& work, std::stop_source& stop) {
 Job::Job(const py::tuple& how) : progress_(how[0]), note_(how[1]) {
   const auto threads = how[2].cast<unsigned>();
   const auto memory = how[3].cast<std::uint64_t>();
-  context_.threads = threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
+  context_.threads = all_or(threads);
   if (memory > 0) context_.memory_bytes = memory;
   context_.stop = stop_.get_token();
   if (!progress_.is_none()) {
     context_.progress = [this](const terrain::Progress& at) {
       constexpr double kBetweenReports = 0.05;
       const double time = now();
+      // The last report of a piece of work need not say how far it came.
+      if (at.count > 0) last_count_ = at.count, last_fraction_ = at.fraction;
       if (!at.ended && time - last_report_ < kBetweenReports) return;
       last_report_ = time;
       call_python([&] {
-        progress_(py::str(at.what.data(), at.what.size()), at.count, at.fraction, at.ended);
+        progress_(py::str(at.what.data(), at.what.size()), last_count_, last_fraction_, at.ended);
       });
+      if (at.ended) last_count_ = 0, last_fraction_ = 0;
     };
   }
   if (!note_.is_none()) {

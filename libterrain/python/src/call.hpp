@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <exception>
 #include <functional>
 #include <stop_token>
+#include <thread>
 #include <type_traits>
 #include <utility>
 
@@ -18,18 +20,31 @@ namespace terrace::python {
 /// signals; one that raises, as Ctrl-C does, requests `stop` and is raised once the work has ended.
 void run_apart(const std::function<void()>& work, std::stop_source& stop);
 
-/// The same for work that knows no stop: Ctrl-C is raised when it has ended.
+/// The same for work() or work(stop token); what takes no token is not stopped, and Ctrl-C is
+/// raised when it has ended.
 template <class Work>
 auto released(Work&& work) {
   std::stop_source stop;
-  using Result = std::invoke_result_t<Work>;
+  const auto call = [&] {
+    if constexpr (std::is_invocable_v<Work, std::stop_token>) {
+      return work(stop.get_token());
+    } else {
+      return work();
+    }
+  };
+  using Result = std::invoke_result_t<decltype(call)>;
   if constexpr (std::is_void_v<Result>) {
-    run_apart([&] { work(); }, stop);
+    run_apart(call, stop);
   } else {
     Result result;
-    run_apart([&] { result = work(); }, stop);
+    run_apart([&] { result = call(); }, stop);
     return result;
   }
+}
+
+/// A number of threads, 0 for one per core.
+inline unsigned all_or(unsigned threads) {
+  return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
 }
 
 /// A job of libterrain's: its context from Python's objects.
@@ -65,6 +80,8 @@ class Job {
   std::stop_source stop_;
   std::exception_ptr raised_;  ///< by progress or note
   double last_report_ = 0;
+  std::uint64_t last_count_ = 0;  ///< and
+  double last_fraction_ = 0;      ///< of the piece of work that goes on
 };
 
 }  // namespace terrace::python

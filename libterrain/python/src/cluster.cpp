@@ -2,13 +2,14 @@
 #include <algorithm>
 #include <limits>
 #include <string>
-#include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <pybind11/stl.h>
 #include <terrace/cluster/dendrogram.hpp>
 #include <terrace/cluster/facility_location.hpp>
+#include <terrace/cluster/hierarchy.hpp>
 #include <terrace/cluster/k_means.hpp>
 #include <terrace/cluster/k_median.hpp>
 #include <terrace/cluster/linkage.hpp>
@@ -16,28 +17,10 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 
 namespace terrace::python {
 namespace {
-
-unsigned all_or(unsigned threads) {
-  return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
-}
-
-/// Points of the plane get z = 0.
-std::vector<cluster::Point3> points_of(const Array<double>& given) {
-  if (given.ndim() == 2 && given.shape(1) == 2) {
-    std::vector<cluster::Point3> points;
-    points.reserve(static_cast<std::size_t>(given.shape(0)));
-    for (const auto& p : rows_of<2>(given, "points")) points.push_back({p[0], p[1], 0});
-    return points;
-  }
-  if (given.ndim() != 2 || given.shape(1) != 3) {
-    throw py::value_error("points must have the shape (n, 2) or (n, 3)");
-  }
-  const auto rows = rows_of<3>(given, "points");
-  return {rows.begin(), rows.end()};
-}
 
 /// Rows a, b, height, size.
 std::vector<std::array<double, 4>> rows_of_merges(const cluster::Dendrogram& made) {
@@ -50,19 +33,60 @@ std::vector<std::array<double, 4>> rows_of_merges(const cluster::Dendrogram& mad
   return rows;
 }
 
-py::array linkage(const Array<double>& given, const std::string& method, unsigned threads) {
-  const std::vector<cluster::Point3> points = points_of(given);
+/// threads; entry and memory of the matrix.
+cluster::LinkageOptions linkage_options(const py::dict& how) {
+  cluster::LinkageOptions options;
+  bool single_precision = false;
+  take_option(how, "single_precision", single_precision);
+  if (single_precision) options.entry = cluster::MatrixEntry::float32;
+  take_option(how, "memory", options.memory_limit);
+  take_option(how, "threads", options.threads);
+  options.threads = all_or(options.threads);
+  return options;
+}
+
+/// edges: if given, single linkage restricted to these pairs.
+py::array linkage(const Array<double>& given, const std::string& method,
+                  const std::optional<Array<std::uint32_t>>& edges, const py::dict& how) {
+  const std::vector<cluster::Point3> points = points3_of(given);
   const bool single = named<bool>(method, "method", {{"single", true}, {"complete", false}});
-  const cluster::LinkageOptions options{.threads = all_or(threads)};
+  const cluster::LinkageOptions options = linkage_options(how);
+  bool gpu = false;
+  take_option(how, "gpu", gpu);
+  std::span<const cluster::PointPair> pairs;
+  if (edges) pairs = rows_of<2>(*edges, "edges");
   return to_array(released([&] {
-    return rows_of_merges(
-        single ? cluster::single_linkage(points, options)
-               : cluster::complete_linkage(std::span<const cluster::Point3>(points), options));
+    const std::span<const cluster::Point3> all(points);
+    if (edges) return rows_of_merges(cluster::single_linkage(all, pairs));
+    if (gpu) {
+      return rows_of_merges(single ? cluster::cuda_single_linkage(all)
+                                   : cluster::cuda_complete_linkage(all, options.entry));
+    }
+    return rows_of_merges(single ? cluster::single_linkage(all, options)
+                                 : cluster::complete_linkage(all, options));
+  }));
+}
+
+/// The linkage of the edges of a tree and their lengths.
+py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& lengths) {
+  const auto pairs = rows_of<2>(ends, "edges");
+  const auto heights = numbers_of(lengths, "lengths");
+  if (pairs.size() != heights.size()) {
+    throw py::value_error("there are " + std::to_string(heights.size()) + " lengths of " +
+                          std::to_string(pairs.size()) + " edges");
+  }
+  return to_array(released([&] {
+    std::vector<cluster::Link> links;
+    links.reserve(pairs.size());
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      links.push_back({pairs[i][0], pairs[i][1], heights[i]});
+    }
+    return rows_of_merges(cluster::make_dendrogram(links.size() + 1, links));
   }));
 }
 
 /// distances: of all pairs i < j of `count` things, by i, then j.
-py::array linkage_of_distances(std::size_t count, const Array<double>& given, unsigned threads) {
+py::array linkage_of_distances(std::size_t count, const Array<double>& given, const py::dict& how) {
   const auto distances = numbers_of(given, "distances");
   if (count == 0 || count > cluster::kMostDendrogramPoints ||
       distances.size() != count * (count - 1) / 2) {
@@ -71,14 +95,14 @@ py::array linkage_of_distances(std::size_t count, const Array<double>& given, un
   const auto of_pair = [&](std::uint32_t i, std::uint32_t j) {
     return distances[i * (2 * count - i - 1) / 2 + (j - i - 1)];
   };
-  const cluster::LinkageOptions options{.threads = all_or(threads)};
+  const cluster::LinkageOptions options = linkage_options(how);
   return to_array(
       released([&] { return rows_of_merges(complete_linkage(count, of_pair, options)); }));
 }
 
 /// (ends of each edge, lengths)
 py::tuple spanning_tree(const Array<double>& given, unsigned threads) {
-  const std::vector<cluster::Point3> points = points_of(given);
+  const std::vector<cluster::Point3> points = points3_of(given);
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<double> lengths;
   released([&] {
@@ -117,9 +141,9 @@ py::array cut(const Array<double>& given, std::optional<std::size_t> count,
 py::tuple k_means(const Array<double>& given, const py::object& start, std::size_t clusters,
                   const Array<double>& weights, std::uint64_t seed, std::size_t restarts,
                   std::size_t max_iterations, double tolerance, unsigned threads) {
-  const std::vector<cluster::Point3> points = points_of(given);
+  const std::vector<cluster::Point3> points = points3_of(given);
   std::vector<cluster::Point3> centres;
-  if (!start.is_none()) centres = points_of(start.cast<Array<double>>());
+  if (!start.is_none()) centres = points3_of(start.cast<Array<double>>());
   const auto weighing = numbers_of(weights, "weights");
   if (!weighing.empty() && weighing.size() != points.size()) {
     throw py::value_error("there are " + std::to_string(weighing.size()) + " weights of " +
@@ -139,30 +163,6 @@ py::tuple k_means(const Array<double>& given, const py::object& start, std::size
                         made.sse, made.iterations, made.converged);
 }
 
-cluster::FacilityStrategy strategy_of(const std::string& name) {
-  using cluster::FacilityStrategy;
-  return named<FacilityStrategy>(name, "method",
-                                 {{"fast", FacilityStrategy::fast},
-                                  {"automatic", FacilityStrategy::automatic},
-                                  {"full-scan", FacilityStrategy::full_scan},
-                                  {"quadtree", FacilityStrategy::quadtree},
-                                  {"octree", FacilityStrategy::octree},
-                                  {"kd-tree", FacilityStrategy::kd_tree},
-                                  {"facilities", FacilityStrategy::facilities},
-                                  {"interchange", FacilityStrategy::interchange},
-                                  {"jain-vazirani", FacilityStrategy::jain_vazirani},
-                                  {"greedy-stars", FacilityStrategy::greedy_stars}});
-}
-
-cluster::Effort effort_named(const std::string& name) {
-  using cluster::Effort;
-  return named<Effort>(name, "effort",
-                       {{"fast", Effort::fast},
-                        {"default", Effort::standard},
-                        {"fine", Effort::fine},
-                        {"full", Effort::full}});
-}
-
 /// (facilities, labels, opening, connection and outlier cost, lower bound); -1: an outlier.
 py::tuple arrays_of_solution(cluster::FacilitySolution&& made) {
   return py::make_tuple(to_array(std::move(made.facilities)),
@@ -170,64 +170,195 @@ py::tuple arrays_of_solution(cluster::FacilitySolution&& made) {
                         made.connection_cost, made.outlier_cost, made.lower_bound);
 }
 
-/// bound_steps: of a search for a better lower bound than the method's own; 0: none.
-template <class Problem>
-cluster::FacilitySolution with_bound(const Problem& problem, cluster::FacilitySolution&& made,
-                                     std::size_t bound_steps, unsigned threads) {
-  if (bound_steps > 0) {
-    const double bound =
-        cluster::lower_bound(problem, made, {.steps = bound_steps, .threads = threads}).lower_bound;
-    made.lower_bound = std::max(made.lower_bound, bound);
+/// How a problem is solved.
+struct Search {
+  /// count: exactly so many facilities, which cost nothing.
+  template <class Problem>
+  py::tuple solve(const Problem& problem) const {
+    return arrays_of_solution(released([&](const std::stop_token& stop) {
+      const auto goes_on = [&](auto...) { return !stop.stop_requested(); };
+      if constexpr (!std::is_same_v<Problem, cluster::FacilityEntities>) {
+        if (count) return k_median(problem, *count, median);
+      } else if (count) {
+        throw std::invalid_argument("entities have no k-median: give the matrix of distances");
+      }
+      cluster::FacilityOptions search = options;
+      search.progress = goes_on;
+      if (start) search.start = &*start;
+      cluster::FacilitySolution made = cluster::solve(problem, search);
+      // A search for a better lower bound than the method's own.
+      if (bound_steps > 0) {
+        const cluster::LowerBoundOptions bounding{
+            .steps = bound_steps, .threads = options.threads, .progress = goes_on};
+        const double bound = cluster::lower_bound(problem, made, bounding).lower_bound;
+        made.lower_bound = std::max(made.lower_bound, bound);
+      }
+      return made;
+    }));
   }
-  return std::move(made);
+
+  cluster::FacilityOptions options;
+  cluster::KMedianOptions median;
+  std::optional<cluster::FacilitySolution> start;
+  std::optional<std::size_t> count;
+  std::size_t bound_steps = 0;
+};
+
+Search search_of(const py::dict& given) {
+  Search search;
+  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  search.options.strategy = strategy_named(given["method"].cast<std::string>());
+  search.options.effort = effort_named(given["effort"].cast<std::string>());
+  set("seed", search.options.seed);
+  set("threads", search.options.threads);
+  search.options.threads = all_or(search.options.threads);
+  set("steps", search.options.steps);
+  set("restarts", search.options.restarts);
+  set("batch", search.options.batch);
+  set("assign_nearest", search.options.assign_nearest);
+  set("seconds", search.options.seconds);
+  set("count", search.count);
+  set("bound_steps", search.bound_steps);
+  if (search.options.restarts) search.median.restarts = *search.options.restarts;
+  search.median.seed = search.options.seed;
+  search.median.threads = search.options.threads;
+  search.median.bound_steps = static_cast<std::uint32_t>(
+      std::min(search.bound_steps, std::size_t{std::numeric_limits<std::uint32_t>::max()}));
+  if (given.contains("start")) {
+    const auto [facilities, labels] =
+        given["start"].cast<std::pair<Array<std::uint32_t>, Array<std::int64_t>>>();
+    const auto open = numbers_of(facilities, "facilities");
+    cluster::FacilitySolution& start = search.start.emplace();
+    start.facilities.assign(open.begin(), open.end());
+    for (const std::int64_t label : numbers_of(labels, "labels")) {
+      if (label < -1 || label >= static_cast<std::int64_t>(open.size())) {
+        throw py::value_error("a label of `start` is not one of its clusters");
+      }
+      start.assignment.push_back(static_cast<std::uint32_t>(label));
+    }
+  }
+  return search;
 }
 
-/// count: exactly so many facilities, which cost nothing.
+/// cluster::kOutlier for -1 is what the cast above gives.
+static_assert(cluster::kOutlier == static_cast<std::uint32_t>(std::int64_t{-1}));
+
 py::tuple facility_location(const Array<double>& given, double facility_cost,
-                            std::optional<std::size_t> count, const std::string& method,
-                            const std::string& effort, const std::string& metric,
-                            const Array<double>& weights, double outlier_price, std::uint64_t seed,
-                            std::size_t bound_steps, unsigned threads) {
-  const std::vector<cluster::Point3> points = points_of(given);
-  const cluster::FacilityPoints problem{
+                            const std::string& metric, const Array<double>& weights,
+                            const std::optional<Array<double>>& channels, double outlier_price,
+                            const py::dict& how) {
+  Search search = search_of(how);
+  if (!search.options.restarts) search.median.restarts = 1;
+  search.median.bound_steps = 0;
+  const std::vector<cluster::Point3> points = points3_of(given);
+  cluster::FacilityPoints problem{
       .points = points,
       .weights = numbers_of(weights, "weights"),
       .metric = terrain::MetricChoice::parse(metric).on_ground({}, cluster::kIdentityMap),
       .facility_cost = facility_cost,
       .outlier_price = outlier_price};
-  const cluster::FacilityOptions options{.strategy = strategy_of(method),
-                                         .effort = effort_named(effort),
-                                         .seed = seed,
-                                         .threads = all_or(threads)};
-  return arrays_of_solution(released([&] {
-    if (!count) return with_bound(problem, solve(problem, options), bound_steps, options.threads);
-    return k_median(problem, *count,
-                    {.restarts = 1, .bound_steps = 0, .seed = seed, .threads = options.threads});
+  std::vector<double> ones;
+  if (channels) {
+    if (channels->ndim() != 2 || static_cast<std::size_t>(channels->shape(0)) != points.size()) {
+      throw py::value_error("`channels` has one row for each point");
+    }
+    ones.assign(static_cast<std::size_t>(channels->shape(1)), 1.0);
+    problem.channels = {.values = {channels->data(), static_cast<std::size_t>(channels->size())},
+                        .weights = ones};
+  }
+  return search.solve(problem);
+}
+
+/// Entities of the same number of corners each.
+struct Entities {
+  /// given: shape (n, corners, 2 or 3). ordered: polylines, also of three corners.
+  Entities(const Array<double>& given, bool ordered_) : ordered(ordered_) {
+    if (given.ndim() != 3 || given.shape(1) < 1) {
+      throw py::value_error("entities must have the shape (n, corners, 2 or 3)");
+    }
+    count = static_cast<std::size_t>(given.shape(0));
+    corners = static_cast<std::size_t>(given.shape(1));
+    places = points3_of(given.attr("reshape")(-1, given.shape(2)));
+  }
+  [[nodiscard]] std::span<const cluster::Point3> operator[](std::size_t i) const {
+    return std::span(places).subspan(i * corners, corners);
+  }
+  [[nodiscard]] static double distance(std::span<const cluster::Point3> a,
+                                       std::span<const cluster::Point3> b, bool ordered) {
+    if (a.size() == 2) return cluster::segment_distance({a[0], a[1]}, {b[0], b[1]});
+    if (a.size() == 3 && !ordered) {
+      return cluster::triangle_distance({a[0], a[1], a[2]}, {b[0], b[1], b[2]});
+    }
+    return cluster::polyline_distance(a, b);
+  }
+
+  std::vector<cluster::Point3> places;
+  std::size_t count = 0, corners = 0;
+  bool ordered;
+};
+
+py::tuple entity_location(const Array<double>& given, bool ordered, double facility_cost,
+                          const Array<double>& weights, double outlier_price, const py::dict& how) {
+  const Search search = search_of(how);
+  const Entities entities(given, ordered);
+  const double diagonal =
+      cluster::diagonal(cluster::Euclidean{}, cluster::bounds_of(entities.places));
+  return search.solve(cluster::FacilityEntities{.count = entities.count,
+                                                .distance =
+                                                    [&](std::uint32_t a, std::uint32_t b) {
+                                                      return Entities::distance(
+                                                          entities[a], entities[b], ordered);
+                                                    },
+                                                .symmetric = true,
+                                                .triangle_inequality = true,
+                                                .weights = numbers_of(weights, "weights"),
+                                                .facility_cost = facility_cost * diagonal,
+                                                .outlier_price = outlier_price * diagonal});
+}
+
+/// Row by row, the distances of each of `a` from each of `b`.
+py::array entity_distances(const Array<double>& a, const Array<double>& b, bool ordered) {
+  const Entities from(a, ordered), to(b, ordered);
+  if (from.corners != to.corners) throw py::value_error("the entities have not as many corners");
+  return to_array(released([&] {
+    std::vector<double> distances;
+    distances.reserve(from.count * to.count);
+    for (std::size_t i = 0; i < from.count; ++i) {
+      for (std::size_t j = 0; j < to.count; ++j) {
+        distances.push_back(Entities::distance(from[i], to[j], ordered));
+      }
+    }
+    return distances;
   }));
 }
 
 /// Costs of connecting a facility (row) with a client (column), and of opening each facility.
 py::tuple facility_matrix(const Array<double>& connection, const Array<double>& opening,
-                          std::optional<std::size_t> count, const std::string& method,
-                          const std::string& effort, std::uint64_t seed, std::size_t bound_steps,
-                          unsigned threads) {
+                          const py::dict& how) {
   if (connection.ndim() != 2) throw py::value_error("connection costs have two dimensions");
-  const cluster::FacilityMatrix problem{
+  const Search search = search_of(how);
+  return search.solve(cluster::FacilityMatrix{
       .facilities = static_cast<std::size_t>(connection.shape(0)),
       .clients = static_cast<std::size_t>(connection.shape(1)),
       .opening = numbers_of(opening, "opening costs"),
-      .connection = {connection.data(), static_cast<std::size_t>(connection.size())}};
-  const cluster::FacilityOptions options{.strategy = strategy_of(method),
-                                         .effort = effort_named(effort),
-                                         .seed = seed,
-                                         .threads = all_or(threads)};
-  return arrays_of_solution(released([&] {
-    if (!count) return with_bound(problem, solve(problem, options), bound_steps, options.threads);
-    return k_median(problem, *count,
-                    {.bound_steps = static_cast<std::uint32_t>(std::min(
-                         bound_steps, std::size_t{std::numeric_limits<std::uint32_t>::max()})),
-                     .seed = seed,
-                     .threads = options.threads});
+      .connection = {connection.data(), static_cast<std::size_t>(connection.size())}});
+}
+
+py::array clusters_of_size(const Array<double>& given, double size, std::uint64_t seed,
+                           const py::tuple& how) {
+  const std::vector<cluster::Point3> points = points3_of(given);
+  return to_array(Job(how).run([&](const terrain::Context& context) {
+    const auto report = [&](std::uint64_t done) {
+      context.check_stop();
+      if (!context.progress) return;
+      const double share = static_cast<double>(done) / static_cast<double>(points.size());
+      context.progress({.what = "points", .count = done, .fraction = share});
+    };
+    auto labels = cluster::clusters_of_size(points, size, seed, context.threads, report);
+    if (context.progress) {
+      context.progress({.what = "points", .count = points.size(), .fraction = 1, .ended = true});
+    }
+    return labels;
   }));
 }
 
@@ -236,11 +367,15 @@ py::tuple facility_matrix(const Array<double>& connection, const Array<double>& 
 void bind_cluster(py::module_& module) {
   module.def("linkage", &linkage);
   module.def("linkage_of_distances", &linkage_of_distances);
+  module.def("tree_linkage", &tree_linkage);
   module.def("spanning_tree", &spanning_tree);
   module.def("cut", &cut);
   module.def("k_means", &k_means);
   module.def("facility_location", &facility_location);
+  module.def("entity_location", &entity_location);
+  module.def("entity_distances", &entity_distances);
   module.def("facility_matrix", &facility_matrix);
+  module.def("clusters_of_size", &clusters_of_size);
 }
 
 }  // namespace terrace::python

@@ -8,6 +8,7 @@
 
 #include <terrace/stream/error.hpp>
 #include <terrace/terrain/error.hpp>
+#include <terrace/tri/multiresolution.hpp>
 
 namespace terrace::python {
 namespace {
@@ -26,6 +27,8 @@ void translate(std::exception_ptr thrown) {
     } else {
       PyErr_SetString(error_type.ptr(), error.what());
     }
+  } catch (const tri::HierarchyError& error) {
+    PyErr_SetString(error_type.ptr(), error.what());
   } catch (const terrain::UsageError& error) {
     PyErr_SetString(PyExc_ValueError, error.what());
   } catch (const std::filesystem::filesystem_error& error) {
@@ -59,6 +62,10 @@ PYBIND11_MODULE(_core, module) {
   bind_tin(module);
   bind_trees(module);
   bind_cluster(module);
+  bind_hierarchy(module);
+  bind_crs(module);
+  bind_model(module);
+  bind_points(module);
   bind_matching(module);
 }
 

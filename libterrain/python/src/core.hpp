@@ -22,6 +22,10 @@ void bind_shape(py::module_& module);
 void bind_tin(py::module_& module);
 void bind_trees(py::module_& module);
 void bind_cluster(py::module_& module);
+void bind_hierarchy(py::module_& module);
+void bind_crs(py::module_& module);
+void bind_model(py::module_& module);
+void bind_points(py::module_& module);
 void bind_matching(py::module_& module);
 
 }  // namespace terrace::python

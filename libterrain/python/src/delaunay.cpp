@@ -9,21 +9,30 @@
 namespace terrace::python {
 namespace {
 
-template <std::size_t N, class Metric>
-auto bind_triangulation(py::module_& module, const char* name) {
-  using Shared = SharedDelaunay<N, Metric>;
+/// What triangulations and surfaces share.
+template <class Shared>
+auto bind_mesh_of_points(py::module_& module, const char* name) {
   return py::class_<Shared>(module, name)
       .def("insert", &Shared::insert)
       .def("remove", &Shared::remove)
       .def("points", &Shared::points)
       .def("vertices", &Shared::vertices)
       .def("simplices", &Shared::simplices)
-      .def("neighbours", &Shared::neighbours)
-      .def("find_simplex", &Shared::find_simplex)
-      .def("nearest", &Shared::nearest)
       .def("size", &Shared::size)
       .def("count", &Shared::count)
-      .def("hash", &Shared::hash);
+      .def("hash", &Shared::hash)
+      .def("start_journal", &Shared::start_journal)
+      .def("take_changes", &Shared::take_changes);
+}
+
+template <std::size_t N, class Metric>
+auto bind_triangulation(py::module_& module, const char* name) {
+  using Shared = SharedDelaunay<N, Metric>;
+  return bind_mesh_of_points<Shared>(module, name)
+      .def("neighbours", &Shared::neighbours)
+      .def("adjacent", &Shared::adjacent)
+      .def("find_simplex", &Shared::find_simplex)
+      .def("nearest", &Shared::nearest);
 }
 
 /// Maps with their boxes (lower corner, upper corner).
@@ -78,7 +87,15 @@ py::tuple adapted3(SharedDelaunay3& shared, const MetricRegions<3>& regions) {
 void bind_delaunay(py::module_& module) {
   bind_triangulation<2, tri::Euclidean>(module, "SharedDelaunay2")
       .def(py::init<>())
-      .def("adapted", &adapted2);
+      .def("adapted", &adapted2)
+      .def("build_grid", [](SharedDelaunay2& shared, double x0, double y0, double step,
+                            std::uint32_t columns, std::uint32_t rows) {
+        const tri::VertexId first =
+            shared.change(std::size_t{columns} * rows, [&](tri::Delaunay2<double>& mesh) {
+              return mesh.build_grid(x0, y0, step, columns, rows);
+            });
+        return slot(first);
+      });
   bind_triangulation<3, tri::Euclidean>(module, "SharedDelaunay3")
       .def(py::init<>())
       .def("adapted", &adapted3);
@@ -90,6 +107,14 @@ void bind_delaunay(py::module_& module) {
       .def(py::init([](const tri::LinearMap3& map) {
         return std::make_unique<SharedDelaunay<3, tri::EllipticalMetric3>>(map);
       }));
+  bind_mesh_of_points<SharedSurface>(module, "SharedSurface")
+      .def(py::init<>())
+      .def("restore", [](SharedSurface& shared, unsigned threads) {
+        shared.change(0, [&](auto& surface) {
+          surface.restore(threads);
+          return 0;
+        });
+      });
   module.def("ellipse_map", py::overload_cast<double, double, double>(&tri::ellipse_map));
   module.def("ellipsoid_map", &tri::ellipsoid_map);
 }

@@ -16,6 +16,7 @@
 
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/delaunay3.hpp>
+#include <terrace/tri/dynamic_surface.hpp>
 #include <terrace/tri/metric.hpp>
 
 #include "arrays.hpp"
@@ -23,12 +24,58 @@
 
 namespace terrace::python {
 
+template <class Number, std::size_t N>
+bool finite(const std::array<Number, N>& p) {
+  return std::all_of(p.begin(), p.end(), [](Number c) { return c - c == 0; });
+}
+
+/// The places in an order in which the next one is mostly near the last (Morton's): a walk from
+/// there is short.
+template <std::size_t N>
+std::vector<std::size_t> near_order(std::span<const std::array<double, N>> places) {
+  constexpr unsigned kBits = 16;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::array<double, N> low, high;
+  low.fill(kInfinity);
+  high.fill(-kInfinity);
+  for (const auto& p : places) {
+    for (std::size_t i = 0; i < N && finite(p); ++i) {
+      low[i] = std::min(low[i], p[i]);
+      high[i] = std::max(high[i], p[i]);
+    }
+  }
+  std::vector<std::pair<std::uint64_t, std::size_t>> keys(places.size());
+  for (std::size_t at = 0; at < places.size(); ++at) {
+    keys[at].second = at;
+    if (!finite(places[at])) continue;
+    std::array<std::uint32_t, N> cell{};
+    for (std::size_t i = 0; i < N; ++i) {
+      // Halves, so that no difference overflows.
+      const double share = (places[at][i] / 2 - low[i] / 2) / (high[i] / 2 - low[i] / 2);
+      cell[i] = share > 0 ? static_cast<std::uint32_t>(share * ((1U << kBits) - 1)) : 0;
+    }
+    for (unsigned bit = kBits; bit-- > 0;) {
+      for (const std::uint32_t c : cell) keys[at].first = keys[at].first << 1 | (c >> bit & 1);
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::size_t> order;
+  order.reserve(keys.size());
+  for (const auto& [key, at] : keys) order.push_back(at);
+  return order;
+}
+
+/// What differs between kinds of meshes: kCorners of a simplex, ids of simplices and access to
+/// them.
 template <std::size_t N, class Metric>
 struct Triangulation;
 template <class Metric>
 struct Triangulation<2, Metric> {
   using Type = tri::Delaunay2<double, Metric>;
   using Simplex = tri::TriangleId;
+  static constexpr std::size_t kCorners = 3;
+  static void settle(Type&) {}
+  static const auto& added(const typename Type::Changes& of) { return of.added_triangles; }
   static auto all(const Type& of) { return of.all_triangles(); }
   static std::size_t count(const Type& of) { return of.triangle_count(); }
   static std::uint32_t slots(const Type& of) { return of.triangle_slots(); }
@@ -42,6 +89,9 @@ template <class Metric>
 struct Triangulation<3, Metric> {
   using Type = tri::Delaunay3<double, Metric>;
   using Simplex = tri::TetrahedronId;
+  static constexpr std::size_t kCorners = 4;
+  static void settle(Type&) {}
+  static const auto& added(const typename Type::Changes& of) { return of.added_tetrahedra; }
   static auto all(const Type& of) { return of.all_tetrahedra(); }
   static std::size_t count(const Type& of) { return of.tetrahedron_count(); }
   static std::uint32_t slots(const Type& of) { return of.tetrahedron_slots(); }
@@ -52,15 +102,33 @@ struct Triangulation<3, Metric> {
   }
 };
 
+/// The surface of points in space.
+struct SurfaceKind {
+  using Type = tri::DynamicSurface<double>;
+  static constexpr std::size_t kCorners = 3;
+  static void settle(Type& of) { of.follow(); }
+  static const auto& added(const Type::Changes& of) { return of.added_triangles; }
+  static auto all(const Type& of) { return of.all_triangles(); }
+  static std::size_t count(const Type& of) { return of.triangle_count(); }
+};
+
 /// A triangulation that Python's threads may share: one works on it at a time.
-template <std::size_t N, class Metric = tri::Euclidean>
+template <std::size_t N, class Metric = tri::Euclidean, class Kind_ = Triangulation<N, Metric>>
 class SharedDelaunay {
  public:
-  using Kind = Triangulation<N, Metric>;
+  using Kind = Kind_;
   using Mesh = typename Kind::Type;
   using Point = std::array<double, N>;
+  using Row = std::array<std::int32_t, Kind::kCorners>;
 
-  explicit SharedDelaunay(const Metric& metric = {}) : mesh_(metric) {}
+  SharedDelaunay() = default;
+  explicit SharedDelaunay(const Metric& metric) : mesh_(metric) {}
+
+  /// work(mesh), which changes it as a whole.
+  template <class Work>
+  auto change(std::size_t items, Work&& work) {
+    return locked(items + size_, [&] { return work(mesh_); });
+  }
 
   /// work(mesh), which only reads it and takes about as long as a pass over it and so many items.
   template <class Work>
@@ -75,10 +143,12 @@ class SharedDelaunay {
       if (mesh_.vertex_count() == 0) {
         const std::vector<tri::VertexId> made = mesh_.build(points);
         for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i]);
+        Kind::settle(mesh_);
         return handles;
       }
       std::vector<typename Mesh::Insertion> made(points.size());
       mesh_.insert(points, made);
+      Kind::settle(mesh_);
       for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i].vertex);
       return handles;
     }));
@@ -95,6 +165,7 @@ class SharedDelaunay {
         throw std::invalid_argument("vertex " + std::to_string(*twice) + " is named twice");
       }
       mesh_.remove(vertices);
+      Kind::settle(mesh_);
       return 0;
     });
   }
@@ -121,13 +192,9 @@ class SharedDelaunay {
 
   [[nodiscard]] py::array_t<std::int32_t> simplices() {
     return to_array(locked(size_, [&] {
-      std::vector<std::array<std::int32_t, N + 1>> rows;
+      std::vector<Row> rows;
       rows.reserve(Kind::count(mesh_));
-      for (const auto s : Kind::all(mesh_)) {
-        const auto corners = mesh_.vertices(s);
-        auto& row = rows.emplace_back();
-        for (std::size_t i = 0; i <= N; ++i) row[i] = handle(corners[i]);
-      }
+      for (const auto s : Kind::all(mesh_)) rows.push_back(row_of(mesh_.vertices(s)));
       return rows;
     }));
   }
@@ -135,17 +202,71 @@ class SharedDelaunay {
   [[nodiscard]] py::array_t<std::int32_t> neighbours() {
     return to_array(locked(size_, [&] {
       const std::vector<std::int32_t> rank = rows_of_simplices();
-      std::vector<std::array<std::int32_t, N + 1>> rows;
+      std::vector<Row> rows;
       rows.reserve(Kind::count(mesh_));
       for (const auto s : Kind::all(mesh_)) {
         const auto around = mesh_.neighbours(s);
         auto& row = rows.emplace_back();
-        for (std::size_t i = 0; i <= N; ++i) {
+        for (std::size_t i = 0; i < row.size(); ++i) {
           row[i] = mesh_.alive(around[i]) ? rank[slot(around[i])] : -1;
         }
       }
       return rows;
     }));
+  }
+
+  /// Compressed rows by number of vertex: where each begins, the vertices joined to it.
+  [[nodiscard]] py::tuple adjacent() {
+    std::vector<std::int32_t> joined;
+    auto begins = locked(size_, [&] {
+      std::vector<std::int64_t> rows{0};
+      std::vector<tri::VertexId> around;
+      for (std::uint32_t v = 0; v < mesh_.vertex_slots(); ++v) {
+        if (mesh_.alive(tri::VertexId{v})) {
+          mesh_.adjacent(tri::VertexId{v}, around);
+          for (const tri::VertexId other : around) joined.push_back(handle(other));
+        }
+        rows.push_back(static_cast<std::int64_t>(joined.size()));
+      }
+      return rows;
+    });
+    return py::make_tuple(to_array(std::move(begins)), to_array(std::move(joined)));
+  }
+
+  void start_journal() {
+    locked(0, [&] {
+      mesh_.start_journal();
+      recording_ = true;
+      return 0;
+    });
+  }
+
+  /// What came and went since then or the last call. Throws: std::invalid_argument unless a journal
+  /// was started.
+  [[nodiscard]] py::dict take_changes() {
+    std::vector<std::int32_t> added, removed;
+    std::vector<Point> removed_points;
+    std::vector<Row> added_rows, removed_rows;
+    locked(size_, [&] {
+      if (!recording_) throw std::invalid_argument("record() has not been called");
+      typename Mesh::Changes changes;
+      mesh_.take_changes(changes);
+      for (const tri::VertexId v : changes.added_vertices) added.push_back(handle(v));
+      for (const tri::VertexId v : changes.removed_vertices) removed.push_back(handle(v));
+      removed_points = std::move(changes.removed_points);
+      for (const auto s : Kind::added(changes)) added_rows.push_back(row_of(mesh_.vertices(s)));
+      for (const auto& corners : changes.removed_corners) {
+        removed_rows.push_back(row_of(corners));
+      }
+      return 0;
+    });
+    py::dict result;
+    result["added_vertices"] = to_array(std::move(added));
+    result["removed_vertices"] = to_array(std::move(removed));
+    result["removed_points"] = to_array(std::move(removed_points));
+    result["added_simplices"] = to_array(std::move(added_rows));
+    result["removed_simplices"] = to_array(std::move(removed_rows));
+    return result;
   }
 
   [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& given) {
@@ -154,7 +275,7 @@ class SharedDelaunay {
       const std::vector<std::int32_t> rank = rows_of_simplices();
       std::vector<std::int32_t> found(places.size(), -1);
       tri::VertexId hint = tri::kNoVertex;
-      for (std::size_t i = 0; i < places.size(); ++i) {
+      for (const std::size_t i : near_order(places)) {
         if (!finite(places[i])) continue;
         const auto s = Kind::found(mesh_, places[i], hint);
         if (mesh_.alive(s)) found[i] = rank[slot(s)];
@@ -168,7 +289,7 @@ class SharedDelaunay {
     return to_array(locked(places.size(), [&] {
       std::vector<std::int32_t> found(places.size(), -1);
       tri::VertexId last = tri::kNoVertex;
-      for (std::size_t i = 0; i < places.size(); ++i) {
+      for (const std::size_t i : near_order(places)) {
         if (!finite(places[i])) continue;
         last = mesh_.nearest(places[i], last);
         if (last != tri::kNoVertex) found[i] = handle(last);
@@ -203,8 +324,10 @@ class SharedDelaunay {
 
  private:
   static std::int32_t handle(tri::VertexId vertex) { return static_cast<std::int32_t>(vertex); }
-  static bool finite(const Point& p) {
-    return std::all_of(p.begin(), p.end(), [](double c) { return c - c == 0; });
+  static Row row_of(const std::array<tri::VertexId, Kind::kCorners>& corners) {
+    Row row{};
+    std::transform(corners.begin(), corners.end(), row.begin(), handle);
+    return row;
   }
 
   /// For much work signals are looked for.
@@ -232,10 +355,12 @@ class SharedDelaunay {
 
   std::mutex mutex_;
   Mesh mesh_;                          ///< under the mutex only
+  bool recording_ = false;             ///< likewise
   std::atomic<std::size_t> size_ = 0;  ///< vertices after the last piece of work
 };
 
 using SharedDelaunay2 = SharedDelaunay<2>;
 using SharedDelaunay3 = SharedDelaunay<3>;
+using SharedSurface = SharedDelaunay<3, tri::Euclidean, SurfaceKind>;
 
 }  // namespace terrace::python

@@ -14,6 +14,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 #include "store.hpp"
 
 namespace terrace::python {
@@ -21,12 +22,7 @@ namespace {
 
 terrain::SamplerOptions sampler_of(const std::string& method, unsigned level,
                                    std::optional<double> max_edge) {
-  return {.method = named<tri::Interpolation>(method, "method",
-                                              {{"linear", tri::Interpolation::kLinear},
-                                               {"natural", tri::Interpolation::kNaturalNeighbour},
-                                               {"nearest", tri::Interpolation::kNearest}}),
-          .level = level,
-          .max_edge = max_edge};
+  return {.method = interpolation_named(method), .level = level, .max_edge = max_edge};
 }
 
 /// Rows of height, east, north.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <terrace/matching/assignment.hpp>
+#include <terrace/matching/halving.hpp>
 #include <terrace/matching/large_matching.hpp>
 #include <terrace/matching/matching.hpp>
 #include <terrace/matching/point_assignment.hpp>
@@ -32,6 +32,25 @@ py::tuple assign(const py::array_t<T, py::array::c_style>& costs) {
   return arrays_of_assignment(released([&] { return matching::assign(all, rows, columns); }));
 }
 
+/// row_of(number): the costs of that row. The matrix is never stored.
+py::tuple assign_rows(std::size_t rows, std::size_t columns, const py::function& row_of) {
+  return arrays_of_assignment(released([&](const std::stop_token& stop) {
+    return matching::assign_rows(rows, columns, [&](std::size_t row, std::span<double> costs) {
+      const py::gil_scoped_acquire held;
+      // What ends the work is Ctrl-C, which is raised in its place.
+      if (stop.stop_requested()) throw py::value_error("stopped");
+      const auto given = Array<double>(row_of(row));
+      const auto numbers = numbers_of(given, "a row of costs");
+      if (numbers.size() != costs.size()) {
+        throw py::value_error("row " + std::to_string(row) + " has " +
+                              std::to_string(numbers.size()) + " costs of " +
+                              std::to_string(costs.size()) + " columns");
+      }
+      std::copy(numbers.begin(), numbers.end(), costs.begin());
+    });
+  }));
+}
+
 template <std::size_t N>
 py::tuple assign_places(const Array<double>& a, const Array<double>& b) {
   const auto rows = rows_of<N>(a, "a"), columns = rows_of<N>(b, "b");
@@ -40,17 +59,62 @@ py::tuple assign_places(const Array<double>& a, const Array<double>& b) {
 
 /// (mate of each point or -1, cost, bound, optimal)
 template <std::size_t N>
-py::tuple match(const Array<double>& given, std::size_t exact_limit, std::size_t window,
-                unsigned rounds, unsigned threads) {
+py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
+                std::size_t exact_limit, std::size_t window, unsigned rounds, double tolerance,
+                unsigned threads) {
   const auto points = rows_of<N>(given, "points");
   matching::LargeMatchingOptions options;
   options.exact_limit = exact_limit;
+  options.labels = numbers_of(labels, "labels");
+  options.tolerance = tolerance;
   options.window = window;
   options.rounds = rounds;
-  options.threads = threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
-  matching::LargeMatching made = released([&] { return match_large(points, options); });
+  options.threads = all_or(threads);
+  matching::LargeMatching made = released([&](const std::stop_token& stop) {
+    options.progress = [&](auto...) { return !stop.stop_requested(); };
+    return match_large(points, options);
+  });
   return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, made.dual_bound,
                         made.optimal);
+}
+
+/// (mates, cost, iterations done, rows of iteration and cost where it fell). distances: `given` is
+/// the matrix of them, not points.
+py::tuple match_by_halving(const Array<double>& given, bool distances, const std::string& method,
+                           std::uint64_t iterations, double seconds, std::uint64_t seed,
+                           unsigned threads) {
+  using matching::Halving;
+  matching::HalvingOptions options;
+  options.method = named<Halving>(
+      method, "method", {{"monotone", Halving::monotone}, {"monte-carlo", Halving::monte_carlo}});
+  options.iterations = iterations;
+  options.seconds = seconds;
+  options.seed = seed;
+  options.threads = all_or(threads);
+  std::vector<std::array<double, 3>> points;
+  if (!distances) {
+    points = points3_of(given);
+  } else if (given.ndim() != 2 || given.shape(0) != given.shape(1)) {
+    throw py::value_error("distances must have the shape (n, n)");
+  }
+  const auto count = static_cast<std::size_t>(given.shape(0));
+  const double* const matrix = given.data();
+  std::vector<std::array<double, 2>> steps;
+  matching::HalvingMatching made = released([&](const std::stop_token& stop) {
+    options.progress = [&](auto...) { return !stop.stop_requested(); };
+    matching::HalvingMatching result =
+        distances
+            ? matching::match_by_halving(
+                  count, [&](std::uint32_t i, std::uint32_t j) { return matrix[i * count + j]; },
+                  options)
+            : matching::match_by_halving(points, options);
+    for (const auto& step : result.steps) {
+      steps.push_back({static_cast<double>(step.iteration), step.cost});
+    }
+    return result;
+  });
+  return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, made.iterations,
+                        to_array(std::move(steps)));
 }
 
 /// Compressed rows; the same.
@@ -94,17 +158,15 @@ void bind_matching(py::module_& module) {
   module.def("assign", &assign<double>, py::arg().noconvert());
   module.def("assign", &assign<float>, py::arg().noconvert());
   module.def("assign", &assign<std::int32_t>, py::arg().noconvert());
+  module.def("assign_rows", &assign_rows);
   module.def("assign_sparse", &assign_sparse);
+  module.def("match_by_halving", &match_by_halving);
   module.def("match_edges", &match_edges);
   module.def("assign_points", [](const Array<double>& a, const Array<double>& b) {
     return a.ndim() == 2 && a.shape(1) == 3 ? assign_places<3>(a, b) : assign_places<2>(a, b);
   });
-  module.def("match_points", [](const Array<double>& points, std::size_t exact_limit,
-                                std::size_t window, unsigned rounds, unsigned threads) {
-    return points.ndim() == 2 && points.shape(1) == 3
-               ? match<3>(points, exact_limit, window, rounds, threads)
-               : match<2>(points, exact_limit, window, rounds, threads);
-  });
+  module.def("match_points2", &match<2>);
+  module.def("match_points3", &match<3>);
 }
 
 }  // namespace terrace::python

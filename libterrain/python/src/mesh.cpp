@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -12,6 +14,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 #include "store.hpp"
 
 namespace terrace::python {
@@ -25,15 +28,47 @@ py::tuple arrays_of(terrain::TriangleMesh&& mesh) {
                         levels);
 }
 
+/// heights: "smoothing" (method, iterations, strength, pass band, edge height), the files "overlay"
+/// and "save", "replace".
 py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
-               const py::list& focuses, const std::string& where, const std::string& metric,
-               const std::string& crs, const py::tuple& how) {
+               const py::list& focuses, const std::string& where,
+               const std::optional<std::pair<unsigned, std::uint64_t>>& cluster,
+               const std::string& metric, const py::dict& heights, const std::string& crs,
+               const py::tuple& how) {
   const stream::Store store = open.get();
-  const terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  if (cluster) {
+    const tri::ClusterId id = cluster_of(store, cluster->first, cluster->second);
+    detail.cluster = static_cast<stream::ClusterId>(id);
+  }
   terrain::DetailMeshOptions options;
   options.metric = terrain::MetricChoice::parse(metric);
+  if (heights.contains("smoothing")) {
+    const auto [method, iterations, strength, pass_band, edge_height] =
+        heights["smoothing"].cast<std::tuple<std::string, unsigned, double, double, double>>();
+    options.heights.smoothing = {.method = smoothing_named(method),
+                                 .iterations = iterations,
+                                 .strength = strength,
+                                 .pass_band = pass_band,
+                                 .edge_height = edge_height};
+  }
+  std::string overlay_path, save_path;
+  bool replace = false;
+  take_option(heights, "overlay", overlay_path);
+  take_option(heights, "save", save_path);
+  take_option(heights, "replace", replace);
   return arrays_of(Job(how).run([&](const terrain::Context& context) {
+    std::optional<stream::Overlay> overlay;
+    if (!overlay_path.empty()) {
+      options.heights.overlay = &overlay.emplace(terrain::open_height_overlay(overlay_path, store));
+    }
+    std::optional<stream::OverlayWriter> writer;
+    if (!save_path.empty()) {
+      options.heights.save =
+          &writer.emplace(save_path, store, store.schema().coordinates[2].name, replace);
+    }
     terrain::TriangleMesh made = detail_mesh(store, detail, options, context);
+    if (writer) writer->finish();
     if (const auto to = change_to(store, crs)) {
       const terrain::PlaceConversion places(*to);
       places(made.positions);
@@ -84,21 +119,9 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   if (const auto where = given["where"].cast<std::string>(); !where.empty()) {
     options.where.emplace(where, store.schema());
   }
-  using tri::PointDuplicates, tri::TinQuality, terrain::Fill;
-  options.quality = named<TinQuality>(given["quality"].cast<std::string>(), "quality",
-                                      {{"greedy", TinQuality::kGreedy},
-                                       {"removal", TinQuality::kRemoval},
-                                       {"fitted", TinQuality::kFitted}});
-  options.duplicates = named<PointDuplicates>(given["duplicates"].cast<std::string>(), "duplicates",
-                                              {{"all", PointDuplicates::kAll},
-                                               {"min", PointDuplicates::kMin},
-                                               {"max", PointDuplicates::kMax},
-                                               {"mean", PointDuplicates::kMean},
-                                               {"first", PointDuplicates::kFirst},
-                                               {"error", PointDuplicates::kError}});
-  options.fill =
-      named<Fill>(given["fill"].cast<std::string>(), "fill",
-                  {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}});
+  options.quality = quality_named(given["quality"].cast<std::string>());
+  options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
+  options.fill = fill_named(given["fill"].cast<std::string>());
   const terrain::BoundedMeshResult outcome = Job(how).run(
       [&](const terrain::Context& context) { return write_bounded_mesh(store, options, context); });
   py::dict result;

@@ -9,6 +9,7 @@
 #include <terrace/tri/smoothing.hpp>
 
 #include "delaunay.hpp"
+#include "names.hpp"
 
 /// What is computed from heights of a triangulation's vertices, which are given by number of
 /// vertex.
@@ -18,16 +19,85 @@ namespace {
 
 py::array heights(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& places,
                   const std::string& method, unsigned threads) {
-  using tri::Interpolation;
-  const auto how = named<Interpolation>(method, "method",
-                                        {{"linear", Interpolation::kLinear},
-                                         {"natural", Interpolation::kNaturalNeighbour},
-                                         {"nearest", Interpolation::kNearest}});
+  const tri::Interpolation how = interpolation_named(method);
   const auto values = numbers_of(given, "heights");
   const auto asked = rows_of<2>(places, "places");
   return to_array(shared.read(asked.size(), [&](const auto& mesh) {
     return heights_at(mesh, values, asked, how, threads);
   }));
+}
+
+/// Compressed rows of places: weights, vertices, where each row begins.
+py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const std::string& method) {
+  const tri::Interpolation how = interpolation_named(method);
+  const auto asked = rows_of<2>(places, "places");
+  std::vector<double> shares;
+  std::vector<std::int32_t> vertices;
+  auto begins = shared.read(asked.size(), [&](const auto& mesh) {
+    // As they are found, and where those of each place are among them.
+    std::vector<tri::VertexWeight> all, found;
+    std::vector<std::size_t> first(asked.size());
+    std::vector<std::int64_t> rows(asked.size() + 1, 0);
+    tri::VertexId near = tri::kNoVertex;
+    for (const std::size_t i : near_order(asked)) {
+      if (!finite(asked[i])) {
+        throw std::invalid_argument("place " + std::to_string(i) + " is not finite");
+      }
+      weights_at(mesh, asked[i], how, found, near);
+      if (!found.empty()) near = found.front().vertex;
+      first[i] = all.size();
+      rows[i + 1] = static_cast<std::int64_t>(found.size());
+      all.insert(all.end(), found.begin(), found.end());
+    }
+    shares.reserve(all.size());
+    vertices.reserve(all.size());
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      for (std::size_t k = first[i]; k < first[i] + static_cast<std::size_t>(rows[i + 1]); ++k) {
+        shares.push_back(all[k].weight);
+        vertices.push_back(static_cast<std::int32_t>(all[k].vertex));
+      }
+      rows[i + 1] += rows[i];
+    }
+    return rows;
+  });
+  return py::make_tuple(to_array(std::move(shares)), to_array(std::move(vertices)),
+                        to_array(std::move(begins)));
+}
+
+/// Rows of min angle, aspect, area, surface area, volume above, volume below.
+py::array triangle_quality(SharedDelaunay2& shared, const Array<double>& given, double datum) {
+  const auto values = numbers_of(given, "heights");
+  return to_array(shared.read(0, [&](const auto& mesh) {
+    if (values.size() < mesh.vertex_slots()) {
+      throw std::invalid_argument("there are fewer heights than vertices");
+    }
+    std::vector<std::array<double, 6>> rows;
+    for (const tri::TriangleId t : mesh.all_triangles()) {
+      const tri::TriangleQuality of = tri::triangle_quality(mesh, values, t, datum);
+      rows.push_back({of.min_angle_degrees, of.aspect, of.area, of.surface_area, of.volume_above,
+                      of.volume_below});
+    }
+    return rows;
+  }));
+}
+
+py::dict distances(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& points,
+                   const std::string& method, unsigned threads) {
+  const tri::Interpolation how = interpolation_named(method);
+  const auto values = numbers_of(given, "heights");
+  const auto samples = rows_of<3>(points, "samples");
+  const tri::VerticalDistances made = shared.read(samples.size(), [&](const auto& mesh) {
+    return vertical_distances(mesh, values, samples, how, threads);
+  });
+  py::dict result;
+  result["count"] = made.count;
+  result["outside"] = made.outside;
+  result["max"] = made.max;
+  result["mean"] = made.mean;
+  result["rms"] = made.rms;
+  result["bias"] = made.bias;
+  result["worst"] = made.count > 0 ? static_cast<std::int64_t>(made.worst) : -1;
+  return result;
 }
 
 py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
@@ -52,16 +122,11 @@ py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
 py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
                  const std::optional<Array<std::int32_t>>& vertices, const std::string& method,
                  unsigned iterations, double strength, double pass_band, double edge_height) {
-  using tri::Smoothing;
-  const tri::SmoothingOptions options{
-      .method = named<Smoothing>(method, "method",
-                                 {{"laplacian", Smoothing::kLaplacian},
-                                  {"taubin", Smoothing::kTaubin},
-                                  {"bilateral", Smoothing::kBilateral}}),
-      .iterations = iterations,
-      .strength = strength,
-      .pass_band = pass_band,
-      .edge_height = edge_height};
+  const tri::SmoothingOptions options{.method = smoothing_named(method),
+                                      .iterations = iterations,
+                                      .strength = strength,
+                                      .pass_band = pass_band,
+                                      .edge_height = edge_height};
   const auto values = numbers_of(given, "heights");
   std::span<const std::int32_t> only;
   if (vertices) only = numbers_of(*vertices, "vertices");
@@ -80,10 +145,11 @@ py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
   }));
 }
 
-py::dict quality(SharedDelaunay2& shared, const Array<double>& given, double datum) {
+py::dict quality(SharedDelaunay2& shared, const Array<double>& given, double datum,
+                 std::size_t bins) {
   const auto values = numbers_of(given, "heights");
   const tri::MeshQuality made =
-      shared.read(0, [&](const auto& mesh) { return mesh_quality(mesh, values, datum); });
+      shared.read(0, [&](const auto& mesh) { return mesh_quality(mesh, values, datum, bins); });
   py::dict result;
   result["triangles"] = made.triangles;
   result["min_angle"] = made.min_angle_degrees;
@@ -94,6 +160,8 @@ py::dict quality(SharedDelaunay2& shared, const Array<double>& given, double dat
   result["min_edge"] = made.min_edge;
   result["max_edge"] = made.max_edge;
   result["mean_edge"] = made.mean_edge;
+  result["edge_histogram"] =
+      to_array(std::vector<std::int64_t>(made.edge_histogram.begin(), made.edge_histogram.end()));
   result["area"] = made.area;
   result["surface_area"] = made.surface_area;
   result["volume_above"] = made.volume_above;
@@ -107,6 +175,9 @@ void bind_samples(py::module_& module) {
   module.def("heights_at", &heights);
   module.def("gradients_at", &gradients);
   module.def("smooth", &smooth);
+  module.def("weights_at", &weights);
+  module.def("vertical_distances", &distances);
+  module.def("triangle_quality", &triangle_quality);
   module.def("mesh_quality", &quality);
 }
 

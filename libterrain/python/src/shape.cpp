@@ -13,13 +13,20 @@ namespace {
 /// (kept tetrahedra and triangles of the surface, as corners by number of vertex; volume; lids were
 /// left out; components; Euler characteristic)
 template <class Metric>
-py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule, bool lids,
+py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule,
+                const std::string& criterion, double edge_factor, bool keep_vertices, bool lids,
                 unsigned threads) {
-  using tri::ShapeRule;
-  const tri::ShapeOptions options{.rule = named<ShapeRule>(rule, "rule",
-                                                           {{"poles", ShapeRule::kPoles},
-                                                            {"flood", ShapeRule::kFlood},
-                                                            {"published", ShapeRule::kPublished}})};
+  using tri::ShapeRule, tri::ShapeCriterion;
+  const tri::ShapeOptions options{
+      .rule = named<ShapeRule>(rule, "rule",
+                               {{"poles", ShapeRule::kPoles},
+                                {"flood", ShapeRule::kFlood},
+                                {"published", ShapeRule::kPublished}}),
+      .criterion = named<ShapeCriterion>(
+          criterion, "criterion",
+          {{"gabriel", ShapeCriterion::kGabriel}, {"edge-length", ShapeCriterion::kEdgeLength}}),
+      .edge_factor = edge_factor,
+      .keep_vertices = keep_vertices};
   std::vector<std::array<std::int32_t, 4>> kept;
   std::vector<std::array<std::int32_t, 3>> faces;
   tri::ShapeParts parts;
@@ -47,11 +54,43 @@ py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule, bool
                         parts.components, parts.euler_characteristic);
 }
 
+tri::Surface surface_of(const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
+  const auto places = rows_of<3>(vertices, "vertices");
+  const auto corners = rows_of<3>(triangles, "triangles");
+  return {{places.begin(), places.end()}, {corners.begin(), corners.end()}};
+}
+
+py::dict measure(const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
+  const tri::Surface surface = surface_of(vertices, triangles);
+  const tri::SurfaceMeasures made = released([&] { return tri::measure(surface); });
+  py::dict result;
+  result["faces"] = made.faces;
+  result["vertices"] = made.vertices;
+  result["edges"] = made.edges;
+  result["area"] = made.area;
+  result["volume"] = made.volume;
+  result["components"] = made.components;
+  result["euler_characteristic"] = made.euler_characteristic;
+  result["border_edges"] = made.border_edges;
+  result["non_manifold_edges"] = made.non_manifold_edges;
+  result["closed"] = made.closed;
+  return result;
+}
+
+/// The triangles, those of components with negative volume inside out.
+py::array turned_outward(const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
+  tri::Surface surface = surface_of(vertices, triangles);
+  released([&] { tri::turn_outward(surface); });
+  return to_array(std::move(surface.faces));
+}
+
 }  // namespace
 
 void bind_shape(py::module_& module) {
   module.def("shape", &shape<tri::Euclidean>);
   module.def("shape", &shape<tri::EllipticalMetric3>);
+  module.def("measure", &measure);
+  module.def("turned_outward", &turned_outward);
 }
 
 }  // namespace terrace::python

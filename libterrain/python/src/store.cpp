@@ -36,28 +36,8 @@ py::dict info_of(const OpenStore& open) {
   info["mean_height"] = store.mean_height() * z.scale + z.offset;
   info["vertical"] = schema.vertical;
   info["transform"] = py::cast(schema.world.xy);
-  py::dict crs;
-  crs["epsg"] = schema.crs.epsg;
-  crs["vertical_epsg"] = schema.crs.vertical_epsg;
-  crs["name"] = schema.crs.name;
-  crs["wkt"] = schema.crs.wkt;
-  crs["geographic"] = schema.crs.geographic;
-  crs["unit"] = schema.crs.horizontal_unit;
-  crs["vertical_unit"] = schema.crs.vertical_unit;
-  info["crs"] = crs;
-  py::list attributes;
-  const py::list fields = record_type(schema).attr("names");
-  for (std::size_t i = 0; i < schema.attributes.size(); ++i) {
-    const stream::Channel& channel = schema.attributes[i];
-    py::dict attribute;
-    attribute["name"] = fields[3 + i];
-    attribute["dtype"] = type_name(channel.type);
-    attribute["scale"] = channel.scale;
-    attribute["offset"] = channel.offset;
-    attribute["unit"] = channel.unit;
-    attributes.append(attribute);
-  }
-  info["attributes"] = attributes;
+  info["crs"] = crs_info(schema.crs);
+  info["attributes"] = attributes_info(schema);
   info["top"] = store.top();
   py::list levels;
   for (const stream::LevelInfo& of : store.levels()) {
@@ -89,10 +69,8 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
   const stream::Store store = open.get();
   terrain::Detail detail = detail_of(store, level, region, focuses, where);
   if (cluster) {
-    if (cluster->first > store.top() || cluster->second >> 56 != 0) {
-      throw py::value_error("the store has no such cluster");
-    }
-    detail.cluster = stream::cluster_id(cluster->first, cluster->second);
+    const tri::ClusterId id = cluster_of(store, cluster->first, cluster->second);
+    detail.cluster = static_cast<stream::ClusterId>(id);
   }
   const std::size_t payload = store.schema().payload_size();
   std::vector<std::byte> records = Job(how).run([&](const terrain::Context& context) {
@@ -118,6 +96,26 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
   return to_records(std::move(records), record_type(store.schema()));
 }
 
+/// A row for each cluster of a level: the box in the CRS, error, descendants, members.
+py::array clusters(const OpenStore& open, unsigned level, const py::tuple& how) {
+  const stream::Store store = open.get();
+  if (level > store.top()) throw py::value_error("the store has no level " + std::to_string(level));
+  return to_array(Job(how).run([&](const terrain::Context& context) {
+    std::vector<std::array<double, 9>> rows;
+    const std::uint64_t count = store.levels()[level].clusters;
+    rows.reserve(count);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      context.check_stop();
+      const stream::ClusterRecord of = store.record(stream::cluster_id(level, i));
+      const stream::Box3 box = world_box(store.schema(), of.summary.box);
+      rows.push_back({box.min[0], box.min[1], box.min[2], box.max[0], box.max[1], box.max[2],
+                      of.summary.error, static_cast<double>(of.summary.descendants),
+                      static_cast<double>(of.points)});
+    }
+    return rows;
+  }));
+}
+
 /// Records of found points, with their distance at the end.
 std::vector<std::byte> records_of(const stream::StoreQuery& query,
                                   const std::vector<stream::FoundPoint>& found) {
@@ -136,14 +134,17 @@ std::vector<std::byte> records_of(const stream::StoreQuery& query,
 }
 
 py::array near(const OpenStore& open, const std::vector<double>& place,
-               std::optional<std::size_t> count, std::optional<double> radius, unsigned level) {
+               std::optional<std::size_t> count, std::optional<double> radius, unsigned level,
+               const std::string& where) {
   const stream::Store store = open.get();
   if (place.size() != 2 && place.size() != 3)
     throw py::value_error("`near` has two or three numbers");
   terrain::NearPlace wanted{.xy = {place[0], place[1]}};
   if (place.size() == 3) wanted.z = place[2];
   std::vector<std::byte> records = released([&] {
-    stream::StoreQuery query(store);
+    std::optional<stream::Where> condition;
+    if (!where.empty()) condition.emplace(where, store.schema());
+    stream::StoreQuery query(store, 0, std::move(condition));
     return records_of(query, count ? nearest_points(query, wanted, *count, level)
                                    : points_within(query, wanted, radius.value(), level));
   });
@@ -172,6 +173,32 @@ terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::
   return detail;
 }
 
+tri::ClusterId cluster_of(const stream::Store& store, unsigned level, std::uint64_t number) {
+  if (level > store.top() || number >= store.levels()[level].clusters) {
+    throw py::value_error("the store has no cluster " + std::to_string(number) + " of level " +
+                          std::to_string(level));
+  }
+  return tri::cluster_id(level, number);
+}
+
+stream::Point3 stored_point(const stream::Schema& schema, const stream::Point3& world) {
+  const std::array<double, 2> xy = stored_place(schema, {world[0], world[1]});
+  const stream::Channel& z = schema.coordinates[2];
+  return {xy[0], xy[1], (world[2] - z.offset) / z.scale};
+}
+
+stream::Box3 stored_box(const stream::Schema& schema, const stream::Box3& world) {
+  stream::Box3 stored;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    stream::Point3 p;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      p[axis] = (corner >> axis & 1) != 0 ? world.max[axis] : world.min[axis];
+    }
+    stored.include(stored_point(schema, p));
+  }
+  return stored;
+}
+
 std::string text_of(const stream::Problem& problem) {
   return problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what;
 }
@@ -190,6 +217,17 @@ void bind_store(py::module_& module) {
       .def("info", &info_of)
       .def("points", &points)
       .def("near", &near)
+      .def("clusters", &clusters)
+      .def("count",
+           [](const OpenStore& open, const py::object& given) {
+             const stream::Store store = open.get();
+             const std::array<double, 6>& xy = store.schema().world.xy;
+             if (xy[1] != 0 || xy[3] != 0)
+               throw py::value_error(
+                   "the raster is rotated: a box of its CRS is none of its columns and rows");
+             const stream::Box3 box = stored_box(store.schema(), region_of(given).value().box());
+             return released([&] { return stream::StoreQuery(store).count(box); });
+           })
       .def("verify", [](const OpenStore& open, const py::tuple& how) {
         const stream::Store store = open.get();
         return Job(how).run([&](const terrain::Context& context) {

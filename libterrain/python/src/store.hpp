@@ -10,6 +10,7 @@
 #include <terrace/stream/store_query.hpp>
 #include <terrace/terrain/crs.hpp>
 #include <terrace/terrain/detail.hpp>
+#include <terrace/tri/multiresolution.hpp>
 
 #include "core.hpp"
 
@@ -38,6 +39,14 @@ class OpenStore {
 /// Throws: ValueError for a level that the store does not have; terrace.Error for a bad condition.
 terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
                           const py::list& focuses, const std::string& where);
+
+/// A cluster by its level and its number there. Throws: ValueError for one that the store does not
+/// have.
+tri::ClusterId cluster_of(const stream::Store& store, unsigned level, std::uint64_t number);
+
+/// Stored coordinates of a point in the CRS, and those around a box of it.
+stream::Point3 stored_point(const stream::Schema& schema, const stream::Point3& world);
+stream::Box3 stored_box(const stream::Schema& schema, const stream::Box3& world);
 
 /// File, place and what is wrong there.
 std::string text_of(const stream::Problem& problem);

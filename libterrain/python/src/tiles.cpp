@@ -8,6 +8,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 #include "store.hpp"
 
 namespace terrace::python {
@@ -42,14 +43,11 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
     take_option(given, name, value);
     return value;
   };
-  using tri::TinQuality, terrain::Fill;
-  request.quality = named<TinQuality>(text("quality", "removal"), "quality",
-                                      {{"greedy", TinQuality::kGreedy},
-                                       {"removal", TinQuality::kRemoval},
-                                       {"fitted", TinQuality::kFitted}});
+  request.quality = quality_named(text("quality", "removal"));
   request.vertical = reference_named(text("vertical", "recorded"));
-  request.fill = named<Fill>(text("fill", "interpolate"), "fill",
-                             {{"flat", Fill::flat}, {"interpolate", Fill::interpolate}});
+  request.fill = fill_named(text("fill", "interpolate"));
+  if (request.fill == terrain::Fill::none)
+    throw py::value_error("tiles have no holes: `fill` is flat or interpolate");
   return request;
 }
 

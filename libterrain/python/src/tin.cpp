@@ -8,17 +8,10 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 
 namespace terrace::python {
 namespace {
-
-tri::TinQuality quality_named(const std::string& name) {
-  using tri::TinQuality;
-  return named<TinQuality>(name, "quality",
-                           {{"greedy", TinQuality::kGreedy},
-                            {"removal", TinQuality::kRemoval},
-                            {"fitted", TinQuality::kFitted}});
-}
 
 py::dict measures(double max_error, double rms_error, std::size_t samples, std::size_t uncovered) {
   py::dict result;
@@ -32,21 +25,17 @@ py::dict measures(double max_error, double rms_error, std::size_t samples, std::
 /// (vertices, triangles, measures). max_points 0: no limit.
 py::tuple tin_of_points(const Array<double>& x, const Array<double>& y, const Array<double>& z,
                         double max_error, std::size_t max_points, const std::string& quality,
-                        const std::string& duplicates) {
-  using tri::PointDuplicates;
+                        const std::string& duplicates, double min_angle,
+                        const Array<double>& frame) {
   tri::PointTinOptions options;
   options.max_error = max_error;
   options.max_points = max_points;
+  options.min_angle_degrees = min_angle;
   options.quality = quality_named(quality);
-  options.duplicates = named<PointDuplicates>(duplicates, "duplicates",
-                                              {{"all", PointDuplicates::kAll},
-                                               {"min", PointDuplicates::kMin},
-                                               {"max", PointDuplicates::kMax},
-                                               {"mean", PointDuplicates::kMean},
-                                               {"first", PointDuplicates::kFirst},
-                                               {"error", PointDuplicates::kError}});
+  options.duplicates = duplicates_named(duplicates);
+  const auto corners = rows_of<3>(frame, "frame");
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
-  tri::PointTin made = released([&] { return tri::point_tin(xs, ys, zs, {}, options); });
+  tri::PointTin made = released([&] { return tri::point_tin(xs, ys, zs, corners, options); });
   const tri::TinErrors& errors = made.errors;
   return py::make_tuple(
       to_array(std::move(made.vertices)), to_array(std::move(made.triangles)),
@@ -87,10 +76,40 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
                         measures(check.max_error, check.rms_error, check.samples, check.uncovered));
 }
 
+/// (sample of each vertex, the largest error)
+py::tuple simplify_line(const Array<double>& t, const Array<double>& heights, double max_error) {
+  const auto along = numbers_of(t, "t"), values = numbers_of(heights, "heights");
+  double largest = 0;
+  auto samples = released([&] {
+    const tri::SimplifiedLine made = tri::simplify_line(along, values, max_error);
+    largest = made.largest_error;
+    std::vector<std::int64_t> kept;
+    for (const tri::LineVertex& vertex : made.vertices) kept.push_back(vertex.sample);
+    return kept;
+  });
+  return py::make_tuple(to_array(std::move(samples)), largest);
+}
+
+/// Columns of samples against any surface.
+py::dict measure_surface(const Array<double>& x, const Array<double>& y, const Array<double>& z,
+                         const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
+  const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
+  const auto places = rows_of<3>(vertices, "vertices");
+  const auto corners = rows_of<3>(triangles, "triangles");
+  const tri::TinErrors made =
+      released([&] { return tri::measure_surface(xs, ys, zs, places, corners); });
+  py::dict result = measures(made.largest, made.rms, made.covered + made.uncovered, made.uncovered);
+  result["worst"] =
+      made.largest_at == tri::kNoSample ? std::int64_t{-1} : std::int64_t{made.largest_at};
+  return result;
+}
+
 }  // namespace
 
 void bind_tin(py::module_& module) {
   module.def("tin_of_points", &tin_of_points);
+  module.def("simplify_line", &simplify_line);
+  module.def("measure_surface", &measure_surface);
   module.def("tin_of_grid", &tin_of_grid<float>, py::arg().noconvert(), py::arg(), py::arg(),
              py::arg(), py::arg(), py::arg());
   module.def("tin_of_grid", &tin_of_grid<double>, py::arg().noconvert(), py::arg(), py::arg(),

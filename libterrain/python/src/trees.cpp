@@ -17,18 +17,40 @@
 namespace terrace::python {
 namespace {
 
+/// A function of Python's from positions, an array, to the partner of each or -1.
+template <class Point>
+matching::LevelMatcher<Point> matcher_of(const py::object& given) {
+  if (given.is_none()) return {};
+  return [&given](std::span<const Point> nodes) {
+    const py::gil_scoped_acquire held;
+    const Array<std::int64_t> mates(
+        given(to_array(std::vector<Point>(nodes.begin(), nodes.end()))));
+    std::vector<std::uint32_t> result;
+    for (const std::int64_t mate : numbers_of(mates, "what `matcher` returns")) {
+      if (mate < -1 || mate >= static_cast<std::int64_t>(nodes.size())) {
+        throw py::value_error("`matcher` returns the partner " + std::to_string(mate) + " among " +
+                              std::to_string(nodes.size()) + " points");
+      }
+      result.push_back(static_cast<std::uint32_t>(mate));
+    }
+    return result;
+  };
+}
+
 /// (rows a, b, distance, size; the level of each row; positions of the rows' nodes)
 template <std::size_t N>
 py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
-                  const Array<std::uint32_t>& labels, unsigned threads) {
+                  const Array<std::uint32_t>& labels, const py::object& matcher, unsigned threads) {
   const auto points = rows_of<N>(given, "points");
   matching::MatchingTreeOptions<std::array<double, N>> options;
   options.weights = numbers_of(weights, "weights");
   options.labels = numbers_of(labels, "labels");
   options.threads = threads;
+  options.matcher = matcher_of<std::array<double, N>>(matcher);
   std::vector<std::array<double, 4>> rows;
   std::vector<std::uint32_t> levels;
-  auto made = released([&] {
+  auto made = released([&](const std::stop_token& stop) {
+    options.progress = [&](auto...) { return !stop.stop_requested(); };
     auto tree = make_matching_tree(points, options);
     rows.reserve(tree.rows.size());
     levels.reserve(tree.rows.size());
@@ -54,6 +76,28 @@ std::vector<matching::TreeChildren> children_of(const Array<double>& given) {
     children.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)});
   }
   return children;
+}
+
+/// Children of the rows after rotations. lower, upper: corners of the boxes of the primitives.
+template <std::size_t N>
+py::array rotated(const Array<double>& rows, const Array<double>& lower, const Array<double>& upper,
+                  unsigned passes) {
+  const std::vector<matching::TreeChildren> children = children_of(rows);
+  const auto low = rows_of<N>(lower, "lower"), high = rows_of<N>(upper, "upper");
+  if (low.size() != high.size()) {
+    throw py::value_error("there are " + std::to_string(low.size()) + " lower and " +
+                          std::to_string(high.size()) + " upper corners");
+  }
+  return to_array(released([&] {
+    std::vector<matching::Box<N>> boxes;
+    for (std::size_t i = 0; i < low.size(); ++i) boxes.push_back({low[i], high[i]});
+    std::vector<std::array<std::uint32_t, 2>> result;
+    const std::span<const matching::Box<N>> all(boxes);
+    for (const auto& [a, b] : matching::rotate_tree<N>(children, all, passes)) {
+      result.push_back({a, b});
+    }
+    return result;
+  }));
 }
 
 /// Numbers and distances of what queries have found, -1 and infinity for nothing.
@@ -129,12 +173,10 @@ std::vector<matching::Triangle> triangles_of(const Array<std::uint32_t>& given) 
 }  // namespace
 
 void bind_trees(py::module_& module) {
-  module.def("matching_tree", [](const Array<double>& points, const Array<double>& weights,
-                                 const Array<std::uint32_t>& labels, unsigned threads) {
-    return points.ndim() == 2 && points.shape(1) == 3
-               ? tree_of<3>(points, weights, labels, threads)
-               : tree_of<2>(points, weights, labels, threads);
-  });
+  module.def("matching_tree2", &tree_of<2>);
+  module.def("matching_tree3", &tree_of<3>);
+  module.def("rotate_tree2", &rotated<2>);
+  module.def("rotate_tree3", &rotated<3>);
   module.def("centroids", [](const Array<double>& corners, const Array<std::uint32_t>& triangles) {
     return to_array(matching::centroids(rows_of<3>(corners, "vertices"), triangles_of(triangles)));
   });

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "view.hpp"
+
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -17,26 +20,14 @@
 namespace terrace::python {
 namespace {
 
-/// What came and went, as arrays.
-struct ViewChange {
-  std::vector<std::int32_t> added_vertices, removed_vertices, moved_vertices;
-  std::vector<stream::Point3> added_positions, moved_positions;
-  std::vector<std::int32_t> added_triangles, removed_triangles;
-  std::vector<std::array<std::int32_t, 3>> added_corners;
+/// What a frame did.
+struct ViewChange : MeshChange {
   std::size_t expanded = 0, collapsed = 0, missing = 0, pending = 0, points = 0;
   bool settled = false;
 };
 
-py::dict dict_of(ViewChange&& change) {
-  py::dict result;
-  result["added_vertices"] = to_array(std::move(change.added_vertices));
-  result["added_positions"] = to_array(std::move(change.added_positions));
-  result["removed_vertices"] = to_array(std::move(change.removed_vertices));
-  result["moved_vertices"] = to_array(std::move(change.moved_vertices));
-  result["moved_positions"] = to_array(std::move(change.moved_positions));
-  result["added_triangles"] = to_array(std::move(change.added_triangles));
-  result["added_corners"] = to_array(std::move(change.added_corners));
-  result["removed_triangles"] = to_array(std::move(change.removed_triangles));
+py::dict dict_of_view(ViewChange&& change) {
+  py::dict result = dict_of(static_cast<MeshChange&&>(change));
   result["expanded"] = change.expanded;
   result["collapsed"] = change.collapsed;
   result["missing"] = change.missing;
@@ -53,72 +44,72 @@ class AnyView {
   /// Everything there is, as added.
   virtual ViewChange whole() = 0;
   virtual terrain::ViewTraffic traffic() = 0;
+  virtual ViewChange restore(unsigned threads) = 0;
+  /// how: nothing unpins.
+  virtual void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> how) = 0;
+  /// Records of the store's schema. Throws: std::invalid_argument for a vertex that is not there or
+  /// whose attributes are no longer kept.
+  virtual std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) = 0;
+  /// Metres east, north and up of points in stored coordinates.
+  virtual void to_metres(std::span<stream::Point3> points) = 0;
 };
 
 template <class Shown>
 class ViewOf final : public AnyView {
  public:
   using StoreView = terrain::StoreView<Shown>;
-  static constexpr bool kTriangles = !std::is_same_v<Shown, tri::PointCloud>;
-
   ViewOf(const stream::Store& store, const tri::ViewOptions& options, bool reads_in_frame)
       : view_(store, options,
               reads_in_frame ? StoreView::Reader::in_frame : StoreView::Reader::thread) {}
 
   ViewChange frame(const tri::View& wish, double seconds) override {
     const auto& step = view_.frame(wish, seconds);
-    ViewChange change;
-    const auto& changes = step.delta->changes;
-    for (const tri::VertexId v : changes.removed_vertices) change.removed_vertices.push_back(id(v));
-    for (const tri::VertexId v : changes.added_vertices) add(change, v);
-    for (const tri::VertexId v : step.delta->reassigned) {
-      change.moved_vertices.push_back(id(v));
-      change.moved_positions.push_back(view_.in_view_frame(v));
-    }
-    if constexpr (kTriangles) {
-      for (const auto t : changes.removed_triangles) change.removed_triangles.push_back(id(t));
-      for (const auto t : changes.added_triangles) add(change, t);
-    }
+    ViewChange change = described(changes().of(*step.delta));
     change.expanded = step.expanded;
     change.collapsed = step.collapsed;
     change.missing = step.missing;
     change.pending = step.pending;
-    describe(change);
     return change;
   }
-
-  ViewChange whole() override {
-    ViewChange change;
-    const auto& shown = view_.model().triangulation();
-    for (const tri::VertexId v : shown.all_vertices()) add(change, v);
-    if constexpr (kTriangles) {
-      for (const auto t : shown.all_triangles()) add(change, t);
-    }
-    describe(change);
-    return change;
-  }
-
+  ViewChange whole() override { return described(changes().whole()); }
   terrain::ViewTraffic traffic() override { return view_.traffic(); }
+  ViewChange restore(unsigned threads) override {
+    return described(changes().of(view_.restore(threads)));
+  }
+  void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> how) override {
+    how ? view_.pin(cluster, *how) : view_.unpin(cluster);
+  }
+  std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) override {
+    std::vector<std::byte> records;
+    for (const std::int32_t number : vertices) {
+      const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
+      if (number < 0 || !view_.model().triangulation().alive(vertex)) {
+        throw std::invalid_argument("there is no vertex " + std::to_string(number));
+      }
+      const auto record = view_.attributes(vertex);
+      if (record.empty()) {
+        throw std::invalid_argument("the attributes of vertex " + std::to_string(number) +
+                                    " are no longer kept: ask after the frame that adds it");
+      }
+      records.insert(records.end(), record.begin(), record.end());
+    }
+    return records;
+  }
+  void to_metres(std::span<stream::Point3> points) override {
+    for (stream::Point3& p : points) p = view_.in_view_frame(p);
+  }
 
  private:
-  template <class Id>
-  static std::int32_t id(Id of) {
-    return static_cast<std::int32_t>(tri::slot(of));
+  auto changes() const {
+    return MeshChanges<typename terrain::ViewTriangulation<Shown>::type,
+                       std::function<stream::Point3(tri::VertexId)>>(
+        view_.model(), [this](tri::VertexId v) { return view_.in_view_frame(v); });
   }
-  void add(ViewChange& change, tri::VertexId v) const {
-    change.added_vertices.push_back(id(v));
-    change.added_positions.push_back(view_.in_view_frame(v));
-  }
-  void add(ViewChange& change, tri::TriangleId t) const {
-    if constexpr (kTriangles) {
-      const auto corners = view_.model().triangulation().vertices(t);
-      change.added_triangles.push_back(id(t));
-      change.added_corners.push_back({id(corners[0]), id(corners[1]), id(corners[2])});
-    }
-  }
-  void describe(ViewChange& change) const {
+  ViewChange described(MeshChange&& made) const {
+    ViewChange change{std::move(made)};
     change.settled = view_.settled();
     change.points = view_.model().point_count();
+    return change;
   }
 
   StoreView view_;
@@ -127,13 +118,21 @@ class ViewOf final : public AnyView {
 /// A view that Python's threads may share, and that a fork of the process may not use.
 class SharedView {
  public:
-  SharedView(const OpenStore& open, bool points, bool reads_in_frame, std::size_t max_points)
+  SharedView(const OpenStore& open, const std::string& kind, bool reads_in_frame,
+             const py::dict& given)
       : process_(getpid()), store_(open.get()) {
     tri::ViewOptions options;
-    options.max_points = max_points;
+    take_option(given, "max_points", options.max_points);
+    take_option(given, "max_bytes", options.max_cached_bytes);
+    take_option(given, "collapse_below", options.collapse_below);
+    take_option(given, "guard", options.guard);
+    take_option(given, "silhouette", options.silhouette);
     const py::gil_scoped_release released;
-    if (points) {
+    if (kind == "points") {
       view_ = std::make_unique<ViewOf<tri::PointCloud>>(store_, options, reads_in_frame);
+    } else if (kind == "surface") {
+      using Surface = tri::DynamicSurface<std::int32_t>;
+      view_ = std::make_unique<ViewOf<Surface>>(store_, options, reads_in_frame);
     } else if (store_.schema().grid) {
       view_ = std::make_unique<ViewOf<std::int32_t>>(store_, options, reads_in_frame);
     } else {
@@ -160,14 +159,36 @@ class SharedView {
 
  public:
   py::dict frame(const tri::View& wish, double seconds) {
-    return dict_of(locked([&] { return view_->frame(wish, seconds); }));
+    return dict_of_view(locked([&] { return view_->frame(wish, seconds); }));
   }
   py::dict whole() {
-    return dict_of(locked([&] { return view_->whole(); }));
+    return dict_of_view(locked([&] { return view_->whole(); }));
   }
   py::tuple traffic() {
     const terrain::ViewTraffic read = locked([&] { return view_->traffic(); });
     return py::make_tuple(read.clusters, read.points, read.bytes);
+  }
+  py::dict restore(unsigned threads) {
+    return dict_of_view(locked([&] { return view_->restore(threads); }));
+  }
+  void pin(unsigned level, std::uint64_t number, std::optional<bool> expanded) {
+    const tri::ClusterId cluster = cluster_of(store_, level, number);
+    std::optional<tri::ViewPin> how;
+    if (expanded) how = *expanded ? tri::ViewPin::expanded : tri::ViewPin::collapsed;
+    locked([&] { view_->pin(cluster, how); });
+  }
+  py::array attributes(const Array<std::int32_t>& given) {
+    const auto vertices = numbers_of(given, "vertices");
+    const py::dtype type = attributes_type(store_.schema());
+    if (type.itemsize() == 0) throw py::value_error("the store's points have no attributes");
+    return to_records(locked([&] { return view_->attributes(vertices); }), type);
+  }
+  py::array to_metres(const Array<double>& given) {
+    const auto places = rows_of<3>(given, "points");
+    std::vector<stream::Point3> points;
+    for (const stream::Point3& p : places) points.push_back(stored_point(store_.schema(), p));
+    locked([&] { view_->to_metres(points); });
+    return to_array(std::move(points));
   }
 
  private:
@@ -182,6 +203,10 @@ tri::Point3 point_of(const py::object& given, const char* what) {
   const auto numbers = numbers_of(array, what);
   if (numbers.size() != 3) throw py::value_error(std::string(what) + " has three numbers");
   return {numbers[0], numbers[1], numbers[2]};
+}
+
+tri::Box3 box_of(const std::array<double, 6>& box) {
+  return {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
 }
 
 tri::View view_of(const py::dict& given) {
@@ -199,8 +224,19 @@ tri::View view_of(const py::dict& given) {
   } else if (!given["position"].is_none()) {
     const tri::Pose pose{point_of(given["position"], "position"),
                          point_of(given["direction"], "direction"), point_of(given["up"], "up")};
-    view.camera = tri::perspective_camera(pose, number("fov"), number("width") / number("height"),
-                                          number("height"));
+    const double aspect = number("width") / number("height");
+    view.camera =
+        given["ground_height"].is_none()
+            ? tri::perspective_camera(pose, number("fov"), aspect, number("height"))
+            : tri::orthographic_camera(pose, number("ground_height"), aspect, number("height"));
+  }
+  for (const py::handle focus : given["focus"]) {
+    const auto [box, level] = focus.cast<std::pair<std::array<double, 6>, unsigned>>();
+    view.focuses.push_back({box_of(box), level});
+  }
+  for (const py::handle region : given["regions"]) {
+    const auto [box, error] = region.cast<std::pair<std::array<double, 6>, double>>();
+    view.regions.push_back({box_of(box), error});
   }
   return view;
 }
@@ -209,11 +245,15 @@ tri::View view_of(const py::dict& given) {
 
 void bind_view(py::module_& module) {
   py::class_<SharedView>(module, "SharedView")
-      .def(py::init<const OpenStore&, bool, bool, std::size_t>())
+      .def(py::init<const OpenStore&, const std::string&, bool, const py::dict&>())
       .def("frame", [](SharedView& view, const py::dict& wish,
                        double seconds) { return view.frame(view_of(wish), seconds); })
       .def("whole", &SharedView::whole)
-      .def("traffic", &SharedView::traffic);
+      .def("traffic", &SharedView::traffic)
+      .def("restore", &SharedView::restore)
+      .def("pin", &SharedView::pin)
+      .def("attributes", &SharedView::attributes)
+      .def("to_metres", &SharedView::to_metres);
 }
 
 }  // namespace terrace::python

@@ -4,7 +4,8 @@
 ``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters. From
 a ``Store`` come points, meshes, heights, contours, tiles and live views at any level of detail. Beside
 it stand the methods that it is made of: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
-``linkage``, ``kmeans``, ``cluster``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``.
+``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``;
+and what it reads: ``read_points``, ``write_points``, ``Transformation``.
 
 Long calls release the interpreter's lock, use all cores unless ``threads`` says otherwise, and end soon
 after Ctrl-C. Results depend on the input and the options alone, not on threads or machine.
@@ -27,23 +28,29 @@ Errors: ``ValueError`` for arguments that make no sense, ``TypeError`` for objec
 (True, True)
 """
 
-from ._clustering import Clusters, KMeans, cluster, facility_location, flat_clusters, kmeans, linkage, spanning_tree
+from ._clustering import (ClusterBlock, Clusters, KMeans, cluster, clusters_of_size, entity_distances, facility_location,
+                          flat_clusters, kmeans, linkage, spanning_tree, stream_clusters, tree_linkage)
 from ._core import Error
-from ._delaunay import Delaunay2, Delaunay3, Shape, ellipse, ellipsoid
-from ._matching import Assignment, Matching, assignment, edge_matching, matching
+from ._crs import Transformation
+from ._delaunay import Delaunay2, Delaunay3, DynamicSurface, MeshChanges, Shape, ellipse, ellipsoid
+from ._matching import Assignment, HalvingMatching, Matching, assignment, edge_matching, halving_matching, matching
 from ._mesh import BoundedMesh, Mesh
+from ._points import PointReader, point_batches, read_points, write_points
 from ._raster import Raster
 from ._store import FeatureCollection, Store, build, xyz
 from ._tiles import verify_tiles
-from ._tin import bounded_mesh, interpolate
-from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree
-from ._view import View, ViewDelta
+from ._tin import bounded_mesh, interpolate, simplify_line
+from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree, rotate_tree
+from ._view import MeshDelta, Multiresolution, View, ViewDelta
 
 __version__ = '0.1.0'
 __all__ = [
-    'Assignment', 'BoundedMesh', 'Clusters', 'Delaunay2', 'Delaunay3', 'Error', 'FeatureCollection', 'KMeans',
-    'Matching', 'MatchingTree', 'Mesh', 'PointTree', 'Raster', 'Shape', 'Store', 'TriangleTree', 'View',
-    'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'edge_matching', 'ellipse', 'ellipsoid',
-    'facility_location', 'flat_clusters', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree',
-    'spanning_tree', 'verify_tiles', 'xyz',
+    'Assignment', 'BoundedMesh', 'ClusterBlock', 'Clusters', 'Delaunay2', 'Delaunay3', 'DynamicSurface', 'Error',
+    'FeatureCollection', 'HalvingMatching', 'KMeans', 'Matching', 'MatchingTree', 'Mesh', 'MeshChanges',
+    'MeshDelta', 'Multiresolution', 'PointReader', 'PointTree', 'Raster', 'Shape', 'Store', 'Transformation',
+    'TriangleTree', 'View', 'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'clusters_of_size',
+    'edge_matching', 'ellipse', 'ellipsoid', 'entity_distances', 'facility_location', 'flat_clusters',
+    'halving_matching', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree', 'point_batches',
+    'read_points', 'rotate_tree', 'simplify_line', 'spanning_tree', 'stream_clusters', 'tree_linkage',
+    'verify_tiles', 'write_points', 'xyz',
 ]

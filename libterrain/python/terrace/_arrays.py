@@ -46,6 +46,30 @@ def as_native(array, what):
     return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder('='))
 
 
+def as_numbered(given, what, width=None, least=0, most=2 ** 32 - 2):
+    """Whole numbers in one dimension, or in rows of `width`, as they come. Raises: TypeError, ValueError."""
+    array = as_array(given, what)
+    if array.size == 0:
+        array = np.empty((0,) if width is None else (0, width), np.uint32)
+    if array.dtype.kind not in 'iu':
+        raise TypeError(f'{what} are whole numbers, not {array.dtype}')
+    if array.ndim != (1 if width is None else 2) or width not in (None, array.shape[-1]):
+        raise ValueError(f'{what} must have the shape {"(n,)" if width is None else f"(n, {width})"}, not {array.shape}')
+    if array.size and (array.min() < least or array.max() > most):
+        raise ValueError(f'{what} must be between {least} and {most}')
+    return array
+
+
+def as_labels(labels):
+    """Whole numbers of any size as 0, 1, ..; None as none. Raises: TypeError."""
+    if labels is None:
+        return np.empty(0, np.uint32)
+    labels = as_array(labels, 'labels')
+    if labels.dtype.kind not in 'iu':
+        raise TypeError(f'labels are whole numbers, not {labels.dtype}')
+    return np.unique(labels, return_inverse=True)[1].reshape(labels.shape).astype(np.uint32)
+
+
 def whole(value, what, least=0):
     """A whole number. Raises: TypeError, ValueError."""
     try:

@@ -52,16 +52,29 @@ def _handles(vertices):
     return vertices.astype(np.int32)
 
 
-class _Delaunay:
-    _width = 0
-    _kind = None
-    _elliptical_kind = None
+@dataclass(frozen=True)
+class MeshChanges:
+    """What came and went between two moments. Simplices are told by their corners, numbers of vertices. Apply removals first: a
+    number that is used again is on both sides."""
 
-    def __init__(self, points=None, *, metric=None):
-        self._elliptical = metric is not None
-        self._core = self._elliptical_kind(_map(metric, self._width)) if self._elliptical else self._kind()
-        #: The vertex of each point that was given here.
-        self.ids = np.empty(0, np.int32) if points is None else self.insert(points)
+    added_vertices: np.ndarray
+    removed_vertices: np.ndarray
+    removed_points: np.ndarray  #: where removed_vertices were, in parallel
+    added_simplices: np.ndarray  #: shape (n, 3), or (n, 4) of tetrahedra
+    removed_simplices: np.ndarray
+
+    def __repr__(self):
+        return (f'<terrace.MeshChanges: {len(self.added_vertices)} vertices and {len(self.added_simplices)} simplices came, '
+                f'{len(self.removed_vertices)} and {len(self.removed_simplices)} went>')
+
+
+class _PointMesh:
+    """Vertices that come and go, and simplices between them."""
+
+    _width = 0
+
+    #: The vertex of each point that was given to the constructor.
+    ids = np.empty(0, np.int32)
 
     def insert(self, points):
         """Adds points: shape (n, 2) or (n, 3) of any finite numbers; together is faster than one by one.
@@ -90,6 +103,42 @@ class _Delaunay:
         """Corners of the triangles or tetrahedra, int32: numbers of vertices, so ``points[simplices]`` are their
         coordinates. Counter-clockwise; of tetrahedra a, b, c counter-clockwise seen from d."""
         return self._core.simplices()
+
+    def record(self):
+        """From here on changes() tells what changes; what was recorded before is dropped."""
+        self._core.start_journal()
+
+    def changes(self):
+        """The net MeshChanges since record() or the last call. Raises: ValueError unless record() was called before.
+        O(what changed)."""
+        return MeshChanges(**self._core.take_changes())
+
+    def digest(self):
+        """A hash of the set of simplices by coordinates: equal for equal sets, whatever their history."""
+        return self._core.hash()
+
+    def __len__(self):
+        return self._core.size()
+
+    def __repr__(self):
+        return f'<terrace.{type(self).__name__}: {len(self)} vertices, {self._core.count()} {self._simplices}>'
+
+
+class _Delaunay(_PointMesh):
+    _kind = None
+    _elliptical_kind = None
+
+    def __init__(self, points=None, *, metric=None):
+        self._elliptical = metric is not None
+        self._core = self._elliptical_kind(_map(metric, self._width)) if self._elliptical else self._kind()
+        if points is not None:
+            self.ids = self.insert(points)
+
+    @property
+    def vertex_neighbor_vertices(self):
+        """The vertices joined to each by an edge, as SciPy's: (where those of each number of vertex begin, int64;
+        vertices, int32). In the plane counter-clockwise."""
+        return self._core.adjacent()
 
     @property
     def neighbors(self):
@@ -128,17 +177,6 @@ class _Delaunay:
             checked.append((box[:self._width].tolist(), box[self._width:].tolist(), _map(metric, self._width)))
         return checked
 
-    def digest(self):
-        """A hash of the set of simplices by coordinates: equal for equal point sets, whatever their history."""
-        return self._core.hash()
-
-    def __len__(self):
-        return self._core.size()
-
-    def __repr__(self):
-        kind = {2: 'triangles', 3: 'tetrahedra'}[self._width]
-        return f'<terrace.{type(self).__name__}: {len(self)} vertices, {self._core.count()} {kind}>'
-
 
 class Delaunay2(_Delaunay):
     """The Delaunay triangulation of points in the plane: exact, dynamic, and a function of the point set alone.
@@ -146,8 +184,8 @@ class Delaunay2(_Delaunay):
     Ties of cocircular points are broken by a symbolic perturbation, so a removal after an insertion gives back the very
     triangles. About a microsecond per point. Threads may share one.
 
-    metric: None, or an invertible map of shape (2, 2), such as ellipse(): lengths are those of mapped vectors, and the triangles
-    exactly those of the points mapped without rounding.
+    metric: None, or an invertible map of shape (2, 2), such as ellipse(): lengths are those of mapped vectors, and the
+    triangles exactly those of the points mapped without rounding.
 
     >>> d = Delaunay2([[0, 0], [1, 0], [0, 1], [1, 1]])
     >>> d
@@ -161,9 +199,57 @@ class Delaunay2(_Delaunay):
     True
     """
 
-    _width = 2
+    _width, _simplices = 2, 'triangles'
     _kind = _core.SharedDelaunay2
     _elliptical_kind = _core.EllipticalDelaunay2
+
+    @classmethod
+    def of_grid(cls, columns, rows, origin=(0.0, 0.0), step=1.0):
+        """The triangulation of a complete grid, written directly: O(n). The vertex of column i and row j is j * columns + i.
+
+        origin: of column 0 and row 0; step: between neighbours, positive, also to the next row, to +y. Raises:
+        ValueError unless doubles hold all coordinates exactly.
+
+        >>> Delaunay2.of_grid(3, 2)
+        <terrace.Delaunay2: 6 vertices, 4 triangles>
+        """
+        x, y = map(float, origin)
+        made = cls()
+        columns, rows = whole(columns, 'columns'), whole(rows, 'rows')
+        if columns * rows > 2 ** 29:
+            raise ValueError('a triangulation has at most 2^29 vertices')
+        first = made._core.build_grid(x, y, float(step), columns, rows)
+        made.ids = np.arange(first, first + columns * rows, dtype=np.int32) if columns * rows else made.ids
+        return made
+
+    def weights(self, places, method='linear'):
+        """The weights of the vertices that interpolate at places: heights() is their sum of products with values.
+
+        places, method: as of heights(). Returns: (weights, float64; vertices, int32; where those of each place begin,
+        int64): the data of a ``scipy.sparse.csr_matrix`` of shape (len(places), len(points)). Weights are not negative
+        and add up to 1; outside the hull there are none, but for 'nearest'. Raises: ValueError. Source: R. Sibson,
+        1980.
+
+        >>> d = Delaunay2([[0, 0], [1, 0], [0, 1]])
+        >>> weights, vertices, begins = d.weights([[0.25, 0.5], [9, 9]])
+        >>> weights @ d.points[vertices], begins
+        (array([0.25, 0.5 ]), array([0, 3, 3]))
+        """
+        return _core.weights_at(self._euclidean(), as_rows(places, 'places', (2,)), method)
+
+    def vertical_distances(self, values, samples, method='linear', *, threads=None):
+        """How far samples that are not in the triangulation lie above or below its surface.
+
+        values, method: as of heights(). samples: shape (n, 3). Returns: a dict: count (of those measured), outside (the
+        hull, or where a height is NaN), max, mean and rms of distances without sign, bias (the mean of sample minus
+        surface), worst (the sample at ``max``, -1 for none). Raises: ValueError.
+
+        >>> d = Delaunay2([[0, 0], [1, 0], [0, 1]])
+        >>> d.vertical_distances(d.by_vertex([1, 2, 3]), [[0.25, 0.5, 3]])['bias']
+        0.75
+        """
+        return _core.vertical_distances(self._euclidean(), as_numbers(values, 'values'), as_rows(samples, 'samples', (3,)), method,
+                                        _threads(threads))
 
     def heights(self, values, places, method='linear', *, threads=None):
         """Heights at places between vertices.
@@ -195,12 +281,20 @@ class Delaunay2(_Delaunay):
         return _core.smooth(self._euclidean(), as_numbers(values, 'values'), None if vertices is None else _handles(vertices),
                             method, whole(iterations, 'iterations'), float(strength), float(pass_band), float(edge_height))
 
-    def quality(self, values, datum=0.0):
+    def quality(self, values, datum=0.0, *, bins=16):
         """Angles (degrees) and edges in the plane, areas, and the volumes between the surface and ``datum``.
 
         values: as of heights(). Returns: a dict: triangles, min_angle, mean_min_angle, max_aspect, mean_aspect, edges,
-        min_edge, max_edge, mean_edge, area, surface_area, volume_above, volume_below."""
-        return _core.mesh_quality(self._euclidean(), as_numbers(values, 'values'), float(datum))
+        min_edge, max_edge, mean_edge, edge_histogram (counts in ``bins`` equal intervals from min_edge to max_edge),
+        area, surface_area, volume_above, volume_below."""
+        return _core.mesh_quality(self._euclidean(), as_numbers(values, 'values'), float(datum), whole(bins, 'bins', 1))
+
+    def triangle_quality(self, values, datum=0.0):
+        """The same of each triangle, in the order of simplices. Returns: a structured array: min_angle (degrees),
+        aspect (1 for an equilateral triangle, otherwise larger), area, surface_area, volume_above, volume_below."""
+        made = _core.triangle_quality(self._euclidean(), as_numbers(values, 'values'), float(datum))
+        names = ('min_angle', 'aspect', 'area', 'surface_area', 'volume_above', 'volume_below')
+        return made.view([(name, 'f8') for name in names]).reshape(-1)
 
     def adapted(self, regions):
         """The triangles after flips of edges to suit a metric in each region.
@@ -218,8 +312,8 @@ class Delaunay2(_Delaunay):
 @dataclass(frozen=True)
 class Shape:
     """The inside of a shape and its surface. tetrahedra: int32, shape (k, 4), and surface: a Mesh over
-    ``Delaunay3.points``, counter-clockwise seen from outside. volume: of the tetrahedra. open: lids were left out of the surface.
-    components, euler_characteristic: of the surface; 2 for a sphere, 0 for a torus."""
+    ``Delaunay3.points``, counter-clockwise seen from outside. volume: of the tetrahedra. open: lids were left out of
+    the surface. components, euler_characteristic: of the surface; 2 for a sphere, 0 for a torus."""
 
     tetrahedra: np.ndarray
     surface: Mesh
@@ -240,7 +334,7 @@ class Delaunay3(_Delaunay):
     <terrace.Delaunay3: 4 vertices, 1 tetrahedra>
     """
 
-    _width = 3
+    _width, _simplices = 3, 'tetrahedra'
     _kind = _core.SharedDelaunay3
     _elliptical_kind = _core.EllipticalDelaunay3
 
@@ -250,15 +344,54 @@ class Delaunay3(_Delaunay):
         metric although no flip is possible)."""
         return self._euclidean().adapted(self._regions(regions))
 
-    def shape(self, rule='poles', *, lids=False, threads=None):
+    def shape(self, rule='poles', *, criterion='gabriel', edge_factor=0.5, keep_vertices=True, lids=False, threads=None):
         """The shape from whose surface the points were scanned: which tetrahedra are inside, and their surface.
 
-        rule: 'poles', by angles between circumspheres, for samples of any density; 'flood' and 'published' peel from the
-        hull. lids: whether what closes an open scan is part of the surface. Returns: a Shape, empty if there are no
-        tetrahedra. Raises: ValueError. About 0.3 s per 100,000 points. Source: J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
+        rule: 'poles', by angles between circumspheres, for samples of any density; 'flood' and 'published' peel from
+        the hull where facets do not meet the ``criterion``: 'gabriel', or 'edge-length' with ``edge_factor``; no vertex
+        then loses all its tetrahedra unless ``keep_vertices`` is false. lids: whether what closes an open scan is part
+        of the surface. Returns: a Shape, empty if there are no tetrahedra. Raises: ValueError. About 0.3 s per 100,000
+        points. Source: J. Skala, section 8.3; N. Amenta, M. Bern, 1999.
 
         >>> Delaunay3([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).shape('flood')
         <terrace.Shape: 1 tetrahedra, 4 triangles, volume 0.166667>
         """
-        tetrahedra, faces, *rest = _core.shape(self._core, rule, bool(lids), _threads(threads))
+        tetrahedra, faces, *rest = _core.shape(self._core, rule, criterion, float(edge_factor), bool(keep_vertices), bool(lids),
+                                              _threads(threads))
         return Shape(tetrahedra, Mesh(self.points, faces), *rest)
+
+
+class DynamicSurface(_PointMesh):
+    """The surface from which a changing set of points in space was scanned, by the poles rule of Delaunay3.shape():
+    ``simplices`` are its triangles, counter-clockwise seen from outside.
+
+    It follows insertions and removals, about 12 us per point, where tetrahedra are new; restore() computes it afresh.
+    Closed: open scans have lids. Threads may share one. Raises: ValueError. Source: J. Skala, section 8.3; N. Amenta,
+    M. Bern, 1999.
+
+    >>> angles, heights = np.random.default_rng(1).random((2, 500))
+    >>> radii = np.sqrt(1 - (2 * heights - 1) ** 2)
+    >>> ball = DynamicSurface(np.column_stack((radii * np.cos(7 * angles), radii * np.sin(7 * angles), 2 * heights - 1)))
+    >>> ball.remove(ball.ids[:50])
+    >>> ball.mesh().measures()['euler_characteristic']
+    2
+    """
+
+    _width, _simplices = 3, 'triangles'
+
+    def __init__(self, points=None):
+        self._core = _core.SharedSurface()
+        if points is not None:
+            self.ids = self.insert(points)
+
+    def restore(self, *, threads=None):
+        """Computes the surface from scratch, as of a new object of the same points; 3 us per vertex."""
+        self._core.restore(_threads(threads))
+
+    def mesh(self):
+        """The surface as a Mesh of its own."""
+        used, corners = np.unique(self.simplices, return_inverse=True)
+        return Mesh(self.points[used], corners.reshape(-1, 3).astype(np.uint32))
+
+    def _repr_svg_(self):
+        return self.mesh()._repr_svg_()

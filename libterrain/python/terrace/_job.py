@@ -16,15 +16,14 @@ class _Line:
         self._written = False
 
     def __call__(self, what, count, fraction, ended):
-        if ended:
-            if self._written:
-                sys.stderr.write('\n')
-            self._written = False
+        if ended and not self._written:
             return
         share = f'{100 * fraction:3.0f} % ' if fraction > 0 else ''
         sys.stderr.write(f'\r{share}{count:,} {what}   ')
+        if ended:
+            sys.stderr.write('\n')
         sys.stderr.flush()
-        self._written = True
+        self._written = not ended
 
 
 class _Bars:
@@ -34,18 +33,22 @@ class _Bars:
         self._tqdm, self._bar, self._what = tqdm, None, None
 
     def __call__(self, what, count, fraction, ended):
-        if ended or what != self._what:
-            if self._bar is not None:
-                self._bar.close()
-            self._bar = self._what = None
-        if ended:
-            return
-        if self._bar is None:
+        if what != self._what:
+            self._close()
+            if ended:
+                return
             self._bar, self._what = self._tqdm(unit=' ' + what, unit_scale=True), what
         if fraction > 0:
             self._bar.total = max(count, round(count / fraction))
         self._bar.n = count
         self._bar.refresh()
+        if ended:
+            self._close()
+
+    def _close(self):
+        if self._bar is not None:
+            self._bar.close()
+        self._bar = self._what = None
 
 
 def _shown_progress():
@@ -59,7 +62,7 @@ def _shown_progress():
 def job(progress=None, threads=None, memory=None):
     """What the compiled half takes. progress: None, True for a bar, or
     called as progress(what, count, fraction, ended): what is counted, how many so far, the share that is done
-    (0: not known), and whether this is the last call."""
+    (0: not known), and whether this is the last call of what is counted."""
     if progress is True:
         progress = _shown_progress()
     elif progress is False:

@@ -6,7 +6,7 @@ import os
 import numpy as np
 
 from . import _core
-from ._arrays import as_array, as_rows
+from ._arrays import as_numbered, as_rows
 from ._pictures import light, triangles_svg
 
 
@@ -23,6 +23,14 @@ class Mesh:
     def __iter__(self):
         return iter((self.vertices, self.triangles))
 
+    @classmethod
+    def read(cls, path):
+        """The triangles of a file: .ply, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without
+        triangles; OSError; Error."""
+        path = os.fspath(path)
+        with open(path, 'rb'):  # what is not there is an error of the system
+            return Mesh(*_core.read_mesh(path))
+
     def save(self, path, replace=False):
         """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk, whole or not at all; or .svg, a picture from above."""
         path = os.fspath(path)
@@ -30,12 +38,34 @@ class Mesh:
             with open(path, 'w' if replace else 'x', encoding='ascii') as file:
                 file.write(self._svg(len(self.triangles)))
             return
-        triangles = as_array(self.triangles, 'triangles')
-        if triangles.dtype.kind not in 'iu':
-            raise TypeError(f'triangles are whole numbers, not {triangles.dtype}')
-        if triangles.size and (triangles.min() < 0 or triangles.max() >= len(self.vertices)):
-            raise ValueError('triangles have corners that are no vertices')
-        _core.write_mesh(path, as_rows(self.vertices, 'vertices', (3,)), triangles, bool(replace))
+        _core.write_mesh(path, *self._parts(), bool(replace))
+
+    def _parts(self):
+        vertices = as_rows(self.vertices, 'vertices', (3,))
+        return vertices, as_numbered(self.triangles, 'triangles', 3, most=len(vertices) - 1)
+
+    def measures(self):
+        """A dict: faces, vertices (with a face), edges, area, volume (enclosed, negative inside out), components,
+        euler_characteristic (2 for a sphere, 2 less for each handle), border_edges, non_manifold_edges, closed. Raises:
+        ValueError. O(n log n)."""
+        return _core.measure(*self._parts())
+
+    def turned_outward(self):
+        """The same mesh with components of negative volume turned inside out. Raises: ValueError."""
+        return Mesh(self.vertices, _core.turned_outward(*self._parts()), self.levels)
+
+    def errors(self, samples):
+        """Vertical distances of samples from the mesh, whose triangles must not overlap seen from above.
+
+        samples: shape (n, 3). Returns: a dict: samples, uncovered (on no triangle: not measured), max_error, rms_error,
+        worst (the sample with the largest error, -1 for none). Raises: ValueError. O(n).
+
+        >>> flat = Mesh(np.array([[0., 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
+        >>> flat.errors([[0.2, 0.2, 3], [1, 1, 0]])
+        {'max_error': 3.0, 'rms_error': 3.0, 'samples': 2, 'uncovered': 1, 'worst': 0}
+        """
+        columns = np.ascontiguousarray(as_rows(samples, 'samples', (3,)).T)
+        return _core.measure_surface(*columns, *self._parts())
 
     def area(self):
         """Of the surface, in square units of its coordinates."""

@@ -10,10 +10,9 @@ from ._pictures import grey_png
 class Raster:
     """Samples on a grid, NaN where there are none.
 
-    values: float32, as the GeoTIFF has them, or uint8 (hillshade); shape (rows, columns). transform: six numbers a, b, c, d, e, f from
-    columns and rows of the cells' *corners* to x and y, as rasterio's and GDAL's affine transforms. crs: 'EPSG:n' or WKT, None if it is
-    not known.
-    """
+    values: float32, as the GeoTIFF has them, or uint8 (hillshade); shape (rows, columns). transform: six numbers a, b,
+    c, d, e, f from columns and rows of the cells' *corners* to x and y, as rasterio's and GDAL's affine transforms.
+    crs: 'EPSG:n' or WKT, None if it is not known. """
 
     def __init__(self, values, transform, crs):
         self.values, self.transform, self.crs = values, transform, crs

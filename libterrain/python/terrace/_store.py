@@ -20,7 +20,7 @@ from ._sources import crs_text, source_of
 _BUILD_OPTIONS = {
     'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
     'outlier_price', 'band', 'cell', 'seed', 'datum_shift', 'where', 'keep', 'drop', 'resolution', 'metric',
-    'region', 'effort', 'order', 'entities',
+    'region', 'effort', 'order', 'entities', 'method', 'heights_of_colour',
 }
 _TILE_OPTIONS = {
     'name', 'max_error', 'geoid', 'flat_height', 'water', 'water_height', 'normals', 'metadata', 'gzip', 'resume',
@@ -28,7 +28,7 @@ _TILE_OPTIONS = {
 }
 
 
-def _checked(options, known, function):
+def checked(options, known, function):
     for name in options:
         if name not in known:
             raise TypeError(f'{function}() has no option {name!r}; it has {", ".join(sorted(known))}')
@@ -45,9 +45,9 @@ def xyz(points):
     return np.lib.stride_tricks.as_strided(points['x'], (len(points), 3), (points.strides[0], 8))
 
 
-def _real_values(records, info):
+def real_values(records, attributes):
     """Attributes that are stored with a scale or offset, as real values (float64), like files written of them."""
-    scaled = {a['name']: a for a in info['attributes'] if a['scale'] != 1 or a['offset'] != 0}
+    scaled = {a['name']: a for a in attributes if a['scale'] != 1 or a['offset'] != 0}
     if not scaled:
         return records
     kind = [(name, 'f8' if name in scaled else records.dtype[name]) for name in records.dtype.names]
@@ -58,6 +58,10 @@ def _real_values(records, info):
             real[name] *= scaled[name]['scale']
             real[name] += scaled[name]['offset']
     return real
+
+
+def _smoothing(method='laplacian', iterations=10, strength=0.5, pass_band=0.1, edge_height=0.0):
+    return method, whole(iterations, 'iterations'), float(strength), float(pass_band), float(edge_height)
 
 
 def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=None, progress=None, threads=None,
@@ -84,11 +88,12 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
 
     Options: ``replace`` an existing store; ``where`` ('classification == 2'), ``region`` (box, polygons), ``keep``,
     ``drop`` (names of attributes) say what is read; ``block_points`` (10000) are clustered together, at
-    ``facility_cost`` (3.0, times a block's diagonal), with ``effort`` 'fast', 'default', 'fine' or 'full',
-    ``z_weight`` of heights, a ``metric`` ('euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'), ``channels``
-    (pairs of an attribute and metres per unit) and ``outlier_price``; ``order`` 'auto', 'stream' or 'spatial';
-    ``vertical`` 'ellipsoidal' or 'orthometric'; ``seed``; of files ``input_format``, ``entities``, ``skip_damaged``,
-    ``band``, ``cell``, ``resolution``, ``datum_shift``.
+    ``facility_cost`` (3.0, times a block's diagonal), with ``effort`` 'fast', 'default', 'fine' or 'full', ``z_weight``
+    of heights, a ``metric`` ('euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'), ``channels`` (pairs of an
+    attribute and metres per unit) and ``outlier_price``, by a ``method`` of cluster(); ``order`` 'auto', 'stream' or
+    'spatial'; ``vertical`` 'ellipsoidal' or 'orthometric'; ``seed``; of files ``input_format``, ``entities``,
+    ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` ('mapbox', 'terrarium'), ``resolution``,
+    ``datum_shift``.
 
     progress: None, True for a bar (tqdm's where it is), or a function called as progress(what, count, fraction,
     ended). threads: all cores unless given. memory: bytes, 256 MiB unless given. The store depends on the source,
@@ -106,7 +111,7 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     ...         print(len(store.points(where='class == 3')))
     400
     """
-    given = _checked(options, _BUILD_OPTIONS, 'build')
+    given = checked(options, _BUILD_OPTIONS, 'build')
     if 'region' in given:
         given['region'] = as_region(given['region'])
     source, text = source_of(sources, transform, crs, nodata, attributes)
@@ -209,29 +214,61 @@ class Store:
         Returns: a structured array: x, y, z (float64), then the attributes with their types (float64 where they have
         a scale). ``xyz()`` gives its coordinates as an array (n, 3). Order: coarser levels first.
         """
-        focuses = self._focuses(focus)
-        if cluster is not None:
-            if region is not None or focuses:
-                raise ValueError('points() takes either `cluster` or `region` and `focus`')
-            cluster = tuple(whole(number, 'cluster') for number in cluster)
-            if len(cluster) != 2:
-                raise ValueError('`cluster` is a pair of its level and its number there')
+        focus = list(focus)
+        focuses, cluster = self._focuses(focus), self._cluster(cluster, region, focus)
         if level is None:
             level = cluster[0] if cluster else 0
         records = self._core.points(whole(level, 'level'), as_region(region), focuses, where or '', cluster,
                                     (crs_text(crs) or ''), job(progress, threads))
-        return _real_values(records, self._info)
+        return real_values(records, self._info['attributes'])
+
+    @staticmethod
+    def _cluster(cluster, region, focus):
+        if cluster is None:
+            return None
+        if region is not None or len(focus):
+            raise ValueError('give either `cluster` or `region` and `focus`')
+        cluster = tuple(whole(number, 'cluster') for number in cluster)
+        if len(cluster) != 2:
+            raise ValueError('`cluster` is a pair of its level and its number there')
+        return cluster
 
     @staticmethod
     def _focuses(focus):
         return [(as_region(place), whole(level, 'level')) for place, level in focus]
 
-    def query(self, *, box=None, near=None, k=None, radius=None, level=0):
+    def clusters(self, level=0, *, progress=None, threads=None):
+        """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS that
+        hold all points below, a little more than they need), error (metres; no point below is farther from the
+        representative), descendants (points of level 0 below), members. The number of a row is that of
+        ``points(cluster=(level, number))``."""
+        made = self._core.clusters(whole(level, 'level'), job(progress, threads))
+        return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
+
+    def count(self, box):
+        """The number of points in a box of four or six numbers, of which only the border is read. Points within
+        rounding of the border may count or not. Raises: ValueError for a rotated raster."""
+        box = as_region(box)
+        if not isinstance(box, tuple):
+            raise ValueError('count() takes a box')
+        return self._core.count(box)
+
+    def own_region(self, region, crs):
+        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon, with so many corners that
+        outlines are within a millionth of their length; without the heights of a box. Raises: Error where nothing leads
+        from there."""
+        text = crs_text(crs)
+        if region is None or text is None:
+            raise ValueError('own_region() needs a region and its CRS')
+        polygons = _core.own_region(self._core, as_region(region), text)
+        return {'type': 'MultiPolygon', 'coordinates': [[ring + ring[:1] for ring in polygon] for polygon in polygons]}
+
+    def query(self, *, box=None, near=None, k=None, radius=None, level=0, where=''):
         """The points in a box, or near a place: the ``k`` nearest, or all within a ``radius`` in metres.
 
         near: (x, y) or (x, y, z) in the store's CRS; without z heights do not count in distances, which are in metres
-        on the ground. Returns: a structured array as points() does; near a place the nearest first, with a field
-        ``distance``.
+        on the ground. where: a condition as in points(). Returns: a structured array as points() does; near a place
+        the nearest first, with a field ``distance``.
         """
         if (box is None) == (near is None):
             raise ValueError('query() needs either `box` or `near`')
@@ -239,13 +276,13 @@ class Store:
         if box is not None:
             if k is not None or radius is not None:
                 raise ValueError('`k` and `radius` go with `near`')
-            return self.points(region=box, level=level)
+            return self.points(region=box, level=level, where=where)
         if (k is None) == (radius is None):
             raise ValueError('`near` needs either `k` or `radius`')
         place = [float(number) for number in near]
         if k is not None:
             k = whole(k, 'k')
-        return _real_values(self._core.near(place, k, radius, level), self._info)
+        return real_values(self._core.near(place, k, radius, level, where), self._info['attributes'])
 
     def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):
         return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, whole(level, 'level'), max_edge, (crs_text(crs) or ''),
@@ -320,21 +357,34 @@ class Store:
             notes.info('contours are in the store\'s own x and y: nothing leads from its CRS to WGS 84')
         return FeatureCollection(json.loads(text))
 
-    def mesh(self, level=None, region=None, *, focus=(), where=None, metric='euclidean', crs=None, max_points=None,
-             progress=None, threads=None, memory=None):
+    def mesh(self, level=None, region=None, *, focus=(), where=None, cluster=None, metric='euclidean', crs=None, max_points=None,
+             smoothing=None, overlay=None, save_overlay=None, replace=False, progress=None, threads=None, memory=None):
         """The Delaunay triangulation of a level, with finer detail in focuses.
 
-        level: by default the finest of at most ``max_points`` (100,000). region, focus, where, crs: as points(); the
-        triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow it.
+        level: by default the finest of at most ``max_points`` (100,000). region, focus, where, cluster, crs: as
+        points(); the triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow
+        it. smoothing: a method of Delaunay2.smooth(), or a dict of ``method`` and its options; with a region inside it
+        only. overlay: a file of other heights, which ``save_overlay`` writes: those that are not the store's, which
+        never changes; with ``replace`` over what is there.
 
         Returns: a Mesh, which unpacks as (vertices, triangles).
         """
+        focus = list(focus)
+        cluster = self._cluster(cluster, region, focus)
+        if level is None and cluster is not None and max_points is None:
+            level = cluster[0]
         if level is None:
             level = self.level_within(100_000 if max_points is None else max_points)
         elif max_points is not None:
             raise ValueError('mesh() takes either `level` or `max_points`')
-        return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '',
-                                metric, (crs_text(crs) or ''), job(progress, threads, memory)))
+        heights = {'replace': bool(replace)}
+        if smoothing is not None:
+            heights['smoothing'] = _smoothing(**({'method': smoothing} if isinstance(smoothing, str) else smoothing))
+        for name, path in (('overlay', overlay), ('save', save_overlay)):
+            if path is not None:
+                heights[name] = os.fspath(path)
+        return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '', cluster,
+                                metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
 
     def lines(self, level=0, region=None, where=None, *, focus=(), progress=None, threads=None, memory=None):
         """The lines of a store that was built with ``entities`` 'segments' or 'polylines', of mixed levels of detail.
@@ -406,7 +456,7 @@ class Store:
 
         Returns: a dict: tiles, bytes, made, kept, removed, zooms (zoom, tiles, max_error).
         """
-        given = _checked(options, _TILE_OPTIONS, 'tiles')
+        given = checked(options, _TILE_OPTIONS, 'tiles')
         if zooms is not None:
             given['first_zoom'], given['last_zoom'] = (whole(zoom, 'zooms') for zoom in zooms)
         return _core.write_tiles(self._core, os.fspath(folder), given, job(progress, threads, memory))

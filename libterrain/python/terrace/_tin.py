@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from . import _core
-from ._arrays import as_rows, whole
+from ._arrays import as_numbers, as_rows, whole
 from ._delaunay import Delaunay2
 from ._mesh import BoundedMesh
 from ._sources import source_of
@@ -16,17 +16,21 @@ def _values(column):
     return np.ascontiguousarray(column['array'] * column['scale'] + column['offset'], dtype=np.float64)
 
 
-def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal', duplicates='all', transform=None, nodata=None):
+def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal', duplicates='all', min_angle=5.0, frame=None, transform=None,
+                 nodata=None):
     """The mesh with few triangles that is within ``max_error`` of every sample, verified on each, or the best of at
     most ``max_points`` vertices: of an array, without a store.
 
     samples: points or a raster in memory, as build() takes them: shape (n, 3), or (rows, columns) with ``transform``, a
-    Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN and
-    ``nodata`` in it are no samples. quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time.
-    duplicates: which of several points at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'.
+    Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN
+    and ``nodata`` in it are no samples. quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more
+    time. duplicates: which of several points at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. For
+    points: ``min_angle``, degrees, below which removal makes no triangle; frame: shape (k, 3), a convex polygon,
+    counter-clockwise, in place of their hull, kept exactly; points outside do not count.
 
-    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us per vertex inserted.
-    Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than memory.
+    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us
+    per vertex inserted. Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than
+    memory.
 
     >>> y, x = np.mgrid[0:60, 0:80]
     >>> mesh = bounded_mesh(20 * np.sin(x / 9) * np.cos(y / 7), 0.5, transform=(10, 0, 0, 0, -10, 0))
@@ -43,7 +47,10 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
     if isinstance(source, list):
         raise TypeError('bounded_mesh() takes arrays; build() takes files')
     if 'columns' in source:
-        return BoundedMesh(*_core.tin_of_points(*map(_values, source['columns']), bound, most, quality, duplicates))
+        frame = np.empty((0, 3)) if frame is None else as_rows(frame, 'frame', (3,))
+        return BoundedMesh(*_core.tin_of_points(*map(_values, source['columns']), bound, most, quality, duplicates, float(min_angle), frame))
+    if frame is not None:
+        raise ValueError('`frame` is for points')
     a, b, c, d, e, f = source['transform']
     if b != 0 or d != 0:
         raise ValueError('the raster is rotated: build a store of it, or give points')
@@ -74,3 +81,18 @@ def interpolate(samples, places, method='linear', *, threads=None):
     samples = as_rows(samples, 'samples', (3,))
     mesh = Delaunay2(samples[:, :2])
     return mesh.heights(mesh.by_vertex(samples[:, 2]), places, method, threads=threads)
+
+
+def simplify_line(t, heights, max_error):
+    """A chain of few of the samples along a line within ``max_error`` of each: the ends, then the sample of greatest
+    error, and so on.
+
+    t: positions along the line, ascending, shape (n,); of equal ones the first counts. heights: one for each. Returns:
+    (the samples that are kept, int64, ascending; the largest error). It depends on these samples alone, so both sides
+    of a border get the same chain. Usually O(n log n). Raises: ValueError. Source: D. Douglas, T. Peucker, 1973, with
+    vertical distances.
+
+    >>> simplify_line([0, 1, 2, 3], [0, 0.1, 0, 5], 0.5)
+    (array([0, 2, 3]), 0.1)
+    """
+    return _core.simplify_line(as_numbers(t, 't'), as_numbers(heights, 'heights'), float(max_error))

@@ -87,6 +87,141 @@ class Linkage(unittest.TestCase):
                          {tuple(sorted(edge)) for edge in zip(expected.row.tolist(), expected.col.tolist())})
 
 
+    def test_of_edges_of_a_tree_and_of_candidates(self):
+        points = np.random.default_rng(16).random((300, 2))
+        expected = hierarchy.linkage(points, 'single')
+        edges, lengths = terrace.spanning_tree(points)
+        shuffled = np.random.default_rng(17).permutation(len(edges))
+        triangulation = terrace.Delaunay2(points)
+        number = triangulation.by_vertex(np.arange(300))
+        sides = number[triangulation.simplices[:, [0, 1, 1, 2, 2, 0]]].astype(int).reshape(-1, 2)
+        for made in (terrace.tree_linkage(edges[shuffled], lengths[shuffled]), terrace.linkage(points, edges=sides)):
+            np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
+            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-12)
+        self.assertEqual(terrace.tree_linkage([], []).shape, (0, 4))
+        for wrong in (lambda: terrace.tree_linkage([[0, 1], [1, 0]], [1, 1]), lambda: terrace.tree_linkage([[0, 1]], [1, 2]),
+                      lambda: terrace.tree_linkage([[0, 9]], [1]), lambda: terrace.tree_linkage([[0, 1]], [np.nan]),
+                      lambda: terrace.linkage(points, edges=[[0, 1]]), lambda: terrace.linkage(points, edges=[[0, 300]]),
+                      lambda: terrace.linkage(points, 'complete', edges=edges), lambda: terrace.linkage(pdist(points), 'complete', edges=edges)):
+            with self.assertRaises(ValueError):
+                wrong()
+        with self.assertRaises(TypeError):
+            terrace.tree_linkage([[0.0, 1.0]], [1])
+
+    def test_the_matrix_of_complete_linkage(self):
+        points = np.random.default_rng(18).random((200, 3))
+        exact, rounded = (terrace.linkage(points, 'complete', single_precision=single) for single in (False, True))
+        np.testing.assert_allclose(rounded[:, 2], exact[:, 2], rtol=1e-6)
+        self.assertTrue((rounded[:, 2] != exact[:, 2]).any())
+        with self.assertRaisesRegex(ValueError, '160000'):
+            terrace.linkage(points, 'complete', memory=1000)
+        try:
+            np.testing.assert_allclose(terrace.linkage(points, 'complete', gpu=True)[:, 2], exact[:, 2])
+        except RuntimeError as error:
+            self.assertRegex(str(error), 'CUDA|GPU')
+
+
+class Streams(unittest.TestCase):
+    """The hierarchy of blocks, by its definition."""
+
+    def check(self, batches, **options):
+        blocks = []
+        made = terrace.stream_clusters(batches, blocks.append, **options)
+        rows = np.concatenate(batches)
+        fields = [name for name in rows.dtype.names or () if name not in 'xyz']
+        places = np.column_stack([rows[axis] for axis in 'xyz']) if rows.dtype.names else rows
+        tops = {0: np.arange(len(rows))}
+        below, error = {}, {}  # what each cluster stands for
+        counts = [0] * (made['top'] + 1)
+        by_place = {tuple(place): at for at, place in enumerate(places)}
+        seen = []
+        for block in sorted(blocks, key=lambda block: (block.level, block.number)):
+            ids = [by_place[tuple(place)] for place in block.points]
+            if fields:
+                for name in fields:
+                    np.testing.assert_array_equal(block.values[name], rows[name][ids])
+            self.assertEqual(block.children.shape, (len(ids), block.level))
+            for c, (first, last) in enumerate(zip(block.first, block.first[1:])):
+                members = block.order[first:last]
+                stands = []
+                for member in members:
+                    stands += below[block.level - 1, block.children[member, -1]] if block.level else [ids[member]]
+                below[block.level, counts[block.level]] = stands
+                counts[block.level] += 1
+                np.testing.assert_array_equal(block.boxes[c], np.concatenate((places[stands].min(axis=0), places[stands].max(axis=0))))
+                self.assertEqual(block.descendants[c], len(stands))
+                head = block.representatives[c]
+                if head >= 0:
+                    self.assertIn(head, members)
+                    farthest = np.linalg.norm(places[stands] - places[ids[head]], axis=1).max()
+                    self.assertLessEqual(farthest, block.errors[c] * (1 + 1e-12))
+                seen += [ids[member] for member in members if member != head]
+        self.assertEqual(sorted(seen), sorted(tops[0]))  # each point ends in one place
+        self.assertEqual((made['points'], made['level_clusters']), (len(rows), counts))
+        return blocks
+
+    def test_is_a_hierarchy(self):
+        random = np.random.default_rng(20)
+        batches = [random.random((700, 3)) + [i % 4, i // 4, 0] for i in range(12)]
+        blocks = self.check(batches, block_points=500)
+        again = self.check(batches, block_points=500, threads=1)
+        self.assertGreater(max(block.level for block in blocks), 0)
+        key = lambda block: (block.level, block.number)  # noqa: E731
+        for one, other in zip(sorted(blocks, key=key), sorted(again, key=key)):
+            np.testing.assert_array_equal(one.order, other.order)
+            np.testing.assert_array_equal(one.points, other.points)
+        self.assertIn('clusters of', repr(blocks[0]))
+
+    def test_fields_travel(self):
+        records = np.zeros(3000, [('x', 'f8'), ('y', 'f4'), ('z', 'i4'), ('class', 'u1'), ('name', 'S3')])
+        random = np.random.default_rng(21)
+        records['x'], records['y'], records['z'] = random.random(3000), random.random(3000), np.arange(3000)
+        records['class'], records['name'] = np.arange(3000) % 7, b'abc'
+        self.check(np.split(records, 3), block_points=400, facility_cost=1.0, effort='fast')
+
+    def test_misuse(self):
+        points = np.random.default_rng(22).random((900, 3))
+        self.assertEqual(terrace.stream_clusters([], lambda block: None)['points'], 0)
+
+        class Enough(Exception):
+            pass
+
+        def raising(*_):
+            raise Enough
+
+        def broken():
+            yield points
+            raise Enough
+
+        for batches, sink in (([points] * 9, raising), (broken(), lambda block: None)):
+            with self.assertRaises(Enough):
+                terrace.stream_clusters(batches, sink, block_points=100)
+        for wrong, options, kind in (([points, points[:, :2] * np.nan], {}, ValueError), ([[1, 2]], {}, ValueError),
+                                     ([points], {'block_points': 1}, ValueError), ([points], {'facility_cost': 0}, ValueError),
+                                     ([points], {'metric': 'far'}, ValueError), ([points, np.zeros(2, [('x', 'f8')])], {}, ValueError),
+                                     ([np.zeros(2, [('x', 'f8'), ('y', 'f8'), ('z', 'f8'), ('o', object)])], {}, TypeError),
+                                     ([np.zeros(2, [('x', 'f8')])], {}, ValueError), ([['a']], {}, TypeError), (3, {}, TypeError)):
+            with self.subTest(repr(options)):
+                with self.assertRaises(kind):
+                    terrace.stream_clusters(wrong, lambda block: None, **options)
+        with self.assertRaises(TypeError):
+            terrace.stream_clusters([points], None)
+
+    def test_clusters_of_size(self):
+        points = np.random.default_rng(23).random((30000, 2))
+        seen = []
+        labels = terrace.clusters_of_size(points, 80, progress=lambda *at: seen.append(at))
+        sizes = np.bincount(labels)
+        self.assertTrue(sizes.min() > 0 and 40 < sizes.mean() < 160)
+        spread = [np.ptp(points[labels == label], axis=0).max() for label in range(0, len(sizes), 20)]
+        self.assertLess(np.median(spread), 0.2)
+        self.assertEqual(seen[-1], ('points', 30000, 1.0, True))
+        np.testing.assert_array_equal(labels, terrace.clusters_of_size(points, 80, threads=1))
+        self.assertEqual(terrace.clusters_of_size(np.zeros((0, 2)), 5).shape, (0,))
+        with self.assertRaises(ValueError):
+            terrace.clusters_of_size([[np.nan, 0]], 5)
+
+
 class KMeans(unittest.TestCase):
     @settings(max_examples=40, deadline=None, derandomize=True)
     @given(some_points(80, width=3, least=5), st.integers(1, 5))
@@ -191,6 +326,62 @@ class Facilities(unittest.TestCase):
             terrace.cluster(np.zeros((0, 2)))
 
 
+    def test_entities(self):
+        random = np.random.default_rng(24)
+        for corners, ordered in ((2, False), (3, False), (3, True), (5, True), (1, False)):
+            entities = random.random((9, corners, 3))
+            if corners in (2, 3) and not ordered:
+                orders = [*itertools.permutations(range(corners))]
+            else:
+                orders = [tuple(range(corners)), tuple(range(corners))[::-1]]
+            expected = np.array([[min(np.sqrt(((a[list(order)] - b) ** 2).sum(axis=1).mean()) for order in orders) for b in entities]
+                                 for a in entities])
+            np.testing.assert_allclose(terrace.entity_distances(entities, ordered=ordered), expected, rtol=1e-12, atol=1e-12)
+            made = terrace.cluster(entities, 0.1, ordered=ordered, effort='full')
+            price = 0.1 * np.linalg.norm(np.ptp(entities.reshape(-1, 3), axis=0))
+            self.assertAlmostEqual(made.opening_cost, price * len(made.facilities), places=9)
+            self.assertAlmostEqual(made.connection_cost, expected[made.facilities[made.labels], np.arange(9)].sum(), places=9)
+        flat = random.random((4, 2, 2))
+        np.testing.assert_allclose(terrace.entity_distances(flat, flat[:2]), terrace.entity_distances(np.dstack((flat, np.zeros((4, 2)))))[:, :2])
+        for wrong in (lambda: terrace.entity_distances(flat, np.zeros((1, 3, 2))), lambda: terrace.entity_distances([[1, 2]]),
+                      lambda: terrace.entity_distances(np.zeros((2, 2, 4))), lambda: terrace.entity_distances(np.zeros((2, 0, 3))),
+                      lambda: terrace.cluster(flat, count=2), lambda: terrace.cluster(flat, metric='squared'),
+                      lambda: terrace.cluster(flat, method='fast'), lambda: terrace.cluster(flat * np.nan),
+                      lambda: terrace.cluster(np.zeros((0, 2, 3)))):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    def test_channels_are_axes(self):
+        points = np.random.default_rng(25).random((200, 3))
+        solid = terrace.cluster(points, 0.05, method='kd-tree')
+        flat = terrace.cluster(points[:, :2], 0.05, method='kd-tree', channels=points[:, 2:])
+        np.testing.assert_array_equal(solid.labels, flat.labels)
+        self.assertAlmostEqual(solid.cost, flat.cost, places=9)
+        terrace.cluster(points[:, :2], channels=points)
+        for wrong in (points[:5], points[:, 0], points * np.nan):
+            with self.assertRaises(ValueError):
+                terrace.cluster(points, channels=wrong)
+        with self.assertRaises(ValueError):
+            terrace.cluster(points, channels=points, method='fast')
+
+    def test_searches_go_on(self):
+        points = np.random.default_rng(26).random((400, 2))
+        short = terrace.cluster(points, 0.05, method='kd-tree', steps=3)
+        longer = terrace.cluster(points, 0.05, method='kd-tree', steps=300, start=short, seed=2, assign_nearest=True)
+        self.assertLess(longer.cost, short.cost)
+        distances = cdist(points, points[longer.facilities])
+        np.testing.assert_array_equal(longer.labels, distances.argmin(axis=1))
+        still = terrace.cluster(points, 0.05, method='kd-tree', steps=0, start=longer)
+        np.testing.assert_array_equal(still.facilities, longer.facilities)
+        self.assertLessEqual(terrace.cluster(points, count=9, restarts=4).cost, terrace.cluster(points, count=9).cost)
+        broken = terrace.Clusters(short.facilities, short.labels + 1, 0, 0, 0, 0)
+        for wrong in ({'start': broken}, {'start': terrace.cluster(points[:50])}, {'restarts': 0}):
+            with self.assertRaises(ValueError):
+                terrace.cluster(points, method='kd-tree', **wrong)
+        with self.assertRaises(TypeError):
+            terrace.cluster(points, method='kd-tree', start=3)
+
+
 class Assignments(unittest.TestCase):
     @settings(max_examples=60, deadline=None, derandomize=True)
     @given(arrays.arrays(st.sampled_from([np.float64, np.float32, np.int32, np.int64, np.uint8]),
@@ -223,6 +414,24 @@ class Assignments(unittest.TestCase):
             self.assertTrue((costs[made.columns >= 0, made.columns[made.columns >= 0]] > 0).all())
         with self.assertRaises(ValueError):
             terrace.assignment(sparse.csr_matrix(([1.0, 1.0], ([0, 1], [0, 0])), shape=(2, 2)))
+
+    def test_costs_of_rows(self):
+        costs = np.random.default_rng(27).random((40, 60))
+        made = terrace.assignment(lambda row: costs[row], shape=costs.shape)
+        np.testing.assert_array_equal(made.columns, terrace.assignment(costs).columns)
+        self.assertEqual(made.cost, terrace.assignment(costs).cost)
+
+        class Enough(Exception):
+            pass
+
+        def raising(row):
+            raise Enough
+
+        for function, shape, kind in ((raising, (2, 2), Enough), (lambda row: [1], (2, 2), ValueError), (lambda row: 'ab', (2, 2), TypeError),
+                                      (lambda row: [np.nan] * 2, (2, 2), ValueError), (costs, (2, 2), TypeError),
+                                      (lambda row: [1], (-1, 2), ValueError), (lambda row: [1], (1.5, 2), TypeError)):
+            with self.assertRaises(kind):
+                terrace.assignment(function, shape=shape)
 
     def test_misuse(self):
         for wrong, kind in (([[1, np.nan]], ValueError), ([1, 2], ValueError), ([['a']], TypeError),
@@ -269,6 +478,40 @@ class Matchings(unittest.TestCase):
                       ([[0, 1]], [1], 3), ([[0, 1]], [1], 1), ([[0, 1, 2]], [1])):
             with self.assertRaises(ValueError):
                 terrace.edge_matching(*wrong)
+
+    def test_halving(self):
+        for width, count in ((2, 40), (3, 31)):
+            points = np.random.default_rng(count).random((count, width))
+            best = terrace.matching(points)
+            made = terrace.halving_matching(points, iterations=400)
+            self.assertLess(made.cost, 1.2 * best.cost)
+            self.assertGreaterEqual(made.cost, best.cost - 1e-9)
+            self.assertAlmostEqual(made.cost, np.linalg.norm(points[made.pairs[:, 0]] - points[made.pairs[:, 1]], axis=1).sum(), places=9)
+            self.assertEqual((made.mates == -1).sum(), count % 2)
+            self.assertTrue((np.diff(made.steps, axis=0) * [1, -1] > 0).all())
+            self.assertEqual((made.steps[-1, 1], made.iterations), (made.cost, 400))
+            by_matrix = terrace.halving_matching(cdist(points, points), distances=True, iterations=400)
+            np.testing.assert_allclose(by_matrix.cost, made.cost, rtol=1e-9)
+            random = terrace.halving_matching(points, method='monte-carlo', iterations=50, threads=3)
+            self.assertGreater(random.cost, made.cost)
+            np.testing.assert_array_equal(random.mates, terrace.halving_matching(points, method='monte-carlo', iterations=50, threads=1).mates)
+        self.assertEqual(terrace.halving_matching(np.zeros((0, 2))).pairs.shape, (0, 2))
+        self.assertLess(terrace.halving_matching(np.random.default_rng(1).random((200, 2)), iterations=10 ** 9, seconds=0.1).iterations, 10 ** 6)
+        for wrong, options in (([[0, np.nan], [1, 1]], {}), ([[1, 2, 3], [1, 2, 3]], {'distances': True}), ([[0, 0]], {'method': 'fast'}),
+                               ([[0, np.inf], [np.inf, 0]], {'distances': True}), ([0], {'distances': True}), ([[0, 0]], {'iterations': 0})):
+            with self.assertRaises(ValueError):
+                terrace.halving_matching(wrong, **options)
+
+    def test_clusters_first(self):
+        points, labels = np.random.default_rng(28).random((90, 2)), np.repeat([5, -2, 10 ** 12], [31, 29, 30])
+        made = terrace.matching(points, labels=labels, rounds=0)
+        apart = sum(labels[a] != labels[b] for a, b in made.pairs)
+        self.assertEqual(apart, 1)  # the ones left over of the two odd clusters
+        self.assertLessEqual(terrace.matching(points, labels=labels).cost, made.cost)
+        for wrong, options, kind in ((points, {'labels': labels[:3]}, ValueError), (points, {'labels': labels * 0.5}, TypeError),
+                                     (points, {'tolerance': -1}, ValueError)):
+            with self.assertRaises(kind):
+                terrace.matching(wrong, **options)
 
     def test_sizes(self):
         odd = terrace.matching(np.random.default_rng(1).random((101, 2)))

@@ -91,6 +91,61 @@ class Triangulations(unittest.TestCase):
         np.testing.assert_array_equal(made.nearest(asked), made.ids[closest])
         self.assertEqual(terrace.Delaunay2().nearest([[0, 0]])[0], -1)
 
+    def test_changes(self):
+        for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3), (terrace.DynamicSurface, 3)):
+            random = np.random.default_rng(11)
+            made = kind(random.random((200, width)))
+            with self.assertRaises(ValueError):
+                made.changes()
+            made.record()
+            places = dict(zip(made.vertices.tolist(), map(tuple, made.points[made.vertices])))
+            simplices = {frozenset(row) for row in made.simplices.tolist()}
+            for step in range(6):
+                added = made.insert(random.random((40, width)))
+                made.remove(random.choice(made.vertices, 30, replace=False))
+                if step % 2:
+                    made.insert(random.random((5, width)))
+                told = made.changes()
+                for vertex, place in zip(told.removed_vertices.tolist(), told.removed_points):
+                    self.assertEqual(places.pop(vertex), tuple(place))
+                places.update(zip(told.added_vertices.tolist(), map(tuple, made.points[told.added_vertices])))
+                gone = {frozenset(row) for row in told.removed_simplices.tolist()}
+                self.assertTrue(gone <= simplices)
+                simplices = (simplices - gone) | {frozenset(row) for row in told.added_simplices.tolist()}
+                self.assertEqual(simplices, {frozenset(row) for row in made.simplices.tolist()})
+                self.assertEqual(places, dict(zip(made.vertices.tolist(), map(tuple, made.points[made.vertices]))))
+            self.assertEqual(len(added), 40)
+            before = made.changes()
+            self.assertEqual((len(before.added_vertices), before.added_simplices.shape[1:]), (0, told.added_simplices.shape[1:]))
+            both = made.insert(random.random((4, width)))
+            made.remove(both)
+            self.assertEqual(len(made.changes().added_vertices), 0)  # came and went
+            self.assertIn('came', repr(told))
+
+    def test_vertex_neighbours_are_scipys(self):
+        for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3)):
+            points = np.random.default_rng(12).random((400, width))
+            made, expected = kind(points), Delaunay(points)
+            made.remove(made.insert(points[:3] + 7))  # numbers that are free
+            begins, joined = made.vertex_neighbor_vertices
+            self.assertEqual(len(begins), len(made.points) + 1)
+            theirs, other = expected.vertex_neighbor_vertices
+            for i, vertex in enumerate(made.ids):
+                np.testing.assert_array_equal(np.sort(joined[begins[vertex]:begins[vertex + 1]]),
+                                              np.sort(made.ids[other[theirs[i]:theirs[i + 1]]]))
+        self.assertEqual(len(terrace.Delaunay2().vertex_neighbor_vertices[1]), 0)
+
+    def test_of_grid(self):
+        made = terrace.Delaunay2.of_grid(30, 20, (-4, 8), 0.5)
+        y, x = np.mgrid[0:20, 0:30]
+        points = np.column_stack((x.ravel() * 0.5 - 4, y.ravel() * 0.5 + 8))
+        np.testing.assert_array_equal(made.points[made.ids], points)
+        self.assertEqual(made.digest(), terrace.Delaunay2(points).digest())
+        self.assertEqual(len(terrace.Delaunay2.of_grid(0, 5)), 0)
+        for wrong in ((4, 3, (0, 0), 0.1), (3, 3, (0, 0), -1), (3, 3, (0, np.nan)), (-1, 3), (2 ** 20, 2 ** 20), (3, 3, (1,))):
+            with self.assertRaises(ValueError):
+                terrace.Delaunay2.of_grid(*wrong)
+
     def test_misuse(self):
         made = terrace.Delaunay2(np.random.default_rng(1).random((50, 2)))
         before = made.digest()

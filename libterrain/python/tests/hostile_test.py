@@ -71,7 +71,7 @@ def anything(luck):
 
 def calls(luck, terrace, shared, folder):
     """One call of something public with mostly senseless arguments: whether it went through."""
-    stores, view, shape2, shape3 = shared
+    stores, view, shape2, shape3, surface, model = shared
     store = luck.choice(stores)
     some = lambda: anything(luck)  # noqa: E731
     points = lambda: np.random.default_rng(luck.randrange(99)).random((luck.randrange(1, 60), luck.choice([2, 3])))  # noqa: E731
@@ -142,6 +142,57 @@ def calls(luck, terrace, shared, folder):
         (lambda a, b, r: terrace.PointTree(a).hit(b, b, r), [solid, solid, luck.random], []),
         (lambda a, b, c: (terrace.TriangleTree(a, b).hit(c, c), terrace.TriangleTree(a, b).nearest(c)),
          [solid, lambda: [[0, 0, 0]], solid], []),
+        (terrace.halving_matching, [points], ['method', 'distances', 'seconds', 'seed', 'threads']),
+        (lambda a, i: terrace.halving_matching(a, iterations=i), [points, number], []),
+        (lambda a, **k: terrace.matching(a, **k), [points], ['labels', 'tolerance', 'window', 'threads']),
+        (lambda f, s: terrace.assignment(f, shape=s), [lambda: lambda row: [row, 1, 2], lambda: (number(), 3)], []),
+        (terrace.matching_tree, [points], ['matcher']), (lambda a, m: terrace.matching_tree(a, matcher=lambda nodes: m), [points, handles], []),
+        (lambda a, b, **k: terrace.rotate_tree(terrace.linkage(a), b, **k), [lambda: solid() + 1, solid], ['upper', 'passes']),
+        (lambda a, **k: terrace.rotate_tree(a, **k), [lambda: terrace.linkage(solid())], ['lower']),
+        (terrace.tree_linkage, [lambda: [[0, 1], [1, 2]], lambda: place()[:2]], []), (lambda a: terrace.tree_linkage(*terrace.spanning_tree(a)), [points], []),
+        (terrace.linkage, [points], ['edges', 'single_precision', 'memory', 'gpu']),
+        (lambda a: terrace.linkage(a, edges=terrace.spanning_tree(a)[0]), [points], []),
+        (terrace.cluster, [points], ['channels', 'restarts', 'steps', 'start', 'assign_nearest', 'ordered']),
+        (lambda a, k: terrace.cluster(np.reshape(a, (-1, k, 3)), 0.1), [solid, lambda: luck.choice([1, 2, 3, 4])], []),
+        (terrace.entity_distances, [lambda: solid().reshape(-1, 1, 3)], ['b', 'ordered']),
+        (lambda a, b: terrace.cluster(a, method='kd-tree', start=terrace.Clusters(b, a, 0, 0, 0, 0)), [points, handles], []),
+        (terrace.clusters_of_size, [points, number], ['seed', 'progress', 'threads']),
+        (terrace.stream_clusters, [lambda: [solid() + 1, solid()], lambda: lambda block: None],
+         ['block_points', 'facility_cost', 'effort', 'method', 'metric', 'seed', 'threads']),
+        (lambda a, b: terrace.stream_clusters([a, b], lambda block: block.points.sum(), block_points=20), [solid, solid], []),
+        (lambda a, **k: terrace.Delaunay2(a).weights(a, **k), [flat], ['method']), (lambda a, b: terrace.Delaunay2(a).weights(b), [flat, flat], []),
+        (lambda a, b, c, **k: terrace.Delaunay2(a).vertical_distances(b, c, **k), [flat, lambda: np.zeros(80), solid], ['method', 'threads']),
+        (lambda a, b: (terrace.Delaunay2(a).triangle_quality(b), terrace.Delaunay2(a).vertex_neighbor_vertices), [flat, lambda: np.zeros(80)], []),
+        (terrace.Delaunay2.of_grid, [number, number], ['origin', 'step']),
+        (lambda a, b: (shape2.record(), shape2.insert(a), shape2.remove(b), shape2.changes()), [flat, handles], []),
+        (lambda a, b: (shape3.record(), shape3.insert(a), shape3.remove(b), shape3.changes()), [solid, handles], []),
+        (lambda a, b: (surface.record(), surface.insert(a), surface.remove(b), surface.changes(), surface.simplices, surface.digest()), [solid, handles], []),
+        (lambda: (surface.restore(), repr(surface), surface.mesh().measures(), surface.points), [], []), (terrace.DynamicSurface, [solid], []),
+        (lambda a, **k: terrace.Delaunay3(a).shape(**k), [solid], ['rule', 'criterion', 'edge_factor', 'keep_vertices']),
+        (terrace.simplify_line, [lambda: np.arange(9), lambda: np.zeros(9), luck.random], []),
+        (lambda a, b: (terrace.Mesh(a, b).measures(), terrace.Mesh(a, b).turned_outward()), [solid, lambda: [[0, 1, 2]]], []),
+        (lambda a, b, c: terrace.Mesh(a, b).errors(c), [solid, lambda: [[0, 1, 2]], solid], []),
+        (terrace.Mesh.read, [lambda: os.path.join(folder, luck.choice(['a.ply', 'm.glb', 'dem', 'none']))], []),
+        (terrace.bounded_mesh, [solid, luck.random], ['min_angle', 'frame']),
+        (lambda a, b, c: terrace.Transformation(a, b).forward(c), [lambda: luck.choice([4326, 32632, 'EPSG:3857']), lambda: luck.choice([4326, 32632, 'WGS 84']), flat], []),
+        (terrace.Transformation, [lambda: 4326, lambda: 3857], ['area', 'datum_shift']),
+        (lambda a, c: stores[0].own_region(a, c), [box, lambda: luck.choice([4326, 32632, 3857])], []), (store.clusters, [lambda: luck.randrange(3)], []),
+        (store.count, [box], []), (store.mesh, [lambda: 0], ['cluster', 'smoothing', 'overlay', 'replace']),
+        (lambda a: store.mesh(0, smoothing='laplacian', save_overlay=os.path.join(folder, 'heights'), replace=a), [lambda: True], []),
+        (lambda a: store.mesh(0, overlay=a), [lambda: os.path.join(folder, 'heights')], []),
+        (terrace.read_points, [solid], ['where', 'region', 'keep', 'drop', 'block_points', 'crs', 'attributes', 'transform', 'band', 'entities']),
+        (terrace.read_points, [lambda: os.path.join(folder, luck.choice(['a.ply', 'w.laz', 'w.csv', 'none']))], ['where', 'region', 'resolution', 'skip_damaged']),
+        (lambda n, a, **k: terrace.write_points(os.path.join(folder, n), a, replace=True, **k), [lambda: luck.choice(['w.laz', 'w.csv', 'w.ply', 'w.copc.laz']), solid],
+         ['format', 'attributes', 'crs', 'where', 'progress', 'threads']),
+        (view.frame, [place], ['focus', 'regions', 'ground_height']), (view.pin, [lambda: (0, number()), lambda: luck.choice([True, False, None])], []),
+        (view.attributes, [handles], []), (view.to_metres, [solid], []), (view.restore, [], ['threads']),
+        (lambda a: terrace.View(a, 'surface', reader='frame').frame(ground_error=0.0, seconds=0.01), [lambda: stores[1]], []),
+        (terrace.View, [lambda: stores[1]], ['kind', 'max_bytes', 'collapse_below', 'guard', 'silhouette']),
+        (model.expand, [lambda: luck.choice(model.children())], []), (model.collapse, [lambda: (0, number())], []), (model.children, [lambda: (0, number())], []),
+        (model.refine, [box, lambda: luck.randrange(2)], []), (model.coarsen, [box, lambda: luck.randrange(2)], []),
+        (model.set_detail, [lambda: luck.randrange(3)], ['focus']), (model.cluster_info, [lambda: (0, number())], []),
+        (lambda: (repr(model), model.snapshot(), model.mesh, model.expanded, len(model)), [], []),
+        (terrace.Multiresolution, [lambda: store, lambda: 0], ['focus']),
         (terrace.verify_tiles, [lambda: os.path.join(folder, 'tiles')], ['store', 'max_error', 'vertical', 'geoid']),
         (lambda a, b: terrace.Mesh(a, b).save(os.path.join(folder, 'a.ply'), True), [solid, lambda: [[0, 0, 0]]], []),
     ]
@@ -158,10 +209,19 @@ def calls(luck, terrace, shared, folder):
             traceback.print_exc()
             raise SystemExit(f'{call} with {arguments!r}, {given!r}') from error
         return False
+    except RuntimeError as error:  # of a build without a GPU
+        if 'CUDA' not in str(error):
+            raise
+        return False
 
 
 def main(seed, count):
     import terrace
+    try:
+        import tqdm
+        tqdm.tqdm.monitor_interval = 0  # no thread that a fork could meet in AddressSanitizer's memory
+    except ImportError:
+        pass
     luck = random.Random(seed)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -173,7 +233,8 @@ def main(seed, count):
         closed = terrace.Store.open(os.path.join(folder, 'cloud'))
         closed.close()
         # Without a reading thread: a fork would wait for ever for what that holds of AddressSanitizer's memory.
-        shared = stores + [closed], terrace.View(stores[0], reader='frame'), terrace.Delaunay2(), terrace.Delaunay3()
+        shared = stores + [closed], terrace.View(stores[0], reader='frame'), terrace.Delaunay2(), terrace.Delaunay3(), \
+            terrace.DynamicSurface(), terrace.Multiresolution(stores[1])
         worked = 0
         for _ in range(count):
             kind = luck.random()

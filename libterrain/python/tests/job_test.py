@@ -24,6 +24,7 @@ class Jobs(StoreCase):
         terrace.build(ALPS, self.path('alps'), progress=lambda *at: seen.append(at))
         self.assertTrue(all(at[0] == 'points' for at in seen))
         self.assertTrue(seen[-1][3])
+        self.assertEqual(seen[-1][1:3], (1338658, 1.0))
         counts = [at[1] for at in seen if not at[3]]
         self.assertEqual(counts, sorted(counts))
         with self.assertRaises(TypeError):
@@ -68,7 +69,13 @@ class Jobs(StoreCase):
             points = np.random.default_rng(1).random((400_000, 2))
             for call in (lambda: store.bounded_mesh(0.0), lambda: store.heights(points * 1e3 + [300000, 5200000], 'natural'),
                          lambda: store.tiles(sys.argv[2], (0, 20), vertical='ignore'), lambda: terrace.Delaunay3(np.c_[points, points[::-1, 0]]),
-                         lambda: terrace.linkage(points), lambda: terrace.kmeans(points, 200), lambda: terrace.matching(points[:50_000])):
+                         lambda: terrace.linkage(points), lambda: terrace.kmeans(points, 200), lambda: terrace.matching(points[:50_000]),
+                         # These would not end by themselves.
+                         lambda: terrace.halving_matching(points[:300], iterations=10 ** 12),
+                         lambda: terrace.cluster(points[:2000], method='kd-tree', steps=10 ** 15),
+                         lambda: terrace.stream_clusters((points for _ in iter(int, 1)), lambda block: None),
+                         lambda: [0 for _ in iter(int, 1) if len(terrace.read_points(points[:9], crs='EPSG:4326')) == 0],
+                         lambda: terrace.write_points(sys.argv[2] + '.laz', np.c_[points, points[:, 0]].repeat(5, axis=0))):
                 timer = threading.Timer(0.03, os.kill, (os.getpid(), signal.SIGINT))
                 timer.start()
                 try:
@@ -79,7 +86,8 @@ class Jobs(StoreCase):
         ''')
         told = subprocess.run([sys.executable, '-c', code, self.path('cloud'), self.path('interrupted-tiles')],
                               stdout=subprocess.PIPE, text=True, check=True).stdout
-        self.assertEqual(told.split(), ['interrupted'] * 7)
+        self.assertEqual(told.split(), ['interrupted'] * 12)
+        self.assertFalse(os.path.exists(self.path('interrupted-tiles.laz')))
 
     def test_other_threads_go_on(self):
         turns, stop = [0], threading.Event()
@@ -97,7 +105,9 @@ class Jobs(StoreCase):
         for call in (lambda: terrace.build(points, self.path('busy'), replace=True), lambda: store.mesh(level=0),
                      lambda: terrace.Delaunay3(points), lambda: terrace.linkage(points[:100_000]),
                      lambda: terrace.kmeans(points, 99, max_iterations=9), lambda: terrace.cluster(points),
-                     lambda: terrace.matching(points[:5000]), lambda: terrace.assignment(points[:2000], points[2000:4000])):
+                     lambda: terrace.matching(points[:5000]), lambda: terrace.DynamicSurface(points[:50_000]),
+                     lambda: terrace.read_points(points), lambda: terrace.halving_matching(points[:300], iterations=100),
+                     lambda: terrace.stream_clusters([points], lambda block: None), lambda: terrace.Delaunay2(points[:, :2]).weights(points[:, :2]), lambda: terrace.assignment(points[:2000], points[2000:4000])):
             before, began = turns[0], time.monotonic()
             call()
             turned.append((turns[0] - before) / (time.monotonic() - began))

@@ -51,6 +51,54 @@ class Meshes(StoreCase):
         with self.assertRaises(ValueError):
             self.scan.mesh(level=0, max_points=10)
 
+    def test_a_cluster(self):
+        below = terrace.xyz(self.scan.points(cluster=(1, 0), level=0))
+        vertices, triangles = self.scan.mesh(level=0, cluster=(1, 0))
+        np.testing.assert_array_equal(sorted_rows(vertices), sorted_rows(below))
+        expected = terrace.Delaunay2(below[:, :2])
+        self.assertEqual(triangle_set(vertices, triangles), {tuple(sorted(map(tuple, expected.points[three]))) for three in expected.simplices})
+        self.assertEqual(len(self.scan.mesh(cluster=(1, 0)).vertices), len(self.scan.points(cluster=(1, 0))))
+        for wrong in ({'region': (0, 0, 1, 1)}, {'focus': [((0, 0, 1, 1), 0)]}, {'level': 5}):
+            with self.assertRaises(ValueError):
+                self.scan.mesh(cluster=(1, 0), **wrong)
+
+    def test_smoothed_heights_and_overlays(self):
+        for store in (self.scan, self.raster):
+            plain = store.mesh(level=0)
+            saved = self.path(f'heights-{len(store)}')
+            smooth = store.mesh(level=0, smoothing={'method': 'taubin', 'iterations': 4, 'strength': 0.6}, save_overlay=saved)
+            np.testing.assert_array_equal(smooth.vertices[:, :2], plain.vertices[:, :2])
+            moved = smooth.vertices[:, 2] != plain.vertices[:, 2]
+            self.assertTrue(moved.any())
+            again = store.mesh(level=0, overlay=saved)
+            np.testing.assert_array_equal(again.vertices, smooth.vertices)
+            # Delaunay2.smooth() on the same triangulation.
+            flat = plain.vertices[:, :2] if store is self.scan else (plain.vertices[:, :2] - plain.vertices[:, :2].min(axis=0)) / 10
+            triangulation = terrace.Delaunay2(flat)
+            expected = triangulation.smooth(triangulation.by_vertex(plain.vertices[:, 2]), 'taubin', iterations=4, strength=0.6)
+            if store is self.scan:
+                np.testing.assert_allclose(smooth.vertices[:, 2], expected[triangulation.ids], rtol=0, atol=1e-6)
+            with self.assertRaises((FileExistsError, terrace.Error)):
+                store.mesh(level=0, smoothing='laplacian', save_overlay=saved)
+            store.mesh(level=0, smoothing='laplacian', save_overlay=saved, replace=True)
+            self.assertFalse((store.mesh(level=0, overlay=saved).vertices == smooth.vertices).all())
+        for wrong, kind in (({'smoothing': 'best'}, ValueError), ({'smoothing': {'strength': 9}}, ValueError), ({'smoothing': {'much': 9}}, TypeError),
+                            ({'overlay': self.path('none')}, (OSError, terrace.Error)), ({'overlay': saved}, terrace.Error)):
+            with self.assertRaises(kind):
+                self.scan.mesh(level=0, **wrong)
+
+    def test_files_are_read(self):
+        mesh = self.scan.mesh(level=1)
+        for ending in ('ply', 'obj'):
+            mesh.save(self.path('read.' + ending))
+            back = terrace.Mesh.read(self.path('read.' + ending))
+            np.testing.assert_array_equal(back.vertices, mesh.vertices)
+            np.testing.assert_array_equal(back.triangles, mesh.triangles)
+        with self.assertRaises(OSError):
+            terrace.Mesh.read(self.path('none.ply'))
+        with self.assertRaises(TypeError):
+            terrace.Mesh.read(1)  # no name, but a file of the process
+
     def test_bounds_are_kept(self):
         for store, points in ((self.raster, None), (self.scan, self.points)):
             last = None

@@ -86,6 +86,60 @@ class Stores(StoreCase):
         with self.assertRaises(ValueError):
             self.scan.points(cluster=(1, 0), region=(0, 0, 1, 1))
 
+    def test_a_table_of_clusters(self):
+        for level in range(self.scan.top + 1):
+            told = self.scan.clusters(level)
+            self.assertEqual(len(told), self.scan.info['levels'][level]['clusters'])
+            self.assertEqual(told['descendants'].sum() if level < self.scan.top else len(self.points), len(self.points))
+            for number in range(0, len(told), 7):
+                if level == self.scan.top:
+                    continue
+                below = terrace.xyz(self.scan.points(cluster=(level, number), level=0))
+                self.assertEqual(len(below), told['descendants'][number])
+                box = np.concatenate((below.min(axis=0), below.max(axis=0)))
+                grown = (told['bounds'][number] - box) * [-1, -1, -1, 1, 1, 1]
+                self.assertTrue((grown >= 0).all() and (grown < 0.05 * np.tile(np.ptp(self.points, axis=0), 2)).all())
+                # The representative comes last.
+                farthest = np.linalg.norm(below - terrace.xyz(self.scan.points(cluster=(level, number)))[-1], axis=1).max()
+                self.assertLessEqual(farthest, told['error'][number] * 1.001)
+        with self.assertRaises(ValueError):
+            self.scan.clusters(99)
+
+    def test_counts(self):
+        random = np.random.default_rng(30)
+        for store, points in ((self.scan, self.points), (self.raster, terrace.xyz(self.raster.points()))):
+            low, size = points.min(axis=0), np.ptp(points, axis=0)
+            for _ in range(20):
+                box = np.sort(random.random((2, 3)), axis=0) * size * 1.1 + low - 0.05 * size
+                inside = ((points >= box[0]) & (points <= box[1])).all(axis=1)
+                self.assertEqual(store.count(box.ravel()), inside.sum())
+                flat = ((points >= box[0]) & (points <= box[1]))[:, :2].all(axis=1)
+                self.assertEqual(store.count(box[:, :2].ravel()), flat.sum())
+        turned = terrace.build(self.samples, self.path('turned'), transform=(7, -7, 0, 7, 7, 0))
+        for store, wrong in ((turned, (0, 0, 1, 1)), (self.scan, (1, 1, 0, 0)), (self.scan, {'type': 'Polygon', 'coordinates': [[(0, 0), (1, 0), (0, 1)]]})):
+            with self.assertRaises(ValueError):
+                store.count(wrong)
+
+    def test_regions_of_other_reference_systems(self):
+        to_lonlat = terrace.Transformation(32632, 4326)
+        corners = np.array([[300200, 5200100], [300800, 5200150], [300500, 5200700]], float)
+        region = {'type': 'Polygon', 'coordinates': [to_lonlat.forward(corners).tolist()]}
+        own = self.scan.own_region(region, 'EPSG:4326')
+        got = self.scan.points(region=own)
+        self.assertEqual(len(got), len(self.scan.points(region={'type': 'Polygon', 'coordinates': [corners.tolist()]})))
+        self.assertEqual(own['type'], 'MultiPolygon')
+        west, south = to_lonlat.forward(corners).min(axis=0)
+        east, north = to_lonlat.forward(corners).max(axis=0)
+        lonlat = to_lonlat.forward(self.points[:, :2])
+        inside = ((lonlat >= [west, south]) & (lonlat <= [east, north])).all(axis=1)
+        box = self.scan.own_region((west, south, east, north), 4326)
+        self.assertAlmostEqual(len(self.scan.points(region=box)), inside.sum(), delta=2)
+        same = self.scan.own_region((0, 0, 1, 1), 'EPSG:32632')['coordinates'][0][0]
+        self.assertEqual({*map(tuple, same)} >= {(0, 0), (1, 1)} and same[0] == same[-1], True)
+        for wrong in (lambda: self.scan.own_region(None, 4326), lambda: self.scan.own_region((0, 0, 1, 1), None), lambda: self.scan.own_region((0, 0, 1, 1), 'EPSG:1')):
+            with self.assertRaises(ValueError):
+                wrong()
+
     def test_nearest(self):
         place = (300500.0, 5200400.0)
         distances = np.hypot(*(self.points[:, :2] - place).T)
@@ -99,6 +153,13 @@ class Stores(StoreCase):
         within = self.scan.query(near=place, radius=50.0)
         self.assertTrue((within['distance'] <= 50).all())
         self.assertAlmostEqual(len(within), (distances <= 50).sum(), delta=2)
+        one = self.classes[0]
+        some = self.scan.query(near=place, k=25, where=f'class == {one}')
+        np.testing.assert_array_equal(terrace.xyz(some), self.points[order := np.argsort(
+            np.where(self.classes == one, distances, np.inf))[:25]])
+        self.assertTrue((self.classes[order] == one).all())
+        with self.assertRaises(ValueError):
+            self.scan.query(near=place, k=1, where='height of')
 
     def test_other_reference_systems(self):
         got = self.scan.points(crs='EPSG:4326')

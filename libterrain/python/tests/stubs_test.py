@@ -20,6 +20,14 @@ highest: float = float(heights.max())
 vertices, triangles = store.bounded_mesh(max_error=1.0)
 inside = store.points(region=(0, 0, 1, 1), where='z > 3')
 delta = terrace.View(store).frame((0, 0, 1), pixel_error=1)
+points = terrace.read_points('scan.laz', where='class == 2')
+made = terrace.stream_clusters([points], lambda block: print(block.points.shape, block.level), effort='fast')
+model = terrace.Multiresolution(store)
+model.expand(model.children()[0])
+lonlat = terrace.Transformation('EPSG:32632', 4326).forward(terrace.xyz(points)[:, :2])
+clusters = terrace.cluster(lonlat, 0.1, method='kd-tree', start=terrace.cluster(lonlat, 0.1))
+tree = terrace.PointTree(lonlat, terrace.rotate_tree(terrace.linkage(lonlat), lonlat))
+mates = terrace.halving_matching(lonlat, iterations=9).mates
 print(delta.added_corners.shape, terrace.kmeans(inside, 3).centres, terrace.Delaunay2([[0, 0]]).simplices)
 '''
 

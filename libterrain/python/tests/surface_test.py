@@ -9,6 +9,8 @@ import terrace
 
 try:
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+    from scipy.sparse import csr_matrix
+    from scipy.spatial import ConvexHull
 except ImportError as missing:
     raise unittest.SkipTest(f'{missing.name} is missing')
 
@@ -67,6 +69,61 @@ class MeshesOfArrays(unittest.TestCase):
             u, v = np.linalg.solve((corners[1:] - corners[0]).T, middle - corners[0])
             self.assertFalse(u > 0 and v > 0 and u + v < 1, 'a triangle lies in the hole')
 
+    def test_a_frame_of_ones_own(self):
+        samples = np.column_stack((np.random.default_rng(4).random((500, 2)), np.zeros(500)))
+        frame = [[0.2, 0.2, 1], [0.8, 0.2, 1], [0.8, 0.8, 1], [0.2, 0.8, 1]]
+        mesh = terrace.bounded_mesh(samples, 0.5, frame=frame)
+        np.testing.assert_array_equal(mesh.vertices[:4], frame)
+        self.assertEqual(mesh.uncovered, 500 - ((samples[:, :2] >= 0.2) & (samples[:, :2] <= 0.8)).all(axis=1).sum())
+        self.assertLessEqual(mesh.max_error, 0.5)
+        self.assertLessEqual(len(terrace.bounded_mesh(self.wavy(), 0.05, min_angle=0).triangles), len(terrace.bounded_mesh(self.wavy(), 0.05, min_angle=30).triangles))
+        for wrong in (lambda: terrace.bounded_mesh(samples, 1, frame=frame[::-1]), lambda: terrace.bounded_mesh(samples, 1, min_angle=90),
+                      lambda: terrace.bounded_mesh(np.zeros((9, 9)), 1, frame=frame)):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    @staticmethod
+    def wavy():
+        xy = np.random.default_rng(5).random((3000, 2))
+        return np.column_stack((xy, np.sin(9 * xy[:, 0]) * np.cos(7 * xy[:, 1])))
+
+    def test_errors_of_any_mesh(self):
+        samples = self.wavy()
+        mesh = terrace.bounded_mesh(samples, 0.1)
+        told = mesh.errors(samples)
+        self.assertEqual((told['samples'], told['uncovered']), (3000, 0))
+        self.assertAlmostEqual(told['max_error'], mesh.max_error, places=12)
+        self.check_bound(mesh, samples, told['max_error'])
+        above = samples + [0, 0, 10]
+        self.assertAlmostEqual(mesh.errors(np.vstack((above, [[9, 9, 0]])))['rms_error'], 10, delta=0.1)
+        self.assertEqual(mesh.errors([])['worst'], -1)
+        with self.assertRaises(ValueError):
+            terrace.Mesh(np.zeros((3, 3)), np.array([[0, 1, 3]])).errors(samples)
+
+    def test_lines(self):
+        random = np.random.default_rng(6)
+        for count, bound in ((1, 0.1), (2, 0.1), (300, 0.3), (300, 0.0)):
+            t, heights = np.sort(random.random(count)), np.cumsum(random.normal(size=count)) / 5
+            kept, error = terrace.simplify_line(t, heights, bound)
+            self.assertEqual((kept[0], kept[-1]), (0, count - 1))
+            self.assertTrue((np.diff(kept) > 0).all())
+            errors = np.abs(np.interp(t, t[kept], heights[kept]) - heights)
+            self.assertAlmostEqual(errors.max(), error, places=12)
+            self.assertLessEqual(error, bound)
+            # Greedily: of the samples in between none can be left out until the bound is reached.
+            chain = [0, count - 1]
+            while True:
+                errors = np.abs(np.interp(t, t[chain], heights[chain]) - heights)
+                if errors.max() <= bound:
+                    break
+                chain = sorted({*chain, int(errors.argmax())})
+            if bound > 0:
+                self.assertEqual(kept.tolist(), sorted(set(chain)))
+        self.assertEqual(terrace.simplify_line([], [], 1)[0].tolist(), [])
+        for wrong in (([1, 0], [0, 0], 1), ([0, 1], [0], 1), ([0, np.nan], [0, 0], 1), ([0, 1], [0, 0], -1), ([[0, 1]], [0, 0], 1)):
+            with self.assertRaises(ValueError):
+                terrace.simplify_line(*wrong)
+
     def test_misuse(self):
         flat = np.zeros((9, 9))
         for wrong, options in ((flat, {}), (flat, {'max_error': 1, 'max_points': 9}), (flat, {'max_error': -1}),
@@ -107,6 +164,60 @@ class Interpolation(unittest.TestCase):
         self.assertLess(np.nanmax(np.abs(mesh.heights(wavy, self.asked, 'natural') - mesh.heights(wavy, self.asked))), 0.1)
         for threads in (1, 2):
             np.testing.assert_array_equal(mesh.heights(wavy, self.asked, threads=threads), mesh.heights(wavy, self.asked))
+
+    def test_weights_are_what_heights_are_made_of(self):
+        mesh = terrace.Delaunay2(self.xy)
+        wavy = mesh.by_vertex(self.z)
+        for method in ('linear', 'natural', 'nearest'):
+            shares, vertices, begins = mesh.weights(self.asked, method)
+            matrix = csr_matrix((shares, vertices, begins), shape=(len(self.asked), len(mesh.points)))
+            some = np.diff(begins) > 0
+            heights = mesh.heights(wavy, self.asked, method)
+            np.testing.assert_array_equal(some, ~np.isnan(heights))
+            np.testing.assert_allclose((matrix @ np.nan_to_num(wavy))[some], heights[some], rtol=0, atol=1e-12)
+            self.assertGreaterEqual(shares.min(), 0)
+            np.testing.assert_allclose(np.asarray(matrix.sum(axis=1)).ravel()[some], 1, rtol=1e-12)
+            if method != 'nearest':
+                np.testing.assert_allclose((matrix @ np.nan_to_num(mesh.points))[some], self.asked[some], rtol=0, atol=1e-12)
+        self.assertEqual(terrace.Delaunay2().weights([[0, 0]])[2].tolist(), [0, 0])
+        for wrong in (lambda: mesh.weights([[np.nan, 0]]), lambda: mesh.weights(self.asked, 'cubic'), lambda: mesh.weights([[1, 2, 3]])):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    def test_vertical_distances(self):
+        mesh = terrace.Delaunay2(self.xy)
+        wavy = mesh.by_vertex(self.z)
+        samples = np.column_stack((self.asked, np.random.default_rng(9).random(len(self.asked))))
+        for method in ('linear', 'natural', 'nearest'):
+            apart = samples[:, 2] - mesh.heights(wavy, self.asked, method)
+            measured = ~np.isnan(apart)
+            told = mesh.vertical_distances(wavy, samples, method)
+            self.assertEqual((told['count'], told['outside']), (measured.sum(), (~measured).sum()))
+            for name, expected in (('max', np.nanmax(np.abs(apart))), ('mean', np.nanmean(np.abs(apart))), ('bias', np.nanmean(apart)),
+                                   ('rms', np.sqrt(np.nanmean(apart ** 2)))):
+                self.assertAlmostEqual(told[name], expected, places=12)
+            self.assertEqual(told['worst'], np.nanargmax(np.abs(apart)))
+        self.assertEqual(mesh.vertical_distances(wavy, [])['worst'], -1)
+        for wrong in (lambda: mesh.vertical_distances(wavy[:9], samples), lambda: mesh.vertical_distances(wavy, self.asked)):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    def test_quality_of_each_triangle(self):
+        mesh = terrace.Delaunay2(self.xy)
+        wavy = mesh.by_vertex(self.z)
+        each, all_ = mesh.triangle_quality(wavy, 0.3), mesh.quality(wavy, 0.3, bins=7)
+        self.assertEqual(len(each), len(mesh.simplices))
+        for name in ('area', 'surface_area', 'volume_above', 'volume_below'):
+            self.assertAlmostEqual(each[name].sum(), all_[name], places=9)
+        self.assertEqual((each['min_angle'].min(), each['aspect'].max()), (all_['min_angle'], all_['max_aspect']))
+        a, b, c = (mesh.points[mesh.simplices[:, i]] for i in range(3))
+        np.testing.assert_allclose(each['area'], np.cross(b - a, c - a) / 2, rtol=1e-9)
+        sides = np.unique(np.sort(mesh.simplices[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)), axis=0)
+        lengths = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
+        np.testing.assert_array_equal(all_['edge_histogram'], np.histogram(lengths, 7)[0])
+        for wrong in (lambda: mesh.triangle_quality(wavy[:9]), lambda: mesh.quality(wavy, bins=0)):
+            with self.assertRaises(ValueError):
+                wrong()
 
     def test_smoothing(self):
         mesh = terrace.Delaunay2(self.xy)
@@ -226,6 +337,65 @@ class Shapes(unittest.TestCase):
         bowl = terrace.Delaunay3(points[points[:, 2] < 0.2])
         self.assertTrue(bowl.shape().open)
         self.assertFalse(bowl.shape(lids=True).open)
+
+    def test_criteria(self):
+        made = terrace.Delaunay3(np.random.default_rng(16).random((300, 3)))
+        wide, narrow = (len(made.shape('flood', criterion='edge-length', edge_factor=factor, keep_vertices=False).tetrahedra) for factor in (1.5, 0.4))
+        self.assertGreater(wide, narrow)
+        self.assertGreaterEqual(len(made.shape('flood', criterion='edge-length', edge_factor=0.4).tetrahedra), narrow)
+        for wrong in ({'criterion': 'best'}, {'edge_factor': 0}, {'edge_factor': np.nan}):
+            with self.assertRaises(ValueError):
+                made.shape('flood', **wrong)
+
+    def test_surfaces_that_change(self):
+        random = np.random.default_rng(17)
+        ball = random.normal(size=(2000, 3))
+        ball /= np.linalg.norm(ball, axis=1)[:, None]
+        made = terrace.DynamicSurface(ball)
+        fixed = terrace.Delaunay3(ball).shape(lids=True).surface
+        self.assertEqual(corner_sets(made.points, made.simplices), corner_sets(fixed.vertices, fixed.triangles))
+        more = random.normal(size=(200, 3))
+        more /= np.linalg.norm(more, axis=1)[:, None]
+        made.remove(made.ids[:150])
+        made.insert(more)
+        told = made.mesh().measures()
+        self.assertEqual((told['components'], told['euler_characteristic'], told['closed']), (1, 2, True))
+        self.assertAlmostEqual(told['volume'], 4 / 3 * np.pi, delta=0.1)
+        made.restore()
+        self.assertEqual(made.digest(), terrace.DynamicSurface(np.vstack((ball[150:], more))).digest())
+        self.assertIn('triangles', repr(made))
+        self.assertIn('polygon', made._repr_svg_())
+        made.remove(made.vertices)
+        self.assertEqual((len(made), made.simplices.shape, made.mesh().triangles.shape), (0, (0, 3), (0, 3)))
+        for wrong in (lambda: made.insert([[np.nan, 0, 0]]), lambda: made.remove([3]), lambda: terrace.DynamicSurface([[1, 2]])):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    def test_measures_and_orientation(self):
+        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], float)
+        hull = ConvexHull(corners)
+        cube = terrace.Mesh(corners, hull.simplices).turned_outward()
+        self.assertEqual({frozenset(row) for row in cube.triangles.tolist()}, {frozenset(row) for row in hull.simplices.tolist()})
+
+        def signed(mesh):
+            a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+            return np.einsum('ij,ij->i', np.cross(a, b), c).sum() / 6
+
+        outward = terrace.Delaunay3(corners + np.random.default_rng(2).normal(scale=1e-3, size=(8, 3))).shape('flood').surface
+        inside_out = terrace.Mesh(outward.vertices, outward.triangles[:, ::-1])
+        told = inside_out.measures()
+        self.assertAlmostEqual(told['volume'], signed(inside_out), places=12)
+        self.assertLess(told['volume'], -5.9)
+        turned = inside_out.turned_outward()
+        self.assertAlmostEqual(turned.measures()['volume'], -told['volume'], places=12)
+        self.assertAlmostEqual(turned.area(), told['area'], places=9)
+        self.assertEqual((told['faces'], told['vertices'], told['edges'], told['euler_characteristic'], told['border_edges'], told['components']),
+                         (12, 8, 18, 2, 0, 1))
+        opened = terrace.Mesh(outward.vertices, outward.triangles[1:]).measures()
+        self.assertEqual((opened['border_edges'], opened['closed']), (3, False))
+        for wrong in (np.array([[0, 1, 8]]), np.array([[0, 0, 1]]), np.array([[-1, 0, 1]])):
+            with self.assertRaises(ValueError):
+                terrace.Mesh(corners, wrong).measures()
 
     def test_few_points(self):
         self.assertEqual(terrace.Delaunay3().shape().tetrahedra.shape, (0, 4))

@@ -12,7 +12,7 @@ import unittest
 import numpy as np
 
 import terrace
-from python_case import COMMAND, StoreCase
+from python_case import COMMAND, TRANSFORM, StoreCase, sorted_rows
 
 
 class Tiles(StoreCase):
@@ -140,8 +140,90 @@ class Views(StoreCase):
             delta = view.frame(matrix=matrix, size=(1000, 1000), pixel_error=0.1, seconds=5)
         self.assertGreater(delta.points, first.points)
 
+    def settled(self, view, **wish):
+        delta = view.frame(seconds=10, **wish)
+        while not delta.settled:
+            delta = view.frame(seconds=10, **wish)
+        return view.snapshot()
+
+    def test_focuses_regions_pins(self):
+        box = np.array([300300, 5200300, 300500, 5200500])
+        corners = terrace.View(self.scan).to_metres([[*box[:2], 0], [*box[2:], 0]])[:, :2]
+        x, y = self.points[:, 0], self.points[:, 1]
+        inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
+        for wish in ({'focus': [(corners.ravel(), 0)]}, {'regions': [(corners.ravel(), 0.0)]}):
+            view = terrace.View(self.scan, reader='frame')
+            now = self.settled(view, **wish).added_positions
+            self.assertLess(len(now), len(self.scan))
+            shown = {tuple(place) for place in np.round(now, 3)}
+            wanted = np.round(view.to_metres(self.points[inside]), 3)
+            self.assertTrue(all(tuple(place) in shown for place in wanted))
+        view = terrace.View(self.scan, reader='frame')
+        few = len(self.settled(view, ground_error=np.inf).added_vertices)
+        view.pin((self.scan.top - 1, 0), True)
+        more = len(self.settled(view, ground_error=np.inf).added_vertices)
+        self.assertGreater(more, few)
+        view.pin((self.scan.top - 1, 0), None)
+        self.assertEqual(len(self.settled(view, ground_error=np.inf).added_vertices), few)
+        view.pin((self.scan.top - 1, 0), False)
+        self.assertLess(len(self.settled(view, ground_error=0.0).added_vertices), len(self.scan))
+        flat = terrace.View(self.scan, reader='frame')
+        near = self.settled(flat, position=(0, 0, 900), direction=(0, 0, -1), up=(0, 1, 0), ground_height=100, size=(500, 500))
+        self.assertGreater(len(near.added_vertices), few)
+
+    def test_attributes_and_places(self):
+        view = terrace.View(self.scan, 'points', reader='frame')
+        delta = view.frame((0, -900, 500), seconds=5)
+        told = view.attributes(delta.added_vertices)
+        places = view.to_metres(self.points)
+        classes = {tuple(place): number for place, number in zip(np.round(places, 6), self.classes)}
+        self.assertEqual([classes[tuple(place)] for place in np.round(delta.added_positions, 6)], told['class'].tolist())
+        # Metres from the middle, up by height.
+        np.testing.assert_allclose(places[:, 2], self.points[:, 2], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(np.ptp(places, axis=0), np.ptp(self.points, axis=0), rtol=1e-3)
+        for wrong in ([10 ** 6], [-1], [2 ** 40]):
+            with self.assertRaises(ValueError):
+                view.attributes(wrong)
+        with self.assertRaises(ValueError):
+            terrace.View(self.raster).attributes([0])
+
+    def test_the_surface_of_a_scan(self):
+        random = np.random.default_rng(4)
+        ball = random.normal(size=(3000, 3))
+        ball *= 100 / np.linalg.norm(ball, axis=1)[:, None]
+        store = terrace.build(ball, self.path('ball'), block_points=500)
+        view = terrace.View(store, 'surface', reader='frame')
+        vertices, triangles = {}, {}
+
+        def take(delta):
+            for triangle in delta.removed_triangles:
+                del triangles[triangle]
+            for vertex in delta.removed_vertices:
+                del vertices[vertex]
+            vertices.update(zip(delta.added_vertices.tolist(), delta.added_positions))
+            triangles.update(zip(delta.added_triangles.tolist(), delta.added_corners.tolist()))
+
+        delta = view.frame(ground_error=0.0, seconds=1)
+        take(delta)
+        while not delta.settled:
+            delta = view.frame(ground_error=0.0, seconds=1)
+            take(delta)
+        take(view.restore())
+        number = {vertex: at for at, vertex in enumerate(vertices)}
+        mesh = terrace.Mesh(np.array([*vertices.values()]), np.array([[number[corner] for corner in row] for row in triangles.values()]))
+        told = mesh.measures()
+        self.assertEqual((told['euler_characteristic'], told['closed']), (2, True))
+        self.assertAlmostEqual(told['volume'] / (4 / 3 * np.pi * 1e6), 1, delta=0.02)
+
     def test_misuse(self):
         view = terrace.View(self.scan)
+        for wrong in ((self.scan.top + 1, 0), (0, 10 ** 9)):
+            with self.assertRaises(ValueError):
+                view.pin(wrong, True)
+        for wrong in ({'focus': [((1, 1, 0, 0), 0)]}, {'regions': [((0, 0, 1, 1), np.nan)]}, {'position': (0, 0, 1), 'ground_height': 0}):
+            with self.subTest(repr(wrong)):
+                with self.assertRaises(ValueError):
+                    view.frame(**wrong)
         for wrong in ({'position': (0, 0)}, {'position': (0, 0, np.nan)}, {'position': (0, 0, 1), 'direction': (0, 0, 0)},
                       {'position': (0, 0, 1), 'up': (0, 1, -0.5)}, {'position': (0, 0, 1), 'fov': 0},
                       {'position': (0, 0, 1), 'size': (0, 0)}, {'matrix': np.eye(3)}, {'matrix': np.zeros((4, 4))},
@@ -184,6 +266,126 @@ class Views(StoreCase):
         for thread in threads:
             thread.join()
         self.assertEqual(failures, [])
+
+
+class Models(StoreCase):
+    """Clusters expanded and collapsed, against the triangulation of the points that are there."""
+
+    def check(self, model):
+        vertices, triangles = model.mesh
+        expected = terrace.Delaunay2(self.flat(model, vertices))
+        number = np.empty(len(expected.points), int)
+        number[expected.ids] = np.arange(len(vertices))
+        self.assertEqual({frozenset(row) for row in triangles.tolist()}, {frozenset(row) for row in number[expected.simplices].tolist()})
+
+    def flat(self, model, vertices):
+        if not self.grid:
+            return vertices[:, :2]
+        return np.round((vertices[:, :2] - [TRANSFORM[2], TRANSFORM[5]]) / [10, -10] - 0.5)
+
+    def test_expanded_and_collapsed(self):
+        for store in (self.scan, terrace.build(self.samples, self.path('small-blocks'), transform=TRANSFORM, block_points=500, replace=True)):
+            self.grid = store.info['grid']
+            model = terrace.Multiresolution(store)
+            whole = [model.snapshot()]
+            top = store.points(level=store.top)
+            self.assertEqual(len(model), len(top))
+            np.testing.assert_array_equal(sorted_rows(model.mesh.vertices), sorted_rows(terrace.xyz(top)))
+            self.check(model)
+            clusters = model.children()
+            self.assertEqual(len(clusters), len(np.unique(clusters, axis=0)))
+            chosen = clusters[::3]
+            told = store.clusters(store.top - 1)
+            for cluster in chosen:
+                info = model.cluster_info(cluster)
+                row = told[int(cluster[1])]
+                np.testing.assert_allclose(info['bounds'], row['bounds'])
+                self.assertEqual((info['error'], info['members']), (row['error'], row['members']))
+                whole.append(model.expand(cluster))
+            self.check(model)
+            self.assertEqual({*map(tuple, model.expanded.tolist())}, {*map(tuple, chosen.tolist())})
+            # The deltas add up.
+            vertices, triangles = {}, {}
+            for delta in whole:
+                for triangle in delta.removed_triangles:
+                    del triangles[triangle]
+                for vertex in delta.removed_vertices:
+                    del vertices[vertex]
+                vertices.update(zip(delta.added_vertices.tolist(), map(tuple, delta.added_positions)))
+                vertices.update(zip(delta.moved_vertices.tolist(), map(tuple, delta.moved_positions)))
+                triangles.update(zip(delta.added_triangles.tolist(), map(tuple, delta.added_corners)))
+            now = model.snapshot()
+            self.assertEqual(vertices, dict(zip(now.added_vertices.tolist(), map(tuple, now.added_positions))))
+            self.assertEqual(triangles, dict(zip(now.added_triangles.tolist(), map(tuple, now.added_corners))))
+            before = corner_sets(*model.mesh)
+            more = model.children(chosen[0]) if store.top > 1 else []
+            for cluster in more:
+                model.expand(cluster)
+            for cluster in more:
+                model.collapse(cluster)
+            self.assertEqual(corner_sets(*model.mesh), before)
+            for cluster in chosen[::-1]:
+                model.collapse(cluster)
+            self.assertEqual(len(model), len(top))
+            self.assertEqual(len(model.expand(chosen[0]).added_vertices), len(model.collapse(chosen[0]).removed_vertices))
+            self.assertIn('clusters expanded', repr(model))
+            self.assertIn('polygon', model._repr_svg_())
+
+    def test_boxes(self):
+        box = (300300, 5200300, 300500, 5200500)
+        x, y = self.points[:, 0], self.points[:, 1]
+        inside = (x >= box[0]) & (x <= box[2]) & (y >= box[1]) & (y <= box[3])
+        wanted = {*map(tuple, self.points[inside])}
+        model = terrace.Multiresolution(self.scan)
+        coarse = len(model)
+        model.refine(box, 0)
+        self.assertTrue(wanted <= {*map(tuple, model.mesh.vertices)})
+        self.assertTrue(coarse < len(model) < len(self.scan))
+        fine = len(model)
+        model.coarsen((300000, 5200000, 301000, 5200800), self.scan.top)
+        self.assertEqual(len(model), coarse)
+        model.set_detail(self.scan.top, focus=[(box, 0)])
+        self.assertEqual(len(model), fine)
+        self.assertEqual(len(terrace.Multiresolution(self.scan, focus=[(box, 0)])), fine)
+        model.set_detail(0)
+        np.testing.assert_array_equal(sorted_rows(model.mesh.vertices), sorted_rows(self.points))
+        self.assertEqual(model.mesh.levels.max(), self.scan.top)
+
+    def test_misuse(self):
+        model = terrace.Multiresolution(self.scan)
+        for wrong in (lambda: model.expand((0, 0)) if self.scan.top > 1 else 1 / 0, lambda: model.expand((9, 0)), lambda: model.expand((0, 10 ** 12)),
+                      lambda: model.children((0, 0)), lambda: model.cluster_info((self.scan.top, 0)), lambda: model.refine((1, 1, 0, 0), 0),
+                      lambda: model.refine((0, 0, 1), 0), lambda: model.expand((1, 2, 3))):
+            with self.assertRaises((ValueError, ZeroDivisionError)):
+                wrong()
+        for wrong in (lambda: model.expand(3), lambda: model.expand((0.5, 0)), lambda: terrace.Multiresolution('cloud')):
+            with self.assertRaises(TypeError):
+                wrong()
+
+    def test_threads_share_a_model(self):
+        model = terrace.Multiresolution(self.scan)
+        clusters, failures, before = model.children(), [], corner_sets(*model.mesh)
+
+        def work(seed):
+            try:
+                for cluster in clusters[seed::4]:
+                    model.expand(cluster)
+                    model.snapshot()
+                    model.collapse(cluster)
+            except Exception as error:
+                failures.append(error)
+
+        threads = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(failures, [])
+        self.assertEqual(corner_sets(*model.mesh), before)
+
+
+def corner_sets(vertices, triangles):
+    return {tuple(sorted(map(tuple, three))) for three in vertices[triangles]}
 
 
 if __name__ == '__main__':

@@ -49,6 +49,62 @@ class MatchingTrees(unittest.TestCase):
             below.append(below[a] | below[b])
         self.assertEqual(sum(len(mixed) == 1 for mixed in below[60:]), 3 * 19)
 
+    def test_with_a_matcher(self):
+        points = np.random.default_rng(8).random((37, 2))
+        sizes = []
+
+        def halves(nodes):
+            sizes.append(len(nodes))
+            return terrace.halving_matching(nodes, iterations=50).mates
+
+        made = terrace.matching_tree(points, matcher=halves)
+        self.check_tree(points, np.ones(37), made)
+        self.assertEqual(sizes, [37, 19, 10, 5, 3, 2])
+        first = made.rows[made.levels == 1][:, :2].astype(int)
+        self.assertEqual({*map(tuple, first)}, {*map(tuple, terrace.halving_matching(points, iterations=50).pairs)})
+
+        class Enough(Exception):
+            pass
+
+        def raising(nodes):
+            raise Enough
+
+        for matcher, kind in ((raising, Enough), (lambda nodes: [0] * len(nodes), ValueError), (lambda nodes: [-1] * len(nodes), ValueError),
+                              (lambda nodes: [99] * len(nodes), ValueError), (lambda nodes: [1, 0], ValueError), (lambda nodes: 'a', TypeError), (3, TypeError)):
+            with self.assertRaises(kind):
+                terrace.matching_tree(points, matcher=matcher)
+
+    def test_rotated(self):
+        random = np.random.default_rng(9)
+        for width in (2, 3):
+            lower = random.random((400, width)) ** 3
+            for boxes in ((lower,), (lower, lower + 0.02 * random.random((400, width)))):
+                tree = terrace.linkage(lower)
+                rows = terrace.rotate_tree(tree, *boxes)
+                self.assertEqual(sorted(rows.ravel()), [*range(798)])  # each node but the root has one parent
+                self.assertTrue((rows.max(axis=1) < 400 + np.arange(399)).all())
+
+                def area_sum(children):
+                    low, high = [*boxes[0]], [*boxes[-1]]
+                    total = 0
+                    for a, b in children.astype(int):
+                        low.append(np.minimum(low[a], low[b]))
+                        high.append(np.maximum(high[a], high[b]))
+                        side = high[-1] - low[-1]
+                        total += side.sum() if width == 2 else side[0] * side[1] + side[1] * side[2] + side[2] * side[0]
+                    return total
+
+                self.assertLess(area_sum(rows), area_sum(tree[:, :2]))
+            asked = random.random((50, width))
+            for given, want in zip(terrace.PointTree(lower, rows).nearest(asked, 3), terrace.PointTree(lower, tree).nearest(asked, 3)):
+                np.testing.assert_array_equal(given, want)
+        self.assertAlmostEqual(terrace.PointTree(lower, terrace.rotate_tree(tree, lower, passes=0)).cost, terrace.PointTree(lower, tree).cost)
+        for wrong in (lambda: terrace.rotate_tree(tree, lower[:5]), lambda: terrace.rotate_tree(tree, lower, lower[:5]),
+                      lambda: terrace.rotate_tree(tree, lower, lower - 1), lambda: terrace.rotate_tree(tree, lower, lower[:, :2]),
+                      lambda: terrace.rotate_tree([[0, 0]], lower[:2]), lambda: terrace.rotate_tree(tree, lower * np.nan)):
+            with self.assertRaises(ValueError):
+                wrong()
+
     def test_misuse(self):
         self.assertEqual(terrace.matching_tree(np.zeros((1, 2))).rows.shape, (0, 4))
         some = np.random.default_rng(3).random((5, 2))

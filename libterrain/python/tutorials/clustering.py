@@ -42,6 +42,20 @@ chosen = terrace.assignment(points, moved)
 print(chosen, f'{(chosen.columns == np.arange(len(points))).mean():.0%} of the points get their own copy')
 
 # %% [markdown]
+# The hierarchy of clusters that stores are made of takes any number of points in one pass; here a function counts its clusters.
+
+# %%
+clusters = {}
+
+
+def count(block):
+    clusters[block.level] = clusters.get(block.level, 0) + len(block.representatives)
+
+
+made = terrace.stream_clusters((random.random((10000, 3)) for _ in range(30)), count)
+print(f'{made["points"]} points, clusters by level: {dict(sorted(clusters.items()))}')
+
+# %% [markdown]
 # A triangulation that changes: what is inserted and removed again leaves no trace.
 
 # %%

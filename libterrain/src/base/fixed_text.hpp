@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -23,33 +25,52 @@ class FixedText {
     return FixedText(decimals);
   }
 
+  /// Bytes that write() takes, at most.
+  static constexpr std::size_t kLongest = 40;
+
   /// Empty for NaN. Numbers with too many digits for 64 bits get their shortest text that reads
   /// back the same.
   void append(std::string& text, double value) const {
-    if (std::isnan(value)) return;
-    char digits[40];
-    const double scaled = std::nearbyint(std::abs(value) * static_cast<double>(power_));
-    if (!(scaled < 9e18)) {
-      text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
-      return;
-    }
+    char digits[kLongest];
+    text.append(digits, write(digits, value));
+  }
+  /// Writes the same from `at` on and returns its end.
+  char* write(char* at, double value) const {
+    if (std::isnan(value)) return at;
+    const double scaled = rounded(std::abs(value) * static_cast<double>(power_));
+    if (!(scaled < 9e18)) return std::to_chars(at, at + kLongest, value).ptr;
     const auto number = static_cast<std::uint64_t>(scaled);
-    char* at = digits;
     if (value < 0 && number != 0) *at++ = '-';
-    at = std::to_chars(at, digits + sizeof digits, number / power_).ptr;
-    if (decimals_ > 0) {
-      *at++ = '.';
-      std::uint64_t rest = number % power_;
-      for (int i = decimals_; i-- > 0;) {
-        at[i] = static_cast<char>('0' + rest % 10);
-        rest /= 10;
-      }
-      at += decimals_;
+    const std::uint64_t whole = number / power_;
+    at = std::to_chars(at, at + kLongest - 1, whole).ptr;
+    if (decimals_ == 0) return at;
+    *at++ = '.';
+    std::uint64_t rest = number - whole * power_;
+    int left = decimals_;
+    for (; left >= 2; left -= 2, rest /= 100) {
+      const std::size_t pair = 2 * (rest % 100);
+      at[left - 2] = kPairs[pair];
+      at[left - 1] = kPairs[pair + 1];
     }
-    text.append(digits, at);
+    if (left == 1) at[0] = static_cast<char>('0' + rest);
+    return at + decimals_;
   }
 
  private:
+  /// To the nearest integer, halves to even, without a call of the C library.
+  static double rounded(double value) {
+    constexpr double kWhole = 0x1p52;  ///< from here on there are integers alone
+    return value < kWhole ? value + kWhole - kWhole : value;
+  }
+  static constexpr std::array<char, 200> kPairs = [] {
+    std::array<char, 200> pairs{};
+    for (std::size_t i = 0; i < 100; ++i) {
+      pairs[2 * i] = static_cast<char>('0' + i / 10);
+      pairs[2 * i + 1] = static_cast<char>('0' + i % 10);
+    }
+    return pairs;
+  }();
+
   int decimals_;
   std::uint64_t power_ = 1;
 };

@@ -69,11 +69,15 @@ void ContourText::append(std::string& text, const ContourLine& line,
           number_text(static_cast<double>(line.level) * interval_) +
           "},\"geometry\":{\"type\":\"LineString\",\"coordinates\":[";
   for (std::size_t i = 0; i < places.size(); ++i) {
-    text += i == 0 ? "[" : ",[";
-    number_.append(text, places[i][0]);
-    text += ',';
-    number_.append(text, places[i][1]);
-    text += ']';
+    std::array<char, 2 * FixedText::kLongest + 4> pair;
+    char* at = pair.data();
+    if (i > 0) *at++ = ',';
+    *at++ = '[';
+    at = number_.write(at, places[i][0]);
+    *at++ = ',';
+    at = number_.write(at, places[i][1]);
+    *at++ = ']';
+    text.append(pair.data(), at);
   }
   text += "]}}";
 }

@@ -5,6 +5,7 @@
 #include <bit>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "base/portable_math.hpp"
 
@@ -15,12 +16,13 @@ ContourTriangles::ContourTriangles(double interval, std::function<void(ContourLi
     : levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
 
 std::size_t ContourTriangles::Hash::operator()(const Crossing& c) const {
-  std::uint64_t hash = static_cast<std::uint64_t>(c.level);
   // Adding 0 makes 0 of -0, which is equal to it.
-  for (const double v : {c.a[0], c.a[1], c.b[0], c.b[1]}) {
-    hash = scramble(hash) ^ std::bit_cast<std::uint64_t>(v + 0.0);
-  }
-  return scramble(hash);
+  const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v + 0.0); };
+  std::uint64_t hash = static_cast<std::uint64_t>(c.level) * 0x9E3779B97F4A7C15U;
+  hash = std::rotl(hash ^ bits(c.a[0]), 29) * 0xBF58476D1CE4E5B9U;
+  hash = std::rotl(hash ^ bits(c.a[1]), 29) * 0x94D049BB133111EBU;
+  hash = std::rotl(hash ^ bits(c.b[0]), 29) * 0xBF58476D1CE4E5B9U;
+  return scramble(hash ^ bits(c.b[1]));
 }
 
 void ContourTriangles::join(std::span<const Triangle> triangles) {
@@ -62,10 +64,25 @@ void ContourTriangles::sort(std::span<Triangle> triangles) {
         t.begin(), t.end(), [](const Corner& a, const Corner& b) { return a.place < b.place; });
     std::rotate(t.begin(), smallest, t.end());
   }
-  std::sort(triangles.begin(), triangles.end(), [](const Triangle& s, const Triangle& t) {
-    return std::tie(s[0].place, s[1].place, s[2].place) <
-           std::tie(t[0].place, t[1].place, t[2].place);
+  // Triangles are large: most are told apart by their first corners.
+  struct Key {
+    Point2 first;
+    std::uint32_t number;
+  };
+  std::vector<Key> order;
+  order.reserve(triangles.size());
+  for (const Triangle& t : triangles) {
+    order.push_back({t[0].place, static_cast<std::uint32_t>(order.size())});
+  }
+  std::sort(order.begin(), order.end(), [&](const Key& p, const Key& q) {
+    if (p.first != q.first) return p.first < q.first;
+    const Triangle &s = triangles[p.number], &t = triangles[q.number];
+    return std::tie(s[1].place, s[2].place) < std::tie(t[1].place, t[2].place);
   });
+  std::vector<Triangle> sorted;
+  sorted.reserve(triangles.size());
+  for (const Key& key : order) sorted.push_back(triangles[key.number]);
+  std::copy(sorted.begin(), sorted.end(), triangles.begin());
 }
 
 }  // namespace terrace::terrain

@@ -2,12 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <limits>
-#include <map>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -32,84 +30,85 @@ struct OpenLineLimit {
 /// member `level`) on an edge; at most one segment begins there and at most one ends. Lines come
 /// out in an order that depends on the order of the segments alone.
 ///
-/// Some hash look-ups per segment. Memory: the lines that are not whole.
+/// Two hash look-ups per segment. Memory: the lines that are not whole.
 template <class Crossing, class Hash>
 class LineJoiner {
  public:
   /// emit: takes every line once it is whole. Lines that shrink to a point are left out.
   explicit LineJoiner(std::function<void(ContourLine&&)> emit, OpenLineLimit limit = {})
-      : emit_(std::move(emit)), limit_(std::move(limit)) {}
+      : emit_(std::move(emit)), limit_(std::move(limit)) {
+    // Places of points are numbers of 32 bits.
+    limit_.points = std::min<std::uint64_t>(limit_.points, kNone - 4);
+  }
 
   void add(const Crossing& from, Point2 from_place, const Crossing& to, Point2 to_place) {
     ++segments_;
     if (open_points_ > limit_.points) limit_.exceeded();
-    const auto before = ends_.find(from);
-    const auto after = begins_.find(to);
-    if (before == ends_.end() && after == begins_.end()) {
-      lines_[next_line_] = {from, to, {from_place, to_place}};
-      begins_[from] = ends_[to] = next_line_++;
+    const std::uint32_t from_hash = hash_of(from), to_hash = hash_of(to);
+    const std::uint32_t first = take(from, from_hash, kEnd);
+    const std::uint32_t second = take(to, to_hash, kBegin);
+    if (first == kNone && second == kNone) {
+      const std::uint32_t fresh = new_line();
+      lines_[fresh] = {from, to, next_number_++, new_point(from_place), new_point(to_place), 2};
+      points_[lines_[fresh].first].next = lines_[fresh].last;
+      put(from_hash, fresh, kBegin);
+      put(to_hash, fresh, kEnd);
       open_points_ += 2;
-      return;
-    }
-    if (after == begins_.end()) {
-      const std::uint64_t number = before->second;
-      Line& line = lines_[number];
-      line.points.push_back(to_place);
+    } else if (second == kNone) {
+      const std::uint32_t added = new_point(to_place);
+      Line& line = lines_[first];
+      points_[line.last].next = added;
+      line.last = added;
       line.end = to;
-      ends_.erase(before);
-      ends_[to] = number;
+      ++line.count;
       ++open_points_;
-      return;
-    }
-    if (before == ends_.end()) {
-      const std::uint64_t number = after->second;
-      Line& line = lines_[number];
-      line.points.push_front(from_place);
+      put(to_hash, first, kEnd);
+    } else if (first == kNone) {
+      const std::uint32_t added = new_point(from_place);
+      Line& line = lines_[second];
+      points_[added].next = line.first;
+      line.first = added;
       line.begin = from;
-      begins_.erase(after);
-      begins_[from] = number;
+      ++line.count;
       ++open_points_;
-      return;
-    }
-    const std::uint64_t first = before->second, second = after->second;
-    ends_.erase(before);
-    begins_.erase(after);
-    Line& line = lines_[first];
-    if (first == second) {
-      line.points.push_back(to_place);
+      put(from_hash, second, kBegin);
+    } else if (first == second) {
+      const std::uint32_t added = new_point(to_place);
+      Line& line = lines_[first];
+      points_[line.last].next = added;
+      line.last = added;
+      ++line.count;
       ++open_points_;
-      emit(line, true);
-      lines_.erase(first);
-      return;
-    }
-    // The shorter one moves; the line keeps the smaller number.
-    Line& rest = lines_[second];
-    if (rest.points.size() > line.points.size()) {
-      rest.points.insert(rest.points.begin(), line.points.begin(), line.points.end());
-      line.points.swap(rest.points);
+      emit(first, true);
     } else {
-      line.points.insert(line.points.end(), rest.points.begin(), rest.points.end());
+      // The line keeps the smaller number.
+      Line& line = lines_[first];
+      Line& rest = lines_[second];
+      points_[line.last].next = rest.first;
+      line.last = rest.last;
+      line.end = rest.end;
+      line.count += rest.count;
+      line.number = std::min(line.number, rest.number);
+      slot_of(second, kEnd)->end = first << 1 | kEnd;
+      drop_line(second);
     }
-    line.end = rest.end;
-    const std::uint64_t kept = std::min(first, second);
-    begins_[line.begin] = ends_[line.end] = kept;
-    if (kept != first) lines_[kept] = std::move(line);
-    lines_.erase(std::max(first, second));
   }
 
-  /// Emits the lines of which no end goes on. O(lines that are not whole).
+  /// Emits the lines of which no end goes on. O(n log n) with n lines that are not whole.
   template <class GoesOn>
   void emit_whole(const GoesOn& goes_on) {
-    for (auto at = lines_.begin(); at != lines_.end();) {
-      Line& line = at->second;
-      if (goes_on(line.begin) || goes_on(line.end)) {
-        ++at;
-        continue;
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> whole;
+    for (std::uint32_t i = 0; i < lines_.size(); ++i) {
+      const Line& line = lines_[i];
+      if (line.count > 0 && !goes_on(line.begin) && !goes_on(line.end)) {
+        whole.emplace_back(line.number, i);
       }
-      begins_.erase(line.begin);
-      ends_.erase(line.end);
-      emit(line, false);
-      at = lines_.erase(at);
+    }
+    std::sort(whole.begin(), whole.end());
+    for (const auto& [number, i] : whole) {
+      take(lines_[i].begin, hash_of(lines_[i].begin), kBegin);
+      take(lines_[i].end, hash_of(lines_[i].end), kEnd);
+      emit(i, false);
     }
   }
 
@@ -119,25 +118,126 @@ class LineJoiner {
   [[nodiscard]] std::uint64_t segments() const { return segments_; }
 
  private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  static constexpr std::uint32_t kBegin = 0, kEnd = 1;
   struct Line {
     Crossing begin, end;
-    std::deque<Point2> points;
+    std::uint64_t number = 0;  ///< lines are emitted by it
+    std::uint32_t first = 0, last = 0;
+    std::uint64_t count = 0;  ///< points; 0: the place is free, `first` is the next free one
+  };
+  struct Point {
+    Point2 place{};
+    std::uint32_t next = 0;
+  };
+  /// An end of a line, in a table with linear probing.
+  struct Slot {
+    std::uint32_t hash = 0;
+    std::uint32_t end = kNone;  ///< a line's place << 1 | kBegin or kEnd; kNone: the slot is free
   };
 
-  void emit(Line& line, bool closed) {
-    open_points_ -= line.points.size();
+  static std::uint32_t hash_of(const Crossing& crossing) {
+    return static_cast<std::uint32_t>(Hash()(crossing));
+  }
+  [[nodiscard]] const Crossing& crossing_of(std::uint32_t end) const {
+    const Line& line = lines_[end >> 1];
+    return (end & 1U) == kBegin ? line.begin : line.end;
+  }
+
+  /// Takes the line that begins (or ends) at a crossing out of the table; kNone if there is none.
+  std::uint32_t take(const Crossing& crossing, std::uint32_t hash, std::uint32_t side) {
+    for (std::size_t at = hash & mask_; slots_[at].end != kNone; at = (at + 1) & mask_) {
+      const std::uint32_t end = slots_[at].end;
+      if (slots_[at].hash != hash || (end & 1U) != side || !(crossing_of(end) == crossing))
+        continue;
+      erase(at);
+      return end >> 1;
+    }
+    return kNone;
+  }
+  void erase(std::size_t hole) {
+    // What follows moves up if it lies no nearer to its own place than to the hole.
+    for (std::size_t at = (hole + 1) & mask_; slots_[at].end != kNone; at = (at + 1) & mask_) {
+      if (((at - slots_[at].hash) & mask_) < ((at - hole) & mask_)) continue;
+      slots_[hole] = slots_[at];
+      hole = at;
+    }
+    slots_[hole].end = kNone;
+    --ends_;
+  }
+  void put(std::uint32_t hash, std::uint32_t line, std::uint32_t side) {
+    if (2 * ++ends_ > slots_.size()) {
+      std::vector<Slot> before(2 * slots_.size());
+      before.swap(slots_);
+      mask_ = slots_.size() - 1;
+      for (const Slot& slot : before) {
+        if (slot.end != kNone) *free_slot(slot.hash) = slot;
+      }
+    }
+    *free_slot(hash) = {hash, line << 1 | side};
+  }
+  Slot* free_slot(std::uint32_t hash) {
+    std::size_t at = hash & mask_;
+    while (slots_[at].end != kNone) at = (at + 1) & mask_;
+    return &slots_[at];
+  }
+  Slot* slot_of(std::uint32_t line, std::uint32_t side) {
+    const std::uint32_t end = line << 1 | side;
+    std::size_t at = hash_of(crossing_of(end)) & mask_;
+    while (slots_[at].end != end) at = (at + 1) & mask_;
+    return &slots_[at];
+  }
+
+  std::uint32_t new_point(const Point2& place) {
+    if (free_point_ == kNone) {
+      points_.push_back({place});
+      return static_cast<std::uint32_t>(points_.size() - 1);
+    }
+    const std::uint32_t point = free_point_;
+    free_point_ = points_[point].next;
+    points_[point].place = place;
+    return point;
+  }
+  std::uint32_t new_line() {
+    if (free_line_ == kNone) {
+      lines_.emplace_back();
+      return static_cast<std::uint32_t>(lines_.size() - 1);
+    }
+    const std::uint32_t line = free_line_;
+    free_line_ = lines_[line].first;
+    return line;
+  }
+  void drop_line(std::uint32_t line) {
+    lines_[line].count = 0;
+    lines_[line].first = free_line_;
+    free_line_ = line;
+  }
+
+  /// Its ends are not in the table any more.
+  void emit(std::uint32_t number, bool closed) {
+    const Line& line = lines_[number];
+    open_points_ -= line.count;
     ContourLine result{line.begin.level, closed, {}};
-    for (const Point2& p : line.points) {
+    result.points.reserve(line.count);
+    std::uint32_t at = line.first;
+    for (std::uint64_t i = 0; i < line.count; ++i, at = points_[at].next) {
+      const Point2& p = points_[at].place;
       if (result.points.empty() || result.points.back() != p) result.points.push_back(p);
     }
+    points_[line.last].next = free_point_;
+    free_point_ = line.first;
+    drop_line(number);
     if (result.points.size() > 1) emit_(std::move(result));
   }
 
   std::function<void(ContourLine&&)> emit_;
   OpenLineLimit limit_;
-  std::uint64_t open_points_ = 0, segments_ = 0, next_line_ = 0;
-  std::map<std::uint64_t, Line> lines_;  ///< by number: an order that does not depend on hashing
-  std::unordered_map<Crossing, std::uint64_t, Hash> begins_, ends_;
+  std::uint64_t open_points_ = 0, segments_ = 0, next_number_ = 0;
+  std::vector<Line> lines_;
+  std::vector<Point> points_;  ///< of each line linked from its first to its last
+  std::uint32_t free_line_ = kNone, free_point_ = kNone;
+  std::vector<Slot> slots_{16};  ///< a power of two, at most half full
+  std::size_t mask_ = 15, ends_ = 0;
 };
 
 }  // namespace terrace::terrain

@@ -53,6 +53,26 @@ class GeographyPatch {
   bool within_turn_ = true;
 };
 
+/// Patches side by side over a box. Const members may be called by several threads at once.
+class GeographyPatches {
+ public:
+  /// None.
+  GeographyPatches() = default;
+  /// longest: of a patch's sides; where the box has more than 64 of them along a side they are
+  /// longer. The others: as GeographyPatch::fit() wants them.
+  GeographyPatches(const Point2& low, const Point2& high, const Point2& longest, double tolerance,
+                   const std::function<void(std::span<Point2>)>& exact);
+
+  /// Converts a place; false, and nothing done, where polynomials do not suffice. The first
+  /// coordinate is not brought into one turn.
+  bool convert(Point2& place) const;
+
+ private:
+  Point2 low_{}, per_unit_{};  ///< of the box; patches per unit of the coordinates
+  std::size_t columns_ = 0, rows_ = 0;
+  std::vector<std::optional<GeographyPatch>> patches_;
+};
+
 /// Longitudes and latitudes of WGS 84 for many places in a box of a reference system, fast: by
 /// GeographyPatch in patches of at most 20 km where the box has no more than 64 of them along a
 /// side, exactly where polynomials do not suffice. Const members may be called by several threads
@@ -72,9 +92,7 @@ class BoxGeography {
 
  private:
   CoordinateSystem system_;
-  Point2 low_{}, per_unit_{};  ///< of the box; patches per unit of x and y
-  std::size_t columns_ = 0, rows_ = 0;
-  std::vector<std::optional<GeographyPatch>> patches_;
+  GeographyPatches patches_;
 };
 
 }  // namespace terrace::terrain

@@ -122,6 +122,7 @@ class Descent {
       const stream::ClusterId id = stream::cluster_id(level, ordinal);
       // Most are far away, and so are their pages of the index.
       if (!detail_.wants(level, world_box(placement_, store_.coarse_box(id)))) continue;
+      if (!detail_.wants(level, world_box(placement_, store_.page_box(id)))) continue;
       const stream::ClusterRecord record = store_.record(id);
       if (detail_.wants(level, world_box(placement_, record.summary.box))) found(id, record);
     }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/cluster_reader.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 
@@ -24,13 +26,20 @@ class FrameReader final : public ClusterReader {
   FrameReader(FramedSource& source, std::function<bool(const stream::ByteRange&)> given)
       : source_(source), given_(std::move(given)) {}
 
-  void bring(double seconds, const Give& give) override {
+  void bring(double seconds, const Give& give, const GiveRecord& give_record) override {
     const tri::StepBudget budget{.seconds = kReadingShare * seconds, .clock = steady_seconds};
     meter_.start(budget);
     missing_.clear();
     if (!given_ || lacking_.size() > 8 * kMostMissing) lacking_.clear();
+    if (!given_ || lacking_pages_.size() > 8 * kMostMissing) lacking_pages_.clear();
+    ++number_;
     const double end = steady_seconds() + kMissingShare * seconds;
     for (const tri::ViewRequest& request : wanted_) {
+      if (request.members == tri::ClusterRecord::kUnread) {
+        if (missing_.size() >= kMostMissing || !bring_record(request.cluster, end, give_record))
+          break;
+        continue;
+      }
       const auto members = static_cast<std::size_t>(request.members);
       // Above level 0 the records of the clusters below come with it, which takes far longer.
       const std::size_t kind = tri::level_of(request.cluster) > 0 ? 1 : 0;
@@ -57,29 +66,69 @@ class FrameReader final : public ClusterReader {
   [[nodiscard]] std::span<const stream::ByteRange> missing() const override { return missing_; }
 
  private:
+  struct LackingPage {
+    stream::ByteRange range;
+    std::uint64_t told = 0;  ///< in which frame it was added to missing_
+  };
+
+  /// False once the time is over.
+  bool bring_record(tri::ClusterId id, double end, const GiveRecord& give_record) {
+    const tri::ClusterId page = FramedSource::page_of(id);
+    const bool same = page == page_;
+    page_ = page;
+    auto lacking = lacking_pages_.find(page);
+    if (lacking == lacking_pages_.end() || given_(lacking->second.range)) {
+      // The next ones of a page take next to no time.
+      if (!same && steady_seconds() > end) return false;
+      try {
+        give_record(id, source_.exact_record(id));
+        return true;
+      } catch (const stream::MissingBytes& missing) {
+        lacking =
+            lacking_pages_.insert_or_assign(page, LackingPage{missing.ranges().front()}).first;
+      }
+    }
+    if (std::exchange(lacking->second.told, number_) != number_) {
+      missing_.push_back(lacking->second.range);
+    }
+    return true;
+  }
+
   FramedSource& source_;
   std::function<bool(const stream::ByteRange&)> given_;
   std::vector<tri::ViewRequest> wanted_;  ///< by the step before
   std::vector<stream::ByteRange> missing_;
   /// What clusters lacked when they were last looked for.
   std::unordered_map<tri::ClusterId, std::vector<stream::ByteRange>> lacking_;
+  std::unordered_map<tri::ClusterId, LackingPage> lacking_pages_;
+  std::uint64_t number_ = 0;  ///< of the frame
+  tri::ClusterId page_{~std::uint64_t{0}};
   tri::StepMeter meter_;
 };
 
 }  // namespace
 
+tri::ClusterRecord FramedSource::exact_record(tri::ClusterId id) {
+  tri::ClusterRecord record = inner_.record(id);
+  record.box = frame_.box_of(record.box);
+  return record;
+}
+
 tri::ClusterRecord FramedSource::record(tri::ClusterId id) {
-  try {
-    tri::ClusterRecord record = inner_.record(id);
-    record.box = frame_.box_of(record.box);
-    return record;
-  } catch (const stream::MissingBytes& missing) {
-    // Neighbours are often in the same page of the index.
-    for (const stream::ByteRange& range : missing.ranges()) {
-      if (missing_.empty() || missing_.back() != range) missing_.push_back(range);
+  const tri::ClusterId page = page_of(id);
+  if (std::find(missing_pages_.begin(), missing_pages_.end(), page) == missing_pages_.end()) {
+    try {
+      return exact_record(id);
+    } catch (const stream::MissingBytes& missing) {
+      missing_pages_.push_back(page);
+      missing_.insert(missing_.end(), missing.ranges().begin(), missing.ranges().end());
     }
-    return {};
   }
+  const stream::Box3 box =
+      store_.coarse_box(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id)));
+  return {.box = frame_.box_of({box.min, box.max}),
+          .error = std::numeric_limits<double>::infinity(),
+          .members = tri::ClusterRecord::kUnread};
 }
 
 tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
@@ -98,17 +147,21 @@ tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
 }
 
 tri::GivenCluster FramedSource::whole(const std::function<tri::GivenCluster()>& load) {
-  missing_.clear();
   tri::GivenCluster cluster = load();
   if (!missing_.empty()) throw stream::MissingBytes(missing_);
   return cluster;
 }
 
 tri::GivenCluster FramedSource::load(const tri::ViewRequest& request) {
+  missing_pages_.clear();
+  missing_.clear();
+  if (bounds_) return tri::load(*this, request);
   return whole([&] { return tri::load(*this, request); });
 }
 
 tri::GivenCluster FramedSource::load_root() {
+  missing_pages_.clear();
+  missing_.clear();
   return whole([&] { return tri::load_root(*this); });
 }
 

@@ -22,9 +22,11 @@ namespace terrace::terrain {
 /// The clusters of a store, members in stored coordinates or on a lattice, boxes in the view frame.
 class FramedSource final : public tri::ClusterSource {
  public:
-  /// Without a lattice (null) members are in stored coordinates. Keeps references.
-  FramedSource(const stream::Store& store, const ViewFrame& frame, const ViewLattice* lattice)
-      : store_(store), inner_(store), frame_(frame), lattice_(lattice) {}
+  /// Without a lattice (null) members are in stored coordinates. `bounds`: records whose bytes are
+  /// missing may be bounds (tri::ClusterRecord::kUnread). Keeps references.
+  FramedSource(const stream::Store& store, const ViewFrame& frame, const ViewLattice* lattice,
+               bool bounds)
+      : store_(store), inner_(store), frame_(frame), lattice_(lattice), bounds_(bounds) {}
 
   [[nodiscard]] unsigned top() const override { return inner_.top(); }
   [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
@@ -37,6 +39,14 @@ class FramedSource final : public tri::ClusterSource {
   /// missing and can be told, not only the first.
   tri::GivenCluster load(const tri::ViewRequest& request);
   tri::GivenCluster load_root();
+  /// A record itself. Throws: stream::MissingBytes.
+  tri::ClusterRecord exact_record(tri::ClusterId id);
+  /// Clusters with the same number have their records in the same bytes.
+  [[nodiscard]] static tri::ClusterId page_of(tri::ClusterId id) {
+    constexpr std::uint64_t kClusters = 64;  // older stores have larger pages
+    const std::uint64_t ordinal = tri::ordinal_of(id);
+    return tri::cluster_id(tri::level_of(id), ordinal - ordinal % kClusters);
+  }
 
   /// What was read so far; may be asked while another thread reads.
   [[nodiscard]] ViewTraffic traffic() const { return {clusters_, points_, bytes_}; }
@@ -49,19 +59,23 @@ class FramedSource final : public tri::ClusterSource {
   StoreSource inner_;
   const ViewFrame& frame_;
   const ViewLattice* lattice_;
-  std::vector<stream::Point3> nodes_;       ///< what the last read() shows, with a lattice
-  std::vector<stream::ByteRange> missing_;  ///< of the records of the cluster being loaded
+  bool bounds_;
+  std::vector<stream::Point3> nodes_;  ///< what the last read() shows, with a lattice
+  /// Of the records of the cluster being loaded: where, and in which bytes.
+  std::vector<tri::ClusterId> missing_pages_;
+  std::vector<stream::ByteRange> missing_;
   std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
 };
 
 class ClusterReader {
  public:
   using Give = std::function<void(tri::GivenCluster)>;
+  using GiveRecord = std::function<void(tri::ClusterId, const tri::ClusterRecord&)>;
 
   virtual ~ClusterReader() = default;
   /// Before a step: gives what was asked for and is there, for about `seconds`. Throws what reading
   /// threw.
-  virtual void bring(double seconds, const Give& give) = 0;
+  virtual void bring(double seconds, const Give& give, const GiveRecord& give_record) = 0;
   /// After it: what the step lacks, as in tri::ViewControl::Step.
   virtual void ask(const std::vector<tri::ViewRequest>& wanted,
                    const std::vector<tri::ViewRequest>& requests,

@@ -27,7 +27,7 @@ class ReadingThread final : public ClusterReader {
   ReadingThread(const ReadingThread&) = delete;
   ReadingThread& operator=(const ReadingThread&) = delete;
 
-  void bring(double, const Give& give) override {
+  void bring(double, const Give& give, const GiveRecord&) override {
     taken_.clear();
     {
       const std::lock_guard lock(mutex_);

@@ -32,7 +32,7 @@ struct StoreView<Shown>::Impl {
       : store(given),
         frame(store, ground),
         lattice(store, frame),
-        source(store, frame, shows_surface<Shown> ? &lattice : nullptr),
+        source(store, frame, shows_surface<Shown> ? &lattice : nullptr, options.silhouette == 1.0),
         control(source.counts(), load_root(), options),
         reader(make_reader(source)) {
     assert((!std::is_integral_v<Shown> || store.schema().grid));
@@ -74,8 +74,11 @@ const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& 
                                                                double seconds,
                                                                const std::array<double, 2>& after) {
   const double begin = Impl::now();
-  impl_->reader->bring(seconds,
-                       [&](tri::GivenCluster cluster) { impl_->control.give(std::move(cluster)); });
+  impl_->reader->bring(
+      seconds, [&](tri::GivenCluster cluster) { impl_->control.give(std::move(cluster)); },
+      [&](tri::ClusterId id, const tri::ClusterRecord& record) {
+        impl_->control.give_record(id, record);
+      });
   const double left = seconds - (Impl::now() - begin);
   const Step& step =
       impl_->control.step(view, {.seconds = left, .clock = Impl::now, .after = after});

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <span>
+#include <type_traits>
 
 #include "hilbert.hpp"
+#include "lattice.hpp"
 #include "mesh.hpp"
 
 namespace terrace::tri::planar {
@@ -18,30 +20,56 @@ template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict);
 
 /// Inserts a point, or finds the vertex that equals it. `hint`: a living vertex, or kNone.
-struct Inserted {
-  std::uint32_t vertex;
-  bool created;
-};
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 
-/// Inserts points in an order of its own. Calls done(number, inserted) for each.
+/// In each group of so many points one goes first.
+inline constexpr std::uint32_t kSampleEvery = 8;
+
+/// insert_points() of those that find_lattice() has found.
+template <class Kernel, class Done>
+void insert_on_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
+                       std::uint32_t hint, Done done) {
+  Lattice& lattice = mesh.lattice;
+  const auto insert = [&](std::uint32_t i) {
+    const std::size_t node = lattice.node(points[i]);
+    hint = lattice.neighbour(node, hint);
+    const Inserted inserted = insert_point(mesh, points[i], hint);
+    hint = lattice.vertex[node] = inserted.vertex;
+    done(i, inserted);
+  };
+  const std::vector<std::uint32_t>& outside = lattice.outside;
+  for (std::size_t k = 0; k < outside.size(); k += kSampleEvery) insert(outside[k]);
+  for (std::size_t k = 0; k < outside.size(); ++k)
+    if (k % kSampleEvery != 0) insert(outside[k]);
+  fill_lattice(mesh, points);
+  for (std::size_t k = 0; k < lattice.inside.size(); ++k) {
+    done(lattice.inside[k], lattice.inserted[k]);
+  }
+}
+
+/// Inserts points in an order of its own. Calls done(number, inserted) for each. `hint`: where they
+/// are; of a cluster its head.
 ///
 /// The hint of a point is the previous one on a Hilbert curve. As in bulk construction a coarse
-/// sample goes first: it saves a quarter of the temporary triangles.
+/// sample goes first: it saves a quarter of the temporary triangles. Of integer points that lie
+/// side by side those with all their lattice neighbours go last and together, see fill_lattice();
+/// the hint of the others is a lattice neighbour.
 template <class Kernel, class Done>
 void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                    std::uint32_t hint, Done done) {
-  constexpr std::uint32_t kSample = 8;
+  if constexpr (std::is_integral_v<typename Kernel::Coord>) {
+    if (find_lattice(mesh, points, hint)) return insert_on_lattice(mesh, points, hint, done);
+  }
   const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
   const auto insert = [&](std::uint32_t i) {
     const Inserted inserted = insert_point(mesh, points[i], hint);
     hint = inserted.vertex;
     done(i, inserted);
   };
-  for (std::uint32_t k = 0; k < order.size(); k += kSample) insert(order[k]);
+  for (std::uint32_t k = 0; k < order.size(); k += kSampleEvery) insert(order[k]);
   for (std::uint32_t k = 0; k < order.size(); ++k)
-    if (k % kSample != 0) insert(order[k]);
+    if (k % kSampleEvery != 0) insert(order[k]);
 }
 
 }  // namespace terrace::tri::planar

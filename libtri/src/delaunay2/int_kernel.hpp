@@ -45,6 +45,15 @@ struct IntKernel {
   [[gnu::noinline]] static int in_circle(Point a, Point b, Point c, Point p) {
     const Angle at_a = angle(a, b, c);
     const Angle at_p = angle(p, c, b);
+    // Near by, 64 bits are enough; WebAssembly has no wider products.
+    const auto raised = [](std::int64_t value) {
+      return static_cast<std::uint64_t>(value + kNear);
+    };
+    const std::uint64_t all =
+        raised(at_a.cross) | raised(at_a.dot) | raised(at_p.cross) | raised(at_p.dot);
+    if (all < 2 * kNear) [[likely]] {
+      return -sign(at_a.cross * at_p.dot + at_p.cross * at_a.dot);
+    }
     const Int128 sine =
         static_cast<Int128>(at_a.cross) * at_p.dot + static_cast<Int128>(at_p.cross) * at_a.dot;
     return (sine < 0) - (sine > 0);
@@ -61,6 +70,7 @@ struct IntKernel {
   }
 
  private:
+  static constexpr std::int64_t kNear = std::int64_t{1} << 30;
   static int sign(std::int64_t value) { return (value > 0) - (value < 0); }
 };
 

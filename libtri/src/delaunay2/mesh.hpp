@@ -22,6 +22,8 @@ namespace terrace::tri::planar {
 inline constexpr std::uint32_t kGhost = 0;
 inline constexpr std::uint32_t kFreeCorner = 0xFFFFFFFFu;
 
+inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
 /// A side of a triangle: triangle * 4 + index of the corner opposite to it.
 using Side = std::uint32_t;
 
@@ -52,8 +54,6 @@ constexpr bool has_ghost(const std::array<std::uint32_t, 3>& corner) {
 constexpr bool is_finite(const std::array<std::uint32_t, 3>& corner) {
   return corner[0] != kFreeCorner && !has_ghost(corner);
 }
-
-inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
 /// In Mesh::incident: a living vertex without triangles (all points are collinear).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
@@ -96,6 +96,40 @@ struct Region {
   std::vector<std::uint32_t> pinches;
 };
 
+/// What insert_point() did: a new vertex, or the one that equals the point.
+struct Inserted {
+  std::uint32_t vertex;
+  bool created;
+};
+
+/// A window of the integer lattice, see lattice.hpp; scratch memory. A node is the lower left
+/// corner of a square; both have its number.
+struct Lattice {
+  std::array<std::int32_t, 2> low{};  ///< of node 0
+  std::uint32_t columns = 0;
+  std::vector<std::uint32_t> vertex;           ///< by node; kNone: none yet
+  std::vector<std::uint32_t> filled;           ///< by square: 0, or its number in `squares` plus 1
+  std::vector<std::uint32_t> squares;          ///< those to be filled
+  std::vector<std::uint32_t> inside, outside;  ///< numbers of points
+  std::vector<Inserted> inserted;              ///< for each of `inside`
+  std::vector<std::uint32_t> slots;            ///< of triangles, two for each of `squares`
+  std::vector<Side> beyond;                    ///< four for each square: what lies beyond its sides
+
+  [[nodiscard]] std::size_t node(const std::array<std::int32_t, 2>& p) const {
+    return static_cast<std::size_t>(p[1] - low[1]) * columns +
+           static_cast<std::size_t>(p[0] - low[0]);
+  }
+  /// A vertex next to a node, or `other`.
+  [[nodiscard]] std::uint32_t neighbour(std::size_t node, std::uint32_t other) const {
+    for (const std::size_t next :
+         {node - 1, node + 1, node - columns, node + columns, node - columns - 1,
+          node - columns + 1, node + columns - 1, node + columns + 1}) {
+      if (vertex[next] != kNone) return vertex[next];
+    }
+    return other;
+  }
+};
+
 template <class KernelT>
 struct Mesh {
   using Kernel = KernelT;
@@ -125,6 +159,7 @@ struct Mesh {
   std::vector<std::uint32_t> spare;
   Hole<Point> hole;
   Region region;
+  Lattice lattice;
 
   Mesh() {
     point.push_back(Point{});

@@ -2,7 +2,7 @@
 #include "model.hpp"
 
 #ifndef TERRACE_TRI_CORE
-#include "terrace/tri/metric.hpp"
+#include "terrace/tri/regional_delaunay2.hpp"
 #endif
 
 namespace terrace::tri {
@@ -15,6 +15,8 @@ template class MultiresolutionModel<Delaunay2<double>>;
 template class MultiresolutionModel<Delaunay3<std::int32_t>>;
 template class MultiresolutionModel<Delaunay3<double>>;
 template class MultiresolutionModel<DynamicSurface<double>>;
+template class MultiresolutionModel<RegionalDelaunay2<std::int32_t>>;
+template class MultiresolutionModel<RegionalDelaunay2<double>>;
 template class MultiresolutionModel<Delaunay2<double, EllipticalMetric2>>;
 template class MultiresolutionModel<Delaunay3<double, EllipticalMetric3>>;
 #endif

@@ -103,8 +103,9 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   using Slot = ClusterTree::Slot;
   using Verdict = ClusterTree::Verdict;
-  /// Whether a part of it, a surface, follows after operations and can be made from scratch.
-  static constexpr bool kFollows = requires(Triangulation t) { t.restore(1u); };
+  /// Whether a part of it follows after operations, and whether that can be made from scratch.
+  static constexpr bool kFollows = requires(Triangulation t) { t.follow(); };
+  static constexpr bool kRestores = requires(Triangulation t) { t.restore(1u); };
   static constexpr std::size_t kKeptPoints = 1 << 16;
 
   struct Staged {
@@ -285,7 +286,7 @@ auto MultiresolutionModel<Triangulation>::Impl::restore([[maybe_unused]] unsigne
     -> const Delta& {
   assert(!open_);
   start_delta();
-  if constexpr (kFollows) triangulation_.restore(threads);
+  if constexpr (kRestores) triangulation_.restore(threads);
   finish_delta();
   return delta_;
 }

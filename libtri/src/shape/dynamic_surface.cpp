@@ -65,7 +65,7 @@ struct DynamicSurface<Coord>::Impl {
     bool operator<(const Facet& other) const { return corners < other.corners; }
   };
   typename Delaunay3<Coord>::Changes changes;
-  std::vector<std::uint32_t> examined;
+  std::vector<std::uint32_t> examined, exposed;
   std::vector<Facet> vanished, appeared;
   std::vector<bool> fresh;  ///< by vertex slot: new since the last changes; false between calls
 
@@ -77,7 +77,7 @@ struct DynamicSurface<Coord>::Impl {
   /// Brings labels up to date and lists the tetrahedra whose facets may have come or gone.
   void relabel(bool from_scratch, unsigned threads) {
     if (!from_scratch && shape::worth_updating(mesh(), state, changes)) {
-      examined = shape::update_nearby(mesh(), state, changes);
+      examined = shape::update_nearby(mesh(), state, changes, exposed);
       return;
     }
     shape::restore_by_poles(mesh(), state, threads);
@@ -160,7 +160,36 @@ struct DynamicSurface<Coord>::Impl {
     ++count;
   }
 
+  void reserve(std::size_t vertices) {
+    tetrahedra.reserve(vertices);
+    // About as many as there are on a scan.
+    const std::size_t of_tetrahedra = 7 * vertices, of_triangles = 5 * vertices / 2;
+    state.of.reserve(of_tetrahedra);
+    state.forest.reserve(of_tetrahedra);
+    state.local_tetrahedron.reserve(of_tetrahedra);
+    behind.reserve(of_tetrahedra);
+    corners.reserve(of_triangles);
+    side.reserve(of_triangles);
+    state.degree.reserve(vertices + 1);
+    state.labels_gone.reserve(vertices + 1);
+    state.local_vertex.reserve(vertices + 1);
+  }
+
+  /// Lists the tetrahedra beside new ghosts: facets may have come to the hull.
+  void find_exposed() {
+    exposed.clear();
+    mesh().journal.for_each_cell([&](std::uint32_t t, const auto&) {
+      if (t >= mesh().tetrahedron.size()) return;
+      const spatial::Tetrahedron& ghost = mesh().tetrahedron[t];
+      if (ghost.corner[0] == spatial::kFreeCorner || !spatial::has_ghost(ghost.corner)) return;
+      const auto at = std::find(ghost.corner.begin(), ghost.corner.end(), spatial::kGhost);
+      exposed.push_back(
+          spatial::tetrahedron_of(ghost.mate[static_cast<std::size_t>(at - ghost.corner.begin())]));
+    });
+  }
+
   void follow(bool from_scratch, unsigned threads) {
+    find_exposed();
     tetrahedra.take_changes(changes);
     if (!from_scratch && changes.added_vertices.empty() && changes.removed_vertices.empty()) return;
     if (journal.on()) {
@@ -213,8 +242,17 @@ void DynamicSurface<Coord>::remove(std::span<const VertexId> vertices) {
   impl_->tetrahedra.remove(vertices);
 }
 template <class Coord>
+std::size_t DynamicSurface<Coord>::removal_work(std::span<const VertexId> vertices) const {
+  constexpr std::size_t kUsual = 14;  // tetrahedra inside at a vertex of a surface
+  const auto& degree = impl_->state.degree;
+  std::size_t inside = 0;
+  for (const VertexId v : vertices)
+    if (slot(v) < degree.size()) inside += degree[slot(v)];
+  return vertices.size() + (inside - std::min(inside, kUsual * vertices.size())) / 2;
+}
+template <class Coord>
 void DynamicSurface<Coord>::reserve(std::size_t vertices) {
-  impl_->tetrahedra.reserve(vertices);
+  impl_->reserve(vertices);
 }
 
 template <class Coord>

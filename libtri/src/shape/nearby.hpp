@@ -15,10 +15,12 @@
 
 namespace terrace::tri::shape {
 
-/// With more new tetrahedra than this most are far from the surface, see settle_most(): where
-/// detail ends, a few points on the other side of a body have tetrahedra with thousands of the fine
-/// ones.
-inline constexpr std::size_t kManyNew = 2500;
+/// Whether most of the new tetrahedra are far from the surface, see settle_most(): where detail
+/// ends, a few points on the other side of a body have tetrahedra with thousands of the fine ones.
+template <class Changes>
+bool far_reaching(const Changes& changes) {
+  return changes.added_tetrahedra.size() > 900 + 8 * changes.added_vertices.size();
+}
 
 /// The tetrahedra around a change as a triangulation of their own, in local numbers: new ones and
 /// their neighbours, whose labels are sought, and all others that have a vertex with one of them,
@@ -64,26 +66,21 @@ class Nearby {
     smooth_and_sculpt(spheres, inside, part);
     write(tetrahedra, inside);
   }
-  /// By slot, all tetrahedra whose label or whose neighbours may have changed: those looked at, and
-  /// those at vertices that lost some. To be called last.
+  /// By slot, all tetrahedra whose label or whose neighbours may have changed: those looked at, the
+  /// new ones and their neighbours, and those exposed. To be called last.
   template <class Changes>
-  std::vector<std::uint32_t> examined(const Changes& changes) {
+  std::vector<std::uint32_t> examined(const Changes& changes,
+                                      std::span<const std::uint32_t> exposed) {
     examined_ = slots_;
-    for (const std::uint32_t v : vertices_) state_.local_vertex[v] = spatial::kNone;
-    vertices_.clear();
     const auto take_too = [&](std::uint32_t t) {
       if (std::exchange(state_.local_tetrahedron[t], 0) == spatial::kNone) examined_.push_back(t);
     };
-    for (const TetrahedronId t : changes.added_tetrahedra) take_too(slot(t));
-    for (const auto& corners : changes.removed_corners) {
-      for (const VertexId v : corners) {
-        if (!mesh_.vertex_alive(slot(v))) continue;
-        if (std::exchange(state_.local_vertex[slot(v)], 0) != spatial::kNone) continue;
-        vertices_.push_back(slot(v));
-        take_too(mesh_.vertex[slot(v)].incident);
-      }
+    for (const TetrahedronId t : changes.added_tetrahedra) {
+      take_too(slot(t));
+      for (const spatial::Side mate : mesh_.tetrahedron[slot(t)].mate)
+        take_too(spatial::tetrahedron_of(mate));
     }
-    for_stars(examined_, take_too);
+    for (const std::uint32_t t : exposed) take_too(t);
     return examined_;
   }
   [[nodiscard]] const std::vector<std::uint32_t>& slots() const { return slots_; }
@@ -93,22 +90,6 @@ class Nearby {
     if (state_.local_tetrahedron[t] != spatial::kNone) return;
     state_.local_tetrahedron[t] = static_cast<std::uint32_t>(slots_.size());
     slots_.push_back(t);
-  }
-  /// Calls take(t) for all tetrahedra at numbered vertices, ghosts too: joined to those listed,
-  /// which grow, by facets with such a corner.
-  template <class Take>
-  void for_stars(const std::vector<std::uint32_t>& listed, const Take& take_one) {
-    for (std::size_t i = 0; i < listed.size(); ++i) {
-      for (const spatial::Side mate : mesh_.tetrahedron[listed[i]].mate) {
-        const std::uint32_t t = spatial::tetrahedron_of(mate);
-        if (state_.local_tetrahedron[t] != spatial::kNone) continue;
-        const auto& corner = mesh_.tetrahedron[t].corner;
-        if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
-              return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
-            }))
-          take_one(t);
-      }
-    }
   }
   template <class Changes>
   void collect(const Changes& changes, std::span<const TetrahedronId> unlabelled) {
@@ -138,7 +119,19 @@ class Nearby {
         take(mesh_.vertex[slot(v)].incident);
       }
     }
-    for_stars(slots_, [&](std::uint32_t t) { take(t); });
+    // All tetrahedra at these vertices, ghosts too: joined to those listed by facets with such a
+    // corner.
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate) {
+        const std::uint32_t t = spatial::tetrahedron_of(mate);
+        if (state_.local_tetrahedron[t] != spatial::kNone) continue;
+        const auto& corner = mesh_.tetrahedron[t].corner;
+        if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
+              return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
+            }))
+          take(t);
+      }
+    }
   }
   /// In lexicographic order, from 1.
   void number_vertices() {
@@ -261,11 +254,13 @@ std::vector<TetrahedronId> settle_most(const Mesh& mesh, State& state,
   return others;
 }
 
-/// The state of the poles rule after changes; `forest` has the labels before. Returns, by slot, all
-/// tetrahedra whose label or whose neighbours may have changed. Requires a scope of the metric.
+/// The state of the poles rule after changes; `forest` has the labels before. exposed: by slot,
+/// tetrahedra of which a facet may have come to the hull. Returns, by slot, all tetrahedra whose
+/// label or whose neighbours may have changed, these among them. Requires a scope of the metric.
 template <class Changes, class Mesh>
-std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const Changes& changes) {
-  const bool many = changes.added_tetrahedra.size() > kManyNew;
+std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const Changes& changes,
+                                         std::span<const std::uint32_t> exposed = {}) {
+  const bool many = far_reaching(changes);
   state.labels_gone.resize(std::max<std::size_t>(state.labels_gone.size(), mesh.vertex.size()));
   for (std::size_t k = 0; k < changes.removed_tetrahedra.size(); ++k) {
     const std::uint32_t t = slot(changes.removed_tetrahedra[k]);
@@ -292,7 +287,7 @@ std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const C
   nearby.relabel(changes, unlabelled);
   for (const auto& corners : changes.removed_corners)
     for (const VertexId v : corners) state.labels_gone[slot(v)] = 0;
-  return many ? nearby.examined(changes) : nearby.slots();
+  return nearby.examined(changes, exposed);
 }
 
 }  // namespace terrace::tri::shape

@@ -137,9 +137,6 @@ class Star {
       t = triangle.next[after(at)];
       if (t == kNone) return false;
     } while (t != first);
-    for (std::size_t i = 0; i < size_; ++i)
-      if (outer_[i] != kNone)
-        back_[i] = static_cast<std::uint8_t>(side_to(triangles[outer_[i]], slot_[i]));
     return true;
   }
 
@@ -159,6 +156,9 @@ class Star {
   void replace(Triangles& triangles, const PolygonFill& fill,
                std::vector<std::uint32_t>& triangle_of, std::uint32_t vertex) {
     used_ = 0;
+    for (std::size_t i = 0; i < size_; ++i)
+      if (outer_[i] != kNone)
+        back_[i] = static_cast<std::uint8_t>(side_to(triangles[outer_[i]], slot_[i]));
     const std::uint32_t last = put(triangles, fill, triangle_of, 0, size_ - 1);
     link(triangles, last, 1, size_ - 1);
     for (; used_ < size_; ++used_) triangles[slot_[used_]].corner[0] = kNone;

@@ -4,6 +4,10 @@
 #include <string>
 #include <utility>
 
+#ifndef TERRACE_TRI_CORE
+#include "terrace/tri/regional_delaunay2.hpp"
+#endif
+
 namespace terrace::tri {
 #ifdef TERRACE_TRI_CORE
 namespace detail {
@@ -45,6 +49,8 @@ template class ViewControl<Delaunay2<std::int32_t>>;
 template class ViewControl<PointCloud>;
 #else
 template class ViewControl<Delaunay2<double>>;
+template class ViewControl<RegionalDelaunay2<std::int32_t>>;
+template class ViewControl<RegionalDelaunay2<double>>;
 template class ViewControl<DynamicSurface<double>>;
 #endif
 

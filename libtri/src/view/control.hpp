@@ -28,7 +28,8 @@ ViewOptions checked(ViewOptions options);
 
 template <class Triangulation>
 struct ViewControl<Triangulation>::Impl {
-  Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options);
+  Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options,
+       Triangulation empty);
 
   const Step& step(const View& view, const StepBudget& budget);
   [[nodiscard]] ClusterTree& tree() { return model_.impl_->tree_; }
@@ -51,10 +52,22 @@ struct ViewControl<Triangulation>::Impl {
   [[nodiscard]] Room make_room(const Candidate& candidate);
   void ask(const Candidate& candidate);
   void ask_soon();
+  void ask_for_records();
   void request(const Candidate& candidate, double importance, double bytes);
   void expand(const Candidate& candidate, const GivenCluster& given);
+  /// In points of an ordinary place.
+  [[nodiscard]] std::size_t work_to_collapse(Slot slot) {
+    if constexpr (kTellsWork) return model_.triangulation().removal_work(tree().vertices(slot));
+    return tree().size(slot);
+  }
+  [[nodiscard]] bool has_time_to_collapse(Slot slot) {
+    if constexpr (kTellsWork) return meter_.has(work_to_collapse(slot), StepMeter::kCollapse);
+    return meter_.has_usual(StepMeter::kCollapse);
+  }
   void collapse(Slot slot);
   void withdraw();
+
+  static constexpr bool kTellsWork = requires(const Triangulation& t) { t.removal_work({}); };
 
   ViewOptions options_;
   ViewCache cache_;
@@ -73,7 +86,7 @@ struct ViewControl<Triangulation>::Impl {
 
 template <class Triangulation>
 ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenCluster root,
-                                       ViewOptions options)
+                                       ViewOptions options, Triangulation empty)
     : options_(detail::checked(std::move(options))),
       cache_([&] {
         if (root.cluster != cluster_id(static_cast<unsigned>(counts.size()), 0)) {
@@ -85,7 +98,7 @@ ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenC
         cache.give(root);
         return cache;
       }()),
-      model_(cache_, Detail{}, options_.model),
+      model_(cache_, Detail{}, options_.model, std::move(empty)),
       front_(tree(), options_) {
   front_.add(ClusterTree::kRoot, root.child_records, nullptr);
   cache_.drop(root.cluster);
@@ -109,6 +122,7 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   model_.open_step();
   expand_wanted();
   ask_soon();
+  ask_for_records();
   meter_.fixed();
   const bool done = collapse_unwanted(0);
   withdraw();
@@ -123,9 +137,9 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
   while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
-    if (!meter_.has_usual(StepMeter::kCollapse)) return false;
     const Slot slot = front_.next_to_collapse(options_.collapse_below);
     if (slot == ClusterTree::kNoSlot) break;
+    if (!has_time_to_collapse(slot)) return false;
     collapse(slot);
   }
   return true;
@@ -179,9 +193,9 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
     if (!could_fit(candidate, members)) return Room::none;
     const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
     while (lacking(members) > 0) {
-      if (!meter_.has_usual(StepMeter::kCollapse)) return Room::later;
       const Slot slot = front_.next_to_collapse(below);
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
+      if (!has_time_to_collapse(slot)) return Room::later;
       collapse(slot);
     }
   }
@@ -225,6 +239,26 @@ void ViewControl<Triangulation>::Impl::ask_soon() {
   }
 }
 
+// Both lists are ordered by importance.
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::ask_for_records() {
+  const auto unread = front_.unread();
+  if (unread.empty()) return;
+  std::vector<ViewRequest> clusters;
+  clusters.swap(result_.wanted);
+  std::size_t next = 0;
+  const auto records_above = [&](double importance) {
+    for (; next < unread.size() && unread[next].keep > importance; ++next) {
+      result_.wanted.push_back({unread[next].id, {}, ClusterRecord::kUnread, unread[next].keep});
+    }
+  };
+  for (const ViewRequest& cluster : clusters) {
+    records_above(cluster.importance);
+    result_.wanted.push_back(cluster);
+  }
+  records_above(-1.0);
+}
+
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::request(const Candidate& candidate, double importance,
                                                double bytes) {
@@ -257,12 +291,12 @@ template <class Triangulation>
 void ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   const ClusterId id = tree().id(slot);
   const ChildRef place = tree().place(slot);
-  const std::size_t points = tree().size(slot);
+  const std::size_t work = work_to_collapse(slot);
   model_.collapse(id);
   front_.drop(slot, place);
   cache_.find(id, true);  // likely to come back
   ++result_.collapsed;
-  meter_.spend(points, StepMeter::kCollapse);
+  meter_.spend(work, StepMeter::kCollapse);
 }
 
 // Clusters that were requested and are neither wanted now nor within the band of hysteresis.
@@ -280,8 +314,9 @@ void ViewControl<Triangulation>::Impl::withdraw() {
 
 template <class Triangulation>
 ViewControl<Triangulation>::ViewControl(std::vector<std::uint64_t> counts, GivenCluster root,
-                                        ViewOptions options)
-    : impl_(std::make_unique<Impl>(std::move(counts), std::move(root), std::move(options))) {}
+                                        ViewOptions options, Triangulation empty)
+    : impl_(std::make_unique<Impl>(std::move(counts), std::move(root), std::move(options),
+                                   std::move(empty))) {}
 template <class Triangulation>
 ViewControl<Triangulation>::~ViewControl() = default;
 template <class Triangulation>
@@ -310,6 +345,10 @@ bool ViewControl<Triangulation>::give(GivenCluster cluster) {
 template <class Triangulation>
 const GivenCluster* ViewControl<Triangulation>::given(ClusterId cluster) const {
   return std::as_const(impl_->cache_).find(cluster);
+}
+template <class Triangulation>
+void ViewControl<Triangulation>::give_record(ClusterId cluster, const ClusterRecord& record) {
+  if (const auto place = impl_->tree().find(cluster)) impl_->front_.set_record(*place, record);
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::forget(ClusterId cluster) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 
@@ -10,8 +11,6 @@ namespace terrace::tri {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// More clusters are not asked for ahead of time in a step: it would take too much of its time.
-constexpr std::size_t kMostSoon = 4096;
 
 }  // namespace
 
@@ -61,20 +60,16 @@ void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
   group.parent = slot;
   group.columns = ViewColumns(columns_.cones());
   group.columns.resize(children.size());
-  const unsigned level = tree_->level(slot) - 1;
   for (std::uint32_t i = 0; i < children.size(); ++i) {
     group.members.push_back(children[i].members);
-    group.columns.set(i, children[i], level);
-    if (!columns_.cones()) continue;
-    group.columns.set_cone(i, options_->cone
-                                  ? options_->cone(tree_->child_id({slot, i}), children[i])
-                                  : terrain_cone(children[i]));
+    set_columns(group, i, children[i]);
   }
   changed_groups_.push_back(number);
   if (candidate) measure_group(number);
 }
 
 void ViewFront::drop(Slot slot, ChildRef place) {
+  if (collapsed_ < order_.size() && order_[collapsed_].slot == slot) ++collapsed_;
   const std::uint32_t group = group_of_[slot];
   group_of_[slot] = kNone;
   if (group != kNone) {
@@ -103,6 +98,23 @@ ClusterRecord ViewFront::record(ChildRef child) const {
   return record;
 }
 
+void ViewFront::set_record(ChildRef child, const ClusterRecord& record) {
+  const std::uint32_t number = group_of_[child.parent];
+  Group& group = *groups_[number];
+  if (group.members[child.index] != ClusterRecord::kUnread) return;
+  group.members[child.index] = record.members;
+  set_columns(group, child.index, record);
+  changed_groups_.push_back(number);
+}
+
+void ViewFront::set_columns(Group& group, std::uint32_t i, const ClusterRecord& record) {
+  group.columns.set(i, record, tree_->level(group.parent) - 1);
+  if (!columns_.cones()) return;
+  group.columns.set_cone(i, options_->cone
+                                ? options_->cone(tree_->child_id({group.parent, i}), record)
+                                : terrain_cone(record));
+}
+
 // A box around the collapsed children, and the greatest of their errors.
 void ViewFront::bound(std::uint32_t number) {
   const Group& group = *groups_[number];
@@ -122,6 +134,7 @@ void ViewFront::start(const View& view) {
   view_ = &view;
   candidates_.clear();
   soon_.clear();
+  unread_.clear();
   order_.clear();
   sorted_below_ = -kInfinity;
   collapsed_ = 0;
@@ -204,6 +217,12 @@ void ViewFront::measure_group(std::uint32_t number) {
     if (!wanted && !(scratch_.keep[i] > ask_above_)) continue;
     const ChildRef place{group.parent, i};
     if (tree_->child_slot(place) != ClusterTree::kNoSlot) continue;
+    if (group.members[i] == ClusterRecord::kUnread) {
+      // In space errors would shrink less; it is the order alone that depends on it.
+      const double estimate = scratch_.keep[i] / std::sqrt(static_cast<double>(count));
+      unread_.push_back({0.0, estimate, 0.0, place, tree_->child_id(place), 0});
+      continue;
+    }
     std::vector<Candidate>& list = wanted ? candidates_ : soon_;
     list.push_back({scratch_.want[i], scratch_.keep[i], scratch_.distance[i], place,
                     tree_->child_id(place), group.members[i]});
@@ -230,10 +249,10 @@ double ViewFront::keep(ChildRef child) {
 }
 
 std::size_t ViewFront::memory() const {
-  std::size_t bytes = columns_.memory() + bounds_.memory() +
-                      group_of_.capacity() * sizeof(std::uint32_t) +
-                      (candidates_.capacity() + soon_.capacity()) * sizeof(Candidate) +
-                      order_.capacity() * sizeof(Ordered) + by_level_.capacity() * sizeof(Slot);
+  std::size_t bytes =
+      columns_.memory() + bounds_.memory() + group_of_.capacity() * sizeof(std::uint32_t) +
+      (candidates_.capacity() + soon_.capacity() + unread_.capacity()) * sizeof(Candidate) +
+      order_.capacity() * sizeof(Ordered) + by_level_.capacity() * sizeof(Slot);
   for (const ViewDemand* demand : {&own_, &bound_demand_, &scratch_}) {
     bytes += 3 * demand->want.capacity() * sizeof(double);
   }
@@ -267,23 +286,25 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
   return std::nullopt;
 }
 
-std::span<const ViewFront::Candidate> ViewFront::soon() {
+// Those of the list that are still there: the first `most` by keep, the coarsest first on ties.
+std::span<const ViewFront::Candidate> ViewFront::first_of(std::vector<Candidate>& list,
+                                                          std::size_t most) {
+  std::erase_if(list, [&](const Candidate& candidate) {
+    const auto place = tree_->find(candidate.id);
+    return !place || *place != candidate.place;
+  });
   const auto sooner = [](const Candidate& a, const Candidate& b) {
     if (a.keep != b.keep) return a.keep > b.keep;
     if (level_of(a.id) != level_of(b.id)) return level_of(a.id) > level_of(b.id);
     return a.id < b.id;
   };
-  if (soon_.size() > kMostSoon) {
-    const auto end = soon_.begin() + static_cast<std::ptrdiff_t>(kMostSoon);
-    std::nth_element(soon_.begin(), end, soon_.end(), sooner);
-    soon_.erase(end, soon_.end());
+  if (list.size() > most) {
+    const auto end = list.begin() + static_cast<std::ptrdiff_t>(most);
+    std::nth_element(list.begin(), end, list.end(), sooner);
+    list.erase(end, list.end());
   }
-  std::erase_if(soon_, [&](const Candidate& candidate) {
-    const auto place = tree_->find(candidate.id);
-    return !place || *place != candidate.place;
-  });
-  std::sort(soon_.begin(), soon_.end(), sooner);
-  return soon_;
+  std::sort(list.begin(), list.end(), sooner);
+  return list;
 }
 
 double ViewFront::key(Slot slot) const {
@@ -329,10 +350,10 @@ std::size_t ViewFront::points_below(double below) {
 ViewFront::Slot ViewFront::next_to_collapse(double below) {
   sort(below);
   while (collapsed_ + 1 < order_.size() && order_[collapsed_].key < below) {
-    const Ordered& entry = order_[collapsed_++];
     // Pins can hold a child of a cluster that is not wanted.
-    if (tree_->has_expanded_children(entry.slot)) continue;
-    return entry.slot;
+    const Slot slot = order_[collapsed_].slot;
+    if (!tree_->has_expanded_children(slot)) return slot;
+    ++collapsed_;
   }
   return ClusterTree::kNoSlot;
 }

@@ -51,6 +51,8 @@ class ViewFront {
   }
   /// As given, except for bounds beyond 1e150.
   [[nodiscard]] ClusterRecord record(ChildRef child) const;
+  /// The record of a child of which there were only bounds. Not to be called in a step.
+  void set_record(ChildRef child, const ClusterRecord& record);
 
   /// Overrides the view for one cluster: a cluster pinned expanded is expanded as soon as the
   /// cluster above it is, and then all above it stay; one pinned collapsed keeps everything below
@@ -65,12 +67,15 @@ class ViewFront {
   [[nodiscard]] std::optional<Candidate> next();
   /// Clusters that may be wanted soon, the greatest demand first, a few thousand at most. To be
   /// called when next() has no more.
-  [[nodiscard]] std::span<const Candidate> soon();
+  [[nodiscard]] std::span<const Candidate> soon() { return first_of(soon_, kMostSoon); }
+  /// Clusters whose record must be read before it can be told whether they are wanted, now or soon;
+  /// a thousand at most. `keep` is an estimate of it; the greatest first. To be called likewise.
+  [[nodiscard]] std::span<const Candidate> unread() { return first_of(unread_, kMostUnread); }
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
   /// The expanded cluster to collapse first, if its demand is less than `below`: out of view before
   /// in view, then the farthest; in view the least demand, then the farthest. Children before
-  /// parents. kNoSlot if there is none.
+  /// parents. kNoSlot if there is none. The same one until it is dropped.
   [[nodiscard]] Slot next_to_collapse(double below);
   /// The demand of a child by the widened view, computed now.
   [[nodiscard]] double keep(ChildRef child);
@@ -79,6 +84,8 @@ class ViewFront {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  /// More are not asked for ahead of time in a step: it would take too much of its time.
+  static constexpr std::size_t kMostSoon = 4096, kMostUnread = 1024;
   // The children of one expanded cluster.
   struct Group {
     Slot parent = ClusterTree::kNoSlot;
@@ -94,6 +101,8 @@ class ViewFront {
 
   /// The order of the heap: whether `a` comes after `b`.
   [[nodiscard]] static bool less_wanted(const Candidate& a, const Candidate& b);
+  std::span<const Candidate> first_of(std::vector<Candidate>& list, std::size_t most);
+  void set_columns(Group& group, std::uint32_t i, const ClusterRecord& record);
   void bound(std::uint32_t group);
   void measure_group(std::uint32_t group);
   void clamp_to_parents();
@@ -122,7 +131,7 @@ class ViewFront {
   // State of the current step.
   const View* view_ = nullptr;
   std::vector<Candidate> candidates_;  // a heap
-  std::vector<Candidate> soon_;
+  std::vector<Candidate> soon_, unread_;
   ViewDemand scratch_;
   std::vector<Slot> by_level_;
   std::vector<Ordered> order_;

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <mutex>
+#include <new>
 #include <set>
 #include <system_error>
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <zlib.h>
 
 #include "serve/viewer_files.hpp"
 #include "terrace/stream/error.hpp"
@@ -107,6 +109,19 @@ struct Readings {
   }
 };
 
+/// In the format of zlib (RFC 1950), which browsers unpack.
+std::string packed(const std::string& bytes) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::string result(size, '\0');
+  const auto* in = reinterpret_cast<const Bytef*>(bytes.data());
+  auto* out = reinterpret_cast<Bytef*>(result.data());
+  if (compress2(out, &size, in, static_cast<uLong>(bytes.size()), Z_BEST_COMPRESSION) != Z_OK) {
+    throw std::bad_alloc();
+  }
+  result.resize(size);
+  return result;
+}
+
 template <class Shown>
 stream::LinearMap ground_of(const stream::Store& store) {
   using View = terrain::StoreView<Shown>;
@@ -147,8 +162,8 @@ std::string start_file(const stream::Store& store) {
     }
   }
   const Json head = {
-      {"format", "terrace-start"}, {"version", 1}, {"ground", ground}, {"parts", parts}};
-  return head.dump() + "\n" + bytes;
+      {"format", "terrace-start"}, {"version", 2}, {"ground", ground}, {"parts", parts}};
+  return head.dump() + "\n" + packed(bytes);
 }
 
 Site make_site(std::span<const stream::Store> stores) {

@@ -141,10 +141,7 @@ class PointsCommand final : public Command {
     const stream::Store store = open_store(part_.path);
     Detail detail = part_.detail(store, common);
     if (!where_.empty()) detail.where.emplace(where_, store.schema());
-    if (!near_.empty() && detail.where) {
-      throw UsageError("--near finds the nearest of all points: without --where");
-    }
-    if (!near_.empty()) return near(store, detail.level, watch, common);
+    if (!near_.empty()) return near(store, detail, watch, common);
     if (format_ == "geojson" || (format_.empty() && output_.ends_with(".geojson"))) {
       return lines(store, detail, watch, common);
     }
@@ -220,17 +217,17 @@ class PointsCommand final : public Command {
     return summary;
   }
 
-  Summary near(const stream::Store& store, unsigned level, const Stopwatch& watch,
+  Summary near(const stream::Store& store, const Detail& detail, const Stopwatch& watch,
                const CommonOptions& common) const {
     const std::vector<double> v = parse_numbers(near_, "--near");
     if (v.size() != 2 && v.size() != 3) throw UsageError("--near needs X,Y or X,Y,Z");
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
     NearPlace place{.xy = {v[0], v[1]}};
     if (v.size() == 3) place.z = v[2];
-    stream::StoreQuery query(store);
+    stream::StoreQuery query(store, 0, detail.where);
     const std::vector<stream::FoundPoint> found =
-        count_ ? nearest_points(query, place, *count_, level)
-               : points_within(query, place, *radius_, level);
+        count_ ? nearest_points(query, place, *count_, detail.level)
+               : points_within(query, place, *radius_, detail.level);
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
     const std::optional<Transformation> to = part_.crs.to(store, common);

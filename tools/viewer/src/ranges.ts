@@ -5,6 +5,8 @@ import type {ByteRange} from './core';
 
 /// Between ranges nearer than this fetching the gap is cheaper than another request.
 const GAP = 1200;
+/// And this near even if some of the gap is known.
+const SMALL_GAP = 200;
 const MOST_BYTES = 256 * 1024;
 const MOST_REQUESTS = 6;
 const TRIES = 4;
@@ -29,8 +31,37 @@ interface Flight extends ByteRange {
   view: number;    ///< and for which view
 }
 
-/// Ranges joined where they are near, in the order of their first parts.
-export function joined(ranges: ByteRange[], gap = GAP, most = MOST_BYTES): ByteRange[] {
+/// Which bytes of files have been asked for.
+export class Asked {
+  private readonly extents = new Map<string, Array<[number, number]>>();  ///< ascending, apart
+
+  add({file, offset, bytes}: ByteRange): void {
+    const list = this.extents.get(file) ?? [], end = offset + bytes;
+    const first = Asked.after(list, offset), last = Asked.after(list, end + 1, 0);
+    const merged: [number, number] = last > first ? [Math.min(offset, list[first][0]), Math.max(end, list[last - 1][1])] : [offset, end];
+    list.splice(first, last - first, merged);
+    this.extents.set(file, list);
+  }
+  /// Whether any of the bytes between are among them.
+  meets(file: string, from: number, to: number): boolean {
+    const list = this.extents.get(file) ?? [], at = Asked.after(list, from + 1);
+    return at < list.length && list[at][0] < to;
+  }
+  /// The first extent that ends (1) or begins (0) at `place` or behind it.
+  private static after(list: Array<[number, number]>, place: number, side = 1): number {
+    let low = 0, high = list.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (list[middle][side] < place) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+}
+
+/// Ranges joined where they are near, in the order of their first parts; across more than a little not if some of it has
+/// been asked for.
+export function joined(ranges: ByteRange[], asked = new Asked(), gap = GAP, most = MOST_BYTES): ByteRange[] {
   const rank = new Map(ranges.map((range, i) => [range, i]));
   const sorted =
       [...ranges].sort((a, b) => a.file < b.file ? -1 : a.file > b.file ? 1 : a.offset - b.offset);
@@ -39,7 +70,8 @@ export function joined(ranges: ByteRange[], gap = GAP, most = MOST_BYTES): ByteR
     const last = result[result.length - 1];
     const end = range.offset + range.bytes;
     if (last && last.file === range.file && range.offset <= last.offset + last.bytes + gap &&
-        Math.max(end, last.offset + last.bytes) - last.offset <= most) {
+        Math.max(end, last.offset + last.bytes) - last.offset <= most &&
+        (range.offset <= last.offset + last.bytes + SMALL_GAP || !asked.meets(range.file, last.offset + last.bytes, range.offset))) {
       last.bytes = Math.max(last.bytes, end - last.offset);
       last.rank = Math.min(last.rank, rank.get(range)!);
     } else {
@@ -53,6 +85,7 @@ export class Ranges {
   readonly stats: Stats = {requests: 0, bytes: 0};
   private flights: Flight[] = [];
   private readonly tags = new Map<string, string>();
+  private readonly asked = new Asked();
   private fresh = false;
 
   /// sizes: of the files, by name. `give`: takes what has come. `failed`: what cannot be had. `ended`: after
@@ -88,7 +121,7 @@ export class Ranges {
       if (flight.view !== view && now - flight.wanted > PATIENCE) flight.abort.abort();
     }
     if (this.flights.length >= MOST_REQUESTS) return;
-    for (const range of joined(left).slice(0, MOST_REQUESTS - this.flights.length)) {
+    for (const range of joined(left, this.asked).slice(0, MOST_REQUESTS - this.flights.length)) {
       void this.start({...range, abort: new AbortController(), wanted: now, view});
     }
   }
@@ -99,6 +132,7 @@ export class Ranges {
 
   private async start(flight: Flight): Promise<void> {
     this.flights.push(flight);
+    this.asked.add(flight);
     let bytes: Uint8Array|null = null, fault: FetchFault|null = null;
     try {
       bytes = await this.patiently(flight, flight.abort.signal);

@@ -2,7 +2,8 @@
 /// Draws the scene by WebGL 2 from buffers that are indexed by the core's slots.
 
 import {BLOCK, type Changes, type Kind, type State, VERTEX_BYTES} from './core';
-import {add, dot, type OrbitCamera, unit} from './camera';
+import {add, dot, type OrbitCamera, unit, type Vec3} from './camera';
+import {CATEGORIES, GREYS, heightStops, LEVELS, LIGHT, PLAIN, SLOPE, type Stop, texels} from './ramps';
 
 export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity', 'grey'] as const;
 export type Colour = typeof COLOURS[number];
@@ -13,21 +14,6 @@ export interface Look {
   dark: boolean;
   pointSize: number;
 }
-
-/// The ramps of `terrace render`.
-const LAND = [[0.00, 96, 145, 92], [0.18, 150, 178, 110], [0.36, 212, 201, 140], [0.54, 196, 160, 105],
-              [0.70, 160, 122, 92], [0.85, 178, 166, 158], [1.00, 250, 250, 250]];
-const SLOPE = [[0, 250, 250, 245], [15, 250, 215, 110], [35, 205, 70, 45], [60, 75, 15, 30]];
-/// From the coarsest level to level 0.
-const LEVELS = [[0, 68, 34, 112], [0.25, 49, 104, 142], [0.5, 53, 183, 121], [0.75, 180, 221, 44], [1, 253, 231, 80]];
-
-const GREYS = [[0, 28, 30, 34], [1, 245, 245, 240]];
-/// The colours of classes; after the last they begin again.
-export const CATEGORIES = [[68, 119, 170], [238, 153, 51], [51, 153, 85], [204, 68, 85], [136, 102, 187], [153, 119, 68],
-                           [221, 136, 187], [119, 119, 119], [170, 170, 51], [85, 187, 204], [34, 85, 51], [136, 34, 51]];
-
-/// Surfaces without other colours, as `terrace render` draws them.
-const PLAIN = [[0, 205, 205, 200], [1, 205, 205, 200]];
 
 /// The lines around the cluster of a place.
 const OUTLINE = [214, 40, 110];
@@ -77,9 +63,9 @@ uniform vec2 heights;
 uniform float top;
 uniform int lit;   // 0 not, 1 as a map, 2 as a body
 uniform vec3 axis;  // upward
-uniform vec3 lamp;
-uniform float flatLight;
+uniform float flatLight;  // on what faces the eye
 uniform vec4 wire;
+uniform vec3 sun;
 uniform vec3 sky;
 uniform vec3 eye;
 uniform float haze;
@@ -96,21 +82,15 @@ void main() {
       : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
       : attributesOf.y;
   vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
-  if (lit == 2) {
-    // From beside the camera, on both sides, as terrace render does it.
-    if (dot(n, eye - at) < 0.0) n = -n;
-    float light = 0.28 + 0.72 * 0.92 * max(dot(n, lamp), 0.0) / flatLight;
-    colour = vec4(light <= 1.0 ? base * light : base + (1.0 - base) * min(light - 1.0, 1.0), 1.0);
-    return;
-  }
-  float light = 1.0;
-  if (lit == 1) {
-    // From the north-west, as maps have it, and a little from the sky.
-    float sun = max(dot(n, normalize(vec3(-0.55, 0.55, 0.63))), 0.0);
-    light = 0.36 + 0.78 * sun + 0.06 * n.z;
+  if (lit > 0) {
+    // As the command's pictures have it: what faces the eye (the ground of a map) keeps its tint, slopes toward the light grow
+    // paler, the others darker. A body has two sides.
+    if (lit == 2 && dot(n, eye - at) < 0.0) n = -n;
+    float light = ${LIGHT.ambient.toFixed(2)} + ${((1 - LIGHT.ambient) * LIGHT.strength).toFixed(4)} * max(dot(n, sun), 0.0) / flatLight;
+    base = light <= 1.0 ? base * light : base + (1.0 - base) * min(light - 1.0, 1.0);
   }
   float far = 1.0 - exp(-pow(distance(at, eye) / haze, 2.0));
-  colour = vec4(mix(base * light, sky, 0.55 * far), 1.0);
+  colour = vec4(mix(base, sky, 0.55 * far), 1.0);
 }`;
 
 class GrowingBuffer {
@@ -184,7 +164,7 @@ export class Renderer {
     }
     const categories = CATEGORIES.flatMap((c, i) => [[i, ...c], [i + 0.999, ...c]]);
     this.ramps = {
-      height: this.ramp(LAND),
+      height: gl.createTexture()!,
       slope: this.ramp(SLOPE),
       level: this.ramp(LEVELS),
       rgb: this.ramp(GREYS),
@@ -210,10 +190,11 @@ export class Renderer {
     this.linesStale = true;
     this.state = null;
   }
-  show(box: number[], top: number, kind: Kind): void {
+  show(box: number[], top: number, kind: Kind, scan: boolean): void {
     this.box = box;
     this.top = top;
     this.kind = kind;
+    this.fill(this.ramps.height, scan ? heightStops(0, 1) : heightStops(box[2], box[5]));
   }
   apply(state: State, changes: Changes, time: number): void {
     this.state = state;
@@ -278,13 +259,16 @@ export class Renderer {
     gl.uniform2f(this.uniform('heights'), yUp ? box[1] : box[2], yUp ? box[4] : box[5]);
     gl.uniform1f(this.uniform('top'), this.top);
     gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);
-    const toward = add([0, 0, 0], camera.direction, -1);
-    const lamp = unit(add(add(toward, camera.up, 0.45), camera.right, -0.45));
-    gl.uniform3f(this.uniform('lamp'), lamp[0], lamp[1], lamp[2]);
-    gl.uniform1f(this.uniform('flatLight'), dot(lamp, toward));
+    // Cartographic light from the upper left, turned with the viewer; on a body from beside the eye.
+    const turn = (camera.azimuth + LIGHT.turn) * Math.PI / 180, elevation = LIGHT.elevation * Math.PI / 180;
+    const toward = add([0, 0, 0], camera.direction, -1), surface = this.kind === 'surface';
+    const sun: Vec3 = surface ? unit(add(add(toward, camera.up, 0.45), camera.right, -0.45)) :
+                                [Math.sin(turn) * Math.cos(elevation), Math.cos(turn) * Math.cos(elevation), Math.sin(elevation)];
+    gl.uniform3f(this.uniform('sun'), ...sun);
+    gl.uniform1f(this.uniform('flatLight'), surface ? dot(sun, toward) : sun[2]);
     gl.uniform3f(this.uniform('sky'), sky[0], sky[1], sky[2]);
     gl.uniform3f(this.uniform('eye'), eye[0], eye[1], eye[2]);
-    gl.uniform1f(this.uniform('haze'), extent * 2.5);
+    gl.uniform1f(this.uniform('haze'), extent * (camera.body ? 100 : 2.5));
     const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
     gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
     gl.uniform1i(this.uniform('slides'), this.kind === 'raster' ? 1 : 0);
@@ -354,21 +338,17 @@ export class Renderer {
     gl.bindVertexArray(null);
     return array;
   }
-  private ramp(stops: number[][]): WebGLTexture {
-    const gl = this.gl, texels = new Uint8Array(256 * 4), last = stops[stops.length - 1][0];
-    for (let i = 0; i < 256; ++i) {
-      const place = i / 255 * last;
-      const next = Math.max(1, stops.findIndex(stop => stop[0] >= place));
-      const a = stops[next - 1], b = stops[next], t = (place - a[0]) / (b[0] - a[0]);
-      for (let c = 1; c < 4; ++c) texels[4 * i + c - 1] = Math.round((1 - t) * a[c] + t * b[c]);
-      texels[4 * i + 3] = 255;
-    }
-    const texture = gl.createTexture()!;
+  private ramp(stops: Stop[]): WebGLTexture {
+    const texture = this.gl.createTexture()!;
+    this.fill(texture, stops);
+    return texture;
+  }
+  private fill(texture: WebGLTexture, stops: Stop[]): void {
+    const gl = this.gl;
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, texels);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, texels(stops, 256));
     for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
-    return texture;
   }
   private uniform(name: string): WebGLUniformLocation|null {
     if (!this.uniforms.has(name)) this.uniforms.set(name, this.gl.getUniformLocation(this.program, name));

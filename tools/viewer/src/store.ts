@@ -35,24 +35,26 @@ export function parseManifest(bytes: Uint8Array): Manifest {
   return {...json, files};
 }
 
-/// The parts of a store that the first picture needs, in one file: a line of JSON, and then the bytes of each
-/// part in turn.
+/// The parts of a store that the first picture needs, in one file: a line of JSON, and then the bytes of the parts in
+/// turn, packed as zlib does it.
 export interface Start {
   ground: number[];  ///< from stored coordinates to metres
   parts: Array<ByteRange&{data: Uint8Array}>;
 }
 
-export function parseStart(bytes: Uint8Array): Start {
+export async function parseStart(bytes: Uint8Array<ArrayBuffer>): Promise<Start> {
   const end = bytes.indexOf(10);
   const head = end < 0 ? {} : JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
-  if (head.format !== 'terrace-start' || head.version !== 1) throw new Error('it is not a start file of this version');
+  if (head.format !== 'terrace-start' || head.version !== 2) throw new Error('it is not a start file of this version');
+  const unpacked = new Blob([bytes.subarray(end + 1)]).stream().pipeThrough(new DecompressionStream('deflate'));
+  const body = new Uint8Array(await new Response(unpacked).arrayBuffer());
   const parts: Start['parts'] = [];
-  let at = end + 1;
+  let at = 0;
   for (const [file, offset, size] of head.parts as Array<[string, number, number]>) {
-    parts.push({file, offset, bytes: size, data: bytes.subarray(at, at + size)});
+    parts.push({file, offset, bytes: size, data: body.subarray(at, at + size)});
     at += size;
   }
-  if (at !== bytes.length) throw new Error(`${bytes.length} bytes came where ${at} were expected`);
+  if (at !== body.length) throw new Error(`${body.length} bytes came where ${at} were expected`);
   return {ground: head.ground, parts};
 }
 

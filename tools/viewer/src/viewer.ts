@@ -4,7 +4,8 @@
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
 import type {Hit, Kind, Opened} from './core';
 import type {FromWorker, ToWorker} from './messages';
-import {CATEGORIES, type Colour, COLOURS, type Look, Renderer} from './render';
+import {CATEGORIES, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
+import {type Colour, COLOURS, type Look, Renderer} from './render';
 import {type Manifest, worldPoint} from './store';
 
 /// A store that the page shows, from stores.json.
@@ -16,13 +17,6 @@ interface Listed {
 const phone = matchMedia('(max-width: 640px)').matches;
 /// Points at once: what phones draw without effort is less.
 const MOST_POINTS = phone ? 400_000 : 1_500_000;
-const LEGENDS: Partial<Record<Colour, string>> = {
-  height: 'rgb(96 145 92),rgb(150 178 110) 18%,rgb(212 201 140) 36%,rgb(196 160 105) 54%,rgb(160 122 92) 70%,' +
-      'rgb(178 166 158) 85%,rgb(250 250 250)',
-  slope: 'rgb(250 250 245),rgb(250 215 110) 25%,rgb(205 70 45) 58%,rgb(75 15 30)',
-  level: 'rgb(68 34 112),rgb(49 104 142) 25%,rgb(53 183 121) 50%,rgb(180 221 44) 75%,rgb(253 231 80)',
-  intensity: 'rgb(28 30 34),rgb(245 245 240)'
-};
 /// The standard classes of ASPRS LAS 1.4.
 const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation', 'medium vegetation', 'high vegetation',
                  'building', 'low point', 'model key', 'water', 'rail', 'road', 'overlap', 'wire guard', 'wire conductor',
@@ -178,7 +172,7 @@ class Viewer {
         element<HTMLInputElement>('level').max = String(message.manifest.levels.length - 1);
         element('with-level').hidden = message.manifest.levels.length < 2;
         if (this.level !== 255) this.level = Math.min(this.level, message.manifest.levels.length - 1);
-        this.renderer.show(this.box, message.manifest.levels.length - 1, this.kind);
+        this.renderer.show(this.box, message.manifest.levels.length - 1, this.kind, this.scan);
         if (!again) this.camera.fit(this.box, this.aspect);
         if (first && !again) this.applyLink();
         element('with-wire').hidden = this.kind === 'points';
@@ -321,7 +315,10 @@ class Viewer {
   }
   private legend(): void {
     if (!this.manifest) return;
-    const colour = this.look.colour, ramp = LEGENDS[colour];
+    const colour = this.look.colour;
+    const ramps: Partial<Record<Colour, Stop[]>> =
+        {height: this.scan ? heightStops(0, 1) : heightStops(this.box[2], this.box[5]), slope: SLOPE, level: LEVELS, intensity: GREYS};
+    const ramp = ramps[colour];
     element('legend').hidden = !ramp;
     element('classes').hidden = colour !== 'class';
     element('classes').replaceChildren(...this.colours.classes.map(group => {
@@ -338,7 +335,7 @@ class Viewer {
       intensity: ['weak', 'strong']
     };
     [element('legend-low').textContent, element('legend-high').textContent] = texts[colour]!;
-    element('legend-ramp').style.background = `linear-gradient(90deg,${ramp})`;
+    element('legend-ramp').style.background = gradient(ramp);
   }
 
   // ---- A place ---------------------------------------------------------------------------------

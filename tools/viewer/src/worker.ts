@@ -27,7 +27,7 @@ function post(message: FromWorker, transfer: Transferable[] = []): void {
   self.postMessage(message, transfer);
 }
 
-async function fetchWhole(url: string, what: string): Promise<Uint8Array> {
+async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
   let response: Response;
   try {
     response = await fetch(url);
@@ -72,7 +72,7 @@ class Session {
       this.core = this.points = await Core.load(wasm as BufferSource);
       let start;
       try {
-        start = parseStart(bytes);
+        start = await parseStart(bytes);
       } catch (error) {
         throw new FetchFault(`the start file of the store is damaged: ${(error as Error).message}`, false);
       }

@@ -84,7 +84,8 @@ void SearchEngine::open(std::uint32_t candidate) {
 bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std::size_t batch,
                            const FacilityProgress& progress) {
   assert(batch > 0);
-  const std::size_t step = std::max<std::size_t>(candidates / 256, 1);
+  // However long the search is, it can be ended soon.
+  const std::size_t step = std::clamp<std::size_t>(candidates / 256, 1, 1000);
   std::size_t done = 0, next_report = 0;
   while (done < candidates) {
     if (progress && done >= next_report) {

@@ -7,11 +7,13 @@
 #include <cstdint>
 #include <limits>
 #include <list>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "terrace/stream/store.hpp"
+#include "terrace/stream/where.hpp"
 
 namespace terrace::stream {
 
@@ -46,16 +48,20 @@ class StoreQuery {
     Box3 box;
     std::uint64_t ordinal = 0;
     /// Points of level 0 below, including the representative; 0 if the index has not been read for
-    /// this one yet, and the box is Store::coarse_box().
+    /// this one yet, and the box is Store::coarse_box() or page_box().
     std::uint64_t descendants = 0;
   };
   /// A decoded cluster and the clusters that its members head.
   class Node {
    public:
     ClusterId id{};
-    std::vector<Point3> positions;  ///< of the members
+    std::vector<Point3> positions;      ///< of the members
+    std::vector<std::uint8_t> matches;  ///< 1 for members that meet the condition; empty: all do
     std::uint64_t bytes = 0;
 
+    [[nodiscard]] bool match(std::size_t member) const {
+      return matches.empty() || matches[member] != 0;
+    }
     [[nodiscard]] unsigned level() const { return level_of(id); }
     /// The cluster that a member heads on a level below this node's. Throws: Error.
     [[nodiscard]] const Branch& branch(std::size_t member, unsigned below) const {
@@ -63,7 +69,16 @@ class StoreQuery {
       if (branch.descendants == 0) look_up(branch, below);
       return branch;
     }
-    /// The same as far as it is known without reading the index.
+    /// The same, but its box may be that of its page of the index, which is not read. Throws:
+    /// Error.
+    [[nodiscard]] const Branch& near_branch(std::size_t member, unsigned below) const {
+      Branch& branch = branches_[member * level() + below];
+      if (branch.descendants == 0) {
+        branch.box = store_->page_box(cluster_id(below, branch.ordinal));
+      }
+      return branch;
+    }
+    /// The same as far as it is known without reading.
     [[nodiscard]] const Branch& known_branch(std::size_t member, unsigned below) const {
       return branches_[member * level() + below];
     }
@@ -78,7 +93,10 @@ class StoreQuery {
 
   /// leaf_bytes: cache for decoded clusters of level 0 (LRU), for callers that query nearby places
   /// repeatedly. Without it, ranges that do not overlap are read fastest.
-  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0);
+  /// where: only points that meet it are found and counted; clusters of level 0 in which none can
+  /// are not read, and are nodes without members.
+  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0,
+                      std::optional<Where> where = std::nullopt);
   StoreQuery(const StoreQuery&) = delete;
   StoreQuery& operator=(const StoreQuery&) = delete;
 
@@ -99,11 +117,12 @@ class StoreQuery {
   /// The attributes of found points, in their order: Schema::payload_size() bytes each. Reads each
   /// of their clusters once.
   [[nodiscard]] std::vector<std::byte> attributes(std::span<const FoundPoint> found) const;
-  /// The number of points (of level 0 and above) in the box. Only clusters that cross its border
-  /// are read.
+  /// The number of points (of level 0 and above) in the box. Without a condition only clusters that
+  /// cross its border are read.
   [[nodiscard]] std::uint64_t count(const Box3& box);
-  /// An estimate of count() from the index alone: of clusters that cross the border, the share of
-  /// their boxes inside counts. Ends early with any number above `limit` if there are more.
+  /// An estimate of count() without the condition, from the index alone: of clusters that cross the
+  /// border, the share of their boxes inside counts. Ends early with any number above `limit` if
+  /// there are more.
   [[nodiscard]] double estimate(const Box3& box,
                                 double limit = std::numeric_limits<double>::infinity());
 
@@ -112,7 +131,7 @@ class StoreQuery {
 
   /// Visits the root and then, level by level down to `level` and within a level by id, each
   /// cluster for which wants(level, branch) is true. A branch is tested only if that of the same
-  /// point on the level above was wanted, since it lies within that; and with a larger box first,
+  /// point on the level above was wanted, since it lies within that; and with larger boxes first,
   /// for which wants() must be true too where it is for the branch's.
   template <class Wants, class Visit>
   void descend(unsigned level, const Wants& wants, const Visit& visit);
@@ -153,6 +172,7 @@ class StoreQuery {
   void check_looked(std::uint64_t clusters) const;
 
   const Store& store_;
+  std::optional<Where> where_;
   std::uint64_t clusters_ = 0;  ///< of all levels
   Node root_, passing_;         ///< passing: the node that is not cached
   Cache leaves_, inner_;
@@ -174,7 +194,10 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
         const Branch& branch = node.known_branch(i, below);
         const bool known = branch.descendants > 0;
         if (!wants(below, branch)) break;
-        if (!known && !wants(below, node.branch(i, below))) break;
+        if (!known &&
+            !(wants(below, node.near_branch(i, below)) && wants(below, node.branch(i, below)))) {
+          break;
+        }
         wanted_[below].push_back(branch.ordinal);
       }
     }
@@ -204,6 +227,7 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
           return distance > bound || distance == std::numeric_limits<double>::infinity();
         };
         if (beyond(least(node.known_branch(i, below).box))) continue;
+        if (beyond(least(node.near_branch(i, below).box))) continue;
         const Branch& branch = node.branch(i, below);
         const double distance = least(branch.box);
         if (beyond(distance)) continue;
@@ -242,6 +266,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
       // What a point heads on a level lies within what it heads on the level above.
       for (unsigned below = at.level(); below-- > 0;) {
         if (!box.intersects(at.known_branch(i, below).box)) break;
+        if (!box.intersects(at.near_branch(i, below).box)) break;
         const Branch& branch = at.branch(i, below);
         if (!box.intersects(branch.box)) break;
         if (below == 0 || (box.contains(branch.box.min) && box.contains(branch.box.max))) {

@@ -10,21 +10,23 @@
 namespace terrace::stream::store {
 namespace {
 
-using Crc16Table = std::array<std::uint16_t, 256>;
-
-/// kCrc16Tables[k][b]: what byte b followed by k zero bytes leaves in the register, so that eight
-/// bytes are taken at once ("slicing by eight").
-constexpr std::array<Crc16Table, 8> kCrc16Tables = [] {
-  std::array<Crc16Table, 8> tables{};
+/// Tables of a CRC that takes the most significant bit first. [k][b]: what byte b followed by k
+/// zero bytes leaves in the register, so that eight bytes are taken at once ("slicing by eight").
+template <class Register>
+constexpr std::array<std::array<Register, 256>, 8> crc_tables(unsigned polynomial) {
+  constexpr unsigned kBits = 8 * sizeof(Register), kTop = 1u << (kBits - 1);
+  std::array<std::array<Register, 256>, 8> tables{};
   for (unsigned byte = 0; byte < 256; ++byte) {
-    unsigned crc = byte << 8;
+    unsigned crc = byte << (kBits - 8);
     for (std::size_t k = 0; k < 8; ++k) {
-      for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc & 0x8000) != 0 ? 0x11021u : 0u);
-      tables[k][byte] = static_cast<std::uint16_t>(crc);
+      for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc & kTop) != 0 ? polynomial : 0u);
+      tables[k][byte] = static_cast<Register>(crc);
     }
   }
   return tables;
-}();
+}
+constexpr auto kCrc16Tables = crc_tables<std::uint16_t>(0x11021);
+constexpr auto kCrc8Tables = crc_tables<std::uint8_t>(0x107);
 
 /// The same for the CRC-32, which takes the least significant bit first.
 constexpr std::array<std::array<std::uint32_t, 256>, 8> kCrc32Tables = [] {
@@ -77,6 +79,19 @@ std::uint16_t crc16(ByteView bytes) {
     crc = ((crc << 8) & 0xFFFF) ^ kCrc16Tables[0][(crc >> 8) ^ *next];
   }
   return static_cast<std::uint16_t>(crc ^ 0xFFFF);
+}
+
+std::uint8_t crc8(ByteView bytes) {
+  std::uint8_t crc = 0;
+  const std::uint8_t* next = bytes.data();
+  std::size_t left = bytes.size();
+  for (; left >= 8; left -= 8, next += 8) {
+    std::uint8_t after = kCrc8Tables[7][crc ^ next[0]];
+    for (std::size_t k = 1; k < 8; ++k) after ^= kCrc8Tables[7 - k][next[k]];
+    crc = after;
+  }
+  for (; left > 0; --left, ++next) crc = kCrc8Tables[0][crc ^ *next];
+  return crc;
 }
 
 }  // namespace terrace::stream::store

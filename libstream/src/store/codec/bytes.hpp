@@ -44,6 +44,9 @@ inline std::uint32_t crc32(ByteView bytes) { return crc32(0, bytes.data(), bytes
 /// ("CRC-16/GENIBUS"; of "123456789" 0xD64E).
 /// Finds every damage of one or two bits, or within 16 neighbouring bits, in 4 KiB.
 std::uint16_t crc16(ByteView bytes);
+/// CRC-8 with the polynomial 0x07, from 0, most significant bit first ("CRC-8/SMBUS"; of
+/// "123456789" 0xF4). Finds every damage of an odd number of bits, or within 8 neighbouring bits.
+std::uint8_t crc8(ByteView bytes);
 
 template <class T>
 T load(const std::uint8_t* at) {

@@ -45,7 +45,7 @@ class GridCodec {
   [[nodiscard]] std::uint32_t point(std::size_t i) const { return points_[cells_[i]]; }
 
   /// The cells, in the order of rows and columns. Decoding fills x and y with n cells.
-  /// borders: the first context of borders from version 4 on; 0 before.
+  /// borders: the first context of borders from version 5 on; 0 before.
   template <class Coder>
   void positions(Coder& shared, unsigned borders, std::uint32_t width, std::uint32_t height,
                  std::uint32_t n, std::uint64_t* x, std::uint64_t* y) {
@@ -201,7 +201,7 @@ class GridCodec {
     template <class Coder>
     TERRACE_STORE_INLINE void move(Coder& coder, bool lower_half, std::uint64_t& value) {
       unsigned place = kFirstContext + last_;
-      const bool outwards = kRight || borders_ == 0;  // before version 4 to the right
+      const bool outwards = kRight || borders_ == 0;  // before version 5 to the right
       if (borders_ > 0) {
         const std::int64_t room = kRight ? width_ - at_ : at_;
         place = borders_ + (lower_half ? context::kBorders / 2 : 0) +

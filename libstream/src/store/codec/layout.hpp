@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "store/codec/bytes.hpp"
 #include "store/codec/numbers.hpp"
 #include "store/codec/split_codec.hpp"
 #include "store/codec/symbols.hpp"
@@ -19,18 +20,17 @@ namespace terrace::stream::store {
 /// represent any number of points, so nothing else limits the cost of a damaged count.
 inline constexpr std::uint32_t kMostPoints = 1u << 20;
 inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
-/// Minimum bytes of a cluster that has points.
-constexpr std::uint32_t fewest_cluster_bytes(int version) { return version > 3 ? 1 : 4; }
 /// Maximum bytes of a cluster: every point at its raw size, and as much again.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
-/// The version that is written. Stores of earlier versions can be read.
-inline constexpr int kVersion = 4;
+/// The version that is written. Stores of earlier versions can be read, but for one that was never
+/// released.
+inline constexpr int kVersion = 5, kDroppedVersion = 4;
 
 /// Clusters per page of the index, except the last of a level: a page's ordinals follow by
 /// arithmetic.
 inline constexpr std::uint32_t kMostPageClusters = 128;
-constexpr std::uint32_t page_clusters(int version) { return version > 3 ? 64 : kMostPageClusters; }
+inline constexpr std::uint64_t kLeastPageBytes = 4;
 
 /// The common properties of the clusters of one level.
 struct Layout {
@@ -65,17 +65,30 @@ struct Layout {
   }
   /// Attributes whose ranges the index has.
   [[nodiscard]] std::size_t ranges() const { return version > 1 ? attributes.size() : 0; }
-  [[nodiscard]] std::uint64_t page_clusters() const { return store::page_clusters(version); }
+  /// As many as may be read in vain: entries above level 0 are of larger areas, those of rasters
+  /// large against their clusters.
+  [[nodiscard]] std::uint64_t page_clusters() const {
+    if (version < 5) return kMostPageClusters;
+    return level > 0 ? 4 : grid ? 16 : 64;
+  }
+  /// Whether clusters are small for their number, as those of rasters: they may have their bytes in
+  /// common, and short checksums.
+  [[nodiscard]] bool small() const { return version > 4 && grid && level == 0; }
+  [[nodiscard]] unsigned checksum_bits() const { return small() ? 8 : 16; }
+  /// Of a cluster's bytes.
+  [[nodiscard]] std::uint16_t checksum(ByteView bytes) const {
+    return small() ? crc8(bytes) : crc16(bytes);
+  }
   [[nodiscard]] unsigned contexts() const {
     const auto ends = 2 * static_cast<unsigned>(attributes.size());
-    return version > 3 ? index_context() + context::kIndexRange + ends : border_context();
+    return version > 4 ? index_context() + context::kIndexRange + ends : border_context();
   }
-  /// The first context of borders, and of the index: both from version 4 on.
+  /// The first context of borders, and of the index: both from version 5 on.
   [[nodiscard]] unsigned border_context() const { return first_context(columns()); }
   [[nodiscard]] unsigned index_context() const { return border_context() + context::kBorders; }
   /// Whether points that are not split are coded as columns, instead of rows of a raster.
   [[nodiscard]] bool has_point_columns() const {
-    return grid ? version > 3 && level > 0 : version > 1;
+    return grid ? version > 4 && level > 0 : version > 1;
   }
   /// The first context of a column.
   [[nodiscard]] unsigned first_context(unsigned column) const {
@@ -99,7 +112,8 @@ struct Entry {
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< of the box: integers per axis
   std::uint16_t error = 0;                     ///< see error_code
   std::uint64_t descendants = 0;               ///< on level 0: 0
-  std::uint16_t checksum = 0;                  ///< CRC-16 of the bytes
+  std::uint16_t checksum = 0;                  ///< of the bytes
+  std::int64_t jump = 0;  ///< from the end of the bytes of the cluster before to these
 };
 
 /// The least and the greatest value of an attribute in a cluster, as unsigned integers in the order

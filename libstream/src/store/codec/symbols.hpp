@@ -73,7 +73,7 @@ inline constexpr unsigned kForm = 0;      ///< grid or k-d, own box or not
 inline constexpr unsigned kRunCount = 1;  ///< by the runs of the row above: 0, 1, more
 inline constexpr unsigned kRunStart = 4;  ///< by the last step of this border, -2 to 2; first row
 inline constexpr unsigned kRunEnd =
-    10;  ///< likewise; from version 4 on, of both the first row only
+    10;  ///< likewise; from version 5 on, of both the first row only
 inline constexpr unsigned kRunGap = 16;     ///< of second and further runs
 inline constexpr unsigned kRunLength = 17;  ///< likewise
 inline constexpr unsigned kInset = 18;      ///< six: low and high side of each axis
@@ -93,14 +93,14 @@ inline constexpr unsigned kPerAttributeBefore3 = 10;
 inline constexpr unsigned kBetweenLines = 10;
 inline constexpr unsigned kWithinPulse = 14;
 
-// From version 4 on, behind those of the attributes:
+// From version 5 on, behind those of the attributes:
 /// Steps of either border of a raster's cluster: by the half of its rows, the last step (-2 to 2)
 /// and the columns left to the side of the box (0 to 4).
 inline constexpr unsigned kBorderSteps = 5, kBorderRooms = 5;
 inline constexpr unsigned kBorders = 2 * kBorderSteps * kBorderRooms;
 /// Columns of the index, eight each, by magnitude; their shifts; and for each attribute the ends of
 /// its range.
-inline constexpr unsigned kIndexColumns = 11;
+inline constexpr unsigned kIndexColumns = 12;
 inline constexpr unsigned kIndexSteps = 8;
 inline constexpr unsigned kIndexShift = kIndexColumns * kIndexSteps;
 inline constexpr unsigned kIndexRange = kIndexShift + 1;

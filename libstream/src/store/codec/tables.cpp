@@ -96,7 +96,7 @@ void Tables::write(Bytes& out, int version) const {
   for (const Frequencies& context : frequencies) {
     const auto used = std::count_if(context.begin(), context.begin() + kClasses,
                                     [](std::uint16_t f) { return f != 0; });
-    if (version > 3 && used == 0) {
+    if (version > 4 && used == 0) {
       ++unused;
       continue;
     }
@@ -140,7 +140,7 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
     Frequencies frequencies{};
     std::uint64_t symbol = 0, left = kScale;
     const std::uint64_t used = in.varint();
-    if (layout.version > 3 && used == 0) {
+    if (layout.version > 4 && used == 0) {
       const std::uint64_t more = in.varint();
       if (more >= contexts - c) throw Damage("a table has contexts that do not exist");
       tables.frequencies.resize(c + 1 + static_cast<std::size_t>(more), escape_only());

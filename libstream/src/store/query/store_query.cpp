@@ -94,8 +94,9 @@ double share_inside(const Box3& box, const Box3& other) {
 
 }  // namespace
 
-StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
+StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes, std::optional<Where> where)
     : store_(store),
+      where_(std::move(where)),
       leaves_{.most_bytes = leaf_bytes},
       inner_{.most_bytes = kInnerBytes},
       wanted_(store.top() + 1) {
@@ -113,8 +114,21 @@ void StoreQuery::check_looked(std::uint64_t clusters) const {
 
 void StoreQuery::fill(Node& node, ClusterId id) {
   const unsigned level = level_of(id);
-  store_.read(id, points_);
   node.id = id;
+  if (where_ && level == 0 &&
+      !where_->possible(world_box(store_.schema(), store_.record(id).summary.box),
+                        store_.attribute_ranges(id))) {
+    node.positions.clear();
+    node.matches.clear();
+    node.branches_.clear();
+    node.bytes = sizeof(Node) + 64;
+    return;
+  }
+  store_.read(id, points_);
+  if (where_) {
+    node.matches.resize(points_.size());
+    where_->test(points_.positions, points_.payload, node.matches);
+  }
   // Not copied: the next cluster is read into what the node held before.
   std::swap(node.positions, points_.positions);
   node.store_ = &store_;
@@ -126,7 +140,7 @@ void StoreQuery::fill(Node& node, ClusterId id) {
     }
   }
   // The node itself and its entries in list and map count too.
-  node.bytes = node.positions.capacity() * sizeof(Point3) +
+  node.bytes = node.positions.capacity() * sizeof(Point3) + node.matches.capacity() +
                node.branches_.capacity() * sizeof(Branch) + sizeof(Node) + 64;
 }
 
@@ -194,7 +208,7 @@ std::vector<FoundPoint> StoreQuery::in_box(const Box3& box, unsigned level) {
       level, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
-          if (!box.contains(node.positions[i])) continue;
+          if (!box.contains(node.positions[i]) || !node.match(i)) continue;
           found.push_back({.position = node.positions[i],
                            .cluster = node.id,
                            .member = static_cast<std::uint32_t>(i)});
@@ -215,7 +229,7 @@ std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
           const double distance = distance_of(metric, node.positions[i], place);
-          if (!(distance <= radius)) continue;
+          if (!(distance <= radius) || !node.match(i)) continue;
           found.push_back({.position = node.positions[i],
                            .cluster = node.id,
                            .member = static_cast<std::uint32_t>(i),
@@ -234,6 +248,7 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
       level, [&](const Box3& box) { return least_distance(metric, place, box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
+          if (!node.match(i)) continue;
           const FoundPoint point{.position = node.positions[i],
                                  .cluster = node.id,
                                  .member = static_cast<std::uint32_t>(i),
@@ -255,6 +270,16 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
 
 std::uint64_t StoreQuery::count(const Box3& box) {
   std::uint64_t sum = 0;
+  if (where_) {
+    descend(
+        0, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
+        [&](const Node& node) {
+          for (std::size_t i = 0; i < node.positions.size(); ++i) {
+            sum += node.match(i) && box.contains(node.positions[i]) ? 1 : 0;
+          }
+        });
+    return sum;
+  }
   ClusterPoints border;
   cut(
       box,

@@ -94,7 +94,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   const std::uint32_t coded = coder.finish() | static_cast<std::uint32_t>(upper) << 16;
   if (root ? coded != 0 : coded >= n)
     throw Damage("a cluster's representative is not one of its points");
-  const std::uint32_t last = layout.version > 3 && !root ? uncentred(coded, n) : coded;
+  const std::uint32_t last = layout.version > 4 && !root ? uncentred(coded, n) : coded;
   representative_ = last;
   deliver(entry, root ? n : last, out);
 
@@ -166,7 +166,7 @@ bool ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
   if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
     throw Damage("a cluster's box does not suit its form");
   }
-  grid_.positions(coder, layout.version > 3 ? layout.border_context() : 0,
+  grid_.positions(coder, layout.version > 4 ? layout.border_context() : 0,
                   static_cast<std::uint32_t>(box_.size[0]),
                   static_cast<std::uint32_t>(box_.size[1]), n, relative_[0].data(),
                   relative_[1].data());

@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "store/codec/coding.hpp"
 #include "store/codec/column_codec.hpp"
@@ -51,136 +52,181 @@ unsigned floating_shift(std::span<const std::uint64_t> keys, std::uint64_t least
 template <class Coder>
 class PageCoder {
  public:
-  PageCoder(Coder& coder, const Layout& layout, PageColumns& columns)
-      : coder_(coder), first_(layout.index_context()), columns_(columns) {}
+  PageCoder(Coder& coder, const Layout& layout)
+      : coder_(coder),
+        first_(layout.index_context()),
+        small_(layout.small()),
+        checksum_bits_(layout.checksum_bits()) {}
 
-  void run() {
-    for (unsigned axis = 0; axis < 3; ++axis) boxes(axis);
-    numbers(PageColumns::kBytes, steps_);
-    for (const auto field : {PageColumns::kPoints, PageColumns::kDescendants}) numbers(field, {});
-    for (const auto field : {PageColumns::kError, PageColumns::kForms}) {
-      differences(field, context_of(field), context::kIndexSteps, 0, false);
+  void entries(PageColumns& columns) {
+    for (unsigned axis = 0; axis < 3; ++axis) boxes(columns, axis);
+    const auto sizes_x = columns.column(PageColumns::kSizeX);
+    const auto sizes_y = columns.column(PageColumns::kSizeY);
+    const auto points = columns.column(PageColumns::kPoints);
+    const auto bytes = columns.column(PageColumns::kBytes);
+    // Clusters of rasters take a certain share of their boxes.
+    guessed(points, PageColumns::kPoints, [&](std::size_t i) {
+      return small_ ? sizes_x[i] * sizes_y[i] * 45 >> 6 : i > 0 ? points[i - 1] : 0;
+    });
+    // As many bytes per point as the one before.
+    guessed(bytes, PageColumns::kBytes, [&](std::size_t i) {
+      return i > 0 ? bytes[i - 1] * points[i] / std::max<std::uint64_t>(points[i - 1], 1) : 0;
+    });
+    numbers(columns.column(PageColumns::kDescendants), PageColumns::kDescendants);
+    // As far as the one before for the size of the box.
+    const auto errors = columns.column(PageColumns::kError);
+    const auto extent = [&](std::size_t i) {
+      return error_code(static_cast<double>(sizes_x[i] + sizes_y[i]));
+    };
+    guessed(errors, PageColumns::kError, [&](std::size_t i) {
+      return i > 0 ? errors[i - 1] + extent(i) - extent(i - 1) : extent(0);
+    });
+    differences(columns.column(PageColumns::kForms), context_of(PageColumns::kForms));
+    if (small_) {
+      differences(columns.column(PageColumns::kJump), context_of(PageColumns::kJump));
     }
     typename Coder::Local coder = coder_;
-    for (std::uint64_t& checksum : columns_.column(PageColumns::kChecksum)) {
+    for (std::uint64_t& checksum : columns.column(PageColumns::kChecksum)) {
       if constexpr (Coder::kDecoding) {
-        checksum = coder.raw(16);
+        checksum = coder.raw(checksum_bits_);
       } else {
-        coder.raw(checksum, 16);
+        coder.raw(checksum, checksum_bits_);
       }
     }
     keep(coder);
-    for (std::size_t end = 0; end < 2 * columns_.attributes(); ++end) {
-      differences(PageColumns::kFields + end,
-                  first_ + context::kIndexRange + static_cast<unsigned>(end), 1,
-                  shift(PageColumns::kFields + end), end % 2 != 0);
+  }
+
+  void ranges(RangeColumns& columns) {
+    for (unsigned end = 0; end < columns.columns(); ++end) {
+      const std::span<std::uint64_t> keys = columns.column(end);
+      const bool ones = end % 2 != 0;
+      std::uint64_t bits = 0;
+      for (const std::uint64_t key : keys) bits |= ones ? ~key : key;
+      const unsigned by = shift(bits);
+      // All in one context. The first from the least key.
+      differences(keys, first_ + context::kIndexRange + end, {}, 1, by, ones, INT64_MIN >> by);
     }
   }
 
  private:
   static constexpr unsigned kTop = 63;
+  using Steps = std::array<std::uint8_t, kMostPageClusters>;
 
   /// Loops work on a copy of a decoder, see Coder::Local.
   void keep(const Coder& coder) {
     if constexpr (Coder::kDecoding) coder_ = coder;
   }
-  using Steps = std::array<std::uint8_t, kMostPageClusters>;
-
   [[nodiscard]] unsigned context_of(unsigned field) const {
     return first_ + field * context::kIndexSteps;
   }
 
-  /// Sizes and lower ends of an axis. Leaves the steps of the sizes in steps_.
-  void boxes(unsigned axis) {
-    const unsigned by = shift(PageColumns::kSizeX + axis);
+  /// Sizes and lower ends of an axis.
+  void boxes(PageColumns& columns, unsigned axis) {
+    const std::span<std::uint64_t> sizes = columns.column(PageColumns::kSizeX + axis);
+    const std::span<std::uint64_t> lows = columns.column(PageColumns::kLowX + axis);
+    std::uint64_t bits = 0;
+    for (const std::uint64_t size : sizes) bits |= size;
+    for (const std::uint64_t low : lows) bits |= low;
+    const unsigned by = shift(bits);
     unsigned step = 0;
     const unsigned context = context_of(PageColumns::kSizeX + axis);
     std::size_t i = 0;
     typename Coder::Local coder = coder_;
-    for (std::uint64_t& size : columns_.column(PageColumns::kSizeX + axis)) {
+    Steps of_sizes;
+    for (std::uint64_t& size : sizes) {
       std::uint64_t number = (size >> by) - 1;
       step = difference_step(code_number(coder, context + step, number));
       if constexpr (Coder::kDecoding) size = (number + 1) << by;
-      steps_[i++] = static_cast<std::uint8_t>(step);
+      of_sizes[i++] = static_cast<std::uint8_t>(step);
     }
     keep(coder);
-    differences(PageColumns::kLowX + axis, context_of(PageColumns::kLowX + axis),
-                context::kIndexSteps, by, false, axis == 2 ? &steps_ : nullptr);
+    // What goes far in x goes less far in y.
+    if (axis == 1) steps_ = last_steps_;
+    if (axis == 2) steps_ = of_sizes;
+    differences(lows, context_of(PageColumns::kLowX + axis),
+                axis > 0 ? std::span<const std::uint8_t>(steps_) : std::span<const std::uint8_t>(),
+                context::kIndexSteps, by);
   }
 
-  /// Numbers as they are, in contexts by `steps` or, without, by the previous one.
-  void numbers(unsigned field, const std::span<const std::uint8_t> steps) {
+  /// Numbers as they are, in contexts by the previous one.
+  void numbers(std::span<std::uint64_t> values, unsigned field) {
     unsigned step = 0;
-    std::size_t i = 0;
     typename Coder::Local coder = coder_;
-    for (std::uint64_t& value : columns_.column(field)) {
-      if (!steps.empty()) step = steps[i++];
+    for (std::uint64_t& value : values) {
       step = difference_step(code_number(coder, context_of(field) + step, value));
     }
     keep(coder);
   }
-
-  /// Differences of neighbours, the first from 0, of values without their lowest bits, which are 0
-  /// or, with `ones`, 1.
-  void differences(std::size_t field, unsigned context, unsigned contexts, unsigned by, bool ones,
-                   const Steps* steps = nullptr) {
-    const std::uint64_t mask = ones ? (std::uint64_t{1} << by) - 1 : 0;
+  /// Differences to what guess(i) is, which may depend on values before.
+  template <class Guess>
+  void guessed(std::span<std::uint64_t> values, unsigned field, const Guess& guess) {
     unsigned step = 0;
-    std::int64_t previous = 0;
-    std::size_t i = 0;
     typename Coder::Local coder = coder_;
-    for (std::uint64_t& value : columns_.column(field)) {
-      if (steps != nullptr) step = (*steps)[i++];
-      // Ranges are unsigned, but differences of either kind wrap.
-      std::int64_t now = static_cast<std::int64_t>(value) >> by;
-      const unsigned found = code_difference(coder, context + step % contexts, previous, now);
-      step = difference_step(found);
-      previous = now;
-      if constexpr (Coder::kDecoding) value = static_cast<std::uint64_t>(now) << by | mask;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      auto value = static_cast<std::int64_t>(values[i]);
+      step = difference_step(code_difference(coder, context_of(field) + step,
+                                             static_cast<std::int64_t>(guess(i)), value));
+      if constexpr (Coder::kDecoding) values[i] = static_cast<std::uint64_t>(value);
     }
     keep(coder);
   }
 
-  /// The number of lowest bits that all values of a column lack.
-  unsigned shift(std::size_t field) {
-    std::uint64_t by = 0;
-    if constexpr (!Coder::kDecoding) by = common_zeros(field);
+  /// Differences of neighbours, the first from `previous`, of values without their lowest bits,
+  /// which are 0 or, with `ones`, 1. steps: contexts; without, that of the previous difference.
+  void differences(std::span<std::uint64_t> values, unsigned context,
+                   std::span<const std::uint8_t> steps = {},
+                   unsigned contexts = context::kIndexSteps, unsigned by = 0, bool ones = false,
+                   std::int64_t previous = 0) {
+    const std::uint64_t mask = ones ? (std::uint64_t{1} << by) - 1 : 0;
+    unsigned step = 0;
+    typename Coder::Local coder = coder_;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!steps.empty()) step = steps[i];
+      // Ranges are unsigned, but differences of either kind wrap.
+      std::int64_t now = static_cast<std::int64_t>(values[i]) >> by;
+      const unsigned found = code_difference(coder, context + step % contexts, previous, now);
+      step = difference_step(found);
+      last_steps_[i] = static_cast<std::uint8_t>(step);
+      previous = now;
+      if constexpr (Coder::kDecoding) values[i] = static_cast<std::uint64_t>(now) << by | mask;
+    }
+    keep(coder);
+  }
+
+  /// The number of lowest bits that all values of a column lack. bits: that they have, for
+  /// encoding.
+  unsigned shift(std::uint64_t bits) {
+    std::uint64_t by = bits == 0 ? kTop : static_cast<unsigned>(std::countr_zero(bits));
     code_number(coder_, first_ + context::kIndexShift, by);
     if (by > kTop) throw Damage("an index page has a bad column");
     return static_cast<unsigned>(by);
   }
-  [[nodiscard]] unsigned common_zeros(std::size_t field) const {
-    const bool ones = field >= PageColumns::kFields && (field - PageColumns::kFields) % 2 != 0;
-    std::uint64_t bits = 0;
-    for (const std::uint64_t value : columns_.column(field)) bits |= ones ? ~value : value;
-    if (field < PageColumns::kLowX) {
-      for (const std::uint64_t low : columns_.column(field + 3)) bits |= low;
-    }
-    return bits == 0 ? kTop : static_cast<unsigned>(std::countr_zero(bits));
-  }
 
   Coder& coder_;
   unsigned first_;
-  PageColumns& columns_;
-  Steps steps_{};
+  bool small_;
+  unsigned checksum_bits_;
+  Steps steps_{}, last_steps_{};  ///< last: of the last differences
 };
 
-/// The columns of a page before version 4, in the order in which they come.
-constexpr std::array<PageColumns::Field, PageColumns::kFields> kOldOrder{
+/// The columns of a page before version 5, in the order in which they come.
+constexpr std::array<PageColumns::Field, 12> kOldOrder{
     PageColumns::kBytes, PageColumns::kPoints, PageColumns::kForms,       PageColumns::kLowX,
     PageColumns::kLowY,  PageColumns::kLowZ,   PageColumns::kSizeX,       PageColumns::kSizeY,
     PageColumns::kSizeZ, PageColumns::kError,  PageColumns::kDescendants, PageColumns::kChecksum};
 
-/// A page before version 4: each column a base, a shift and a width, then that many bits per
-/// cluster. Returns the offset of the first cluster.
-std::uint64_t read_old_page(ByteView bytes, PageColumns& columns) {
+/// A page before version 5, checksum left out: each column a base, a shift and a width, then that
+/// many bits per cluster. Calls use(number of the column, cluster, value).
+/// Returns the offset of the first cluster.
+template <class Use>
+std::uint64_t read_old_page(ByteView bytes, std::uint32_t clusters, std::size_t ranges, Use&& use) {
   struct Packed {
     std::uint64_t base = 0;
     unsigned shift = 0, width = 0;
   };
   ByteReader in(bytes);
   const std::uint64_t offset = in.varint();
-  std::vector<Packed> packed(columns.columns());
+  std::vector<Packed> packed(kOldOrder.size() + 2 * ranges);
   std::uint64_t bits = 0;
   for (std::size_t f = 0; f < packed.size(); ++f) {
     const std::uint64_t base = in.varint();
@@ -191,7 +237,7 @@ std::uint64_t read_old_page(ByteView bytes, PageColumns& columns) {
     packed[f].shift = in.get<std::uint8_t>();
     if (packed[f].shift > 63 || packed[f].width > 64)
       throw Damage("an index page has a bad column");
-    bits += std::uint64_t{packed[f].width} * columns.clusters();
+    bits += std::uint64_t{packed[f].width} * clusters;
   }
   if (in.left() != (bits + 7) / 8) throw Damage("an index page has a wrong size");
   if (bits % 8 != 0 && bytes.back() >> bits % 8 != 0) {
@@ -204,63 +250,41 @@ std::uint64_t read_old_page(ByteView bytes, PageColumns& columns) {
   for (std::size_t f = 0; f < packed.size(); ++f) {
     const auto [base, shift, width] = packed[f];
     const bool high = f >= kOldOrder.size() && (f - kOldOrder.size()) % 2 != 0;
-    const std::size_t field = f < kOldOrder.size() ? std::size_t{kOldOrder[f]} : f;
-    for (std::uint64_t& value : columns.column(field)) {
+    for (std::uint32_t i = 0; i < clusters; ++i) {
       const unsigned skip = bit & 7;
       std::uint64_t steps = load<std::uint64_t>(room.data() + bit / 8) >> skip;
       if (skip + width > 64) steps |= static_cast<std::uint64_t>(room[bit / 8 + 8]) << (64 - skip);
       if (width < 64) steps &= (std::uint64_t{1} << width) - 1;
       // The last step up may lead beyond the greatest key.
       const bool beyond = high && steps > (UINT64_MAX - base) >> shift;
-      value = beyond ? UINT64_MAX : base + (steps << shift);
+      use(f, i, beyond ? UINT64_MAX : base + (steps << shift));
       bit += width;
     }
   }
   return offset;
 }
 
-/// Both ends are exact.
-double between(double low, double high, std::uint16_t place) {
-  const double share = place / 65535.0;
-  return low * (1 - share) + high * share;
+Bytes padded_copy(ByteView bytes) {
+  Bytes room(bytes.size() + 2 * kPadding);
+  std::copy(bytes.begin(), bytes.end(), room.begin() + kPadding);
+  return room;
+}
+
+/// Calls use(PageCoder) on a string of symbols, padded. Returns what its last state holds.
+template <class Use>
+std::uint32_t decode_symbols(const Bytes& padded, const Layout& layout,
+                             const DecodingTables& tables, Use&& use) {
+  SymbolDecoder decoder(tables.tables,
+                        ByteView(padded).subspan(kPadding, padded.size() - 2 * kPadding));
+  use(PageCoder(decoder, layout));
+  return decoder.finish();
 }
 
 }  // namespace
 
-Box3 PageBox::in(const Box3& bounds) const {
-  Box3 box;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.min[axis] = between(bounds.min[axis], bounds.max[axis], low[axis]);
-    box.max[axis] = between(bounds.min[axis], bounds.max[axis], high[axis]);
-  }
-  return box;
-}
-
-PageBox PageBox::around(const Box3& box, const Box3& bounds) {
-  PageBox found;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double low = bounds.min[axis], high = bounds.max[axis];
-    const auto place = [&](double value) {
-      // Halves, so that no difference overflows.
-      const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * 65535;
-      return static_cast<std::uint16_t>(share > 0 ? std::min(share, 65535.0) : 0);
-    };
-    // Rounding may have left an end inside.
-    std::uint16_t& first = found.low[axis];
-    first = place(box.min[axis]);
-    while (first > 0 && !(between(low, high, first) <= box.min[axis])) --first;
-    std::uint16_t& last = found.high[axis];
-    last = place(box.max[axis]);
-    while (last < UINT16_MAX && !(between(low, high, last) >= box.max[axis])) ++last;
-  }
-  return found;
-}
-
-PageColumns::PageColumns(std::span<const Entry> entries, std::span<const ScalarType> types,
-                         std::span<const KeyRange> ranges)
-    : PageColumns(static_cast<std::uint32_t>(entries.size()), types.size()) {
+PageColumns::PageColumns(std::span<const Entry> entries)
+    : PageColumns(static_cast<std::uint32_t>(entries.size())) {
   assert(!entries.empty() && entries.size() <= kMostPageClusters);
-  assert(ranges.size() == entries.size() * types.size());
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const Entry& entry = entries[i];
     const auto put = [&](std::size_t field, std::uint64_t value) { column(field)[i] = value; };
@@ -273,14 +297,22 @@ PageColumns::PageColumns(std::span<const Entry> entries, std::span<const ScalarT
     put(kError, entry.error);
     put(kDescendants, entry.descendants);
     put(kForms, (entry.forms[0] * kNumberForms + entry.forms[1]) * kNumberForms + entry.forms[2]);
+    put(kJump, static_cast<std::uint64_t>(entry.jump));
     put(kChecksum, entry.checksum);
-    for (std::size_t a = 0; a < types.size(); ++a) {
-      put(kFields + 2 * a, ranges[i * types.size() + a].low);
-      put(kFields + 2 * a + 1, ranges[i * types.size() + a].high);
+  }
+}
+
+RangeColumns::RangeColumns(std::span<const KeyRange> ranges, std::span<const ScalarType> types)
+    : RangeColumns(static_cast<std::uint32_t>(types.empty() ? 1 : ranges.size() / types.size()),
+                   types.size()) {
+  for (std::size_t a = 0; a < types.size(); ++a) {
+    for (std::size_t i = 0; i < clusters(); ++i) {
+      column(2 * a)[i] = ranges[i * types.size() + a].low;
+      column(2 * a + 1)[i] = ranges[i * types.size() + a].high;
     }
   }
-  for (std::size_t end = 0; end < 2 * types.size(); ++end) {
-    const std::span<std::uint64_t> keys = column(kFields + end);
+  for (std::size_t end = 0; end < columns(); ++end) {
+    const std::span<std::uint64_t> keys = column(end);
     const ScalarType type = types[end / 2];
     const auto [least, most] = std::minmax_element(keys.begin(), keys.end());
     const bool up = end % 2 != 0;
@@ -291,65 +323,104 @@ PageColumns::PageColumns(std::span<const Entry> entries, std::span<const ScalarT
   }
 }
 
-void PageColumns::count(const Layout& layout,
+void PageContent::count(const Layout& layout,
                         std::span<std::array<std::uint32_t, kSymbols>> counts) {
   SymbolCounter counter(counts);
-  PageCoder(counter, layout, *this).run();
+  PageCoder coder(counter, layout);
+  coder.entries(entries);
+  coder.ranges(ranges);
 }
 
-void PageColumns::write(const Layout& layout, const EncodingTables& tables, std::uint64_t offset,
-                        Bytes& out) {
+void PageContent::write(const Layout& layout, const EncodingTables& tables, Bytes& out) {
   const std::size_t start = out.size();
-  put_varint(out, offset);
+  Bytes coded_ranges;
   SymbolEncoder encoder(tables.tables);
+  if (ranges.columns() > 0) {
+    encoder.start();
+    PageCoder(encoder, layout).ranges(ranges);
+    encoder.finish(0, coded_ranges);
+  }
+  put_varint(out, offset >> 16);
+  if (ranges.columns() > 0) put_varint(out, coded_ranges.size());
   encoder.start();
-  PageCoder(encoder, layout, *this).run();
-  encoder.finish(0, out);
-  put(out, crc32({out.data() + start, out.size() - start}));
+  PageCoder(encoder, layout).entries(entries);
+  encoder.finish(static_cast<std::uint32_t>(offset & 0xffff), out);
+  out.insert(out.end(), coded_ranges.begin(), coded_ranges.end());
+  put(out, crc16({out.data() + start, out.size() - start}));
 }
 
-PageColumns read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
-                      const DecodingTables* tables, std::uint64_t& offset) {
+CodedPage read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
+                    const DecodingTables* tables) {
   assert(clusters >= 1 && clusters <= layout.page_clusters());
-  if (bytes.size() < 4 ||
-      crc32(bytes.first(bytes.size() - 4)) != load<std::uint32_t>(&bytes[bytes.size() - 4])) {
+  const std::size_t of_checksum = layout.version < 5 ? 4 : 2;
+  if (bytes.size() < of_checksum) throw Damage("an index page has a wrong size");
+  const ByteView checksum = bytes.last(of_checksum);
+  bytes = bytes.first(bytes.size() - of_checksum);
+  if (layout.version < 5 ? crc32(bytes) != load<std::uint32_t>(checksum.data())
+                         : crc16(bytes) != load<std::uint16_t>(checksum.data())) {
     throw Damage("the checksum of an index page is wrong");
   }
-  bytes = bytes.first(bytes.size() - 4);
-  PageColumns columns(clusters, layout.ranges());
-  if (layout.version < 4) {
-    offset = read_old_page(bytes, columns);
-    return columns;
+  CodedPage page{0, PageColumns(clusters), {}};
+  if (layout.version < 5) {
+    page.offset = read_old_page(bytes, clusters, layout.ranges(),
+                                [&](std::size_t f, std::uint32_t i, std::uint64_t value) {
+                                  if (f >= kOldOrder.size()) return;
+                                  page.entries.column(kOldOrder[f])[i] = value;
+                                });
+    page.ranges.assign(bytes.begin(), bytes.end());
+    return page;
   }
   ByteReader in(bytes);
-  offset = in.varint();
-  const ByteView symbols = in.take(in.left());
-  Bytes room(kPadding);
-  room.insert(room.end(), symbols.begin(), symbols.end());
-  room.resize(room.size() + kPadding);
-  SymbolDecoder decoder(tables->tables, ByteView(room).subspan(kPadding, symbols.size()));
-  PageCoder(decoder, layout, columns).run();
-  if (decoder.finish() != 0) throw Damage("an index page does not end as it should");
+  const std::uint64_t upper = in.varint();
+  if (upper >> 48 != 0) throw Damage("an index entry is out of range");
+  const std::uint64_t of_ranges = layout.ranges() > 0 ? in.varint() : 0;
+  if (of_ranges > in.left()) throw Damage("the data end too early");
+  const ByteView entries = in.take(in.left() - static_cast<std::size_t>(of_ranges));
+  page.ranges = padded_copy(in.take(in.left()));
+  page.offset = upper << 16 | decode_symbols(padded_copy(entries), layout, *tables,
+                                             [&](auto coder) { coder.entries(page.entries); });
+  return page;
+}
+
+RangeColumns read_ranges(const Bytes& coded, std::uint32_t clusters, const Layout& layout,
+                         const DecodingTables* tables) {
+  RangeColumns columns(clusters, layout.ranges());
+  if (layout.ranges() == 0) return columns;
+  if (layout.version < 5) {
+    read_old_page(coded, clusters, layout.ranges(),
+                  [&](std::size_t f, std::uint32_t i, std::uint64_t value) {
+                    if (f >= kOldOrder.size()) columns.column(f - kOldOrder.size())[i] = value;
+                  });
+  } else {
+    if (decode_symbols(coded, layout, *tables, [&](auto coder) { coder.ranges(columns); }) != 0) {
+      throw Damage("an index page does not end as it should");
+    }
+  }
   return columns;
 }
 
 IndexPage::IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layout,
                      const DecodingTables* tables)
     : clusters_(clusters) {
-  const PageColumns columns = read_page(bytes, clusters, layout, tables, offsets_[0]);
-  keep(columns);
+  CodedPage page = read_page(bytes, clusters, layout, tables);
+  if (layout.ranges() > 0) ranges_ = std::move(page.ranges);
+  std::uint64_t at = page.offset;
   for (std::uint32_t i = 0; i < clusters_; ++i) {
-    const std::uint64_t cluster = columns.column(Field::kBytes)[i];
-    if (cluster >= kMostBytes || offsets_[i] > UINT64_MAX - cluster) {
+    const std::uint64_t size = page.entries.column(Field::kBytes)[i];
+    std::uint64_t& offset = page.entries.column(kOffset)[i];
+    at += offset;  // beyond the file if that is out of range
+    if (size >= kMostBytes || at > UINT64_MAX - size) {
       throw Damage("an index entry is out of range");
     }
-    offsets_[i + 1] = offsets_[i] + cluster;
+    offset = at;
+    at += size;
   }
+  keep(page.entries);
 }
 
 void IndexPage::keep(const PageColumns& columns) {
-  columns_.resize(columns.columns());
   std::uint32_t end = 0;
+  bytes_.reserve(columns_.size() * clusters_ + sizeof(std::uint64_t));  // mostly enough
   for (std::size_t f = 0; f < columns_.size(); ++f) {
     const auto values = columns.column(f);
     std::uint64_t differences = 0;
@@ -374,23 +445,17 @@ void IndexPage::keep(const PageColumns& columns) {
   }
 }
 
-std::uint64_t IndexPage::value(std::size_t number, std::uint32_t i) const {
-  const Column& column = columns_[number];
+std::uint64_t IndexPage::value(Field field, std::uint32_t i) const {
+  const Column& column = columns_[field];
   const auto kept =
       load<std::uint64_t>(bytes_.data() + column.start + std::size_t{i} * column.width);
   return column.base | (kept & column.mask) << column.shift;
 }
 
-KeyRange IndexPage::range(std::uint32_t i, std::size_t attribute) const {
-  assert(i < clusters_ && PageColumns::kFields + 2 * attribute < columns_.size());
-  const std::size_t low = PageColumns::kFields + 2 * attribute;
-  return {value(low, i), value(low + 1, i)};
-}
-
 Entry IndexPage::entry(std::uint32_t i) const {
   assert(i < clusters_);
   Entry entry;
-  const std::uint64_t bytes = offsets_[i + 1] - offsets_[i], points = value(Field::kPoints, i);
+  const std::uint64_t bytes = value(Field::kBytes, i), points = value(Field::kPoints, i);
   std::uint64_t forms = value(Field::kForms, i);
   const std::uint64_t error = value(Field::kError, i), checksum = value(Field::kChecksum, i);
   if (points > kMostPoints || error > error_code(std::numeric_limits<double>::infinity()) ||
@@ -401,14 +466,15 @@ Entry IndexPage::entry(std::uint32_t i) const {
   entry.points = static_cast<std::uint32_t>(points);
   for (unsigned axis = 3; axis-- > 0; forms /= kNumberForms) {
     entry.forms[axis] = static_cast<NumberForm>(forms % kNumberForms);
-    entry.low[axis] = static_cast<std::int64_t>(value(Field::kLowX + axis, i));
-    entry.size[axis] = value(Field::kSizeX + axis, i);
+    entry.low[axis] = static_cast<std::int64_t>(value(static_cast<Field>(Field::kLowX + axis), i));
+    entry.size[axis] = value(static_cast<Field>(Field::kSizeX + axis), i);
     if (entry.size[axis] == 0) throw Damage("an index entry has an empty box");
   }
   if (forms != 0) throw Damage("an index entry has an unknown number form");
   entry.error = static_cast<std::uint16_t>(error);
   entry.descendants = value(Field::kDescendants, i);
   entry.checksum = static_cast<std::uint16_t>(checksum);
+  if (i > 0) entry.jump = static_cast<std::int64_t>(offset(i) - end(i - 1));
   return entry;
 }
 

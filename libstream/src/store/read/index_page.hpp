@@ -11,28 +11,36 @@
 
 namespace terrace::stream::store {
 
-/// A box around all points of a page's clusters and below them, which the directory has: in
-/// 65535ths of the store's bounds.
-struct PageBox {
-  std::array<std::uint16_t, 3> low{UINT16_MAX, UINT16_MAX, UINT16_MAX}, high{};
-
-  [[nodiscard]] Box3 in(const Box3& bounds) const;
-  /// The least that holds what lies of `box` within `bounds`.
-  static PageBox around(const Box3& box, const Box3& bounds);
-};
-inline constexpr std::uint64_t kPageBoxBytes = 12;
-
-/// Maximum bytes of a page: twelve columns and two for each attribute. Before version 4 each has
+/// Maximum bytes of a page: thirteen columns and two for each attribute. Before version 5 each has
 /// its base, shift and width, and at most 64 bits per cluster; from then on its shift, and a number
 /// takes at most 81 bits.
 constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
-  return 18 + (12 + 2 * std::uint64_t{attributes}) * (10 + 2 + 11 * kMostPageClusters) + 4;
+  return 28 + (13 + 2 * std::uint64_t{attributes}) * (10 + 2 + 11 * kMostPageClusters) + 4;
 }
 
-/// The columns of a page as unsigned integers: the fields of the entries, then the two ends of each
-/// attribute's range.
-class PageColumns {
+/// Columns of unsigned integers, one number per cluster.
+class NumberColumns {
  public:
+  /// clusters: 1 to kMostPageClusters.
+  NumberColumns(std::uint32_t clusters, std::size_t columns)
+      : clusters_(clusters), values_(columns * clusters) {}
+
+  [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
+  [[nodiscard]] std::size_t columns() const { return values_.size() / clusters_; }
+  [[nodiscard]] std::span<std::uint64_t> column(std::size_t number) {
+    return std::span(values_).subspan(number * clusters_, clusters_);
+  }
+  [[nodiscard]] std::span<const std::uint64_t> column(std::size_t number) const {
+    return std::span(values_).subspan(number * clusters_, clusters_);
+  }
+
+ private:
+  std::uint32_t clusters_;
+  std::vector<std::uint64_t> values_;  ///< column after column
+};
+
+/// The fields of a page's entries.
+struct PageColumns : NumberColumns {
   enum Field : unsigned {
     kSizeX,
     kSizeY,
@@ -45,42 +53,54 @@ class PageColumns {
     kError,
     kDescendants,
     kForms,
+    kJump,  ///< signed
     kChecksum,
     kFields
   };
 
-  /// clusters: 1 to kMostPageClusters. attributes: those with ranges.
-  PageColumns(std::uint32_t clusters, std::size_t attributes)
-      : clusters_(clusters), values_((kFields + 2 * attributes) * clusters) {}
-  /// ranges: for each entry, attribute by attribute; they are widened to a few bits.
-  PageColumns(std::span<const Entry> entries, std::span<const ScalarType> types,
-              std::span<const KeyRange> ranges);
-
-  [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
-  [[nodiscard]] std::size_t columns() const { return values_.size() / clusters_; }
-  [[nodiscard]] std::size_t attributes() const { return (columns() - kFields) / 2; }
-  [[nodiscard]] std::span<std::uint64_t> column(std::size_t number) {
-    return std::span(values_).subspan(number * clusters_, clusters_);
-  }
-  [[nodiscard]] std::span<const std::uint64_t> column(std::size_t number) const {
-    return std::span(values_).subspan(number * clusters_, clusters_);
-  }
-
-  /// Adds the symbols of the columns to `counts`, by the contexts of `layout`.
-  void count(const Layout& layout, std::span<std::array<std::uint32_t, kSymbols>> counts);
-  /// Appends a page of version 4. offset: of the first cluster in the level's data file.
-  void write(const Layout& layout, const EncodingTables& tables, std::uint64_t offset, Bytes& out);
-
- private:
-  std::uint32_t clusters_;
-  std::vector<std::uint64_t> values_;  ///< column after column
+  explicit PageColumns(std::uint32_t of_clusters) : NumberColumns(of_clusters, kFields) {}
+  explicit PageColumns(std::span<const Entry> entries);
 };
 
-/// The columns of a page as it is in the file, checksum included. tables: those of its first
-/// cluster, from version 4 on. offset: becomes that of the first cluster in the level's data file.
+/// The ranges of a page's clusters: a column for each end of each attribute's.
+struct RangeColumns : NumberColumns {
+  RangeColumns(std::uint32_t of_clusters, std::size_t attributes)
+      : NumberColumns(of_clusters, 2 * attributes) {}
+  /// ranges: for each cluster, attribute by attribute; they are widened to a few bits.
+  RangeColumns(std::span<const KeyRange> ranges, std::span<const ScalarType> types);
+
+  /// The range of an attribute in cluster i.
+  [[nodiscard]] KeyRange range(std::uint32_t i, std::size_t attribute) const {
+    return {column(2 * attribute)[i], column(2 * attribute + 1)[i]};
+  }
+};
+
+/// What a page consists of.
+struct PageContent {
+  std::uint64_t offset = 0;  ///< of the first cluster in the level's data file
+  PageColumns entries;
+  RangeColumns ranges;
+
+  /// Adds the symbols to `counts`, by the contexts of `layout`.
+  void count(const Layout& layout, std::span<std::array<std::uint32_t, kSymbols>> counts);
+  /// Appends a page of the version that is written.
+  void write(const Layout& layout, const EncodingTables& tables, Bytes& out);
+};
+
+/// A page as it is read: its ranges are still coded, as few readers want them.
+struct CodedPage {
+  std::uint64_t offset = 0;  ///< see PageContent
+  PageColumns entries;
+  Bytes ranges;  ///< padded; before version 5 the whole page
+};
+
+/// bytes: as in the file, checksum included. tables: those of the first cluster, from version 5 on.
 /// Throws: Damage.
-PageColumns read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
-                      const DecodingTables* tables, std::uint64_t& offset);
+CodedPage read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
+                    const DecodingTables* tables);
+/// Throws: Damage.
+RangeColumns read_ranges(const Bytes& coded, std::uint32_t clusters, const Layout& layout,
+                         const DecodingTables* tables);
 
 /// A checked page, with random access to entries.
 class IndexPage {
@@ -91,15 +111,21 @@ class IndexPage {
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
-  /// The range of an attribute in cluster i, possibly widened. Requires ranges.
-  [[nodiscard]] KeyRange range(std::uint32_t i, std::size_t attribute) const;
-  /// Offset of cluster i in the data file; i = clusters() is the end of the last.
-  [[nodiscard]] std::uint64_t offset(std::uint32_t i) const { return offsets_[i]; }
-  /// End of the last cluster.
-  [[nodiscard]] std::uint64_t end() const { return offsets_[clusters_]; }
+  /// The ranges, possibly widened, decoded by this call. layout, tables: as for the page.
+  /// Throws: Damage.
+  [[nodiscard]] RangeColumns ranges(const Layout& layout, const DecodingTables* tables) const {
+    return read_ranges(ranges_, clusters_, layout, tables);
+  }
+  /// Where the bytes of cluster i begin and end in the data file.
+  [[nodiscard]] std::uint64_t offset(std::uint32_t i) const { return value(kOffset, i); }
+  [[nodiscard]] std::uint64_t end(std::uint32_t i) const {
+    return offset(i) + value(Field::kBytes, i);
+  }
 
  private:
   using Field = PageColumns::Field;
+  /// Offsets take the place of jumps.
+  static constexpr Field kOffset = Field::kJump;
   /// Values above a base, in as few bytes as the largest takes.
   struct Column {
     std::uint64_t base = 0, mask = 0;  ///< mask: the bits that are in bytes_
@@ -107,13 +133,13 @@ class IndexPage {
     std::uint8_t shift = 0, width = 0;
   };
 
-  [[nodiscard]] std::uint64_t value(std::size_t column, std::uint32_t i) const;
+  [[nodiscard]] std::uint64_t value(Field field, std::uint32_t i) const;
   void keep(const PageColumns& columns);
 
   std::uint32_t clusters_ = 0;
-  std::array<std::uint64_t, kMostPageClusters + 1> offsets_{};
-  std::vector<Column> columns_;
-  Bytes bytes_;  ///< and eight more, so that a value is one load
+  std::array<Column, Field::kFields> columns_;
+  Bytes bytes_;   ///< and eight more, so that a value is one load
+  Bytes ranges_;  ///< see CodedPage
 };
 
 }  // namespace terrace::stream::store

@@ -8,14 +8,14 @@ namespace terrace::stream::store {
 namespace {
 
 constexpr const char* kRestoreStore = "restore the file or build the store anew";
-/// About 2 KB each.
-constexpr std::uint64_t kCachedPages = 4096;
+/// About 0.5 KB each, those of clouds 2.
+constexpr std::uint64_t kCachedPages = 8192;
+/// Ranges of a page take 1 KB per attribute. Whoever wants them goes from page to page.
+constexpr std::uint64_t kCachedRanges = 64;
 /// About 100 KB each; one set is for about ten million points of level 0.
 constexpr std::uint64_t kCachedTables = 32;
 /// Stores with very many attributes keep fewer.
 constexpr std::uint64_t kCachedContexts = 512 * kCachedTables;
-/// A writer makes one set per 1024 blocks, and no block without a cluster.
-constexpr std::uint64_t kFewestClustersOfTables = 1024;
 
 Error damaged_file(const ByteSource& file, std::uint64_t offset, const std::string& cause) {
   return Error({.file = file.name(),
@@ -38,17 +38,26 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
 
 }  // namespace
 
+template <class Read>
+auto LevelReader::from_directory(Read&& read) const {
+  try {
+    return read();
+  } catch (const Damage& damage) {
+    throw damaged_file(*index_, 0, damage.what());
+  }
+}
+
 LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
     : layout_(manifest.schema, level, manifest.version),
       clusters_(manifest.levels[level].clusters),
-      pages_(clusters_ / layout_.page_clusters() + (clusters_ % layout_.page_clusters() != 0)),
       most_points_(std::min(layout_.most_points(), manifest.levels[level].points)),
       top_(level + 1 == manifest.levels.size()),
       store_points_(manifest.points),
       bounds_(manifest.bounds),
       data_(open_listed(files, manifest.levels[level].data)),
       index_(open_listed(files, manifest.levels[level].index)),
-      page_cache_(static_cast<std::size_t>(std::clamp<std::uint64_t>(pages_, 1, kCachedPages))),
+      page_cache_(1),
+      range_cache_(1),
       tables_cache_(1) {
   for (unsigned below = 0; below < level; ++below) {
     clusters_below_.push_back(manifest.levels[below].clusters);
@@ -56,82 +65,46 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
   const std::uint64_t size = manifest.levels[level].directory_bytes;
   if (size > index_->size())
     throw damaged_file(*index_, 0, "the index is smaller than its directory");
-  read_directory(size);
-  const std::uint64_t most_cached = std::min(kCachedTables, kCachedContexts / layout_.contexts());
-  tables_cache_ = SlotCache<DecodingTables>(static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(tables_at_.size(), 1, std::max<std::uint64_t>(1, most_cached))));
+  directory_ = from_directory([&] {
+    return std::make_unique<const Directory>(*index_, size, clusters_, layout_, bounds_);
+  });
+  const auto slots = [](std::uint64_t wanted, std::uint64_t most) {
+    return static_cast<std::size_t>(
+        std::clamp<std::uint64_t>(wanted, 1, std::max<std::uint64_t>(1, most)));
+  };
+  page_cache_ = SlotCache<IndexPage>(slots(pages(), kCachedPages));
+  if (layout_.ranges() > 0) range_cache_ = SlotCache<RangeColumns>(slots(pages(), kCachedRanges));
+  tables_cache_ = SlotCache<DecodingTables>(slots(
+      directory_->tables().size(), std::min(kCachedTables, kCachedContexts / layout_.contexts())));
 }
 
-void LevelReader::read_directory(std::uint64_t bytes) {
-  const std::uint64_t start = index_->size() - bytes;
-  const std::uint64_t most_tables = 1 + clusters_ / kFewestClustersOfTables;
-  const std::uint64_t page_bytes = 8 + (layout_.version > 3 ? kPageBoxBytes : 0);
-  if (bytes > page_bytes * pages_ + 8 + 8 + most_tables * (20 + Tables::most_bytes(layout_))) {
-    throw damaged_file(*index_, start, "the directory is too large for the level's clusters");
-  }
-  try {
-    const std::size_t size = memory_size(bytes);
-    tail_.resize(size);
-    index_->read(start, std::as_writable_bytes(std::span(tail_)));
-    if (size < 4 ||
-        crc32(ByteView(tail_).first(size - 4)) != load<std::uint32_t>(tail_.data() + size - 4)) {
-      throw Damage("the checksum of the directory is wrong");
-    }
-    ByteReader in(ByteView(tail_).first(size - 4));
-    if (in.left() < 8 || (in.left() - 8) / page_bytes < pages_) {
-      throw Damage("the directory has too few pages");
-    }
-    std::uint64_t previous = 0;
-    for (std::uint64_t p = 0; p < pages_; ++p) {
-      directory_.push_back(in.get<std::uint64_t>());
-      if (directory_.back() < previous ||
-          directory_.back() - previous > most_page_bytes(layout_.ranges()) ||
-          directory_.back() > start || (p == 0 && directory_[0] != 0)) {
-        throw Damage("the pages of the directory do not follow one another");
-      }
-      previous = directory_.back();
-    }
-    directory_.push_back(in.get<std::uint64_t>());
-    if (directory_.back() != start || start - previous > most_page_bytes(layout_.ranges())) {
-      throw Damage("the pages do not end where the directory begins");
-    }
-    for (std::uint64_t p = 0; layout_.version > 3 && p < pages_; ++p) {
-      PageBox box;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        box.low[axis] = in.get<std::uint16_t>();
-        box.high[axis] = in.get<std::uint16_t>();
-      }
-      boxes_.push_back(box.in(bounds_));
-    }
-    const auto count = in.get<std::uint32_t>();
-    for (std::uint32_t t = 0; t < count; ++t) {
-      TablesAt at;
-      at.first = in.varint();
-      at.size = memory_size(in.varint());
-      at.offset = in.offset();
-      in.take(at.size);
-      if (tables_at_.empty() ? at.first != 0 : at.first <= tables_at_.back().first) {
-        throw Damage("the tables do not follow one another");
-      }
-      if (at.first >= clusters_) throw Damage("tables are for clusters that do not exist");
-      tables_at_.push_back(at);
-    }
-    if (in.left() != 0) throw Damage("bytes follow the directory");
-    if (tables_at_.empty() && clusters_ > 0) throw Damage("the level has no tables");
-  } catch (const Damage& damage) {
-    throw damaged_file(*index_, start, damage.what());
-  }
+std::uint64_t LevelReader::page_offset(std::uint64_t page) const {
+  return from_directory([&] { return directory_->page_range(page).begin; });
 }
 
-std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number) const {
-  const std::uint64_t start = page_offset(number);
-  Bytes bytes(static_cast<std::size_t>(page_offset(number + 1) - start));
-  index_->read(start, std::as_writable_bytes(std::span(bytes)));
+Box3 LevelReader::page_box(std::uint64_t ordinal) const {
+  return from_directory([&] { return directory_->page_box(ordinal / layout_.page_clusters()); });
+}
+
+std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
+                                                        SequentialBytes* ahead) const {
+  const Directory::Range at = from_directory([&] { return directory_->page_range(number); });
+  const std::uint64_t start = at.begin;
+  const auto size = static_cast<std::size_t>(at.end - start);
+  Bytes own;
+  ByteView bytes;
+  if (ahead != nullptr) {
+    bytes = ahead->at(start, size);
+  } else {
+    own.resize(size);
+    index_->read(start, std::as_writable_bytes(std::span(own)));
+    bytes = own;
+  }
   try {
     const std::uint64_t most = layout_.page_clusters(), first = number * most;
     return std::make_shared<const IndexPage>(
         bytes, static_cast<std::uint32_t>(std::min(most, clusters_ - first)), layout_,
-        layout_.version > 3 ? tables(first).get() : nullptr);
+        layout_.version > 4 ? tables(first).get() : nullptr);
   } catch (const Damage& damage) {
     throw damaged_file(*index_, start, damage.what());
   }
@@ -160,10 +133,20 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
 }
 
 void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
-  const auto page = this->page(ordinal / layout_.page_clusters());
   out.clear();
+  if (layout_.ranges() == 0) return;
+  const std::uint64_t number = ordinal / layout_.page_clusters();
+  const auto columns = range_cache_.get(number, [&] {
+    const auto page = this->page(number);
+    try {
+      return std::make_shared<const RangeColumns>(page->ranges(
+          layout_, layout_.version > 4 ? tables(number * layout_.page_clusters()).get() : nullptr));
+    } catch (const Damage& damage) {
+      throw damaged_file(*index_, page_offset(number), damage.what());
+    }
+  });
   for (std::size_t a = 0; a < layout_.ranges(); ++a) {
-    out.push_back(page->range(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()), a));
+    out.push_back(columns->range(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()), a));
   }
 }
 
@@ -197,16 +180,17 @@ Entry LevelReader::entry(const IndexPage& page, std::uint32_t i) const {
 }
 
 std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal) const {
-  const auto next =
-      std::upper_bound(tables_at_.begin(), tables_at_.end(), ordinal,
-                       [](std::uint64_t value, const TablesAt& at) { return value < at.first; });
-  const TablesAt& at = *(next - 1);
-  return tables_cache_.get(static_cast<std::uint64_t>(next - 1 - tables_at_.begin()), [&] {
+  const std::vector<Directory::TablesAt>& sets = directory_->tables();
+  const auto next = std::upper_bound(
+      sets.begin(), sets.end(), ordinal,
+      [](std::uint64_t value, const Directory::TablesAt& at) { return value < at.first; });
+  const Directory::TablesAt& at = *(next - 1);
+  return tables_cache_.get(static_cast<std::uint64_t>(next - 1 - sets.begin()), [&] {
     try {
       return std::make_shared<const DecodingTables>(
-          Tables::read(ByteView(tail_).subspan(at.offset, at.size), layout_));
+          Tables::read(directory_->read_tables(at), layout_));
     } catch (const Damage& damage) {
-      throw damaged_file(*index_, index_->size() - tail_.size() + at.offset, damage.what());
+      throw damaged_file(*index_, at.offset, damage.what());
     }
   });
 }
@@ -228,7 +212,7 @@ Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) cons
 void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
                          ByteView bytes, ClusterDecoder& decoder, ClusterPoints& out) const {
   try {
-    if (crc16(bytes) != entry.checksum) {
+    if (layout_.checksum(bytes) != entry.checksum) {
       throw Damage("the checksum of the bytes from " + std::to_string(offset) + " on is wrong");
     }
     decoder.decode(layout_, *tables(ordinal), entry, bytes, top_, out);

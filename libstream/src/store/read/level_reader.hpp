@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -8,6 +9,7 @@
 
 #include "store/manifest.hpp"
 #include "store/read/cluster_decoder.hpp"
+#include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
@@ -45,6 +47,33 @@ class SlotCache {
   std::vector<Slot> slots_;
 };
 
+/// Parts of a file that mostly follow one another, read many at a time.
+class SequentialBytes {
+ public:
+  explicit SequentialBytes(const ByteSource& file) : file_(file) {}
+
+  /// The bytes, with kPadding readable ones before and behind, until the next call. Requires that
+  /// they exist.
+  ByteView at(std::uint64_t offset, std::size_t size) {
+    if (offset < begin_ || offset + size > begin_ + size_) {
+      const std::uint64_t left = file_.size() - offset;
+      size_ = std::max(size, static_cast<std::size_t>(std::min<std::uint64_t>(left, kAtOnce)));
+      begin_ = offset;
+      bytes_.resize(size_ + 2 * kPadding);
+      file_.read(offset, std::as_writable_bytes(std::span(bytes_).subspan(kPadding, size_)));
+    }
+    return ByteView(bytes_).subspan(kPadding + static_cast<std::size_t>(offset - begin_), size);
+  }
+
+ private:
+  static constexpr std::uint64_t kAtOnce = std::uint64_t{32} << 10;
+
+  const ByteSource& file_;
+  Bytes bytes_;
+  std::uint64_t begin_ = 0;
+  std::size_t size_ = 0;
+};
+
 /// What one thread needs to read clusters.
 struct ReadSpace {
   ClusterDecoder decoder;
@@ -62,16 +91,17 @@ class LevelReader {
   [[nodiscard]] bool top() const { return top_; }
   [[nodiscard]] const ByteSource& data() const { return *data_; }
   [[nodiscard]] const ByteSource& index() const { return *index_; }
-  [[nodiscard]] std::uint64_t pages() const { return pages_; }
-  [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const {
-    return directory_[static_cast<std::size_t>(page)];
-  }
+  [[nodiscard]] std::uint64_t pages() const { return directory_->pages(); }
+  /// Where a page begins. Throws: Error.
+  [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const;
 
-  /// The box of the page that has the cluster, or a larger one. Requires that the cluster exists.
+  /// A box around all points of the cluster and below it, and those of its neighbours in the index:
+  /// without reading there, or as the index's contents tell. Requires that the cluster exists.
   [[nodiscard]] Box3 coarse_box(std::uint64_t ordinal) const {
-    const std::uint64_t page = ordinal / layout_.page_clusters();
-    return page < boxes_.size() ? boxes_[static_cast<std::size_t>(page)] : bounds_;
+    return directory_->coarse_box(ordinal / layout_.page_clusters());
   }
+  /// Throws: Error.
+  [[nodiscard]] Box3 page_box(std::uint64_t ordinal) const;
   /// Throws: Error.
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
   /// The entry and where its bytes begin. Throws: Error.
@@ -86,19 +116,19 @@ class LevelReader {
   /// store, and what they head exists. Throws: Error.
   void decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, ByteView bytes,
               ClusterDecoder& decoder, ClusterPoints& out) const;
-  /// Calls visit(first ordinal, IndexPage, bytes of its clusters, padded). Throws: Error.
+  /// Calls visit(ordinal, IndexPage, number in the page, its bytes, padded) for each cluster.
+  /// Throws: Error.
   template <class Visit>
-  void for_each_page(Visit&& visit) const {
-    Bytes bytes;
-    for (std::uint64_t number = 0; number < pages_; ++number) {
-      const auto page = read_page(number);
-      const std::uint64_t begin = page->offset(0);
-      const std::uint64_t first = number * layout_.page_clusters();
-      check_range(first, begin, page->end() - begin);
-      const std::size_t size = memory_size(page->end() - begin);
-      bytes.resize(size + 2 * kPadding);
-      data_->read(begin, std::as_writable_bytes(std::span(bytes).subspan(kPadding, size)));
-      visit(first, *page, ByteView(bytes));
+  void for_each_cluster(Visit&& visit) const {
+    SequentialBytes pages_ahead(*index_), clusters_ahead(*data_);
+    for (std::uint64_t number = 0; number < pages(); ++number) {
+      const auto page = read_page(number, &pages_ahead);
+      for (std::uint32_t i = 0; i < page->clusters(); ++i) {
+        const std::uint64_t ordinal = number * layout_.page_clusters() + i;
+        const std::uint64_t begin = page->offset(i), size = page->end(i) - begin;
+        check_range(ordinal, begin, size);
+        visit(ordinal, *page, i, clusters_ahead.at(begin, memory_size(size)));
+      }
     }
   }
 
@@ -106,30 +136,26 @@ class LevelReader {
   [[nodiscard]] Error damaged(std::uint64_t ordinal, const std::string& cause) const;
 
  private:
-  struct TablesAt {
-    std::uint64_t first = 0;  ///< ordinal of the first cluster that they are for
-    std::size_t offset = 0, size = 0;
-  };
-
-  void read_directory(std::uint64_t bytes);
-  [[nodiscard]] std::shared_ptr<const IndexPage> read_page(std::uint64_t number) const;
+  /// What `read` returns, damage in the directory made an Error.
+  template <class Read>
+  auto from_directory(Read&& read) const;
+  [[nodiscard]] std::shared_ptr<const IndexPage> read_page(std::uint64_t number,
+                                                           SequentialBytes* ahead = nullptr) const;
   [[nodiscard]] std::shared_ptr<const DecodingTables> tables(std::uint64_t ordinal) const;
   void check_range(std::uint64_t ordinal, std::uint64_t offset, std::uint64_t size) const;
   void check_points(const Entry& entry, const ClusterPoints& points) const;
 
   Layout layout_;
-  std::uint64_t clusters_, pages_;
+  std::uint64_t clusters_;
   std::uint64_t most_points_;  ///< of a cluster
   bool top_;
   std::uint64_t store_points_;
   Box3 bounds_;                                ///< of the store
   std::vector<std::uint64_t> clusters_below_;  ///< of each level below
   std::unique_ptr<ByteSource> data_, index_;
-  Bytes tail_;
-  std::vector<std::uint64_t> directory_;  ///< pages_ + 1 offsets in the index file
-  std::vector<Box3> boxes_;               ///< of the pages, from version 4 on
-  std::vector<TablesAt> tables_at_;
+  std::unique_ptr<const Directory> directory_;
   mutable SlotCache<IndexPage> page_cache_;
+  mutable SlotCache<RangeColumns> range_cache_;
   mutable SlotCache<DecodingTables> tables_cache_;
 };
 

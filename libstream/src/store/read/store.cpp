@@ -106,6 +106,10 @@ Box3 Store::coarse_box(ClusterId id) const {
   return impl_->level(level_of(id)).coarse_box(ordinal_of(id));
 }
 
+Box3 Store::page_box(ClusterId id) const {
+  return impl_->level(level_of(id)).page_box(ordinal_of(id));
+}
+
 std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
   check_stop();
   const LevelReader& level = impl_->level(level_of(id));
@@ -143,27 +147,21 @@ void Store::for_each(
   ClusterDecoder decoder;
   ClusterPoints points;
   std::uint64_t visited = 0;
-  level.for_each_page([&](std::uint64_t first, const IndexPage& page, ByteView bytes) {
-    const std::uint64_t start = page.offset(0);
-    std::uint64_t offset = start;
-    for (std::uint32_t i = 0; i < page.clusters(); ++i) {
-      check_stop();
-      const std::uint64_t ordinal = first + i;
-      Entry entry;
-      try {
-        entry = level.entry(page, i);
-      } catch (const Damage& damage) {
-        throw level.damaged(ordinal, damage.what());
-      }
-      level.decode(ordinal, entry, offset,
-                   bytes.subspan(kPadding + static_cast<std::size_t>(offset - start), entry.bytes),
-                   decoder, points);
-      visited += points.size();
-      if (visited > members) throw miscounted();
-      visit(cluster_id(number, ordinal), record_of(entry, number, offset, level.top()), points);
-      offset += entry.bytes;
-    }
-  });
+  level.for_each_cluster(
+      [&](std::uint64_t ordinal, const IndexPage& page, std::uint32_t i, ByteView bytes) {
+        check_stop();
+        Entry entry;
+        try {
+          entry = level.entry(page, i);
+        } catch (const Damage& damage) {
+          throw level.damaged(ordinal, damage.what());
+        }
+        level.decode(ordinal, entry, page.offset(i), bytes, decoder, points);
+        visited += points.size();
+        if (visited > members) throw miscounted();
+        visit(cluster_id(number, ordinal), record_of(entry, number, page.offset(i), level.top()),
+              points);
+      });
   if (visited != members) throw miscounted();
 }
 

@@ -469,7 +469,7 @@ void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& by
       if (i + 1 == waiting) size = bytes.size() - start;
       Entry& entry = entries[entry_of[i]];
       entry.bytes = static_cast<std::uint32_t>(size);
-      entry.checksum = crc16({bytes.data() + start, size});
+      entry.checksum = layout_->checksum({bytes.data() + start, size});
       start += size;
     }
     waiting = 0;

@@ -6,12 +6,15 @@
 #include <numeric>
 #include <utility>
 
+#include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
 #include "store/write/side_by_side.hpp"
 
 namespace terrace::stream::store {
 namespace {
 
+/// Blocks of so many bytes are looked for among those before.
+constexpr std::size_t kMostSharedBytes = 1024;
 /// At most so many of the blocks held back are used to choose how columns are coded. Rasters have
 /// them above level 0 alone, where little depends on it.
 constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
@@ -19,6 +22,14 @@ constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
 constexpr std::size_t kMostGuides = 2;
 /// At least one in so many differences of a guide begins a line, and as many do not.
 constexpr std::uint64_t kLeastShare = 50;
+
+template <class Box>
+void put_box(Bytes& out, const Box& box) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    put(out, box.low[axis]);
+    put(out, box.high[axis]);
+  }
+}
 
 std::string file_name(unsigned level, const char* what) {
   return "level-" + std::to_string(level) + ".0." + what;
@@ -37,6 +48,7 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   if (at_segment_start()) {
     if (!held_.empty()) train();
     tables_.reset();
+    small_blocks_.clear();
     segment_start_ = clusters_;
   }
   ++blocks_;
@@ -228,12 +240,8 @@ void LevelWriter::train() {
     tables.frequencies[c] = normalised(counts[c], least);
   }
 
-  Bytes bytes;
-  tables.write(bytes, layout_.version);
-  put_varint(table_bytes_, segment_start_);
-  put_varint(table_bytes_, bytes.size());
-  table_bytes_.insert(table_bytes_.end(), bytes.begin(), bytes.end());
-  ++table_count_;
+  sets_.push_back({.first = segment_start_, .bytes = {}});
+  tables.write(sets_.back().bytes, layout_.version);
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
   for (const PreparedBlock& block : prepared) write(block);
   encoders_.resize(1);
@@ -247,7 +255,8 @@ void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& cou
   std::vector<KeyRange> ranges;
   const std::size_t attributes = layout_.attributes.size();
   const auto enter = [&] {
-    PageColumns(entries, layout_.attributes, ranges).count(layout_, counts);
+    PageContent{0, PageColumns(entries), RangeColumns(ranges, layout_.attributes)}.count(layout_,
+                                                                                         counts);
     entries.clear();
     ranges.clear();
   };
@@ -263,52 +272,87 @@ void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& cou
 }
 
 void LevelWriter::write(const PreparedBlock& block) {
-  data_.write(block.bytes);
+  std::uint64_t at = data_.size();
+  bool there = false;
+  if (layout_.small() && block.bytes.size() <= kMostSharedBytes) {
+    const auto [found, fresh] =
+        small_blocks_.try_emplace(std::string(block.bytes.begin(), block.bytes.end()), at);
+    at = found->second;
+    there = !fresh;
+  }
+  if (!there) data_.write(block.bytes);
   const std::size_t attributes = layout_.attributes.size();
   for (std::size_t i = 0; i < block.entries.size(); ++i) {
-    if (page_.empty()) page_tables_ = tables_;
-    const Entry& entry = block.entries[i];
+    if (page_.empty()) {
+      page_tables_ = tables_;
+      page_offset_ = last_end_ = at;
+    }
+    Entry entry = block.entries[i];
+    entry.jump = static_cast<std::int64_t>(at - last_end_);
     page_.push_back(entry);
+    last_end_ = at += entry.bytes;
     const auto ranges = block.ranges.begin() + static_cast<std::ptrdiff_t>(i * attributes);
     page_ranges_.insert(page_ranges_.end(), ranges,
                         ranges + static_cast<std::ptrdiff_t>(attributes));
-    data_end_ += entry.bytes;
     points_ += entry.points;
     if (page_.size() == layout_.page_clusters()) write_page();
   }
 }
 
 void LevelWriter::write_page() {
-  put(directory_, index_.size());
   Box3 box;
   for (const Entry& entry : page_) {
     if (entry.points > 0) box.include(record_of(entry, layout_.level, 0, false).summary.box);
   }
-  page_boxes_.push_back(box);
   Bytes bytes;
-  PageColumns(page_, layout_.attributes, page_ranges_)
-      .write(layout_, page_tables_->encoding, page_offset_, bytes);
+  PageContent{page_offset_, PageColumns(page_), RangeColumns(page_ranges_, layout_.attributes)}
+      .write(layout_, page_tables_->encoding, bytes);
   index_.write(bytes);
+  pages_.push_back({bytes.size(), box});
   page_.clear();
   page_ranges_.clear();
-  page_offset_ = data_end_;
+}
+
+std::uint64_t LevelWriter::write_directory(const Box3& bounds) {
+  Bytes directory;
+  for (std::size_t first = 0; first < pages_.size(); first += kChapterPages) {
+    const auto pages = std::span(pages_).subspan(
+        first, std::min<std::size_t>(kChapterPages, pages_.size() - first));
+    Box3 all;
+    std::uint64_t bytes = 0;
+    for (const PageAt& page : pages) {
+      if (!page.box.empty()) all.include(page.box);
+      bytes += page.bytes;
+    }
+    const ChapterBox chapter = all.empty() ? ChapterBox() : ChapterBox::around(all, bounds);
+    Bytes contents;
+    for (const PageAt& page : pages) {
+      put_varint(contents, page.bytes);
+      put_box(contents,
+              page.box.empty() ? PageBox() : PageBox::around(page.box, chapter.in(bounds)));
+    }
+    put(contents, crc32(contents));
+    index_.write(contents);
+    put_varint(directory, bytes);
+    put_varint(directory, contents.size());
+    put_box(directory, chapter);
+  }
+  put_varint(directory, sets_.size());
+  for (Set& set : sets_) {
+    put_varint(directory, set.first);
+    put_varint(directory, set.bytes.size());
+    put(set.bytes, crc32(set.bytes));
+    index_.write(set.bytes);
+  }
+  put(directory, crc32(directory));
+  index_.write(directory);
+  return directory.size();
 }
 
 LevelEntry LevelWriter::finish(bool root, const Box3& bounds) {
   if (!held_.empty()) train();
   if (!page_.empty()) write_page();
-  put(directory_, index_.size());
-  for (const Box3& page : page_boxes_) {
-    const PageBox box = page.empty() ? PageBox{} : PageBox::around(page, bounds);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      put(directory_, box.low[axis]);
-      put(directory_, box.high[axis]);
-    }
-  }
-  put(directory_, table_count_);
-  directory_.insert(directory_.end(), table_bytes_.begin(), table_bytes_.end());
-  put(directory_, crc32(directory_));
-  index_.write(directory_);
+  const std::uint64_t directory_bytes = write_directory(bounds);
   data_.finish();
   index_.finish();
 
@@ -317,7 +361,7 @@ LevelEntry LevelWriter::finish(bool root, const Box3& bounds) {
   entry.members = root ? points_ : points_ - clusters_;
   entry.data = {data_.path().filename().string(), data_.size(), data_.checksum()};
   entry.index = {index_.path().filename().string(), index_.size(), index_.checksum()};
-  entry.directory_bytes = directory_.size();
+  entry.directory_bytes = directory_bytes;
   return entry;
 }
 

@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "store/manifest.hpp"
@@ -82,6 +84,9 @@ class LevelWriter {
   void count_index(std::span<const PreparedBlock> blocks, Counts& counts) const;
   void write(const PreparedBlock& block);
   void write_page();
+  /// Writes the contents of the chapters, the tables and the directory. Returns the bytes of the
+  /// directory.
+  std::uint64_t write_directory(const Box3& bounds);
 
   Layout layout_;
   OutputFile data_, index_;
@@ -97,10 +102,21 @@ class LevelWriter {
   SharedTablesPtr page_tables_;      ///< those of the page's first cluster
   std::vector<Entry> page_;
   std::vector<KeyRange> page_ranges_;
-  std::vector<Box3> page_boxes_;
-  std::uint64_t page_offset_ = 0, data_end_ = 0;
-  Bytes directory_, table_bytes_;
-  std::uint32_t table_count_ = 0;
+  struct PageAt {
+    std::uint64_t bytes = 0;
+    Box3 box;
+  };
+  std::vector<PageAt> pages_;
+  std::uint64_t page_offset_ = 0;  ///< of the page's first cluster, in the data
+  std::uint64_t last_end_ = 0;     ///< of the last cluster, in the data
+  /// Where blocks of the segment are in the data that take few bytes: those of still water are
+  /// alike.
+  std::map<std::string, std::uint64_t> small_blocks_;
+  struct Set {
+    std::uint64_t first = 0;  ///< ordinal of the first cluster that it is for
+    Bytes bytes;
+  };
+  std::vector<Set> sets_;  ///< of tables
 };
 
 }  // namespace terrace::stream::store

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/digest.hpp"
+#include "base/parallel.hpp"
 #include "tile/make/cloud_spacing.hpp"
 
 namespace terrace::terrain {
@@ -46,12 +47,21 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
       whole_bytes / (PointWindow::kBytesPerPoint + CloudSamples::kBytesPerPoint);
   if (tiled.points() >= std::min(most, kMostTriangulated)) return;
   auto all = std::make_unique<PointWindow>(store, 0, whole_bytes);
+  std::unique_ptr<const CloudSamples> placed;
+  const bool side_by_side = threads > 1;
   try {
-    all->load(places.stored_bounds());
+    parallel_for(2, threads, [&](unsigned, std::size_t item) {
+      if (item == 0) {
+        all->load(places.stored_bounds());
+      } else {
+        placed =
+            std::make_unique<CloudSamples>(store, places, vertical, side_by_side ? threads - 1 : 1);
+      }
+    });
   } catch (const PointWindow::NoRoom&) {
     return;
   }
-  samples = std::make_unique<CloudSamples>(tiled, places, vertical, threads);
+  samples = std::move(placed);
   whole = std::move(all);
 }
 

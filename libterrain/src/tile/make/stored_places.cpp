@@ -25,6 +25,9 @@ constexpr unsigned kPlaceSteps = 24;
 constexpr double kSmall = 1.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
+/// Of polynomials that stand for a projection: how long, and how many metres a place may be off.
+constexpr double kPatchDegrees = 0.18;
+constexpr double kPlaneTolerance = 1e-5;
 
 void include(StoredBox& box, const Point2& p) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -108,6 +111,41 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
     last_longitude_ = all.max[0];
   }
   find_bounds(store.path().string(), store.schema().grid);
+  if (!store.schema().grid) fit_polynomials(store);
+}
+
+void StoredPlaces::fit_polynomials(const stream::Store& store) {
+  world_bounds_ = world_box(store.schema(), store.bounds());
+  geography_.emplace(crs_, world_bounds_);
+  const Point2 size{world_bounds_.max[0] - world_bounds_.min[0],
+                    world_bounds_.max[1] - world_bounds_.min[1]};
+  const bool turns = bounds_.west == -180.0 || bounds_.east == 180.0;
+  if (crs_.is_geographic() || turns || !(std::min(size[0], size[1]) > 0.0)) return;
+  plane_ = {{bounds_.west, bounds_.south},
+            {bounds_.east, bounds_.north},
+            {kPatchDegrees, kPatchDegrees},
+            kPlaneTolerance / (std::max(size[0], size[1]) * crs_.metres_per_unit()),
+            [&](std::span<Point2> places) {
+              crs_.from_geographic(places);
+              for (Point2& p : places) {
+                for (std::size_t k = 0; k < 2; ++k) p[k] = (p[k] - world_bounds_.min[k]) / size[k];
+              }
+            }};
+}
+
+void StoredPlaces::from_geographic(std::span<Point2> places) const {
+  std::size_t exact = 0;  // the places before that are done; those from here on are not
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    Point2 place = places[i];
+    if (!plane_.convert(place)) continue;
+    if (exact < i) crs_.from_geographic(places.subspan(exact, i - exact));
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double low = world_bounds_.min[k];
+      places[i][k] = low + place[k] * (world_bounds_.max[k] - low);
+    }
+    exact = i + 1;
+  }
+  if (exact < places.size()) crs_.from_geographic(places.subspan(exact));
 }
 
 Point2 StoredPlaces::world(const Point2& stored) const {
@@ -235,7 +273,7 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   };
   const PlaceGrid grid{low, high, {steps(size[0]), steps(size[1])}};
   std::vector<Point2> places = grid.places();
-  crs_.from_geographic(places);
+  from_geographic(places);
   StoredBox around = nothing();
   for (Point2& p : places) {
     p = stored_place(placement_, p);
@@ -254,7 +292,11 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
 
 void StoredPlaces::to_geographic(std::span<Point2> places) const {
   for (Point2& p : places) p = world(p);
-  crs_.to_geographic(places);
+  if (geography_) {
+    (*geography_)(places);
+  } else {
+    crs_.to_geographic(places);
+  }
   for (Point2& p : places) p[0] = wrapped_longitude(p[0]);
 }
 
@@ -264,7 +306,7 @@ void StoredPlaces::to_stored(std::span<Point2> places) const {
     const double turned = wrapped_longitude(p[0]);
     p = {turned == 180.0 ? -180.0 : turned, std::clamp(p[1], -90.0, 90.0)};
   }
-  crs_.from_geographic(places);
+  from_geographic(places);
   for (Point2& p : places) {
     if (crs_.is_geographic()) p[0] = in_turn(p[0]);
     p = stored_place(placement_, p);

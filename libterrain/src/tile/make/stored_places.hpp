@@ -3,12 +3,14 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
 
+#include "earth/geography_patch.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "tile/format/tile_address.hpp"
@@ -44,19 +46,27 @@ class StoredPlaces {
   /// not meet bounds(), two where a store in degrees goes around the globe.
   [[nodiscard]] std::vector<StoredBox> windows(const GeographicBox& box) const;
 
-  /// Stored x, y to longitude in [-180, 180] and latitude, in place; NaN where there
-  /// is none.
+  /// Stored x, y to longitude in [-180, 180] and latitude, in place; NaN where there is none. Of
+  /// irregular points by BoxGeography, within its tolerance.
   void to_geographic(std::span<Point2> places) const;
   /// Longitude and latitude to stored x, y, in place. -180 and 180 give the same. Places that
-  /// have none get a corner outside stored_bounds().
+  /// have none get a corner outside stored_bounds(). Of irregular points by polynomials, within a
+  /// hundredth of a millimetre.
   void to_stored(std::span<Point2> places) const;
 
  private:
   void find_bounds(const std::string& file, bool is_lattice);
+  void fit_polynomials(const stream::Store& store);
+  /// Longitude and latitude to world x, y, in place.
+  void from_geographic(std::span<Point2> places) const;
   [[nodiscard]] Point2 world(const Point2& stored) const;
   [[nodiscard]] double in_turn(double longitude) const;
 
   CoordinateSystem crs_;
+  // Fast ways there and back for projected points; none for rasters.
+  std::optional<BoxGeography> geography_;
+  GeographyPatches plane_;  ///< to world x, y as shares of world_bounds_
+  stream::Box3 world_bounds_{};
   stream::Placement placement_;
   StoredBox stored_;
   GeographicBox bounds_;

@@ -245,9 +245,9 @@ void set_water(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
 }  // namespace
 
 MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
-                   const TileMeshOptions& options) {
+                   const TileMeshOptions& options, SharedSides* shared) {
   Pieces pieces;
-  TileSides sides(tile, plan, surface);
+  TileSides sides(tile, plan, surface, shared);
   for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
     const auto range = surface.range(box_of(tile, leaf));
     // Where heights differ by less than the bound, usually only the sides are read.

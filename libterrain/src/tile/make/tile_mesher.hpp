@@ -36,9 +36,9 @@ class HeightsTooFar : public std::runtime_error {
 /// Meshes a tile: within plan.max_error of every sample, positions and heights rounded as a client
 /// decodes them. Where the rounding itself is coarser than the bound, max_error says what was
 /// reached. Depends on the arguments alone; what lies on the tile's borders depends on the plan and
-/// the surface there. Memory: of the samples of one leaf, whatever the tile holds.
-/// Throws: HeightsTooFar; stream::Error on a damaged store.
+/// the surface there. shared: of the zoom, or null. Memory: of the samples of one leaf, whatever
+/// the tile holds. Throws: HeightsTooFar; stream::Error on a damaged store.
 MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
-                   const TileMeshOptions& options);
+                   const TileMeshOptions& options, SharedSides* shared = nullptr);
 
 }  // namespace terrace::terrain

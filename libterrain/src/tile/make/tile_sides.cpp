@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "base/portable_math.hpp"
 #include "tile/format/ellipsoid.hpp"
@@ -19,6 +20,8 @@ constexpr double kMostSidePlaces = 4096.0;
 /// Share of the bound that sides are settled to. Samples so close to a side that no vertex fits
 /// between have what the side has.
 constexpr double kSideShare = 0.75;
+/// That SharedSides keeps twice, at 16 bytes each.
+constexpr std::size_t kMostSideVertices = std::size_t{1} << 18;
 
 /// The width of a tile's part at a depth; exact.
 double width_at(unsigned zoom, unsigned depth) {
@@ -91,8 +94,35 @@ std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
   return leaves;
 }
 
-TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface)
-    : tile_(tile), plan_(plan), surface_(surface), data_(surface.bounds()) {}
+std::optional<std::vector<TileSideVertex>> SharedSides::find(const Key& key) const {
+  const std::lock_guard lock(mutex_);
+  for (const Sides* sides : {&recent_, &older_}) {
+    if (const auto found = sides->find(key); found != sides->end()) return found->second;
+  }
+  return std::nullopt;
+}
+
+void SharedSides::keep(const Key& key, const std::vector<TileSideVertex>& vertices) {
+  const std::lock_guard lock(mutex_);
+  if (vertices_ > kMostSideVertices) {
+    older_ = std::exchange(recent_, {});
+    vertices_ = 0;
+  }
+  if (recent_.try_emplace(key, vertices).second) vertices_ += vertices.size();
+}
+
+TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                     SharedSides* shared)
+    : tile_(tile), plan_(plan), surface_(surface), shared_(shared), data_(surface.bounds()) {}
+
+std::optional<SharedSides::Key> TileSides::shared_key(const Side& side) const {
+  const std::uint32_t parts = 1U << side.depth;
+  if (shared_ == nullptr || (side.line != 0 && side.line != parts)) return std::nullopt;
+  const auto [across, along] =
+      side.along_parallel ? std::pair(tile_.y, tile_.x) : std::pair(tile_.x, tile_.y);
+  return SharedSides::Key{side.along_parallel, side.depth, across + (side.line == 0 ? 0 : 1),
+                          std::uint64_t{along} * parts + side.k};
+}
 
 bool TileSides::is_cut(const Side& side) const {
   if (side.depth == kDeepestLeaf) return false;
@@ -207,7 +237,16 @@ std::vector<TileSideVertex> TileSides::settle(const Side& side) {
 const std::vector<TileSideVertex>& TileSides::vertices(const Side& side) {
   const auto key = std::make_tuple(side.along_parallel, side.depth, side.line, side.k);
   if (const auto found = known_.find(key); found != known_.end()) return found->second;
+  const std::optional<SharedSides::Key> shared = shared_key(side);
+  std::optional<std::vector<TileSideVertex>> there;
+  if (shared) there = shared_->find(*shared);
+  if (there) {
+    const std::uint32_t across = side.line == 0 ? 0 : kTileUnits;
+    for (TileSideVertex& vertex : *there) (side.along_parallel ? vertex.v : vertex.u) = across;
+    return known_[key] = std::move(*there);
+  }
   std::vector<TileSideVertex> settled = settle(side);
+  if (shared) shared_->keep(*shared, settled);
   return known_[key] = std::move(settled);
 }
 

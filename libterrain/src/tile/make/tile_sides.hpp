@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -53,12 +56,38 @@ struct TileSideVertex {
   std::int64_t height = 0;
 };
 
+/// Sides that lie on the borders of a zoom's tiles, for the tile beyond: those found last are kept.
+/// May be used by several threads at once.
+class SharedSides {
+ public:
+  /// A side: from part k to k + 1 of the 2^depth that each tile has, along a line between two rows
+  /// or columns of tiles. The vertices' coordinate across the side has no meaning.
+  struct Key {
+    bool along_parallel = false;
+    unsigned depth = 0;
+    std::uint32_t line = 0;
+    std::uint64_t k = 0;
+    friend auto operator<=>(const Key&, const Key&) = default;
+  };
+
+  [[nodiscard]] std::optional<std::vector<TileSideVertex>> find(const Key& key) const;
+  void keep(const Key& key, const std::vector<TileSideVertex>& vertices);
+
+ private:
+  using Sides = std::map<Key, std::vector<TileSideVertex>>;
+  mutable std::mutex mutex_;
+  Sides recent_, older_;
+  std::size_t vertices_ = 0;  ///< of recent_
+};
+
 /// Finds the vertices on the sides of a tile's leaves. They depend on the zoom's plan and on the
 /// surface along the side alone, not on the tile or leaf that asks: what neighbours share is equal,
 /// and leaves of different size fit together, because a side is cut wherever a leaf beside it is.
 class TileSides {
  public:
-  TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface);
+  /// shared: of the zoom; may be null.
+  TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+            SharedSides* shared = nullptr);
 
   /// Counter-clockwise from the south-west corner, each vertex once.
   std::vector<TileSideVertex> around(const TileLeaf& leaf);
@@ -71,6 +100,8 @@ class TileSides {
     std::uint32_t line = 0, k = 0;
   };
   const std::vector<TileSideVertex>& vertices(const Side& side);
+  /// nullopt unless the side is on the tile's border.
+  [[nodiscard]] std::optional<SharedSides::Key> shared_key(const Side& side) const;
   std::vector<TileSideVertex> settle(const Side& side);
   /// Lowest and highest samples within a unit of a place on a side: of those within half a unit, if
   /// there are some.
@@ -99,6 +130,7 @@ class TileSides {
   TileAddress tile_;
   const ZoomPlan& plan_;
   TileSurface& surface_;
+  SharedSides* shared_;
   GeographicBox data_;
   std::map<std::pair<double, double>, std::optional<Samples>> corners_;
   std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<TileSideVertex>>

@@ -68,7 +68,7 @@ void TileSetWriter::begin_change() {
 }
 
 TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const ZoomPlan& plan,
-                                                 TileSurface& surface) {
+                                                 TileSurface& surface, SharedSides& sides) {
   context_.check_stop();
   TileInputs inputs{options_.mesh(), options_.request.gzip, options_.source_options, {}};
   if (options_.request.metadata) inputs.metadata = children_json(tile, deeper_);
@@ -83,7 +83,7 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const 
       return {false, true, *earlier};
     }
   }
-  MadeTile made = make_tile(tile, plan, surface, options_.mesh());
+  MadeTile made = make_tile(tile, plan, surface, options_.mesh(), &sides);
   if (!made.has_data && tile.zoom > 0) return {true, true, {.inputs = digest}};
   made.mesh.metadata = std::move(inputs.metadata);
   std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
@@ -103,11 +103,12 @@ void TileSetWriter::write_tiles(const ZoomPlan& plan, const std::vector<TileAddr
   std::vector<TileJournal::Record> records;
   TileZoom summary{.zoom = plan.zoom};
   TilesOutcome added;
+  SharedSides sides;
   ProgressReport report(context_, "tiles");
   in_order(
       tiles.size(), static_cast<unsigned>(surfaces_.size()),
       [&](unsigned worker, std::size_t i) {
-        return write_tile(tiles[i], plan, *surfaces_[worker]);
+        return write_tile(tiles[i], plan, *surfaces_[worker], sides);
       },
       [&](std::size_t i, const Written& written) {
         report.update(result.tiles + i,

@@ -60,7 +60,8 @@ class TileSetWriter {
     FinishedTile finished;
   };
   void write_tiles(const ZoomPlan& plan, const std::vector<TileAddress>& tiles);
-  Written write_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface);
+  Written write_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                     SharedSides& sides);
   void remove_others();
   void begin_change();
 

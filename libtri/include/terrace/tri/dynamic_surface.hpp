@@ -59,6 +59,10 @@ class DynamicSurface {
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(std::span<const VertexId> vertices);
+  /// An estimate of the work of removing these and following: as much as for this many points in an
+  /// ordinary place. Where detail ends, points have tetrahedra with thousands of the fine ones on
+  /// the other side of a body. As of the last follow(). O(vertices).
+  [[nodiscard]] std::size_t removal_work(std::span<const VertexId> vertices) const;
   void reserve(std::size_t vertices);
 
   /// Brings the surface up to date. About 12 us per point that came or went; from scratch if most

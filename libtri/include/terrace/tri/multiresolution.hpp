@@ -64,6 +64,9 @@ struct ClusterRecord {
   /// ground metres; upper bound of the distance of any descendant from the head
   double error = 0.0;
   std::uint64_t members = 0;  ///< the number that read() will deliver
+
+  /// In place of the number: box and error are bounds, and the record itself has not been read.
+  static constexpr std::uint64_t kUnread = ~std::uint64_t{0};
 };
 
 /// The members of a cluster, in the order that defines their ids. They are inserted in this order:
@@ -157,7 +160,8 @@ struct ModelOptions {
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
 /// vertex.
 ///
-/// Triangulation: Delaunay2 or Delaunay3, in any metric, DynamicSurface, or PointCloud.
+/// Triangulation: Delaunay2 or Delaunay3, in any metric; RegionalDelaunay2, with a metric per
+/// region; DynamicSurface, or PointCloud.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -177,7 +181,7 @@ class MultiresolutionModel {
   /// Starts with the points of the given detail, built in one go. The first delta covers the
   /// changes after that: begin by reading the whole triangulation. The source must outlive the
   /// model.
-  /// `empty`: the triangulation to fill, which supplies the metric.
+  /// `empty`: the triangulation to fill, which supplies the metric or the field of metrics.
   /// Throws: what the source throws, HierarchyError, std::length_error.
   explicit MultiresolutionModel(ClusterSource& source, const Detail& start = {},
                                 ModelOptions options = {}, Triangulation empty = Triangulation());

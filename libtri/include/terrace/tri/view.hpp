@@ -177,7 +177,9 @@ struct GivenCluster {
   std::vector<std::uint64_t> children;
   std::vector<std::byte> values{};
   /// Above level 0: the records of the clusters one level down headed by each member, in order,
-  /// then by the cluster's own head (ViewRequest::head_child); the root has no head.
+  /// then by the cluster's own head (ViewRequest::head_child); the root has no head. Those that
+  /// are slow to come by may be bounds (ClusterRecord::kUnread), unless there are outlines to be
+  /// told (ViewOptions::silhouette).
   std::vector<ClusterRecord> child_records;
 };
 
@@ -185,8 +187,10 @@ struct GivenCluster {
 struct ViewRequest {
   ClusterId cluster{};
   ClusterId head_child{};     ///< above level 0: the cluster that its head heads one level down
-  std::uint64_t members = 0;  ///< from its record
-  double importance = 0.0;    ///< its error over the tolerance
+  /// From its record. ClusterRecord::kUnread: that is what is missing, by which it may be seen that
+  /// the cluster is wanted; see ViewControl::give_record().
+  std::uint64_t members = 0;
+  double importance = 0.0;  ///< its error over the tolerance
 };
 
 /// Reads a cluster from a source, with everything that give() needs; blocks while the source does.
@@ -220,7 +224,8 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
 /// (with outlines 32 more each), and the given clusters that are kept.
 ///
-/// Triangulation: Delaunay2, for points in the plane with heights; DynamicSurface, for scans of
+/// Triangulation: Delaunay2, for points in the plane with heights; RegionalDelaunay2, for the same
+/// with elliptical metrics in regions; DynamicSurface, for scans of
 /// surfaces in space, whose shape is then part of what a step may spend; PointCloud, for points in
 /// space alone.
 template <class Triangulation>
@@ -246,7 +251,8 @@ class ViewControl {
     /// Whether another step with the same view and no new clusters would change nothing.
     bool settled = false;
     /// The missing clusters that are worth loading, most important first, as far as max_points and
-    /// max_cached_bytes leave room for them; then those that may be wanted soon.
+    /// max_cached_bytes leave room for them; then those that may be wanted soon. Among them the
+    /// clusters of which only the record is missing, by an estimate of their importance.
     std::vector<ViewRequest> wanted;
     /// The ones among these that no step has named before, or only before they were withdrawn or
     /// forgotten: for a caller that starts loading at once.
@@ -258,9 +264,10 @@ class ViewControl {
   };
 
   /// counts: clusters of each level below the top, as from ClusterSource::cluster_count. root:
-  /// everything about cluster_id(counts.size(), 0).
+  /// everything about cluster_id(counts.size(), 0). empty: as in MultiresolutionModel.
   /// Throws: HierarchyError, std::length_error; std::invalid_argument for options out of range.
-  ViewControl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options = {});
+  ViewControl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options = {},
+              Triangulation empty = Triangulation());
   ~ViewControl();
   ViewControl(const ViewControl&) = delete;
   ViewControl& operator=(const ViewControl&) = delete;
@@ -283,6 +290,9 @@ class ViewControl {
   /// A cluster that is kept, null for others. What a step has expanded is kept until the next
   /// give(). O(1).
   [[nodiscard]] const GivenCluster* given(ClusterId cluster) const;
+  /// Delivers the record of a cluster of which only bounds were given. Nothing happens if it is no
+  /// longer needed. O(log n).
+  void give_record(ClusterId cluster, const ClusterRecord& record);
   /// Loading failed or was cancelled: the cluster may be requested again.
   void forget(ClusterId cluster);
 

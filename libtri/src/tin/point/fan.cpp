@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fan.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -9,6 +10,12 @@
 #endif
 
 namespace terrace::tri::tin::points {
+namespace {
+
+/// Sectors of more rays are searched, those of fewer found by a bit for each ray.
+constexpr std::size_t kMaskBits = 64;
+
+}  // namespace
 
 void Fan::start(const Vertex& apex, bool open) {
   apex_ = apex;
@@ -26,6 +33,15 @@ void Fan::finish() {
   for (std::size_t i = 0; i < rays; ++i) {
     pairs_[i / 2 * 4 + i % 2] = rays_[i].x - apex_.x;
     pairs_[i / 2 * 4 + i % 2 + 2] = rays_[i].y - apex_.y;
+  }
+  // An open fan is half a turn, or less by rounding.
+  half_ = rays;
+  if (!open_ && rays > kMaskBits) {
+    const double x = pairs_[0], y = pairs_[2];
+    half_ = 1;
+    while (half_ < rays &&
+           x * pairs_[half_ / 2 * 4 + half_ % 2 + 2] > y * pairs_[half_ / 2 * 4 + half_ % 2])
+      ++half_;
   }
   planes_.resize(count);
   sectors_.resize(count);
@@ -65,15 +81,21 @@ std::size_t Fan::sector_of(double dx, double dy) const {
   return (left & 1) == 0 ? 0 : sectors_.size() - 1;
 }
 
+// The rays of each half turn from ray 0 on are sorted by angle.
 std::size_t Fan::sector_of_many(double dx, double dy) const {
-  const std::size_t rays = rays_.size();
   const auto left = [&](std::size_t ray) {
     const double* pair = pairs_.data() + ray / 2 * 4 + ray % 2;
     return pair[0] * dy >= pair[2] * dx;
   };
-  for (std::size_t i = 0; i < sectors_.size(); ++i)
-    if (left(i) && !left(i + 1 == rays ? 0 : i + 1)) return i;
-  return left(0) ? sectors_.size() - 1 : 0;
+  const bool first_half = left(0);
+  if (open_ && !first_half) return 0;
+  std::size_t low = first_half ? 0 : half_ - 1;
+  std::size_t high = first_half ? half_ : rays_.size();
+  while (high - low > 1) {
+    const std::size_t middle = low + (high - low) / 2;
+    (left(middle) ? low : high) = middle;
+  }
+  return std::min(low, sectors_.size() - 1);
 }
 
 double Fan::height_without_plane(std::size_t sector, const Sample& sample) const {
@@ -82,7 +104,6 @@ double Fan::height_without_plane(std::size_t sector, const Sample& sample) const
 }
 
 void Fan::deal(Sample* samples, std::uint32_t head, std::uint32_t apart) {
-  constexpr std::size_t kMaskBits = 64;
   const bool many = rays_.size() > kMaskBits;
   for (std::uint32_t i = head; i != kNone;) {
     Sample& sample = samples[i];

@@ -89,9 +89,9 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
     const Place2 a = mesh_.place(t.corner[0]);
     const Place2 b = mesh_.place(t.corner[1]);
     const Place2 c = mesh_.place(t.corner[2]);
-    if (delaunay_) return Kernel::in_circle(a, b, c, p) > 0;
-    return Kernel::orientation(a, b, p) >= 0 && Kernel::orientation(b, c, p) >= 0 &&
-           Kernel::orientation(c, a, p) >= 0;
+    if (delaunay_) return mesh_.in_circle(a, b, c, p) > 0;
+    return mesh_.orientation(a, b, p) >= 0 && mesh_.orientation(b, c, p) >= 0 &&
+           mesh_.orientation(c, a, p) >= 0;
   });
   mesh_.vertices.push_back(vertex);
   cavity_.fill(mesh_.triangles, mesh_.vertices.size() - 1,

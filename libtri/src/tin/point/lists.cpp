@@ -54,4 +54,46 @@ Measured list_samples(Mesh& mesh, std::uint32_t step, double bound) {
   return result;
 }
 
+Measured measure_lists(Mesh& mesh, double bound) {
+  const Pool<Sample>& samples = *mesh.samples;
+  Measured result;
+  double squares = 0;
+  for (std::uint32_t i = 0; i < samples.size(); ++i)
+    (samples[i].next == kOutside ? result.errors.uncovered : result.errors.covered) += 1;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    Triangle& triangle = mesh.triangles[t];
+    triangle.error = 0;
+    if (!triangle.live() || mesh.heads[t] == kNone) continue;
+    const Place2 a = mesh.place(triangle.corner[0]);
+    const Place2 b = mesh.place(triangle.corner[1]);
+    const Place2 c = mesh.place(triangle.corner[2]);
+    for (std::uint32_t i = mesh.heads[t]; i != kNone; i = samples[i].next) {
+      const Sample& sample = samples[i];
+      const Place2 p{sample.x, sample.y};
+      // Rounding has put it into a list that is not its own: then all are listed anew.
+      if (Kernel::orientation(a, b, p) < 0 || Kernel::orientation(b, c, p) < 0 ||
+          Kernel::orientation(c, a, p) < 0)
+        return list_samples(mesh, 1, bound);
+      const double error = std::abs(height_in(mesh, triangle, sample.x, sample.y) - sample.z);
+      squares += error * error;
+      if (error > result.errors.largest) {
+        result.errors.largest = error;
+        result.errors.largest_at = number(sample);
+      }
+      if (!(error > bound)) continue;
+      ++result.above;
+      if (stuck(sample)) continue;
+      ++result.to_mend;
+      if (!(triangle.error > 0)) result.waiting.push_back(t);
+      if (rounded_up(error) > triangle.error) {
+        triangle.error = rounded_up(error);
+        triangle.place = i;
+      }
+    }
+  }
+  if (result.errors.covered > 0)
+    result.errors.rms = std::sqrt(squares / static_cast<double>(result.errors.covered));
+  return result;
+}
+
 }  // namespace terrace::tri::tin::points

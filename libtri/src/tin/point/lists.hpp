@@ -22,4 +22,8 @@ struct Measured {
 /// those of its worst sample that is beyond the bound and not stuck; error 0 if there is none.
 Measured list_samples(Mesh& mesh, std::uint32_t step, double bound);
 
+/// The same result for all samples from lists that are complete, several times as fast: each is
+/// looked for in the triangle that lists it, exactly.
+Measured measure_lists(Mesh& mesh, double bound);
+
 }  // namespace terrace::tri::tin::points

@@ -13,6 +13,28 @@ namespace terrace::tri::tin::points {
 using Kernel = planar::DoubleKernel;
 using Place2 = std::array<double, 2>;
 
+/// The predicates of Kernel for whole numbers of at most 2^15 in absolute value, or a few more.
+struct WholeKernel {
+  /// Exact, as products are.
+  static int orientation(const Place2& a, const Place2& b, const Place2& c) {
+    const double left = (b[0] - a[0]) * (c[1] - a[1]);
+    const double right = (b[1] - a[1]) * (c[0] - a[0]);
+    return (left > right ? 1 : 0) - (left < right ? 1 : 0);
+  }
+  static int in_circle(const Place2& a, const Place2& b, const Place2& c, const Place2& p) {
+    const Kernel::Angle at_a = Kernel::angle(a, b, c);
+    const Kernel::Angle at_p = Kernel::angle(p, c, b);
+    // Sums of two products are exact, and their products below 2^62.
+    const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
+    constexpr double kDoubt = 0x1p12;
+    if (sine > kDoubt || sine < -kDoubt) return sine < 0 ? 1 : -1;
+    const auto whole = [](double x) { return static_cast<std::int64_t>(x); };
+    const std::int64_t exact =
+        whole(at_a.cross) * whole(at_p.dot) + whole(at_p.cross) * whole(at_a.dot);
+    return (exact < 0 ? 1 : 0) - (exact > 0 ? 1 : 0);
+  }
+};
+
 struct Vertex {
   double x;
   double y;
@@ -32,8 +54,16 @@ struct Mesh {
   Pool<Vertex> vertices;
   Triangles triangles;        ///< `place`: the sample to insert next
   Pool<std::uint32_t> heads;  ///< heads of the triangles' lists of samples, kNone: empty
+  bool whole = false;         ///< WholeKernel serves for vertices
 
   [[nodiscard]] Place2 place(std::uint32_t v) const { return {vertices[v].x, vertices[v].y}; }
+  [[nodiscard]] int orientation(const Place2& a, const Place2& b, const Place2& c) const {
+    return whole ? WholeKernel::orientation(a, b, c) : Kernel::orientation(a, b, c);
+  }
+  [[nodiscard]] int in_circle(const Place2& a, const Place2& b, const Place2& c,
+                              const Place2& p) const {
+    return whole ? WholeKernel::in_circle(a, b, c, p) : Kernel::in_circle(a, b, c, p);
+  }
   /// Walks from a triangle to the one that contains p, exactly. The region is convex, so a border
   /// edge with p beyond it proves that p is outside.
   [[nodiscard]] Spot locate(const Place2& p, std::uint32_t start) const {

@@ -38,6 +38,7 @@ namespace {
 using namespace tin::points;
 using tin::kNone;
 
+constexpr double kMostWhole = 0x1p15;
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
 /// Makes the mesh for one bound after another.
@@ -50,6 +51,10 @@ class Maker {
   bool make(double bound, std::size_t max_vertices, TinQuality quality) {
     mesh_ = {};
     mesh_.samples = &samples_;
+    mesh_.whole =
+        options_.lattice && std::all_of(frame_.begin(), frame_.end(), [](const Point3& p) {
+          return p[0] <= kMostWhole && p[1] <= kMostWhole;
+        });
     for (Sample& sample : span_of(samples_)) {
       sample.next = kUnlisted;
       sample.id = number(sample);
@@ -127,7 +132,7 @@ class Maker {
   /// and need not be redistributed each time.
   void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
-    constexpr std::size_t kSamplesPerTriangle = 8;
+    constexpr std::size_t kSamplesPerTriangle = 3;
     // So few that they and their triangles stay in the cache.
     constexpr std::size_t kTogether = 8192;
     for (const std::uint32_t step : kSteps) {
@@ -141,11 +146,11 @@ class Maker {
 
   /// Measures, and inserts samples that rounding hid from the lists, which are very rare.
   void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
-    measured_ = list_samples(mesh_, 1, bound);
+    measured_ = measure_lists(mesh_, bound);
     while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
       greedy.start(measured_.waiting, samples_.size());
       greedy.run(max_vertices, kUnlimited);
-      measured_ = list_samples(mesh_, 1, bound);
+      measured_ = measure_lists(mesh_, bound);
     }
   }
 

@@ -23,7 +23,10 @@ class Remover {
     const Vertex& vertex = mesh_.vertices[v];
     const bool own = vertex.sample != kNone && (*mesh_.samples)[vertex.sample].next == kIsVertex;
     samples_.gather(mesh_, star_, vertex, own ? vertex.sample : kNone);
-    if (!fill_delaunay() && !fill_within_bound()) return false;
+    if (samples_.out_of_reach(samples_.own(), bound_)) return false;
+    if (!fill_delaunay() &&
+        (samples_.out_of_reach(samples_.beyond(), bound_) || !fill_within_bound()))
+      return false;
     star_.replace(mesh_.triangles, fill_, triangle_of_, v);
     samples_.list(mesh_, star_, fill_);
     return true;
@@ -32,7 +35,7 @@ class Remover {
  private:
   [[nodiscard]] Place2 place(std::size_t i) const { return mesh_.place(star_.ring(i)); }
   [[nodiscard]] bool left(std::size_t i, std::size_t m, std::size_t j) const {
-    return Kernel::orientation(place(i), place(m), place(j)) > 0;
+    return mesh_.orientation(place(i), place(m), place(j)) > 0;
   }
 
   bool fill_delaunay() {
@@ -40,7 +43,7 @@ class Remover {
                star_.size(),
                [&](std::size_t i, std::size_t m, std::size_t j) { return left(i, m, j); },
                [&](std::size_t i, std::size_t m, std::size_t j, std::size_t p) {
-                 return Kernel::in_circle(place(i), place(m), place(j), place(p)) > 0;
+                 return mesh_.in_circle(place(i), place(m), place(j), place(p)) > 0;
                },
                fill_) &&
            star_.all_of(fill_, [&](std::size_t i, std::size_t m, std::size_t j) {

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "star.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 namespace terrace::tri::tin::points {
 namespace {
@@ -20,7 +25,9 @@ void StarSamples::gather(const Mesh& mesh, const Star& star, const Vertex& centr
   y_.clear();
   z_.clear();
   index_.clear();
+  own_ = kNone;
   const auto add = [&](std::uint32_t i) {
+    if (i == centre.sample) own_ = index_.size();
     index_.push_back(i);
     x_.push_back(samples[i].x - centre.x);
     y_.push_back(samples[i].y - centre.y);
@@ -32,8 +39,12 @@ void StarSamples::gather(const Mesh& mesh, const Star& star, const Vertex& centr
     for (std::uint32_t i = mesh.heads[star.triangle(k)]; i != kNone; i = samples[i].next) add(i);
   }
   if (extra != kNone) add(extra);
-  for (std::size_t i = 0; i < star.size(); ++i)
-    for (std::size_t j = i + 1; j < star.size(); ++j) sides_[i][j].known = false;
+  beyond_ = index_.size();
+  own_ = std::min(own_, beyond_);
+  known_.fill(0);
+  words_ = (index_.size() + 63) / 64;
+  if (sides_.size() < 2 * words_ * kMaxRing * kMaxRing)
+    sides_.resize(2 * words_ * kMaxRing * kMaxRing);
 }
 
 double StarSamples::cross_at(std::size_t i, std::size_t j, std::size_t sample) const {
@@ -42,48 +53,97 @@ double StarSamples::cross_at(std::size_t i, std::size_t j, std::size_t sample) c
   return (b.x - a.x) * (y_[sample] - a.y) - (b.y - a.y) * (x_[sample] - a.x);
 }
 
-const StarSamples::Sides& StarSamples::sides(std::size_t i, std::size_t j) {
-  Sides& result = sides_[i][j];
-  if (result.known) return result;
-  result.known = true;
+bool StarSamples::out_of_reach(std::size_t sample, double bound) const {
+  if (sample == index_.size()) return false;
+  const std::size_t size = ring_.size();
+  // Bit j of left[i] and bit i of left_from[j]: left of the line from corner i to j, or on it.
+  std::array<std::uint32_t, kMaxRing> left{}, left_from{}, right{};
+  for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t j = i + 1; j < size; ++j) {
+      const double cross = cross_at(i, j, sample);
+      left[i] |= std::uint32_t{cross >= 0} << j;
+      left_from[j] |= std::uint32_t{cross >= 0} << i;
+      right[i] |= std::uint32_t{cross <= 0} << j;
+    }
+  }
+  // Inside the ring by these signs it is, by the same signs, in a triangle of each fill.
+  for (std::size_t i = 0; i + 1 < size; ++i)
+    if ((left[i] >> (i + 1) & 1U) == 0) return false;
+  if ((right[0] >> (size - 1) & 1U) == 0) return false;
+  for (std::size_t i = 0; i < size; ++i) {
+    for (std::uint32_t ends = right[i]; ends != 0; ends &= ends - 1) {
+      const auto j = static_cast<std::size_t>(std::countr_zero(ends));
+      for (std::uint32_t apexes = left[i] & left_from[j] & ((1U << j) - 1); apexes != 0;
+           apexes &= apexes - 1) {
+        const auto m = static_cast<std::size_t>(std::countr_zero(apexes));
+        const Plane plane = plane_of(ring_[i], ring_[m], ring_[j]);
+        if (plane.sound && !(error_at(plane, ring_[i], sample) > bound)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+StarSamples::Sides StarSamples::sides(std::size_t i, std::size_t j) {
+  std::uint64_t* const left = sides_.data() + 2 * words_ * (i * kMaxRing + j);
+  std::uint64_t* const right = left + words_;
+  if ((known_[i] >> j & 1U) != 0) return {left, right};
+  known_[i] = static_cast<std::uint16_t>(known_[i] | 1U << j);
   const std::size_t count = index_.size();
-  const std::size_t words = (count + 63) / 64;
-  result.left.assign(words, 0);
-  result.right.assign(words, 0);
   const double ax = ring_[i].x;
   const double ay = ring_[i].y;
   const double dx = ring_[j].x - ax;
   const double dy = ring_[j].y - ay;
-  for (std::size_t w = 0; w < words; ++w) {
+  for (std::size_t w = 0; w < words_; ++w) {
     const std::size_t end = std::min(count, (w + 1) * 64);
-    std::uint64_t left = 0;
-    std::uint64_t right = 0;
-    for (std::size_t s = w * 64; s < end; ++s) {
-      const double cross = dx * (y_[s] - ay) - dy * (x_[s] - ax);
-      left |= static_cast<std::uint64_t>(cross >= 0) << (s % 64);
-      right |= static_cast<std::uint64_t>(cross <= 0) << (s % 64);
+    std::uint64_t on_left = 0;
+    std::uint64_t on_right = 0;
+    std::size_t s = w * 64;
+#ifdef __SSE2__
+    for (; s + 1 < end; s += 2) {
+      const __m128d y = _mm_sub_pd(_mm_loadu_pd(&y_[s]), _mm_set1_pd(ay));
+      const __m128d x = _mm_sub_pd(_mm_loadu_pd(&x_[s]), _mm_set1_pd(ax));
+      const __m128d cross =
+          _mm_sub_pd(_mm_mul_pd(_mm_set1_pd(dx), y), _mm_mul_pd(_mm_set1_pd(dy), x));
+      const int ge = _mm_movemask_pd(_mm_cmpge_pd(cross, _mm_setzero_pd()));
+      const int le = _mm_movemask_pd(_mm_cmple_pd(cross, _mm_setzero_pd()));
+      on_left |= static_cast<std::uint64_t>(ge) << (s % 64);
+      on_right |= static_cast<std::uint64_t>(le) << (s % 64);
     }
-    result.left[w] = left;
-    result.right[w] = right;
+#endif
+    for (; s < end; ++s) {
+      const double cross = dx * (y_[s] - ay) - dy * (x_[s] - ax);
+      on_left |= static_cast<std::uint64_t>(cross >= 0) << (s % 64);
+      on_right |= static_cast<std::uint64_t>(cross <= 0) << (s % 64);
+    }
+    left[w] = on_left;
+    right[w] = on_right;
   }
-  return result;
+  return {left, right};
+}
+
+double StarSamples::error_at(const Plane& plane, const Vertex& a, std::size_t sample) const {
+  const double height = a.z + (plane.gx * (x_[sample] - a.x) + plane.gy * (y_[sample] - a.y));
+  return std::abs(height - z_[sample]);
 }
 
 double StarSamples::worst(std::size_t i, std::size_t m, std::size_t j, double limit) {
   const Vertex& a = ring_[i];
   const Plane plane = plane_of(a, ring_[m], ring_[j]);
   if (!plane.sound) return kNever;
-  const Words& first = sides(i, m).left;
-  const Words& second = sides(m, j).left;
-  const Words& chord = sides(i, j).right;
+  const std::uint64_t* const first = sides(i, m).left;
+  const std::uint64_t* const second = sides(m, j).left;
+  const std::uint64_t* const chord = sides(i, j).right;
   double largest = 0;
-  for (std::size_t w = 0; w < first.size(); ++w) {
+  for (std::size_t w = 0; w < words_; ++w) {
     for (std::uint64_t bits = first[w] & second[w] & chord[w]; bits != 0; bits &= bits - 1) {
       const std::size_t s = w * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-      const double height = a.z + (plane.gx * (x_[s] - a.x) + plane.gy * (y_[s] - a.y));
-      const double error = std::abs(height - z_[s]);
+      const double error = error_at(plane, a, s);
       if (error > largest) {
-        if (error > limit) return kNever;
+        if (error > limit) {
+          beyond_ = s;
+          return kNever;
+        }
         largest = error;
       }
     }
@@ -106,15 +166,15 @@ bool StarSamples::wide(std::size_t i, std::size_t m, std::size_t j, double tange
 
 void StarSamples::list(Mesh& mesh, const Star& star, const PolygonFill& fill) {
   const std::size_t count = index_.size();
-  rest_.assign((count + 63) / 64, ~std::uint64_t{0});
+  rest_.assign(words_, ~std::uint64_t{0});
   if (count % 64 != 0) rest_.back() >>= 64 - count % 64;
   for (std::size_t k = 0; k < star.size(); ++k) mesh.heads[star.triangle(k)] = kNone;
   // Slots are reused in the order in which triangles are visited.
   std::size_t k = 0;
   star.all_of(fill, [&](std::size_t i, std::size_t m, std::size_t j) {
-    const Words& first = sides(i, m).left;
-    const Words& second = sides(m, j).left;
-    const Words& chord = sides(i, j).right;
+    const std::uint64_t* const first = sides(i, m).left;
+    const std::uint64_t* const second = sides(m, j).left;
+    const std::uint64_t* const chord = sides(i, j).right;
     std::uint32_t& head = mesh.heads[star.triangle(k++)];
     for (std::size_t w = 0; w < rest_.size(); ++w) {
       const std::uint64_t inside = rest_[w] & first[w] & second[w] & chord[w];

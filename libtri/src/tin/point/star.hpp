@@ -17,6 +17,14 @@ class StarSamples {
   /// `extra`: an additional sample, or kNone.
   void gather(const Mesh& mesh, const Star& star, const Vertex& centre, std::uint32_t extra);
 
+  /// Whether no triangle of corners of the ring comes within `bound` of a sample: then no fill
+  /// does. false if this is not known or there is no such sample.
+  [[nodiscard]] bool out_of_reach(std::size_t sample, double bound) const;
+  /// The sample that the centre was made from.
+  [[nodiscard]] std::size_t own() const { return own_; }
+  /// The sample that was last found beyond the limit.
+  [[nodiscard]] std::size_t beyond() const { return beyond_; }
+
   /// The largest error of the samples in the triangle of corners i < m < j of the ring, or infinity
   /// if one is above `limit` or doubles cannot resolve the triangle's plane.
   double worst(std::size_t i, std::size_t m, std::size_t j, double limit);
@@ -27,22 +35,25 @@ class StarSamples {
   void list(Mesh& mesh, const Star& star, const PolygonFill& fill);
 
  private:
-  using Words = std::vector<std::uint64_t>;
-  /// Which samples lie left of the line from corner i to j, and which right; both: on it.
+  /// Which samples lie left of the line from corner i to j, and which right; both: on it. A bit for
+  /// each sample.
   struct Sides {
-    bool known = false;
-    Words left;
-    Words right;
+    const std::uint64_t* left;
+    const std::uint64_t* right;
   };
-  const Sides& sides(std::size_t i, std::size_t j);
+  Sides sides(std::size_t i, std::size_t j);
+  [[nodiscard]] double error_at(const Plane& plane, const Vertex& a, std::size_t sample) const;
   [[nodiscard]] double cross_at(std::size_t i, std::size_t j, std::size_t sample) const;
   void list_rest(Mesh& mesh, const Star& star, const PolygonFill& fill, std::size_t sample) const;
 
   std::vector<Vertex> ring_;  ///< relative to the centre, heights too
   std::vector<double> x_, y_, z_;
   std::vector<std::uint32_t> index_;
-  std::array<std::array<Sides, kMaxRing>, kMaxRing> sides_;
-  Words rest_;
+  std::size_t own_ = 0, beyond_ = 0;           ///< index_.size(): none
+  std::size_t words_ = 0;                      ///< of a bit for each sample
+  std::array<std::uint16_t, kMaxRing> known_;  ///< [i]: bit j if the sides of i and j are known
+  std::vector<std::uint64_t> sides_;           ///< left and right of all pairs of corners
+  std::vector<std::uint64_t> rest_;
 };
 
 }  // namespace terrace::tri::tin::points

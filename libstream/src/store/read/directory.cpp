@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "store/read/directory.hpp"
+
+#include <utility>
+
+#include "store/codec/tables.hpp"
+#include "store/read/index_page.hpp"
+
+namespace terrace::stream::store {
+namespace {
+
+/// Contents of chapters and tables that are read with the directory if they take no more.
+constexpr std::uint64_t kReadAtOnce = std::uint64_t{64} << 10;
+/// A writer makes one set per 1024 blocks, and no block without a cluster.
+constexpr std::uint64_t kFewestClustersOfTables = 1024;
+constexpr std::uint64_t kMostVarint = 10, kChecksum = 4;
+
+/// What is before the CRC-32 that ends `bytes`.
+ByteView checked(ByteView bytes, const char* damage) {
+  if (bytes.size() < kChecksum ||
+      crc32(bytes.first(bytes.size() - kChecksum)) !=
+          load<std::uint32_t>(bytes.data() + bytes.size() - kChecksum)) {
+    throw Damage(damage);
+  }
+  return bytes.first(bytes.size() - kChecksum);
+}
+
+}  // namespace
+
+Directory::Directory(const ByteSource& index, std::uint64_t bytes, std::uint64_t clusters,
+                     const Layout& layout, const Box3& bounds)
+    : index_(index),
+      clusters_(clusters),
+      pages_(clusters / layout.page_clusters() + (clusters % layout.page_clusters() != 0)),
+      ranges_(layout.ranges()),
+      bounds_(bounds) {
+  const bool old = layout.version < 5;
+  const std::uint64_t most_tables = 1 + clusters / kFewestClustersOfTables;
+  const std::uint64_t of_tables =
+      2 * kMostVarint + (old ? Tables::most_bytes(layout) : std::uint64_t{0});
+  if (bytes > 8 * pages_ + 64 * (1 + pages_ / kChapterPages) + most_tables * of_tables) {
+    throw Damage("the directory is too large for the level's clusters");
+  }
+  const std::uint64_t start = index_.size() - bytes;
+  held_at_ = start;
+  held_ = read(start, bytes);
+  ByteReader in(checked(held_, "the checksum of the directory is wrong"));
+  if (old) {
+    read_old(in, start);
+    return;
+  }
+  read_chapters(in, start);
+  contents_ = std::vector<std::atomic<const Contents*>>(chapters_.size());
+  const std::uint64_t tail = chapters_.front().contents_at;
+  held_ = start - tail > kReadAtOnce ? Bytes() : read(tail, start - tail);
+  held_at_ = tail;
+}
+
+Directory::~Directory() {
+  for (const auto& contents : contents_) delete contents.load();
+}
+
+void Directory::read_old(ByteReader in, std::uint64_t start) {
+  if (in.left() < 8 || (in.left() - 8) / 8 < pages_) {
+    throw Damage("the directory has too few pages");
+  }
+  std::uint64_t previous = 0;
+  for (std::uint64_t p = 0; p <= pages_; ++p) {
+    old_offsets_.push_back(in.get<std::uint64_t>());
+    if (old_offsets_.back() < previous ||
+        old_offsets_.back() - previous > most_page_bytes(ranges_) ||
+        (p == 0 && old_offsets_[0] != 0)) {
+      throw Damage("the pages of the directory do not follow one another");
+    }
+    previous = old_offsets_.back();
+  }
+  if (previous != start) throw Damage("the pages do not end where the directory begins");
+  const auto sets = in.get<std::uint32_t>();
+  read_sets(in, sets, start, false);
+}
+
+void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
+  const std::uint64_t chapters = (pages_ + kChapterPages - 1) / kChapterPages;
+  std::uint64_t pages_end = 0, contents_bytes = 0;
+  for (std::uint64_t c = 0; c < chapters; ++c) {
+    const std::uint64_t pages = std::min(kChapterPages, pages_ - c * kChapterPages);
+    Chapter chapter;
+    const std::uint64_t of_pages = in.varint(), of_contents = in.varint();
+    if (of_pages > pages * most_page_bytes(ranges_) || of_pages > start - pages_end) {
+      throw Damage("the chapters of the directory do not follow one another");
+    }
+    if (of_contents < 7 * pages + kChecksum || of_contents > 16 * pages + kChecksum) {
+      throw Damage("the contents of a chapter have an impossible size");
+    }
+    chapter.pages_at = pages_end;
+    chapter.pages_end = pages_end += of_pages;
+    chapter.contents_at = contents_bytes;
+    chapter.contents_bytes = static_cast<std::size_t>(of_contents);
+    contents_bytes += of_contents;
+    ChapterBox box;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.low[axis] = in.get<std::uint16_t>();
+      box.high[axis] = in.get<std::uint16_t>();
+    }
+    chapter.box = box.in(bounds_);
+    chapters_.push_back(chapter);
+  }
+  if (contents_bytes > start - pages_end) {
+    throw Damage("the chapters of the directory do not follow one another");
+  }
+  for (Chapter& chapter : chapters_) chapter.contents_at += pages_end;
+  const std::uint64_t sets = in.varint();
+  read_sets(in, sets, pages_end + contents_bytes, true);
+  if (tables_.back().offset + tables_.back().size + kChecksum != start) {
+    throw Damage("the tables do not end where the directory begins");
+  }
+}
+
+/// at: where the first set begins if they lie `apart` from the directory.
+void Directory::read_sets(ByteReader& in, std::uint64_t sets, std::uint64_t at, bool apart) {
+  for (std::uint64_t t = 0; t < sets; ++t) {
+    TablesAt set;
+    set.first = in.varint();
+    const std::uint64_t size = in.varint();
+    if (apart ? size > index_.size() - at || kChecksum > index_.size() - at - size
+              : size > in.left()) {
+      throw Damage("the data end too early");
+    }
+    set.size = memory_size(size);
+    if (apart) {
+      set.offset = at;
+      at += size + kChecksum;
+    } else {
+      set.offset = held_at_ + in.offset();
+      in.take(set.size);
+    }
+    if (tables_.empty() ? set.first != 0 : set.first <= tables_.back().first) {
+      throw Damage("the tables do not follow one another");
+    }
+    if (set.first >= clusters_) throw Damage("tables are for clusters that do not exist");
+    tables_.push_back(set);
+  }
+  if (in.left() != 0) throw Damage("bytes follow the directory");
+  if (tables_.empty()) throw Damage("the level has no tables");
+}
+
+Bytes Directory::read(std::uint64_t offset, std::uint64_t size) const {
+  Bytes bytes(memory_size(size));
+  if (offset >= held_at_ && offset - held_at_ <= held_.size() &&
+      size <= held_.size() - (offset - held_at_)) {
+    std::copy_n(held_.begin() + static_cast<std::ptrdiff_t>(offset - held_at_), size,
+                bytes.begin());
+  } else {
+    index_.read(offset, std::as_writable_bytes(std::span(bytes)));
+  }
+  return bytes;
+}
+
+const Directory::Contents& Directory::contents(std::uint64_t number) const {
+  std::atomic<const Contents*>& known = contents_[static_cast<std::size_t>(number)];
+  if (const Contents* const contents = known.load(std::memory_order_acquire)) return *contents;
+  const Chapter& chapter = chapters_[static_cast<std::size_t>(number)];
+  const Bytes bytes = read(chapter.contents_at, chapter.contents_bytes);
+  ByteReader in(checked(bytes, "the checksum of a chapter's contents is wrong"));
+  auto contents = std::make_unique<Contents>();
+  std::uint64_t offset = chapter.pages_at;
+  const std::uint64_t pages = std::min(kChapterPages, pages_ - number * kChapterPages);
+  for (std::uint64_t p = 0; p < pages; ++p) {
+    contents->offsets.push_back(offset);
+    const std::uint64_t size = in.varint();
+    if (size > most_page_bytes(ranges_) || size > chapter.pages_end - offset) {
+      throw Damage("the pages of a chapter do not follow one another");
+    }
+    offset += size;
+    PageBox& box = contents->boxes.emplace_back();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.low[axis] = in.get<std::uint8_t>();
+      box.high[axis] = in.get<std::uint8_t>();
+    }
+  }
+  contents->offsets.push_back(offset);
+  if (offset != chapter.pages_end) throw Damage("the pages of a chapter do not end where it does");
+  if (in.left() != 0) throw Damage("bytes follow the contents of a chapter");
+  const std::lock_guard lock(mutex_);
+  if (known.load(std::memory_order_relaxed) == nullptr) {
+    known.store(contents.release(), std::memory_order_release);
+  }
+  return *known.load(std::memory_order_relaxed);
+}
+
+Directory::Range Directory::page_range(std::uint64_t page) const {
+  const bool old = !old_offsets_.empty();
+  const std::vector<std::uint64_t>& offsets =
+      old ? old_offsets_ : contents(page / kChapterPages).offsets;
+  const auto place = static_cast<std::size_t>(old ? page : page % kChapterPages);
+  return {offsets[place], offsets[place + 1]};
+}
+
+Box3 Directory::page_box(std::uint64_t page) const {
+  if (chapters_.empty()) return bounds_;
+  const Contents& of_pages = contents(page / kChapterPages);
+  return of_pages.boxes[static_cast<std::size_t>(page % kChapterPages)].in(
+      chapters_[static_cast<std::size_t>(page / kChapterPages)].box);
+}
+
+Box3 Directory::coarse_box(std::uint64_t page) const {
+  if (chapters_.empty()) return bounds_;
+  const auto number = static_cast<std::size_t>(page / kChapterPages);
+  const Contents* const known = contents_[number].load(std::memory_order_acquire);
+  const Box3& chapter = chapters_[number].box;
+  return known == nullptr
+             ? chapter
+             : known->boxes[static_cast<std::size_t>(page % kChapterPages)].in(chapter);
+}
+
+Bytes Directory::read_tables(const TablesAt& at) const {
+  if (!old_offsets_.empty()) return read(at.offset, at.size);
+  Bytes bytes = read(at.offset, at.size + kChecksum);
+  bytes.resize(checked(bytes, "the checksum of tables is wrong").size());
+  return bytes;
+}
+
+}  // namespace terrace::stream::store

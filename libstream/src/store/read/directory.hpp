@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "store/codec/layout.hpp"
+#include "terrace/stream/byte_source.hpp"
+
+namespace terrace::stream::store {
+
+/// A box within another, its ends in as many steps as `Number` tells. By default it holds nothing.
+template <class Number>
+struct BoxWithin {
+  static constexpr Number kMost = std::numeric_limits<Number>::max();
+
+  std::array<Number, 3> low{kMost, kMost, kMost}, high{};
+
+  [[nodiscard]] Box3 in(const Box3& outer) const {
+    Box3 box;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.min[axis] = between(outer.min[axis], outer.max[axis], low[axis]);
+      box.max[axis] = between(outer.min[axis], outer.max[axis], high[axis]);
+    }
+    return box;
+  }
+  /// The least that holds what lies of `box` within `outer`.
+  static BoxWithin around(const Box3& box, const Box3& outer) {
+    BoxWithin found;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double low = outer.min[axis], high = outer.max[axis];
+      const auto place = [&](double value) {
+        // Halves, so that no difference overflows.
+        const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * kMost;
+        return static_cast<Number>(share > 0 ? std::min<double>(share, kMost) : 0);
+      };
+      // Rounding may have left an end inside.
+      Number& first = found.low[axis];
+      first = place(box.min[axis]);
+      while (first > 0 && !(between(low, high, first) <= box.min[axis])) --first;
+      Number& last = found.high[axis];
+      last = place(box.max[axis]);
+      while (last < kMost && !(between(low, high, last) >= box.max[axis])) ++last;
+    }
+    return found;
+  }
+
+ private:
+  /// Both ends are exact.
+  static double between(double low, double high, Number place) {
+    const double share = place / static_cast<double>(kMost);
+    return low * (1 - share) + high * share;
+  }
+};
+
+/// A chapter is so many pages of the index; the last one may have fewer.
+inline constexpr std::uint64_t kChapterPages = 64;
+/// In the bounds of the store.
+using ChapterBox = BoxWithin<std::uint16_t>;
+/// In the box of its chapter.
+using PageBox = BoxWithin<std::uint8_t>;
+
+/// Where the parts of a level's index are: pages, the contents of each chapter, sets of tables.
+/// From version 5 on the contents of chapters are read when they are needed unless all of them are
+/// small. Any thread.
+class Directory {
+ public:
+  struct TablesAt {
+    std::uint64_t first = 0;  ///< ordinal of the first cluster that they are for
+    std::uint64_t offset = 0;
+    std::size_t size = 0;  ///< without their checksum
+  };
+
+  /// bytes: of the directory, at the end of `index`, which must outlive this.
+  /// Throws: Damage, Error.
+  Directory(const ByteSource& index, std::uint64_t bytes, std::uint64_t clusters,
+            const Layout& layout, const Box3& bounds);
+  ~Directory();
+  Directory(const Directory&) = delete;
+  Directory& operator=(const Directory&) = delete;
+
+  [[nodiscard]] std::uint64_t pages() const { return pages_; }
+  [[nodiscard]] std::uint64_t chapters() const { return chapters_.size(); }
+  struct Range {
+    std::uint64_t begin = 0, end = 0;
+  };
+  /// Where a page is in the index. Throws: Damage, Error.
+  [[nodiscard]] Range page_range(std::uint64_t page) const;
+  /// A box around all points of the page's clusters and below them. Throws: Damage, Error.
+  [[nodiscard]] Box3 page_box(std::uint64_t page) const;
+  /// The same without reading: until the contents of its chapter have been read, the chapter's.
+  [[nodiscard]] Box3 coarse_box(std::uint64_t page) const;
+  /// The sets of tables, by cluster.
+  [[nodiscard]] const std::vector<TablesAt>& tables() const { return tables_; }
+  /// The bytes of a set. Throws: Damage, Error.
+  [[nodiscard]] Bytes read_tables(const TablesAt& at) const;
+
+ private:
+  struct Contents {
+    std::vector<std::uint64_t> offsets;  ///< of the pages, and of the end of the last
+    std::vector<PageBox> boxes;
+  };
+  struct Chapter {
+    std::uint64_t pages_at = 0, pages_end = 0;  ///< in the index
+    std::uint64_t contents_at = 0;
+    std::size_t contents_bytes = 0;
+    Box3 box;
+  };
+
+  void read_old(ByteReader in, std::uint64_t start);
+  void read_chapters(ByteReader& in, std::uint64_t start);
+  void read_sets(ByteReader& in, std::uint64_t sets, std::uint64_t at, bool apart);
+  [[nodiscard]] Bytes read(std::uint64_t offset, std::uint64_t size) const;
+  [[nodiscard]] const Contents& contents(std::uint64_t chapter) const;
+
+  const ByteSource& index_;
+  std::uint64_t clusters_, pages_;
+  std::size_t ranges_;
+  Box3 bounds_;
+  Bytes held_;  ///< the file from held_at_ on, as far as it was read at once
+  std::uint64_t held_at_ = 0;
+  std::vector<std::uint64_t> old_offsets_;  ///< before version 5
+  std::vector<Chapter> chapters_;
+  std::vector<TablesAt> tables_;
+  mutable std::vector<std::atomic<const Contents*>> contents_;
+  mutable std::mutex mutex_;
+};
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <pybind11/stl.h>
+#include <terrace/terrain/crs.hpp>
+
+#include "arrays.hpp"
+#include "call.hpp"
+#include "store.hpp"
+
+namespace terrace::python {
+namespace {
+
+using Shift = std::optional<terrain::DatumShift>;
+
+/// shift: of the one whose datum does not count as WGS 84; of `to` if neither does. box: where the
+/// data lie in `from`.
+terrain::Transformation transformation(const std::string& from, const std::string& to,
+                                       const Shift& shift, const py::object& box) {
+  auto own = terrain::CoordinateSystem::parse(from);
+  const auto other = terrain::CoordinateSystem::parse(to, shift);
+  if (shift && other.counts_as_wgs84()) own = terrain::CoordinateSystem::parse(from, shift);
+  if (const auto area = region_of(box)) own = own.over(area->box());
+  return {own, other};
+}
+
+/// A region of another CRS as polygons of the store's.
+std::vector<terrain::Polygon> own_region(const OpenStore& open, const py::object& region,
+                                         const std::string& crs) {
+  const stream::Store store = open.get();
+  const auto given = region_of(region);
+  const terrain::Region made = released([&]() -> std::optional<terrain::Region> {
+                                 return terrain::RegionConversion(
+                                     store, terrain::transformation_to(store, crs))(given.value());
+                               }).value();
+  const stream::Box3& box = made.box();
+  std::vector<terrain::Polygon> polygons = made.polygons();
+  if (polygons.empty()) {
+    polygons = {{{{box.min[0], box.min[1]},
+                  {box.max[0], box.min[1]},
+                  {box.max[0], box.max[1]},
+                  {box.min[0], box.max[1]}}}};
+  }
+  return polygons;
+}
+
+}  // namespace
+
+void bind_crs(py::module_& module) {
+  using terrain::Transformation;
+  py::class_<Transformation>(module, "Transformation")
+      .def(py::init(&transformation))
+      .def("convert",
+           [](const Transformation& change, const Array<double>& given, bool back) {
+             const auto places = rows_of<2>(given, "places");
+             return to_array(released([&] {
+               std::vector<terrain::Point2> made(places.begin(), places.end());
+               back ? change.reverse(made) : change.forward(made);
+               return made;
+             }));
+           })
+      .def("note", &Transformation::note)
+      .def("from_title", [](const Transformation& change) { return change.from().title(); })
+      .def("to_title", [](const Transformation& change) { return change.to().title(); });
+  module.def("own_region", &own_region);
+}
+
+}  // namespace terrace::python

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+#include <terrace/stream/point_writer.hpp>
+#include <terrace/terrain/crs.hpp>
+
+#include "arrays.hpp"
+#include "call.hpp"
+#include "sources.hpp"
+
+/// Points from files or arrays, without a store, and to files.
+
+namespace terrace::python {
+namespace {
+
+stream::SourceOptions reading(const py::dict& given, unsigned threads, std::stop_token stop) {
+  stream::SourceOptions options;
+  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  set("input_format", options.format);
+  set("block_points", options.block_points);
+  set("band", options.band);
+  set("cell", options.cell);
+  if (options.block_points < 1) throw py::value_error("`block_points` must be above 0");
+  if (options.band < 1) throw py::value_error("`band` counts from 1");
+  if (given.contains("crs")) {
+    options.crs = terrain::CoordinateSystem::parse(given["crs"].cast<std::string>()).crs();
+  }
+  bool skip_damaged = false;
+  set("skip_damaged", skip_damaged);
+  if (skip_damaged) options.on_damage = [](const stream::Error&, std::uint64_t) {};
+  options.selection = selection_of(given);
+  options.entities = entities_of(given);
+  options.heights_of_colour = colours_of(given);
+  options.threads = threads;
+  options.stop = std::move(stop);
+  return options;
+}
+
+/// Blocks of a source, in coordinates of its CRS. Python's threads may share one.
+class PointReader {
+ public:
+  PointReader(const py::object& source, const py::dict& given, unsigned threads) : held_(source) {
+    const OpenSource open = opener_of(source);
+    const stream::SourceOptions options = reading(given, all_or(threads), {});
+    source_ = released([&] { return open(options); });
+    type_ = record_type(source_->info());
+  }
+
+  /// Records, or None at the end.
+  py::object next() {
+    std::vector<std::byte> records;
+    bool some = false;
+    {
+      const py::gil_scoped_release open;
+      const std::lock_guard lock(mutex_);
+      some = source_->next(block_);
+      if (some) {
+        stream::to_world(source_->info(), block_);
+        const std::size_t payload = source_->info().payload_size();
+        records.resize(block_.size() * (sizeof(stream::Point3) + payload));
+        std::byte* to = records.data();
+        for (std::size_t i = 0; i < block_.size(); ++i) {
+          std::memcpy(to, block_.positions[i].data(), sizeof(stream::Point3));
+          to += sizeof(stream::Point3);
+          if (payload > 0) std::memcpy(to, block_.payload.data() + i * payload, payload);
+          to += payload;
+        }
+      }
+    }
+    if (!some) return py::none();
+    return to_records(std::move(records), type_);
+  }
+
+  [[nodiscard]] const py::dtype& type() const { return type_; }
+  [[nodiscard]] const stream::Schema& schema() const { return source_->info(); }
+
+ private:
+  py::object held_;  ///< the arrays that are read
+  py::dtype type_;
+  std::mutex mutex_;
+  std::unique_ptr<stream::PointSource> source_;
+  stream::PointBlock block_;
+};
+
+/// (points written, how far a coordinate was moved at most)
+py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
+                       const std::string& format, bool replace, const py::tuple& how) {
+  const OpenSource open = opener_of(source);
+  std::uint64_t points = 0;
+  double rounding = 0;
+  Job(how).run([&](const terrain::Context& context) {
+    stream::SourceOptions options;
+    {
+      const py::gil_scoped_acquire held;
+      options = reading(given, context.threads, context.stop);
+    }
+    const std::unique_ptr<stream::PointSource> from = open(options);
+    const stream::SourceInfo& info = from->info();
+    stream::PointHeader header{
+        .attributes = info.attributes, .crs = info.crs, .lattice = lattice_of(info)};
+    if (const auto system = terrain::CoordinateSystem::of(info.crs, path)) {
+      header.crs = system->crs_with_wkt1();
+    }
+    if (info.bounds) header.bounds = world_box(info, *info.bounds);
+    const auto writer = stream::open_point_writer(
+        path, header,
+        {.format = format, .replace = replace, .stop = context.stop, .threads = context.threads});
+    stream::PointBlock block;
+    const auto report = [&](bool ended) {
+      if (!context.progress) return;
+      const stream::Progress at = from->progress();
+      context.progress(
+          {.what = "points", .count = at.points, .fraction = at.fraction, .ended = ended});
+    };
+    while (from->next(block)) {
+      context.check_stop();
+      stream::to_world(info, block);
+      writer->append(block);
+      report(false);
+    }
+    writer->finish();
+    report(true);
+    points = writer->points();
+    rounding = writer->rounding();
+  });
+  return py::make_tuple(points, rounding);
+}
+
+}  // namespace
+
+void bind_points(py::module_& module) {
+  py::class_<PointReader>(module, "PointReader")
+      .def(py::init<const py::object&, const py::dict&, unsigned>())
+      .def("next", &PointReader::next)
+      .def("type", &PointReader::type)
+      .def("attributes", [](const PointReader& reader) { return attributes_info(reader.schema()); })
+      .def("crs", [](const PointReader& reader) { return crs_info(reader.schema().crs); });
+  module.def("write_points", &write_points);
+}
+
+}  // namespace terrace::python

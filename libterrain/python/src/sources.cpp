@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sources.hpp"
+
+#include <string>
+#include <vector>
+
+#include <pybind11/stl.h>
+#include <terrace/stream/memory_source.hpp>
+#include <terrace/terrain/region.hpp>
+
+#include "arrays.hpp"
+
+namespace terrace::python {
+namespace {
+
+stream::Channel channel_of(const py::dict& column) {
+  const auto array = column["array"].cast<py::array>();
+  const auto name = column["name"].cast<std::string>();
+  return {.name = name,
+          .type = scalar_type(array.dtype(), name),
+          .scale = column["scale"].cast<double>(),
+          .offset = column["offset"].cast<double>()};
+}
+
+stream::MemoryColumn column_of(const py::dict& column) {
+  const auto array = column["array"].cast<py::array>();
+  return {static_cast<const std::byte*>(array.data()), array.strides(0)};
+}
+
+stream::MemoryPoints points_of_columns(const py::dict& given) {
+  stream::MemoryPoints points;
+  points.info.files = {given["name"].cast<std::string>()};
+  points.info.format = "array";
+  const auto columns = given["columns"].cast<std::vector<py::dict>>();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    points.info.coordinates[axis] = channel_of(columns.at(axis));
+    points.coordinates[axis] = column_of(columns[axis]);
+  }
+  // Scale and offset of x and y are those of the transform.
+  auto& xy = points.info.world.xy;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    stream::Channel& channel = points.info.coordinates[axis];
+    xy[axis * 4] = channel.scale;
+    xy[axis * 3 + 2] = channel.offset;
+  }
+  points.count = static_cast<std::uint64_t>(columns[0]["array"].cast<py::array>().shape(0));
+  for (const py::dict& attribute : given["attributes"].cast<std::vector<py::dict>>()) {
+    points.info.attributes.push_back(channel_of(attribute));
+    points.attributes.push_back(column_of(attribute));
+  }
+  return points;
+}
+
+stream::MemoryRaster raster_of_samples(const py::dict& given) {
+  stream::MemoryRaster raster;
+  const auto samples = given["samples"].cast<py::array>();
+  raster.info.files = {given["name"].cast<std::string>()};
+  raster.info.format = "array";
+  raster.info.rows = static_cast<std::uint64_t>(samples.shape(0));
+  raster.info.columns = static_cast<std::uint64_t>(samples.shape(1));
+  raster.info.sample = {.name = "sample",
+                        .type = scalar_type(samples.dtype(), "the raster"),
+                        .scale = given["scale"].cast<double>(),
+                        .offset = given["offset"].cast<double>()};
+  raster.info.world.xy = given["transform"].cast<std::array<double, 6>>();
+  raster.info.nodata = given["nodata"].cast<std::optional<double>>();
+  raster.first = static_cast<const std::byte*>(samples.data());
+  raster.row_stride = samples.strides(0);
+  raster.column_stride = samples.strides(1);
+  return raster;
+}
+
+std::string name_in(const py::dict& options, const char* key, std::string otherwise) {
+  take_option(options, key, otherwise);
+  return otherwise;
+}
+
+}  // namespace
+
+OpenSource opener_of(const py::object& source) {
+  if (py::isinstance<py::list>(source)) {
+    return [names = source.cast<std::vector<std::string>>()](const stream::SourceOptions& options) {
+      return stream::open_source(names, options);
+    };
+  }
+  const auto given = source.cast<py::dict>();
+  if (given.contains("samples")) {
+    return [raster = raster_of_samples(given)](const stream::SourceOptions& options) {
+      return stream::open_memory(raster, options);
+    };
+  }
+  return [points = points_of_columns(given)](const stream::SourceOptions& options) {
+    return stream::open_memory(points, options);
+  };
+}
+
+stream::Selection selection_of(const py::dict& options) {
+  stream::Selection selection;
+  take_option(options, "where", selection.where);
+  take_option(options, "keep", selection.keep);
+  take_option(options, "drop", selection.drop);
+  take_option(options, "resolution", selection.resolution);
+  if (options.contains("region")) {
+    if (const auto region = region_of(options["region"])) region->restrict(selection);
+  }
+  return selection;
+}
+
+stream::HeightsOfColour colours_of(const py::dict& options) {
+  using stream::HeightsOfColour;
+  return named<HeightsOfColour>(name_in(options, "heights_of_colour", "none"), "heights_of_colour",
+                                {{"none", HeightsOfColour::none},
+                                 {"mapbox", HeightsOfColour::mapbox},
+                                 {"terrarium", HeightsOfColour::terrarium}});
+}
+
+stream::Entities entities_of(const py::dict& options) {
+  using stream::Entities;
+  return named<Entities>(name_in(options, "entities", "points"), "entities",
+                         {{"points", Entities::points},
+                          {"triangles", Entities::triangles},
+                          {"segments", Entities::segments},
+                          {"polylines", Entities::polylines}});
+}
+
+}  // namespace terrace::python

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Points from files and to files, without a store."""
+
+import os
+
+import numpy as np
+
+from . import _core
+from ._geo import region as as_region
+from ._job import job
+from ._matching import _threads
+from ._sources import source_of
+from ._store import checked, real_values
+
+_READ_OPTIONS = {
+    'input_format', 'where', 'region', 'keep', 'drop', 'resolution', 'skip_damaged', 'band', 'cell', 'heights_of_colour', 'entities',
+    'block_points',
+}
+
+
+def _reading(sources, transform, crs, nodata, attributes, options, function):
+    given = checked(options, _READ_OPTIONS, function)
+    if 'region' in given:
+        given['region'] = as_region(given['region'])
+    source, text = source_of(sources, transform, crs, nodata, attributes)
+    if text is not None:
+        given['crs'] = text
+    return source, given
+
+
+class PointReader:
+    """Points in batches, from point_batches(). dtype: of the batches; crs: a dict of what the source says, as
+    Store.info has it. Threads may share one."""
+
+    def __init__(self, core):
+        self._core = core
+        self._attributes = core.attributes()
+        self.dtype = real_values(np.empty(0, core.type()), self._attributes).dtype
+        self.crs = core.crs()
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        batch = self._core.next()
+        if batch is None:
+            raise StopIteration
+        return real_values(batch, self._attributes)
+
+    def __repr__(self):
+        return f'<terrace.PointReader: {", ".join(self.dtype.names)}>'
+
+
+def point_batches(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
+    """Points of files or arrays, batch by batch in constant memory, those of a batch close together as the source has them.
+
+    sources, transform, crs, nodata, attributes: as of build(). Options: ``where``, ``region``, ``keep``, ``drop``,
+    ``resolution``, ``input_format``, ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` as of
+    build(); ``block_points`` (10000), the most in a batch. Returns: a PointReader, an iterator of structured arrays: x,
+    y, z in the CRS, then attributes as Store.points() gives them. Raises: Error for bad data, OSError, ValueError.
+
+    >>> [len(batch) for batch in point_batches(np.zeros((25000, 3)))]
+    [10000, 10000, 5000]
+    """
+    source, given = _reading(sources, transform, crs, nodata, attributes, options, 'point_batches')
+    return PointReader(_core.PointReader(source, given, _threads(threads)))
+
+
+def read_points(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
+    """All points of files or arrays in one structured array, as point_batches() gives them.
+
+    >>> read_points(np.arange(6.0).reshape(2, 3), where='z > 3')
+    array([(3., 4., 5.)], dtype=[('x', '<f8'), ('y', '<f8'), ('z', '<f8')])
+    """
+    reader = point_batches(sources, transform=transform, crs=crs, nodata=nodata, attributes=attributes, threads=threads, **options)
+    return np.concatenate([np.empty(0, reader.dtype), *reader])
+
+
+def write_points(path, points, *, transform=None, crs=None, nodata=None, attributes=None, format=None, replace=False, progress=None,
+                 threads=None, **options):
+    """Writes points to a file by its ending: .laz, .las, .copc.laz, .ply, .csv, .xyz; whole or not at all.
+
+    points, transform, crs, nodata, attributes, options: as of point_batches(): files too, which are converted in
+    constant memory. format: in place of the ending: 'xyz', 'csv', 'ply', 'ply-ascii', 'las', 'laz', 'copc'. Returns: a
+    dict: points, rounding (how far a coordinate was moved, at most, to the lattice of LAS). Raises: FileExistsError or
+    another OSError; Error; ValueError; KeyboardInterrupt on Ctrl-C, and then no file stands.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_points(folder + '/cube.laz', np.arange(6.0).reshape(2, 3))
+    {'points': 2, 'rounding': 0.0}
+    """
+    source, given = _reading(points, transform, crs, nodata, attributes, options, 'write_points')
+    path = os.fspath(path)
+    written, rounding = _core.write_points(source, given, path, format or '', bool(replace), job(progress, threads))
+    return {'points': written, 'rounding': rounding}

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Points from files and to files, without a store."""
+
+import os
+import unittest
+
+import numpy as np
+
+import terrace
+from python_case import ALPS, StoreCase
+
+
+class Points(StoreCase):
+    def records(self, count=5000):
+        made = np.zeros(count, [('x', 'f8'), ('y', 'f8'), ('z', 'f8'), ('intensity', 'u2'), ('classification', 'u1')])
+        places = np.round(self.points[:count], 2)
+        for i, axis in enumerate('xyz'):
+            made[axis] = places[:, i]
+        made['intensity'], made['classification'] = np.arange(count) % 4000, np.arange(count) % 5
+        return made
+
+    def test_what_is_written_is_read(self):
+        records = self.records()
+        for ending in ('ply', 'csv', 'xyz', 'las', 'laz', 'copc.laz'):
+            path = self.path('points.' + ending)
+            told = terrace.write_points(path, records, crs='EPSG:32632')
+            self.assertEqual(told['points'], len(records))
+            self.assertLess(told['rounding'], 1e-9)
+            back = terrace.read_points(path)
+            if ending == 'copc.laz':
+                back, records = np.sort(back, order=['x', 'y', 'z']), np.sort(records, order=['x', 'y', 'z'])
+            np.testing.assert_allclose(terrace.xyz(back), terrace.xyz(records), rtol=0, atol=1e-9)
+            if ending != 'xyz':
+                for name in ('intensity', 'classification'):
+                    np.testing.assert_array_equal(back[name], records[name])
+            with self.assertRaises((FileExistsError, terrace.Error)):
+                terrace.write_points(path, records)
+            terrace.write_points(path, records[:10], replace=True)
+            self.assertEqual(len(terrace.read_points(path)), 10)
+        self.assertEqual(terrace.point_batches(self.path('points.laz')).crs['epsg'], 0)  # the ten points have none
+        terrace.write_points(self.path('points.laz'), records, crs='EPSG:32632', replace=True)
+        self.assertEqual(terrace.build(self.path('points.laz'), self.path('of-laz')).info['crs']['epsg'], 32632)
+
+    def test_a_part(self):
+        path = self.path('part.laz')
+        records = self.records()
+        terrace.write_points(path, records)
+        wanted = records[(records['classification'] == 2) & (records['x'] <= 300500)]
+        got = terrace.read_points(path, where='classification == 2', region=(0, 0, 300500, 1e7), keep=['intensity'])
+        self.assertEqual(got.dtype.names, ('x', 'y', 'z', 'intensity'))
+        np.testing.assert_array_equal(got['intensity'], wanted['intensity'])
+        told = terrace.write_points(self.path('part.ply'), path, where='classification == 2', region=(0, 0, 300500, 1e7))
+        self.assertEqual(told['points'], len(wanted))
+
+    def test_batches_are_blocks_of_constant_size(self):
+        reader = terrace.point_batches(ALPS, block_points=3000)
+        self.assertIn('x, y, z', repr(reader))
+        self.assertEqual(reader.crs['epsg'], 4326)
+        sizes, points = [], []
+        for batch in reader:
+            self.assertEqual(batch.dtype, reader.dtype)
+            sizes.append(len(batch))
+            points.append(terrace.xyz(batch))
+        self.assertEqual(list(reader), [])
+        store = terrace.build(ALPS, self.path('alps'))
+        self.assertEqual(sum(sizes), len(store))
+        self.assertLessEqual(max(sizes), 3000)
+        np.testing.assert_array_equal(sorted(map(tuple, np.concatenate(points))), sorted(map(tuple, terrace.xyz(store.points()))))
+
+    def test_a_stream_of_clusters_of_a_file(self):
+        blocks = []
+        made = terrace.stream_clusters(terrace.point_batches(self.records(20000)), blocks.append, block_points=2000)
+        self.assertEqual(made['points'], 20000)
+        total = sum(np.bincount(block.values['classification'], minlength=5) for block in blocks if block.level == 0)
+        np.testing.assert_array_equal(total, [4000] * 5)
+
+    def test_progress_and_misuse(self):
+        seen = []
+        terrace.write_points(self.path('seen.ply'), self.points, progress=lambda *at: seen.append(at))
+        self.assertEqual(seen[-1], ('points', len(self.points), 1.0, True))
+
+        class Enough(Exception):
+            pass
+
+        def stop(*at):
+            raise Enough
+
+        with self.assertRaises(Enough):
+            terrace.write_points(self.path('stopped.ply'), self.points, progress=stop)
+        self.assertFalse(os.path.exists(self.path('stopped.ply')))
+        for call, kind in ((lambda: terrace.read_points(self.path('none.laz')), OSError), (lambda: terrace.read_points([]), (ValueError, TypeError)),
+                           (lambda: terrace.read_points(self.points, where='z >'), terrace.Error),
+                           (lambda: terrace.read_points(self.points, block_points=0), ValueError), (lambda: terrace.read_points(self.points, none=1), TypeError),
+                           (lambda: terrace.write_points(self.path('a.what'), self.points), terrace.Error),
+                           (lambda: terrace.write_points(self.path('no/a.ply'), self.points), OSError),
+                           (lambda: terrace.write_points(self.path('a.laz'), self.points, format='shp'), (ValueError, terrace.Error)),
+                           (lambda: terrace.read_points(self.points, crs='EPSG:1'), ValueError), (lambda: terrace.read_points(np.zeros((0, 3))), ValueError)):
+            with self.assertRaises(kind):
+                call()
+
+
+if __name__ == '__main__':
+    unittest.main()

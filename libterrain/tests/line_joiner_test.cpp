@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lines joined from segments in any order, against the lines that the segments were cut from.
+#include "contour/line_joiner.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace terrace::terrain {
+namespace {
+
+struct Crossing {
+  std::int64_t level = 0;
+  std::uint64_t edge = 0;
+  friend bool operator==(const Crossing&, const Crossing&) = default;
+};
+/// Few different values, so that most crossings stand in each other's way.
+struct FewValues {
+  std::size_t operator()(const Crossing& c) const { return c.edge % 7 * 0x10001U; }
+};
+
+Point2 place_of(std::uint64_t edge) { return {static_cast<double>(edge), 0.5}; }
+
+struct Segment {
+  Crossing from, to;
+};
+
+/// Lines of some edges each, closed or not, and their segments, shuffled.
+std::vector<Segment> shuffled_segments(std::mt19937_64& random, std::vector<ContourLine>& lines) {
+  std::vector<Segment> segments;
+  std::uint64_t edge = 0;
+  for (int i = 0; i < 60; ++i) {
+    ContourLine line{static_cast<std::int64_t>(random() % 3), random() % 2 == 0, {}};
+    const std::uint64_t first = edge, count = 1 + random() % 30 + (line.closed ? 1 : 0);
+    for (std::uint64_t k = 0; k < count; ++k, ++edge) {
+      line.points.push_back(place_of(edge));
+      const bool last = k + 1 == count;
+      segments.push_back(
+          {{line.level, edge}, {line.level, last && line.closed ? first : edge + 1}});
+    }
+    line.points.push_back(place_of(line.closed ? first : edge++));
+    lines.push_back(line);
+  }
+  std::shuffle(segments.begin(), segments.end(), random);
+  return segments;
+}
+
+/// Closed lines from their least point on.
+ContourLine turned(ContourLine line) {
+  if (!line.closed) return line;
+  line.points.pop_back();
+  std::rotate(line.points.begin(), std::min_element(line.points.begin(), line.points.end()),
+              line.points.end());
+  line.points.push_back(line.points.front());
+  return line;
+}
+
+TEST(LineJoiner, JoinsSegmentsInAnyOrder) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    std::vector<ContourLine> lines;
+    const std::vector<Segment> segments = shuffled_segments(random, lines);
+    std::map<Point2, ContourLine> expected;
+    for (const ContourLine& line : lines) expected[line.points.front()] = line;
+    std::uint64_t points = 0;
+    LineJoiner<Crossing, FewValues> joiner([&](ContourLine&& given) {
+      const ContourLine line = turned(std::move(given));
+      const auto found = expected.find(line.points.front());
+      ASSERT_NE(found, expected.end());
+      EXPECT_EQ(line.level, found->second.level);
+      EXPECT_EQ(line.closed, found->second.closed);
+      EXPECT_EQ(line.points, found->second.points);
+      points += line.points.size();
+      expected.erase(found);
+    });
+    // Some lines are emitted on the way: those that have no end in the later half.
+    std::map<std::uint64_t, int> later;
+    const std::size_t half = segments.size() / 2;
+    for (std::size_t i = half; i < segments.size(); ++i) {
+      ++later[segments[i].from.edge];
+      ++later[segments[i].to.edge];
+    }
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+      const Segment& s = segments[i];
+      joiner.add(s.from, place_of(s.from.edge), s.to, place_of(s.to.edge));
+      if (i + 1 == half) {
+        joiner.emit_whole([&](const Crossing& c) { return later.contains(c.edge); });
+      }
+    }
+    joiner.emit_whole([](const Crossing&) { return false; });
+    EXPECT_TRUE(expected.empty());
+    EXPECT_EQ(joiner.open_points(), 0U);
+    EXPECT_EQ(joiner.segments(), segments.size());
+    EXPECT_EQ(points, segments.size() + lines.size());
+  }
+}
+
+TEST(LineJoiner, EmitsOpenLinesInTheOrderOfTheirFirstSegments) {
+  std::vector<double> first;
+  LineJoiner<Crossing, FewValues> joiner(
+      [&](ContourLine&& line) { first.push_back(line.points.front()[0]); });
+  const auto add = [&](std::uint64_t from, std::uint64_t to) {
+    joiner.add({0, from}, place_of(from), {0, to}, place_of(to));
+  };
+  // A closed line between makes a place free for the third.
+  add(10, 11);
+  add(20, 21);
+  add(21, 20);
+  add(30, 31);
+  add(1, 2);
+  add(2, 3);
+  add(3, 10);  // joins the last to the first, whose number stays
+  joiner.emit_whole([](const Crossing&) { return false; });
+  EXPECT_EQ(first, (std::vector<double>{20, 1, 30}));
+}
+
+TEST(LineJoiner, TellsOfTooManyPoints) {
+  LineJoiner<Crossing, FewValues> joiner(
+      [](ContourLine&&) {},
+      {.points = 100, .exceeded = [] { throw std::length_error("too many"); }});
+  const auto add_all = [&] {
+    for (std::uint64_t edge = 0; edge < 1000; edge += 2) {
+      joiner.add({0, edge}, place_of(edge), {0, edge + 1}, place_of(edge + 1));
+    }
+  };
+  EXPECT_THROW(add_all(), std::length_error);
+  EXPECT_EQ(joiner.open_points(), 102U);
+}
+
+}  // namespace
+}  // namespace terrace::terrain

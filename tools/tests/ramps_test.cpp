@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `terrace render` and the viewer share: the viewer takes ramps and light from a file, which
+// must have the numbers of the command.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "picture/camera.hpp"
+#include "picture/canvas.hpp"
+#include "picture/color.hpp"
+
+namespace terrace::tools {
+namespace {
+
+using Json = nlohmann::json;
+
+Json shared() {
+  std::ifstream file(TERRACE_RAMPS);
+  EXPECT_TRUE(file) << TERRACE_RAMPS;
+  return Json::parse(file);
+}
+
+/// As ramps.ts mixes colours.
+Rgb mixed(const Json& stops, double place) {
+  std::size_t next = 1;
+  while (next + 1 < stops.size() && stops[next][0] < place) ++next;
+  const double from = stops[next - 1][0], to = stops[next][0];
+  const double t = std::clamp((place - from) / (to - from), 0.0, 1.0);
+  Rgb colour{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double a = stops[next - 1][c + 1], b = stops[next][c + 1];
+    colour[c] = static_cast<std::uint8_t>(std::lround((1 - t) * a + t * b));
+  }
+  return colour;
+}
+
+TEST(Ramps, TheViewerHasThoseOfTheCommand) {
+  const Json ramps = shared();
+  for (int i = -10; i <= 1010; ++i) {
+    const double share = i / 1000.0;
+    EXPECT_EQ(land_colour(share), mixed(ramps["land"], share)) << share;
+    EXPECT_EQ(sea_colour(share), mixed(ramps["sea"], share)) << share;
+    EXPECT_EQ(slope_colour(60 * share), mixed(ramps["slope"], 60 * share)) << share;
+  }
+  const Json& categories = ramps["categories"];
+  for (std::size_t i = 0; i < 3 * categories.size(); ++i) {
+    EXPECT_EQ(Json(category_colour(static_cast<std::int64_t>(i))),
+              categories[i % categories.size()])
+        << i;
+  }
+}
+
+TEST(Ramps, TheViewerHasTheLightOfTheCommand) {
+  const Json light = shared()["light"];
+  const double radians = std::acos(-1.0) / 180;
+  std::mt19937 random(16);
+  std::uniform_real_distribution<double> slope(-2, 2);
+  // The viewer's azimuth is where it looks to, the command's where the viewer stands.
+  for (const double looking : {0.0, 30.0, 135.0, 270.0}) {
+    const ViewDirection view{.azimuth = looking + 180, .elevation = 40};
+    const Camera camera(view);
+    const double turn = (looking + light["turn"].get<double>()) * radians;
+    const double elevation = light["elevation"].get<double>() * radians;
+    const stream::Point3 sun{std::sin(turn) * std::cos(elevation),
+                             std::cos(turn) * std::cos(elevation), std::sin(elevation)};
+    for (int i = 0; i < 200; ++i) {
+      const double x = slope(random), y = slope(random), length = std::sqrt(x * x + y * y + 1);
+      const stream::Point3 normal{x / length, y / length, 1 / length};
+      const double facing = normal[0] * camera.toward[0] + normal[1] * camera.toward[1] +
+                            normal[2] * camera.toward[2];
+      if (facing < 0) continue;
+      const double lit = normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2];
+      const double ambient = light["ambient"], strength = light["strength"];
+      EXPECT_NEAR(Light::for_terrain(view, 1).shade(normal, camera.toward),
+                  ambient + (1 - ambient) * strength * std::max(lit, 0.0) / sun[2], 1e-6)
+          << looking << ": " << x << ", " << y;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tools
