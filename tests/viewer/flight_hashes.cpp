@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// flight_hashes STORE MAX_POINTS [surface]: flies over a store and prints for each stop, as a line of JSON,
-// the camera and the hash of what is shown once the view has settled. The same flight in the
-// browser's core must give the same. surface: where the store is taken for a scan, its surface is
-// shown, computed from scratch at each stop.
+// flight_hashes STORE MAX_POINTS [surface]: flies over a store and prints for each stop, as a line
+// of JSON, the camera and the hash of what is shown once the view has settled. The same flight in
+// the browser's core must give the same. surface: where the store is taken for a scan, its surface
+// is shown, computed from scratch at each stop.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

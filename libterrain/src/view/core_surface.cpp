@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/view_impl.hpp"
 
-/// Likewise for surfaces of scans, apart from core.cpp because they need the triangulation in space.
+/// Likewise for surfaces of scans, apart from core.cpp because they need the triangulation in
+/// space.
 
 namespace terrace::terrain {
 

@@ -30,8 +30,8 @@ bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
   std::vector<stream::Point3> nodes;
   for (const stream::Point3& p : points) {
     nodes.push_back(lattice.node(frame(p)));
-    places.push_back({static_cast<std::int32_t>(nodes.back()[0]),
-                      static_cast<std::int32_t>(nodes.back()[1])});
+    places.push_back(
+        {static_cast<std::int32_t>(nodes.back()[0]), static_cast<std::int32_t>(nodes.back()[1])});
   }
   tri::Delaunay2<std::int32_t> triangulation;
   const std::vector<tri::VertexId> vertices = triangulation.build(places);

@@ -19,7 +19,7 @@ template StoreView<std::int32_t>::StoreView(const stream::Store&, const tri::Vie
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,
                                                Reader);
 template StoreView<tri::DynamicSurface<std::int32_t>>::StoreView(const stream::Store&,
-                                                                const tri::ViewOptions&, Reader);
+                                                                 const tri::ViewOptions&, Reader);
 template class StoreView<double>;
 
 }  // namespace terrace::terrain

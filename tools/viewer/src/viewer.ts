@@ -173,7 +173,12 @@ class Viewer {
         element('with-level').hidden = message.manifest.levels.length < 2;
         if (this.level !== 255) this.level = Math.min(this.level, message.manifest.levels.length - 1);
         this.renderer.show(this.box, message.manifest.levels.length - 1, this.kind, this.scan);
-        if (!again) this.camera.fit(this.box, this.aspect);
+        if (!again) {
+          // Most scans have Y upward; what is tallest along Z stands on it.
+          const [x, y, z] = [0, 1, 2].map(i => this.box[i + 3] - this.box[i]);
+          if (!first || !this.link.has('u')) this.camera.yUp = z <= 1.2 * Math.max(x, y);
+          this.camera.fit(this.box, this.aspect);
+        }
         if (first && !again) this.applyLink();
         element('with-wire').hidden = this.kind === 'points';
         element('with-size').hidden = this.kind !== 'points';
@@ -464,7 +469,7 @@ class Viewer {
     const parts = [`s=${encodeURIComponent(this.store)}`, `v=${view.join(',')}`, `c=${this.look.colour}`, `q=${this.error}`];
     if (this.look.wire) parts.push('w=1');
     if (this.scan && this.asPoints) parts.push('p=1');
-    if (this.scan && !c.yUp) parts.push('u=z');
+    if (this.scan) parts.push(`u=${c.yUp ? 'y' : 'z'}`);
     if (this.level !== 255) parts.push(`l=${this.level}`);
     history.replaceState(null, '', `#${parts.join('&')}`);
   }
