@@ -248,6 +248,27 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
   EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
 }
 
+// On a surface the work is foreseen to be that of the points; the middle of a body has tetrahedra
+// with all of them.
+TYPED_TEST(DynamicSurfaceOf, CostlyRemovalsAreForeseen) {
+  using Coord = TypeParam;
+  std::mt19937_64 random(8);
+  std::vector<std::array<Coord, 3>> points;
+  for (const Point3& p : bumpy_ball(2000, random))
+    points.push_back(
+        {static_cast<Coord>(p[0]), static_cast<Coord>(p[1]), static_cast<Coord>(p[2])});
+  DynamicSurface<Coord> surface;
+  const std::vector<VertexId> vertices = surface.build(points);
+  EXPECT_EQ(surface.removal_work({}), 0u);
+  EXPECT_GE(surface.removal_work(vertices), vertices.size());
+  EXPECT_LT(surface.removal_work(vertices), 3 * vertices.size());
+  const Coord middle{1 << 20};
+  std::vector<typename DynamicSurface<Coord>::Insertion> inserted(1);
+  surface.insert(std::vector<std::array<Coord, 3>>{{middle, middle, middle}}, inserted);
+  surface.follow();
+  EXPECT_GT(surface.removal_work(std::vector<VertexId>{inserted[0].vertex}), 200u);
+}
+
 TYPED_TEST(DynamicSurfaceOf, WhatComesAndGoesUnseenIsNotTold) {
   using Coord = TypeParam;
   std::mt19937_64 random(5);

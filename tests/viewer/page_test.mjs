@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import {spawn} from 'node:child_process';
 import {join} from 'node:path';
-import {after, before, test} from 'node:test';
+import {after, before, describe, test} from 'node:test';
 
 import {launch} from '../clients/globe.mjs';
 import {packages} from '../clients/packages.mjs';
@@ -163,57 +163,6 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   await close();
 });
 
-test('a flight over a raster of cocircular points gives the hashes of the native run', async () => {
-  const {page, errors, close} = await open('#s=flat&q=32');
-  for (const stop of sites.flight('flat', {maxPoints: MAX_POINTS})) {
-    await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
-    await settled(page);
-    assert.equal((await state(page)).points, stop.points);
-    assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
-  }
-  assert.deepEqual(errors, []);
-  await close();
-});
-
-test('a level that is shown everywhere, and the link keeps it', async () => {
-  const {page, errors, close} = await open('#s=flat&q=32');
-  const coarse = (await state(page)).points;
-  await page.focus('#level');
-  await page.keyboard.press('End');
-  await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points > points, coarse);
-  assert.equal((await state(page)).points, 200 * 180);
-  assert.equal(await page.textContent('#level-text'), 'level 0');
-  await page.waitForFunction(() => /l=0/.test(location.hash));
-  const again = await open(new URL(page.url()).hash);
-  assert.equal((await state(again.page)).points, 200 * 180);
-  await page.focus('#level');
-  await page.keyboard.press('Home');
-  await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points === points, coarse);
-  assert.deepEqual([...errors, ...again.errors], []);
-  await again.close();
-  await close();
-});
-
-for (const name of ['bunny', 'autzen']) {
-  test(`real data: ${name}`, {skip: name in sites.real ? false : 'TERRACE_DATA has no such file'}, async () => {
-    const {page, errors, outside, close} = await open(`#s=${name}&q=32`);
-    const flight = sites.flight(name, {maxPoints: MAX_POINTS, kind: name === 'bunny' ? 'surface' : 'points'}).slice(0, 3);
-    // The native flight begins with nothing expanded.
-    for (const stop of [{...flight[0], error: 1e6, points: null}, ...flight]) {
-      await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
-      await settled(page);
-      if (stop.points === null) continue;
-      assert.equal((await state(page)).points, stop.points);
-      assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
-    }
-    const spots = await pixels(page, Array.from({length: 900}, (_, i) => [0.3 + 0.4 * (i % 30) / 30, 0.3 + 0.4 * Math.floor(i / 30) / 30]));
-    assert.ok(new Set(spots.map(String)).size > 20, 'no points are drawn');
-    await page.screenshot({path: join(packages, `viewer-${name}.png`)});
-    assert.deepEqual([errors, outside], [[], []]);
-    await close();
-  });
-}
-
 test('a scan: its surface from all sides, as points and back, a link that restores it', async () => {
   const name = 'bunny' in sites.real ? 'bunny' : 'ball';
   const {page, errors, outside, close} = await open(`#s=${name}&q=2`, {size: {width: 900, height: 600}});
@@ -273,112 +222,170 @@ test('a scan: its surface from all sides, as points and back, a link that restor
   await close();
 });
 
-test('a slow server: never blank, no message, and all there in the end', async () => {
-  site.fault = ({range}) => range === null ? null : 'slow';
-  const {page, errors, close} = await open('#s=alps&q=8', {settle: false});
-  await page.waitForFunction(() => window.terrace?.state.points > 100);
-  assert.equal((await state(page)).settled, false);
-  assert.match(await page.textContent('#status'), /refining/);
-  const [middle] = await pixels(page, [[0.5, 0.5]]), [sky] = await pixels(page, [[0.02, 0.3]]);
-  assert.ok(Math.hypot(...middle.map((c, i) => c - sky[i])) > 60, 'nothing is drawn');
-  await page.waitForTimeout(1800);
-  site.fault = () => null;
-  await settled(page);
-  assert.ok(!await page.isVisible('#message'));
-  assert.deepEqual(errors, []);
-  await close();
-});
-
-test('a phone and a cloud', async () => {
-  const {page, errors, close} = await open('#s=cloud', {size: {width: 390, height: 760}});
-  assert.equal((await state(page)).triangles, 0);
-  assert.ok((await state(page)).points > 1000);
-  await page.waitForTimeout(600);
-  const spots = await pixels(page, Array.from({length: 60}, (_, i) => [0.3 + 0.4 * (i % 10) / 10, 0.4 + 0.2 * Math.floor(i / 10) / 6]));
-  assert.ok(new Set(spots.map(String)).size > 5, 'no points are drawn');
-  assert.ok(!await page.isVisible('#tools'));
-  await page.click('#menu');
-  assert.ok(await page.isVisible('#tools'));
-  assert.ok(!await page.isVisible('#with-wire'));
-  await page.screenshot({path: join(packages, 'viewer-phone.png')});
-  assert.deepEqual(errors, []);
-  await close();
-});
-
-test('a cloud by its colours, classes and intensities', async () => {
-  const {page, errors, close} = await open('#s=cloud', {size: {width: 900, height: 600}});
-  const spots = Array.from({length: 400}, (_, i) => [0.3 + 0.4 * (i % 20) / 20, 0.4 + 0.25 * Math.floor(i / 20) / 20]);
-  const seen = async () => {
-    await page.waitForTimeout(400);
-    return pixels(page, spots);
-  };
-  const kinds = shown => {
-    const red = [], blue = [];
-    shown.forEach(([r, , b], i) => {
-      if (r > 150 && b < 60) red.push(spots[i][0]);
-      if (b > 150 && r < 60) blue.push(spots[i][0]);
-    });
-    return {red, blue};
-  };
-  // It comes in its own colours: red in the west, blue in the east.
-  assert.equal(await page.isChecked('input[value=rgb]'), true);
-  assert.ok(!await page.isVisible('#by-slope'));
-  const {red, blue} = kinds(await seen());
-  assert.ok(red.length > 20 && blue.length > 20, `${red.length} red, ${blue.length} blue`);
-  assert.ok(Math.max(...red) < Math.min(...blue) + 0.05);
-  await page.screenshot({path: join(packages, 'viewer-cloud.png')});
-  await page.click('text=Class');
-  assert.deepEqual(await page.$$eval('#classes li', items => items.map(item => item.textContent)), ['2 ground', '9 water']);
-  const classes = kinds(await seen());
-  assert.equal(classes.red.length, 0);
-  await page.click('text=Intensity');
-  const greys = await seen();
-  assert.ok(greys.filter(([r, g, b]) => Math.abs(r - g) < 12 && Math.abs(g - b) < 16 && r < 200).length > 40);
-  for (let x = 400; !await page.isVisible('#place'); x += 7) {
-    assert.ok(x < 600, 'no point is met');
-    await page.mouse.click(x, 320);
-    await page.waitForTimeout(100);
-  }
-  const rows = await page.$$eval('#place-text dt', dts => dts.map(dt => dt.textContent));
-  for (const name of ['red', 'green', 'blue', 'classification', 'intensity']) assert.ok(rows.includes(name), rows.join());
-  assert.match(page.url(), /c=intensity/);
-  assert.deepEqual(errors, []);
-  await close();
-});
-
-for (const [fault, expected] of Object.entries({
-       whole: /whole files/, short: /does not answer|bytes came/, missing: /no such file/, replaced: /replaced/, damaged: /checksum|damaged/,
-       error: /HTTP 500/, dead: /does not answer/
-     })) {
-  test(`a server that misbehaves (${fault}): a message, and a retry that helps`, async () => {
-    site.fault = ({range}) => range === null ? null : fault;
-    const {page, close} = await open('#s=alps&q=8', {settle: false});
-    await page.waitForSelector('#message:not([hidden])', {timeout: 60_000});
-    assert.match(await page.textContent('#message-text'), expected);
-    assert.ok(!(await state(page)).settled);
-    if (fault === 'whole') await page.screenshot({path: join(packages, 'viewer-message.png')});
-    site.fault = () => null;
-    await page.click('#retry');
-    await settled(page);
-    assert.ok(!await page.isVisible('#message'));
+// Much of what follows is waiting: for servers, and for what is drawn by software.
+describe('pages side by side', {concurrency: 3}, () => {
+  test('a flight over a raster of cocircular points gives the hashes of the native run', async () => {
+    const {page, errors, close} = await open('#s=flat&q=32');
+    for (const stop of sites.flight('flat', {maxPoints: MAX_POINTS})) {
+      await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
+      await settled(page);
+      assert.equal((await state(page)).points, stop.points);
+      assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
+    }
+    assert.deepEqual(errors, []);
     await close();
   });
-}
 
-test('terrace view serves it', async () => {
-  const server = spawn(process.env.TERRACE, ['view', 'alps.store', 'cloud.store', '--no-open'],
-                       {cwd: sites.folder, stdio: ['ignore', 'ignore', 'pipe']});
-  try {
-    const url = await new Promise(
-        resolve => server.stderr.on('data', data => /http:\S+/.test(data) && resolve(/http:\S+/.exec(data)[0])));
-    const {page, errors, outside, close} = await open('#q=16', {url});
-    assert.equal((await state(page)).store, 'alps');
-    await page.selectOption('#store', 'cloud');
-    await page.waitForFunction(() => window.terrace.settled && window.terrace.state.store === 'cloud');
-    assert.deepEqual([errors, outside], [[], []]);
+  test('a level that is shown everywhere, and the link keeps it', async () => {
+    const {page, errors, close} = await open('#s=flat&q=32');
+    const coarse = (await state(page)).points;
+    await page.focus('#level');
+    await page.keyboard.press('End');
+    await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points > points, coarse);
+    assert.equal((await state(page)).points, 200 * 180);
+    assert.equal(await page.textContent('#level-text'), 'level 0');
+    await page.waitForFunction(() => /l=0/.test(location.hash));
+    const again = await open(new URL(page.url()).hash);
+    assert.equal((await state(again.page)).points, 200 * 180);
+    await page.focus('#level');
+    await page.keyboard.press('Home');
+    await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points === points, coarse);
+    assert.deepEqual([...errors, ...again.errors], []);
+    await again.close();
     await close();
-  } finally {
-    server.kill('SIGINT');
+  });
+
+  for (const name of ['bunny', 'autzen']) {
+    test(`real data: ${name}`, {skip: name in sites.real ? false : 'TERRACE_DATA has no such file'}, async () => {
+      const {page, errors, outside, close} = await open(`#s=${name}&q=32`);
+      const flight = sites.flight(name, {maxPoints: MAX_POINTS, kind: name === 'bunny' ? 'surface' : 'points'}).slice(0, 3);
+      // The native flight begins with nothing expanded.
+      for (const stop of [{...flight[0], error: 1e6, points: null}, ...flight]) {
+        await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
+        await settled(page);
+        if (stop.points === null) continue;
+        assert.equal((await state(page)).points, stop.points);
+        assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
+      }
+      const spots = await pixels(page, Array.from({length: 900}, (_, i) => [0.3 + 0.4 * (i % 30) / 30, 0.3 + 0.4 * Math.floor(i / 30) / 30]));
+      assert.ok(new Set(spots.map(String)).size > 20, 'no points are drawn');
+      await page.screenshot({path: join(packages, `viewer-${name}.png`)});
+      assert.deepEqual([errors, outside], [[], []]);
+      await close();
+    });
   }
-  assert.equal(await new Promise(resolve => server.on('exit', resolve)), 0);
+
+  test('a slow server: never blank, no message, and all there in the end', async () => {
+    const server = await serveSite(sites.site);
+    server.fault = ({range}) => range === null ? null : 'slow';
+    const {page, errors, close} = await open('#s=alps&q=8', {url: server.url, settle: false});
+    await page.waitForFunction(() => window.terrace?.state.points > 100);
+    assert.equal((await state(page)).settled, false);
+    assert.match(await page.textContent('#status'), /refining/);
+    const [middle] = await pixels(page, [[0.5, 0.5]]), [sky] = await pixels(page, [[0.02, 0.3]]);
+    assert.ok(Math.hypot(...middle.map((c, i) => c - sky[i])) > 60, 'nothing is drawn');
+    await page.waitForTimeout(1800);
+    server.fault = () => null;
+    await settled(page);
+    assert.ok(!await page.isVisible('#message'));
+    assert.deepEqual(errors, []);
+    await close();
+    await server.close();
+  });
+
+  test('a phone and a cloud', async () => {
+    const {page, errors, close} = await open('#s=cloud', {size: {width: 390, height: 760}});
+    assert.equal((await state(page)).triangles, 0);
+    assert.ok((await state(page)).points > 1000);
+    await page.waitForTimeout(600);
+    const spots = await pixels(page, Array.from({length: 60}, (_, i) => [0.3 + 0.4 * (i % 10) / 10, 0.4 + 0.2 * Math.floor(i / 10) / 6]));
+    assert.ok(new Set(spots.map(String)).size > 5, 'no points are drawn');
+    assert.ok(!await page.isVisible('#tools'));
+    await page.click('#menu');
+    assert.ok(await page.isVisible('#tools'));
+    assert.ok(!await page.isVisible('#with-wire'));
+    await page.screenshot({path: join(packages, 'viewer-phone.png')});
+    assert.deepEqual(errors, []);
+    await close();
+  });
+
+  test('a cloud by its colours, classes and intensities', async () => {
+    const {page, errors, close} = await open('#s=cloud', {size: {width: 900, height: 600}});
+    const spots = Array.from({length: 400}, (_, i) => [0.3 + 0.4 * (i % 20) / 20, 0.4 + 0.25 * Math.floor(i / 20) / 20]);
+    const seen = async () => {
+      await page.waitForTimeout(400);
+      return pixels(page, spots);
+    };
+    const kinds = shown => {
+      const red = [], blue = [];
+      shown.forEach(([r, , b], i) => {
+        if (r > 150 && b < 60) red.push(spots[i][0]);
+        if (b > 150 && r < 60) blue.push(spots[i][0]);
+      });
+      return {red, blue};
+    };
+    // It comes in its own colours: red in the west, blue in the east.
+    assert.equal(await page.isChecked('input[value=rgb]'), true);
+    assert.ok(!await page.isVisible('#by-slope'));
+    const {red, blue} = kinds(await seen());
+    assert.ok(red.length > 20 && blue.length > 20, `${red.length} red, ${blue.length} blue`);
+    assert.ok(Math.max(...red) < Math.min(...blue) + 0.05);
+    await page.screenshot({path: join(packages, 'viewer-cloud.png')});
+    await page.click('text=Class');
+    assert.deepEqual(await page.$$eval('#classes li', items => items.map(item => item.textContent)), ['2 ground', '9 water']);
+    const classes = kinds(await seen());
+    assert.equal(classes.red.length, 0);
+    await page.click('text=Intensity');
+    const greys = await seen();
+    assert.ok(greys.filter(([r, g, b]) => Math.abs(r - g) < 12 && Math.abs(g - b) < 16 && r < 200).length > 40);
+    for (let x = 400; !await page.isVisible('#place'); x += 7) {
+      assert.ok(x < 600, 'no point is met');
+      await page.mouse.click(x, 320);
+      await page.waitForTimeout(100);
+    }
+    const rows = await page.$$eval('#place-text dt', dts => dts.map(dt => dt.textContent));
+    for (const name of ['red', 'green', 'blue', 'classification', 'intensity']) assert.ok(rows.includes(name), rows.join());
+    assert.match(page.url(), /c=intensity/);
+    assert.deepEqual(errors, []);
+    await close();
+  });
+
+  for (const [fault, expected] of Object.entries({
+         whole: /whole files/, short: /does not answer|bytes came/, missing: /no such file/, replaced: /replaced/, damaged: /checksum|damaged/,
+         error: /HTTP 500/, dead: /does not answer/
+       })) {
+    test(`a server that misbehaves (${fault}): a message, and a retry that helps`, async () => {
+      const server = await serveSite(sites.site);
+      server.fault = ({range}) => range === null ? null : fault;
+      const {page, close} = await open('#s=alps&q=8', {url: server.url, size: {width: 480, height: 320}, settle: false});
+      await page.waitForSelector('#message:not([hidden])', {timeout: 60_000});
+      assert.match(await page.textContent('#message-text'), expected);
+      assert.ok(!(await state(page)).settled);
+      if (fault === 'whole') await page.screenshot({path: join(packages, 'viewer-message.png')});
+      server.fault = () => null;
+      await page.click('#retry');
+      await settled(page);
+      assert.ok(!await page.isVisible('#message'));
+      await close();
+      await server.close();
+    });
+  }
+
+  test('terrace view serves it', async () => {
+    const server = spawn(process.env.TERRACE, ['view', 'alps.store', 'cloud.store', '--no-open'],
+                         {cwd: sites.folder, stdio: ['ignore', 'ignore', 'pipe']});
+    try {
+      const url = await new Promise(
+          resolve => server.stderr.on('data', data => /http:\S+/.test(data) && resolve(/http:\S+/.exec(data)[0])));
+      const {page, errors, outside, close} = await open('#q=16', {url});
+      assert.equal((await state(page)).store, 'alps');
+      await page.selectOption('#store', 'cloud');
+      await page.waitForFunction(() => window.terrace.settled && window.terrace.state.store === 'cloud');
+      assert.deepEqual([errors, outside], [[], []]);
+      await close();
+    } finally {
+      server.kill('SIGINT');
+    }
+    assert.equal(await new Promise(resolve => server.on('exit', resolve)), 0);
+  });
 });

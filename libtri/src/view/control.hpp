@@ -29,7 +29,7 @@ ViewOptions checked(ViewOptions options);
 template <class Triangulation>
 struct ViewControl<Triangulation>::Impl {
   Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options,
-       Triangulation empty);
+       Triangulation&& empty);
 
   const Step& step(const View& view, const StepBudget& budget);
   [[nodiscard]] ClusterTree& tree() { return model_.impl_->tree_; }
@@ -86,7 +86,7 @@ struct ViewControl<Triangulation>::Impl {
 
 template <class Triangulation>
 ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenCluster root,
-                                       ViewOptions options, Triangulation empty)
+                                       ViewOptions options, Triangulation&& empty)
     : options_(detail::checked(std::move(options))),
       cache_([&] {
         if (root.cluster != cluster_id(static_cast<unsigned>(counts.size()), 0)) {

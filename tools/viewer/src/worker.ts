@@ -8,7 +8,7 @@ import {type Manifest, parseManifest, parseStart} from './store';
 
 /// What a frame may take in the worker, in milliseconds, and what of it is kept in hand for what the core cannot foresee:
 /// garbage to collect, requests to start, other programs.
-const FRAME = 10, IN_HAND = 2;
+const FRAME = 10, IN_HAND = 3;
 /// Points of a surface in space take so many times the work and memory of others.
 const SURFACE_COST = 4;
 /// Bytes of a scan that are kept for the other module at most.

@@ -209,7 +209,8 @@ class HierarchyBuilder {
 
 /// Clusters of about `size` points by facility location: the hierarchy is built in memory, and the
 /// level is taken whose clusters come nearest to `size` on average (as a factor). Blocks are
-/// compact sets of the points, whatever their order. Returns the cluster of each point, numbered
+/// compact sets of the points, whatever their order. The facility cost decides where clusters of about
+/// 100 points end, so smaller sizes give these, and up to 10,000 points are one cluster. Returns the cluster of each point, numbered
 /// from 0 without gaps; the same for any number of threads. progress, if any, is called with the
 /// points done; what it throws ends the work. Throws: as HierarchyBuilder::push(). O(n log n).
 [[nodiscard]] std::vector<std::uint32_t> clusters_of_size(

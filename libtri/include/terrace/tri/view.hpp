@@ -186,7 +186,7 @@ struct GivenCluster {
 /// A missing cluster.
 struct ViewRequest {
   ClusterId cluster{};
-  ClusterId head_child{};     ///< above level 0: the cluster that its head heads one level down
+  ClusterId head_child{};  ///< above level 0: the cluster that its head heads one level down
   /// From its record. ClusterRecord::kUnread: that is what is missing, by which it may be seen that
   /// the cluster is wanted; see ViewControl::give_record().
   std::uint64_t members = 0;
