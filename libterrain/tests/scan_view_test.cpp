@@ -280,6 +280,7 @@ TEST_F(ScanViews, OfRealScansFollowTheCamera) {
     const stream::Store store = build(points_of(std::filesystem::path(data) / "scan" / scan.file));
     const Round round(store);
     ScanView view(store, {}, ScanView::Reader::in_frame);
+    EXPECT_TRUE(is_scan(store, view.ground()));
     Flown flown;
     ASSERT_NO_FATAL_FAILURE(fly(view, round, 150, 5.0, 0.010, flown));
     std::printf(
@@ -289,6 +290,30 @@ TEST_F(ScanViews, OfRealScansFollowTheCamera) {
     EXPECT_GT(flown.collapsed, 50u);
     EXPECT_LE(1000 * flown.differed_first, scan.first * flown.triangles);
     EXPECT_LE(1000 * flown.differed, scan.later * flown.triangles);
+  }
+}
+
+TEST_F(ScanViews, AreOfBodiesAndNeitherOfGroundNorOfClassifiedPoints) {
+  constexpr stream::LinearMap kMetres{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const stream::Store body = bumpy(5000, 7);
+  EXPECT_TRUE(is_scan(body, kMetres));
+  // Seen so that it is a hundred times as wide as it is high, it is ground.
+  EXPECT_FALSE(is_scan(body, {100, 0, 0, 0, 100, 0, 0, 0, 1}));
+  const std::filesystem::path text = folder_.path() / "points.csv";
+  std::mt19937_64 random(8);
+  const auto part = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  for (const bool classified : {false, true}) {
+    for (const double height : {0.3, 90.0}) {
+      {
+        std::ofstream file(text);
+        file << (classified ? "x,y,z,classification\n" : "x,y,z\n");
+        for (int i = 0; i < 5000; ++i) {
+          file << 100 * part() << ',' << 100 * part() << ',' << height * part()
+               << (classified ? ",2\n" : "\n");
+        }
+      }
+      EXPECT_EQ(is_scan(build(text.string()), kMetres), height > 1 && !classified) << height;
+    }
   }
 }
 

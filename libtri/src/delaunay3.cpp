@@ -213,8 +213,11 @@ void Delaunay3<Coord, Metric>::take_changes(Changes& changes) {
       changes.removed_tetrahedra, changes.added_tetrahedra);
 }
 
+#ifdef TERRACE_TRI_CORE
 template class Delaunay3<std::int32_t>;
+#else
 template class Delaunay3<double>;
 template class Delaunay3<double, EllipticalMetric3>;
+#endif
 
 }  // namespace terrace::tri

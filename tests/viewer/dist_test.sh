@@ -14,7 +14,7 @@ done
 em++ --version | grep -q ' 3\.1\.6' || skip 'another Emscripten than 3.1.6 makes other bytes'
 [ -d /usr/include/nlohmann ] || skip 'nlohmann-json is not installed'
 
-make -s -j"$(nproc)" -f "$source/tools/viewer/core/Makefile" ROOT="$source" OUT="$build/viewer-core" "$build/viewer-core/core.wasm"
+make -s -j"$(nproc)" -f "$source/tools/viewer/core/Makefile" ROOT="$source" OUT="$build/viewer-core" all
 mkdir -p "$build/viewer-sources"
 cp -R "$source/tools/viewer/src" "$source"/tools/viewer/*.json "$source/tools/viewer/build.mjs" "$build/viewer-sources"
 cd "$build/viewer-sources"
@@ -29,7 +29,7 @@ if ! cmp -s package-lock.json node_modules/.viewer; then
 fi
 npm run --silent check
 node build.mjs "$build/viewer-dist"
-cp "$build/viewer-core/core.wasm" "$build/viewer-dist"
+cp "$build/viewer-core/core.wasm" "$build/viewer-core/body.wasm" "$build/viewer-dist"
 status=0
 for file in "$build"/viewer-dist/*; do
   cmp "$file" "$source/tools/viewer/dist/${file##*/}" || status=1

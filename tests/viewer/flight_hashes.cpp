@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// flight_hashes STORE MAX_POINTS: flies over a store and prints for each stop, as a line of JSON,
-// the camera and the hash of what is shown once the view has settled. The same flight in the
-// browser's core must give the same.
+// flight_hashes STORE MAX_POINTS [surface]: flies over a store and prints for each stop, as a line
+// of JSON, the camera and the hash of what is shown once the view has settled. The same flight in
+// the browser's core must give the same. surface: where the store is taken for a scan, its surface
+// is shown, computed from scratch at each stop.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <stdexcept>
+#include <string_view>
 
 #include <terrace/stream/store.hpp>
 #include <terrace/terrain/store_view.hpp>
@@ -48,6 +51,7 @@ int fly(const stream::Store& store, std::size_t max_points) {
     do {
       view.frame(wish, 0.05);
     } while (!view.settled());
+    view.restore();
     std::printf(
         "{\"eye\":[%.17g,%.17g,%.17g],\"direction\":[%.17g,%.17g,%.17g],\"error\":%.17g,"
         "\"points\":%zu,\"expanded\":%zu,\"hash\":\"%016llx\"}\n",
@@ -61,10 +65,16 @@ int fly(const stream::Store& store, std::size_t max_points) {
 }  // namespace
 
 int main(int arguments, char** values) {
-  if (arguments != 3) return 2;
+  const bool surface = arguments == 4 && values[3] == std::string_view("surface");
+  if (arguments != 3 && !surface) return 2;
   try {
     const stream::Store store = stream::Store::open(std::filesystem::path(values[1]));
     const std::size_t max_points = std::strtoull(values[2], nullptr, 10);
+    if (surface) {
+      const auto ground = terrain::StoreView<tri::PointCloud>(store).ground();
+      if (!terrain::is_scan(store, ground)) throw std::invalid_argument("the store is no scan");
+      return fly<tri::DynamicSurface<std::int32_t>>(store, max_points);
+    }
     return store.schema().grid ? fly<std::int32_t>(store, max_points)
                                : fly<tri::PointCloud>(store, max_points);
   } catch (const std::exception& error) {

@@ -5,7 +5,7 @@
 export class Flyer {
   /// connect(heard): starts worker.js, returns {tell(message)}; heard takes what it says. base: the URL of a published
   /// folder. name: of a store in it.
-  constructor(connect, base, name, {maxPoints = 1_500_000, heard = () => {}} = {}) {
+  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, heard = () => {}} = {}) {
     this.serial = 0;
     this.waiting = [];
     this.last = null;  ///< frame
@@ -17,6 +17,8 @@ export class Flyer {
     this.worker.tell({
       type: 'open',
       wasm: `${base}core.wasm`,
+      body: `${base}body.wasm`,
+      asPoints,
       store: `${base}stores/${name}/`,
       start: `${base}stores/${name}.start`,
       maxPoints

@@ -76,7 +76,7 @@ test('a DEM: coarse, then fine, by ranges alone, as the native run', async () =>
   const ranges = site.log.filter(({range}) => range !== null).map(({path, range}) => path + range);
   assert.equal(new Set(ranges).size, ranges.length);
   // Software that draws a million triangles takes minutes; the worker's test flies all of it.
-  for (const stop of sites.flight('alps', MAX_POINTS).slice(0, 1)) {
+  for (const stop of sites.flight('alps', {maxPoints: MAX_POINTS}).slice(0, 1)) {
     await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
     await settled(page);
     assert.equal((await state(page)).points, stop.points);
@@ -163,11 +163,70 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   await close();
 });
 
+test('a scan: its surface from all sides, as points and back, a link that restores it', async () => {
+  const name = 'bunny' in sites.real ? 'bunny' : 'ball';
+  const {page, errors, outside, close} = await open(`#s=${name}&q=2`, {size: {width: 900, height: 600}});
+  const first = await state(page);
+  assert.equal(first.kind, 'surface');
+  assert.ok(first.triangles > 1.8 * first.points && first.triangles < 2.1 * first.points, JSON.stringify(first));
+  assert.equal(await page.isChecked('input[value=grey]'), true);
+  assert.ok(!await page.isVisible('#by-slope'));
+  const [sky] = await pixels(page, [[0.02, 0.5]]);
+  // Grey in many shades from wherever one looks, below as well.
+  for (const drag of [[0, 0], [250, 0], [250, 0], [0, -260], [0, 500]]) {
+    await page.mouse.move(450, 300);
+    await page.mouse.down();
+    await page.mouse.move(450 + drag[0] / 2, 300 + drag[1] / 2);
+    await page.mouse.move(450 + drag[0], 300 + drag[1]);
+    await page.mouse.up();
+    await settled(page);
+    await page.waitForTimeout(100);
+    await page.screenshot({path: join(packages, `viewer-scan-${drag.join('_')}.png`)});
+    const body = await pixels(page, Array.from({length: 64}, (_, i) => [0.44 + 0.12 * (i % 8) / 8, 0.44 + 0.12 * Math.floor(i / 8) / 8]));
+    const shown = body.filter(colour => Math.hypot(...colour.map((c, i) => c - sky[i])) > 25);
+    assert.ok(shown.length > 40, `${shown.length} of 64 after ${drag}`);
+    assert.ok(new Set(shown.map(String)).size > 10, `one shade after ${drag}`);
+    const coloured = shown.filter(([r, g, b]) => Math.abs(r - g) > 8 || Math.abs(g - b) > 12);
+    assert.ok(coloured.length <= 6, `not grey: ${coloured.join(' | ')} after ${drag}`);
+  }
+  assert.ok((await state(page)).camera.tilt > 60, 'it cannot be turned that far');
+  await page.mouse.click(450, 300);
+  await page.waitForSelector('#place:not([hidden])');
+  assert.deepEqual(await page.$$eval('#place-text dt', dts => dts.slice(0, 5).map(dt => dt.textContent)), ['X', 'Y', 'Z', 'Level', 'Cluster']);
+  const before = (await state(page)).points;
+  if ((await page.textContent('#place-text dd:nth-of-type(5)'))[0] === '0') {
+    await page.click('#collapse');
+    await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points < points, before);
+    await page.click('#release');
+    await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points === points, before);
+  }
+  await page.click('text=Triangles');
+  await page.click('text=Level');
+  await page.waitForTimeout(300);
+  await page.screenshot({path: join(packages, 'viewer-scan-level.png')});
+  const link = new URL(page.url()).hash, now = await state(page);
+  await page.click('text=Points');
+  await page.waitForFunction(() => window.terrace.settled && window.terrace.state.kind === 'points');
+  await page.screenshot({path: join(packages, 'viewer-scan-points.png')});
+  await page.waitForFunction(() => /p=1/.test(location.hash));
+  await page.click('text=Surface');
+  await page.waitForFunction(() => window.terrace.settled && window.terrace.state.kind === 'surface');
+  const again = await open(link, {size: {width: 390, height: 760}, dark: true});
+  assert.ok(Math.abs((await state(again.page)).camera.tilt - now.camera.tilt) < 0.01);
+  await again.page.screenshot({path: join(packages, 'viewer-scan-phone.png')});
+  await again.page.click('#menu');
+  assert.ok(await again.page.isVisible('#as') && await again.page.isVisible('#upright'));
+  await again.page.screenshot({path: join(packages, 'viewer-scan-phone-tools.png')});
+  assert.deepEqual([...errors, ...again.errors, ...outside], []);
+  await again.close();
+  await close();
+});
+
 // Much of what follows is waiting: for servers, and for what is drawn by software.
 describe('pages side by side', {concurrency: 3}, () => {
   test('a flight over a raster of cocircular points gives the hashes of the native run', async () => {
     const {page, errors, close} = await open('#s=flat&q=32');
-    for (const stop of sites.flight('flat', MAX_POINTS)) {
+    for (const stop of sites.flight('flat', {maxPoints: MAX_POINTS})) {
       await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
       await settled(page);
       assert.equal((await state(page)).points, stop.points);
@@ -199,7 +258,7 @@ describe('pages side by side', {concurrency: 3}, () => {
   for (const name of ['bunny', 'autzen']) {
     test(`real data: ${name}`, {skip: name in sites.real ? false : 'TERRACE_DATA has no such file'}, async () => {
       const {page, errors, outside, close} = await open(`#s=${name}&q=32`);
-      const flight = sites.flight(name, MAX_POINTS).slice(0, 3);
+      const flight = sites.flight(name, {maxPoints: MAX_POINTS, kind: name === 'bunny' ? 'surface' : 'points'}).slice(0, 3);
       // The native flight begins with nothing expanded.
       for (const stop of [{...flight[0], error: 1e6, points: null}, ...flight]) {
         await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);

@@ -44,15 +44,27 @@ export class Sites {
     }
     writeFileSync(join(this.folder, 'cloud.csv'), cloud);
     this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
-    const stores = ['alps.store', 'flat.store', 'cloud.store'];
+    // A scan: a ball with bumps.
+    let ball = 'x,y,z\n';
+    for (let i = 0; i < 12_000; ++i) {
+      const z = 1 - (2 * i + 1) / 12_000, turn = i * 2.399963229728653, r = Math.sqrt(1 - z * z);
+      const size = 10 + 0.5 * Math.sin(5 * z) + 0.4 * Math.sin(6 * r * Math.cos(turn));
+      ball += `${size * r * Math.cos(turn)},${size * r * Math.sin(turn)},${size * z}\n`;
+    }
+    writeFileSync(join(this.folder, 'ball.csv'), ball);
+    this.terrace('build', 'ball.csv', '-o', 'ball.store', '--block', '1000', '-q');
+    const stores = ['alps.store', 'flat.store', 'cloud.store', 'ball.store'];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);
     }
     this.terrace('publish', ...stores, '-o', 'site', '-q');
   }
-  flight(name, maxPoints = MAX_POINTS) {
-    const out = execFileSync(process.env.FLIGHT_HASHES, [join(this.folder, `${name}.store`), String(maxPoints)],
+  /// kind: 'surface' for that of a scan, for which the worker allows a quarter of the points.
+  flight(name, {maxPoints = MAX_POINTS, kind = 'points'} = {}) {
+    const surface = kind === 'surface';
+    const out = execFileSync(process.env.FLIGHT_HASHES,
+                             [join(this.folder, `${name}.store`), String(surface ? maxPoints / 4 : maxPoints), ...(surface ? [kind] : [])],
                              {encoding: 'utf8', maxBuffer: 1 << 24});
     return out.trim().split('\n').map(line => JSON.parse(line));
   }

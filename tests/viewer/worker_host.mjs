@@ -64,6 +64,7 @@ export class Worker {
       Response,
       performance,
       setTimeout: (work, time) => setTimeout(work, time ?? 0),
+      clearTimeout,
       ArrayBuffer,
       Uint8Array,
       Uint32Array,

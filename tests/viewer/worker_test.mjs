@@ -16,14 +16,16 @@ after(() => sites.remove());
 
 /// A worker over a store of the site.
 class Tested extends Flyer {
-  constructor(name, {fault, maxPoints = MAX_POINTS} = {}) {
+  constructor(name, {fault, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
     const {fetch, log} = folderFetch(sites.site, fault);
     const messages = [];
     let blocks = 0;
     super(heard => new Worker(join(sites.site, 'worker.js'), fetch, heard), 'http://folder/', name, {
       maxPoints,
+      asPoints,
       heard: message => {
         messages.push(message.type);
+        if (message.type === 'frame') changed(message);
         if (message.type === 'frame') blocks += message.changes.vertexBlocks.length;
       }
     });
@@ -42,13 +44,15 @@ class Tested extends Flyer {
   }
 }
 
-for (const name of ['alps', 'flat', 'cloud']) {
-  test(`a flight over ${name} gives the hashes of the native run`, async () => {
-    const flight = sites.flight(name);
+const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
+for (const [name, kind] of Object.entries(FLIGHTS)) {
+  test(`a flight over ${name} gives the hashes of the native run`, {skip: name === 'bunny' && !sites.real.bunny}, async () => {
+    const flight = sites.flight(name, {kind});
     assert.ok(new Set(flight.map(stop => stop.hash)).size >= 4, 'the flight does not change what is shown');
     const flyer = new Tested(name);
     const {scene} = await flyer.opened();
-    assert.equal(scene.triangles, name !== 'cloud');
+    assert.equal(scene.kind, kind);
+    assert.equal(scene.scan, kind === 'surface');
     for (const [i, stop] of flight.entries()) {
       const state = await flyer.settle(stop);
       assert.deepEqual([i, state.points, state.expanded], [i, stop.points, stop.expanded]);
@@ -59,7 +63,7 @@ for (const name of ['alps', 'flat', 'cloud']) {
     const seen = new Set();
     for (const {path, range} of flyer.log) {
       if (range === undefined) {
-        assert.match(path, /^\/(core\.wasm|stores\/\w+\.start)$/);
+        assert.match(path, /^\/((core|body)\.wasm|stores\/\w+\.start)$/);
         continue;
       }
       assert.match(path, /^\/stores\/\w+\/level-\d+\.0\.(clusters|index)$/);
@@ -68,6 +72,134 @@ for (const name of ['alps', 'flat', 'cloud']) {
     }
   });
 }
+
+/// What a page has after changes: an array of vertices' bytes, and corners of triangles.
+class Arrays {
+  vertices = new Uint8Array();
+  triangles = new Uint32Array();
+  apply({state, changes}) {
+    const grown = (old, size) => {
+      if (size <= old.length) return old;
+      const array = new old.constructor(size);
+      array.set(old);
+      return array;
+    };
+    this.vertices = grown(this.vertices, Math.ceil(state.vertexSlots / 64) * 64 * 24);
+    this.triangles = grown(this.triangles, Math.ceil(state.triangleSlots / 64) * 64 * 3);
+    changes.vertexBlocks.forEach((b, i) => this.vertices.set(changes.vertices.subarray(i * 1536, (i + 1) * 1536), b * 1536));
+    changes.triangleBlocks.forEach((b, i) => this.triangles.set(changes.triangles.subarray(i * 192, (i + 1) * 192), b * 192));
+  }
+  vertex(slot) {
+    return Buffer.from(this.vertices.subarray(24 * slot, 24 * slot + 24)).toString('hex');
+  }
+  /// The triangles by all that is known of their corners, in order.
+  listed() {
+    const list = [];
+    for (let i = 0; i < this.triangles.length; i += 3) {
+      const corners = [...this.triangles.subarray(i, i + 3)].map(slot => this.vertex(slot));
+      if (this.triangles[i] === this.triangles[i + 1]) continue;
+      const first = corners.indexOf([...corners].sort()[0]);
+      list.push([...corners.slice(first), ...corners.slice(0, first)].join());
+    }
+    return list.sort();
+  }
+}
+
+test('a surface: what changes have made of the arrays is what a new worker sends, closed and turned outward', async () => {
+  const flight = sites.flight('ball', {kind: 'surface'});
+  const arrays = new Arrays(), fresh = new Arrays();
+  const flyer = new Tested('ball', {changed: message => arrays.apply(message)});
+  await flyer.opened();
+  for (const stop of flight) await flyer.settle(stop);
+  await flyer.hash();
+  const other = new Tested('ball', {changed: message => fresh.apply(message)});
+  await other.opened();
+  for (const stop of flight) await other.settle(stop);
+  await other.hash();
+  // One more: both ways to the same points, the second with restored surfaces between.
+  const last = {...flight[0], error: 3};
+  for (const stop of flight.slice(2, 6)) {
+    await other.settle(stop);
+    await other.hash();
+  }
+  for (const tested of [flyer, other]) {
+    await tested.settle({...last, error: 1e6});
+    await tested.settle(last);
+    await tested.hash();
+  }
+  const list = arrays.listed();
+  assert.ok(list.length > 1000);
+  assert.equal(list.length, flyer.last.state.triangles);
+  assert.deepEqual(list, fresh.listed());
+  // Each edge is passed as often one way as the other, and normals point away from the middle.
+  const edges = new Map(), view = new DataView(arrays.vertices.buffer);
+  for (let i = 0; i < arrays.triangles.length; i += 3) {
+    const c = arrays.triangles.subarray(i, i + 3);
+    if (c[0] === c[1]) continue;
+    for (let k = 0; k < 3; ++k) {
+      const [a, b] = [c[k], c[(k + 1) % 3]];
+      edges.set(`${Math.min(a, b)} ${Math.max(a, b)}`, (edges.get(`${Math.min(a, b)} ${Math.max(a, b)}`) ?? 0) + (a < b ? 1 : -1));
+      const at = [0, 4, 8].map(o => view.getFloat32(24 * a + o, true)), n = [12, 13, 14].map(o => view.getInt8(24 * a + o));
+      const size = Math.hypot(...at), steep = (at[0] * n[0] + at[1] * n[1] + at[2] * n[2]) / size / 127;
+      assert.ok(steep > 0.5, `normal ${n} at ${at}`);
+    }
+  }
+  assert.ok([...edges.values()].every(n => n === 0));
+});
+
+test('a scan as points and back, with the bytes that are there', async () => {
+  const flyer = new Tested('ball', {asPoints: true});
+  assert.equal((await flyer.opened()).scene.kind, 'points');
+  const [stop] = sites.flight('ball');
+  await flyer.settle(stop);
+  assert.equal(await flyer.hash(), stop.hash);
+  assert.ok(!flyer.log.some(request => request.path === '/body.wasm'));
+  for (const kind of ['surface', 'points', 'surface']) {
+    const opened = flyer.opened();
+    flyer.worker.tell({type: 'show', asPoints: kind === 'points'});
+    assert.equal((await opened).scene.kind, kind);
+    await flyer.settle(stop);
+    const [native] = sites.flight('ball', {kind});
+    assert.equal(await flyer.hash(), native.hash);
+  }
+  const ranges = flyer.log.filter(({range}) => range).map(({path, range}) => path + range);
+  assert.equal(new Set(ranges).size, ranges.length);
+  assert.equal(flyer.log.filter(request => request.path === '/body.wasm').length, 1);
+});
+
+test('by hand: a cluster of a surface expands, collapses and is released; a point of it is met', async () => {
+  const flyer = new Tested('ball');
+  await flyer.opened();
+  const answer = async (message, type) => {
+    const done = flyer.until(m => m.type === type);
+    flyer.worker.tell(message);
+    return done;
+  };
+  const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: 1e6};
+  const before = (await flyer.settle(camera)).points;
+  const {hit} = await answer({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
+  assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));
+  flyer.worker.tell({type: 'pin', how: 1});
+  const more = (await flyer.settle(camera)).points;
+  assert.ok(more > before, `${before} ${more}`);
+  const {lines} = await answer({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
+  assert.equal(lines.length % 2, 0);
+  assert.equal((await answer({type: 'profile', id: 2, from: [0, 0, 0], to: [5, 5, 5]}, 'profiled')).line.length, 0);
+  flyer.worker.tell({type: 'pin', how: -1});
+  assert.equal((await flyer.settle(camera)).points, before);
+});
+
+test('a module for bodies that cannot be fetched: a message, and a retry that helps', async () => {
+  let bad = true;
+  const flyer = new Tested('ball', {
+    fault: (request, response) => bad && request.path === '/body.wasm' ? {status: 404, headers: {}, body: Buffer.alloc(0)} : response
+  });
+  assert.match(await flyer.failed(), /HTTP 404/);
+  bad = false;
+  const opened = flyer.opened();
+  flyer.worker.tell({type: 'retry'});
+  assert.equal((await opened).scene.kind, 'surface');
+});
 
 test('the first picture needs the start file alone', async () => {
   const flyer = new Tested('alps');

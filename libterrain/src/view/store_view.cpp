@@ -18,7 +18,8 @@ StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& 
 template StoreView<std::int32_t>::StoreView(const stream::Store&, const tri::ViewOptions&, Reader);
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,
                                                Reader);
+template StoreView<tri::DynamicSurface<std::int32_t>>::StoreView(const stream::Store&,
+                                                                 const tri::ViewOptions&, Reader);
 template class StoreView<double>;
-template class StoreView<tri::DynamicSurface<std::int32_t>>;
 
 }  // namespace terrace::terrain

@@ -150,10 +150,13 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   return vertex_of;
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>, unsigned);
+#else
 template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>,
                                      unsigned);
 template std::vector<VertexId> build(Mesh<EllipticalKernel>&,
                                      std::span<const EllipticalKernel::Point>, unsigned);
+#endif
 
 }  // namespace terrace::tri::spatial

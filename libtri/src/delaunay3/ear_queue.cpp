@@ -152,8 +152,11 @@ void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed) {
   wrap_rest(mesh, filling);
 }
 
+#ifdef TERRACE_TRI_CORE
 template void fill_by_ears(Mesh<IntKernel>&, const IntKernel::Point&);
+#else
 template void fill_by_ears(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
 template void fill_by_ears(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&);
+#endif
 
 }  // namespace terrace::tri::spatial

@@ -159,8 +159,11 @@ std::string find_fault(const Delaunay3<Coord, Metric>& triangulation) {
   return Inspection(Delaunay3Access::mesh(triangulation)).run();
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::string find_fault(const Delaunay3<std::int32_t>&);
+#else
 template std::string find_fault(const Delaunay3<double>&);
 template std::string find_fault(const Delaunay3<double, EllipticalMetric3>&);
+#endif
 
 }  // namespace terrace::tri

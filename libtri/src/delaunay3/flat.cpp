@@ -141,9 +141,12 @@ void make_first(Mesh<Kernel>& mesh, std::uint32_t apex) {
   template void restart(Mesh<Kernel>&, std::vector<std::uint32_t>);            \
   template bool coplanar(const Mesh<Kernel>&, std::span<const std::uint32_t>); \
   template void make_first(Mesh<Kernel>&, std::uint32_t);
+#ifdef TERRACE_TRI_CORE
 TERRACE_INSTANTIATE(IntKernel)
+#else
 TERRACE_INSTANTIATE(DoubleKernel)
 TERRACE_INSTANTIATE(EllipticalKernel)
+#endif
 #undef TERRACE_INSTANTIATE
 
 }  // namespace terrace::tri::spatial

@@ -139,7 +139,10 @@ Pool<std::uint32_t> hilbert_order(std::span<const std::array<Coord, 3>> points, 
   return order;
 }
 
+#ifdef TERRACE_TRI_CORE
 template Pool<std::uint32_t> hilbert_order(std::span<const std::array<std::int32_t, 3>>, unsigned);
+#else
 template Pool<std::uint32_t> hilbert_order(std::span<const std::array<double, 3>>, unsigned);
+#endif
 
 }  // namespace terrace::tri::spatial

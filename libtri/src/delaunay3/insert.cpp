@@ -33,12 +33,15 @@ Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
   return {vertex, true};
 }
 
+#ifdef TERRACE_TRI_CORE
 template void insert_vertex(Mesh<IntKernel>&, std::uint32_t, std::uint32_t);
+template Inserted insert_point(Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
+#else
 template void insert_vertex(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t);
 template void insert_vertex(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t);
-template Inserted insert_point(Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
 template Inserted insert_point(Mesh<DoubleKernel>&, const DoubleKernel::Point&, std::uint32_t);
 template Inserted insert_point(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,
                                std::uint32_t);
+#endif
 
 }  // namespace terrace::tri::spatial

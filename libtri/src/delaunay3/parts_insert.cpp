@@ -340,13 +340,16 @@ void insert_in_parts(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint
   }
 }
 
+#ifdef TERRACE_TRI_CORE
 template void insert_slot(Mesh<IntKernel>&, std::uint32_t, std::uint32_t);
+template void insert_in_parts(Mesh<IntKernel>&, const Curve&, std::span<std::uint32_t>, unsigned);
+#else
 template void insert_slot(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t);
 template void insert_slot(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t);
-template void insert_in_parts(Mesh<IntKernel>&, const Curve&, std::span<std::uint32_t>, unsigned);
 template void insert_in_parts(Mesh<DoubleKernel>&, const Curve&, std::span<std::uint32_t>,
                               unsigned);
 template void insert_in_parts(Mesh<EllipticalKernel>&, const Curve&, std::span<std::uint32_t>,
                               unsigned);
+#endif
 
 }  // namespace terrace::tri::spatial

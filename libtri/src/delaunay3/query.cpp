@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <type_traits>
 
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
@@ -58,9 +59,14 @@ std::uint64_t mix(std::uint64_t z) {
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
   return z ^ (z >> 31);
 }
-std::uint64_t bits(std::int32_t c) { return static_cast<std::uint64_t>(c); }
-// merges -0.0 and 0.0
-std::uint64_t bits(double c) { return std::bit_cast<std::uint64_t>(c + 0.0); }
+template <class Coord>
+std::uint64_t bits(Coord c) {
+  if constexpr (std::is_integral_v<Coord>) {
+    return static_cast<std::uint64_t>(c);
+  } else {
+    return std::bit_cast<std::uint64_t>(c + 0.0);  // merges -0.0 and 0.0
+  }
+}
 
 template <class Point>
 std::uint64_t hash_point(std::uint64_t h, const Point& p) {
@@ -180,9 +186,12 @@ std::uint64_t hash(const Mesh<Kernel>& mesh) {
   template void adjacent(const Mesh<Kernel>&, std::uint32_t, std::vector<VertexId>&);           \
   template void tetrahedra_at(const Mesh<Kernel>&, std::uint32_t, std::vector<TetrahedronId>&); \
   template std::uint64_t hash(const Mesh<Kernel>&);
+#ifdef TERRACE_TRI_CORE
 TERRACE_INSTANTIATE(IntKernel)
+#else
 TERRACE_INSTANTIATE(DoubleKernel)
 TERRACE_INSTANTIATE(EllipticalKernel)
+#endif
 #undef TERRACE_INSTANTIATE
 
 }  // namespace terrace::tri::spatial

@@ -158,8 +158,11 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
   }
 }
 
+#ifdef TERRACE_TRI_CORE
 template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
+#else
 template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
 template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
+#endif
 
 }  // namespace terrace::tri::spatial

@@ -14,7 +14,6 @@ template class MultiresolutionModel<PointCloud>;
 template class MultiresolutionModel<Delaunay2<double>>;
 template class MultiresolutionModel<Delaunay3<std::int32_t>>;
 template class MultiresolutionModel<Delaunay3<double>>;
-template class MultiresolutionModel<DynamicSurface<std::int32_t>>;
 template class MultiresolutionModel<DynamicSurface<double>>;
 template class MultiresolutionModel<RegionalDelaunay2<std::int32_t>>;
 template class MultiresolutionModel<RegionalDelaunay2<double>>;

@@ -340,7 +340,10 @@ std::size_t DynamicSurface<Coord>::memory_bytes() const {
          i.fresh.capacity() / 8;
 }
 
+#ifdef TERRACE_TRI_CORE
 template class DynamicSurface<std::int32_t>;
+#else
 template class DynamicSurface<double>;
+#endif
 
 }  // namespace terrace::tri

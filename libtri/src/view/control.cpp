@@ -51,7 +51,6 @@ template class ViewControl<PointCloud>;
 template class ViewControl<Delaunay2<double>>;
 template class ViewControl<RegionalDelaunay2<std::int32_t>>;
 template class ViewControl<RegionalDelaunay2<double>>;
-template class ViewControl<DynamicSurface<std::int32_t>>;
 template class ViewControl<DynamicSurface<double>>;
 #endif
 

@@ -17,6 +17,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/given_bytes.hpp>
 #include <terrace/stream/store.hpp>
+#include <terrace/terrain/store_view.hpp>
 #include <unistd.h>
 
 #include "scene.hpp"
@@ -71,7 +72,12 @@ int guarded(const Work& work) {
 
 /// What a scene needs at most beside its points, and what each of these takes: caches of clusters
 /// and bytes; triangulation, heights and the arrays to draw.
-constexpr std::size_t kMemory = std::size_t{128} << 20, kPointMemory = 200;
+constexpr std::size_t kMemory = std::size_t{128} << 20;
+#ifdef TERRACE_VIEWER_BODY
+constexpr std::size_t kPointMemory = 700;
+#else
+constexpr std::size_t kPointMemory = 200;
+#endif
 
 /// Growing the memory takes the browser many milliseconds, however little it is, and malloc would
 /// ask for a page at a time. Pages that are not touched cost nothing.
@@ -85,6 +91,17 @@ std::size_t memory_left() {
 void reserve_memory(std::size_t bytes) {
   const std::size_t left = memory_left();
   if (left < bytes) __builtin_wasm_memory_grow(0, (bytes - left + kWasmPage - 1) / kWasmPage);
+}
+
+/// Whether the module for bodies should go on with the store.
+bool is_body(const stream::Store& store, const stream::LinearMap& ground) {
+#ifdef TERRACE_VIEWER_BODY
+  static_cast<void>(store);
+  static_cast<void>(ground);
+  return true;
+#else
+  return terrain::is_scan(store, ground);
+#endif
 }
 
 stream::Point3 point_of(const double* at) { return {at[0], at[1], at[2]}; }
@@ -128,8 +145,8 @@ TERRACE_EXPORT(forget) int terrace_forget(std::size_t name) {
 }
 
 /// input: the nine numbers of the map from stored coordinates to metres. numbers: the box of the
-/// scene; 1 for triangles, 0 for points; the store's checksum; of points whether they have colours,
-/// classes, intensities; how many classes, and these.
+/// scene; 1 for a raster; 1 for the scan of a body; of points whether they have colours, classes,
+/// intensities; how many classes, and these.
 TERRACE_EXPORT(open) int terrace_open(double max_points) {
   return guarded([&] {
     Module& m = module();
@@ -148,7 +165,7 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
                  box.max[1],
                  box.max[2],
                  m.store->schema().grid ? 1.0 : 0.0,
-                 static_cast<double>(m.store->checksum())};
+                 is_body(*m.store, ground) ? 1.0 : 0.0};
     const viewer::CloudColours& colours = m.scene->colours();
     for (const bool has : {colours.has_rgb(), colours.has_group(), colours.has_intensity()}) {
       m.numbers.push_back(has ? 1 : 0);
@@ -207,6 +224,14 @@ TERRACE_EXPORT(changes) int terrace_changes() {
                         static_cast<double>(c.triangle_blocks.size()),
                         address(c.triangle_blocks.data()),
                         address(c.triangles.data())};
+    return kDone;
+  });
+}
+
+/// Computes the surface of a scan from scratch; what that changes is among the next changes().
+TERRACE_EXPORT(restore) int terrace_restore() {
+  return guarded([&] {
+    module().scene->restore();
     return kDone;
   });
 }

@@ -12,6 +12,8 @@
 #include <terrace/terrain/store_view.hpp>
 #include <terrace/tri/geomorph.hpp>
 
+#include "body_normals.hpp"
+
 namespace terrace::viewer {
 namespace {
 
@@ -73,8 +75,9 @@ template <class Shown>
 class SceneOf final : public Scene {
  public:
   using View = terrain::StoreView<Shown>;
-  static constexpr bool kTriangles = std::is_integral_v<Shown>;
-  using Vertex = std::conditional_t<kTriangles, SceneVertex, ScenePoint>;
+  static constexpr bool kRaster = std::is_integral_v<Shown>;
+  static constexpr bool kTriangles = !std::is_same_v<Shown, tri::PointCloud>;
+  using Vertex = std::conditional_t<kRaster, SceneVertex, ScenePoint>;
 
   SceneOf(const stream::Store& store, const stream::LinearMap& ground,
           const tri::ViewOptions& options,
@@ -82,7 +85,7 @@ class SceneOf final : public Scene {
       : store_(store), view_(store, ground, options, given), bounds_(store.bounds()) {
     vertices_.reserve(options.max_points);
     if constexpr (kTriangles) triangles_.reserve(2 * options.max_points);
-    if constexpr (!kTriangles) {
+    if constexpr (!kRaster) {
       std::vector<std::byte> records;
       for (const tri::VertexId vertex : mesh().all_vertices()) {
         const auto record = view_.attributes(vertex);
@@ -131,6 +134,9 @@ class SceneOf final : public Scene {
   }
   [[nodiscard]] std::span<const stream::ByteRange> missing() const override {
     return view_.missing();
+  }
+  void restore() override {
+    if constexpr (kTriangles && !kRaster) apply(view_.restore(), 0);
   }
   [[nodiscard]] std::uint64_t hash() const override { return mesh().hash(); }
   [[nodiscard]] std::optional<SceneHit> pick(const Point3& origin, const Point3& direction,
@@ -192,6 +198,7 @@ class SceneOf final : public Scene {
     vertices_.grow(mesh().vertex_slots());
     listed_.resize(vertices_.size());
     if constexpr (kTriangles) triangles_.grow(mesh().triangle_slots());
+    if constexpr (kTriangles && !kRaster) normals_.grow(vertices_.size());
   }
   /// Without sliding.
   void place(tri::VertexId vertex) {
@@ -201,7 +208,7 @@ class SceneOf final : public Scene {
     v.y = static_cast<float>(p[1]);
     v.z = static_cast<float>(p[2]);
     v.level = static_cast<std::uint8_t>(view_.model().level(vertex));
-    if constexpr (kTriangles) {
+    if constexpr (kRaster) {
       v.start_z = v.z;
       v.start_time = -1e9F;
     } else {
@@ -210,6 +217,7 @@ class SceneOf final : public Scene {
       v.group = colour.group;
       v.intensity = colour.intensity;
     }
+    if constexpr (kTriangles && !kRaster) normals_.place(slot(vertex), mesh().point(vertex));
   }
   template <class Delta>
   void apply(const Delta& delta, double time);
@@ -220,6 +228,7 @@ class SceneOf final : public Scene {
       corners[i] = slot(vertices[i]);
       list(vertices[i]);
     }
+    if constexpr (!kRaster) normals_.add(corners);
   }
   void list(tri::VertexId vertex) {
     if (slot(vertex) >= listed_.size() || listed_[slot(vertex)]) return;
@@ -254,6 +263,7 @@ class SceneOf final : public Scene {
   std::array<double, 2> after_rate_{};
   double after_ = 0, came_ = 0, went_ = 0;  ///< since the changes were last taken
   tri::Geomorph2<std::int32_t> morph_;      // of rasters
+  BodyNormals normals_;                     // of surfaces in space
 };
 
 template <class Shown>
@@ -262,6 +272,7 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
   grow();
   if constexpr (kTriangles) {
     for (const tri::TriangleId triangle : delta.changes.removed_triangles) {
+      if constexpr (!kRaster) normals_.remove(triangles_[slot(triangle)]);
       triangles_.change(slot(triangle)) = {};
     }
   }
@@ -275,12 +286,16 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
     for (const auto& corners : delta.changes.removed_corners) {
       for (const tri::VertexId vertex : corners) list(vertex);
     }
-    for (const tri::VertexId vertex : delta.reassigned) {
-      list(vertex);
-      mesh().adjacent(vertex, ring_);
-      for (const tri::VertexId other : ring_) list(other);
+    if constexpr (kRaster) {
+      for (const tri::VertexId vertex : delta.reassigned) {
+        list(vertex);
+        mesh().adjacent(vertex, ring_);
+        for (const tri::VertexId other : ring_) list(other);
+      }
     }
     renew_normals();
+  }
+  if constexpr (kRaster) {
     if (delta.changes.added_vertices.empty() && delta.reassigned.empty()) return;
     morph_.make(view_.model(), delta, false);
     slide(morph_.added, time);
@@ -290,7 +305,14 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
 
 template <class Shown>
 void SceneOf<Shown>::renew_normals() {
-  if constexpr (kTriangles) {
+  if constexpr (kTriangles && !kRaster) {
+    for (const tri::VertexId vertex : without_normal_) {
+      listed_[slot(vertex)] = false;
+      if (mesh().alive(vertex)) vertices_.change(slot(vertex)).normal = normals_[slot(vertex)];
+    }
+    without_normal_.clear();
+  }
+  if constexpr (kRaster) {
     for (const tri::VertexId vertex : without_normal_) {
       listed_[slot(vertex)] = false;
       if (!mesh().alive(vertex)) continue;
@@ -398,7 +420,7 @@ template <class Shown>
 std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from,
                                                            const Point3& to) const {
   std::vector<std::array<double, 2>> line;
-  if constexpr (kTriangles) {
+  if constexpr (kRaster) {
     const double dx = to[0] - from[0], dy = to[1] - from[1];
     const double length = std::sqrt(dx * dx + dy * dy);
     if (!(length > 0)) return line;
@@ -493,11 +515,16 @@ std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::Lin
   options.max_points = max_points;
   options.max_cached_bytes = std::size_t{128} << 20;
   options.model.reserve = max_points;
+#ifdef TERRACE_VIEWER_BODY
+  return std::make_unique<SceneOf<tri::DynamicSurface<std::int32_t>>>(store, ground, options,
+                                                                      given);
+#else
   if (store.schema().grid) {
     options.model.old_heights = true;  // for the slides
     return std::make_unique<SceneOf<std::int32_t>>(store, ground, options, given);
   }
   return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options, given);
+#endif
 }
 
 }  // namespace terrace::viewer

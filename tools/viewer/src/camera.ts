@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// A camera that turns about a place on the ground: metres east, north and up, angles in degrees.
+/// A camera that turns about a place on the ground, or about a body from any side: metres east, north and up, angles in
+/// degrees.
 
 export type Vec3 = [number, number, number];
 
@@ -24,17 +25,23 @@ export class OrbitCamera {
   distance = 1;
   least = 1;     ///< distances
   most = 1e9;
+  body = false;  ///< no ground: it turns below, too, and moves in the plane of the picture
+  yUp = false;   ///< of a body: north is up, and east stays
+
+  private turned(v: Vec3): Vec3 {
+    return this.body && this.yUp ? [v[0], v[2], -v[1]] : v;
+  }
 
   get direction(): Vec3 {
     const a = this.azimuth * RADIANS, t = this.tilt * RADIANS;
-    return [Math.sin(a) * Math.cos(t), Math.cos(a) * Math.cos(t), -Math.sin(t)];
+    return this.turned([Math.sin(a) * Math.cos(t), Math.cos(a) * Math.cos(t), -Math.sin(t)]);
   }
   get eye(): Vec3 {
     return add(this.target, this.direction, -this.distance);
   }
   get right(): Vec3 {
     const a = this.azimuth * RADIANS;
-    return [Math.cos(a), -Math.sin(a), 0];
+    return this.turned([Math.cos(a), -Math.sin(a), 0]);
   }
   get up(): Vec3 {
     return cross(this.right, this.direction);
@@ -45,18 +52,26 @@ export class OrbitCamera {
     const extent = Math.max(length(size), 1e-3);
     this.target = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2, (box[2] + box[5]) / 2];
     this.azimuth = 0;
-    this.tilt = 42;
-    this.distance = 0.4 * extent / Math.tan(FOV / 2 * RADIANS) / Math.min(1, aspect);
+    this.tilt = this.body ? 12 : 42;
+    this.distance = (this.body ? 0.55 : 0.4) * extent / Math.tan(FOV / 2 * RADIANS) / Math.min(1, aspect);
     this.least = extent * 1e-5;
     this.most = extent * 8;
   }
   orbit(turn: number, tilt: number): void {
     this.azimuth = (this.azimuth + turn + 360) % 360;
-    this.tilt = Math.min(MOST_TILT, Math.max(LEAST_TILT, this.tilt + tilt));
+    this.tilt = this.within(this.tilt + tilt);
+  }
+  /// The nearest tilt that there is.
+  within(tilt: number): number {
+    return Math.min(MOST_TILT, Math.max(this.body ? -MOST_TILT : LEAST_TILT, tilt));
   }
   /// By pixels of a picture of this height; the ground follows the pointer.
   pan(right: number, down: number, height: number): void {
     const metres = 2 * this.distance * Math.tan(FOV / 2 * RADIANS) / height;
+    if (this.body) {
+      this.target = add(add(this.target, this.right, -right * metres), this.up, down * metres);
+      return;
+    }
     const a = this.azimuth * RADIANS;
     const forward: Vec3 = [Math.sin(a), Math.cos(a), 0];
     const steep = Math.max(0.25, Math.sin(this.tilt * RADIANS));
@@ -74,8 +89,8 @@ export class OrbitCamera {
     const share = 1 - this.distance / before;
     const ray = this.ray(x, y, aspect);
     const old = add(this.target, this.direction, -before);
-    // Where the ray meets the level of the target; at the horizon only straight ahead.
-    const drop = (this.target[2] - old[2]) / ray[2];
+    // Where the ray meets the level of the target, or the plane through it; at the horizon only straight ahead.
+    const drop = this.body ? before / dot(ray, this.direction) : (this.target[2] - old[2]) / ray[2];
     if (!(drop > 0) || drop > 6 * before) return;
     const place = add(old, ray, drop);
     this.target = add(this.target, add(place, this.target, -1), share);

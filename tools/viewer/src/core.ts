@@ -49,10 +49,14 @@ export interface Hit {
   attributes: number[];  ///< stored values, in the manifest's order; empty if unknown
 }
 
+/// What a store is shown as.
+export type Kind = 'raster'|'points'|'surface';
+
 /// The scene as a whole.
 export interface Opened {
   box: number[];
-  triangles: boolean;
+  kind: Kind;
+  scan: boolean;  ///< of a body, so that it can be shown by its surface
   /// What points can be drawn by, and the classes that occur.
   colours: {rgb: boolean, intensity: boolean, classes: number[]};
 }
@@ -81,6 +85,7 @@ interface Exports {
   open(maxPoints: number): number;
   frame(): number;
   changes(): number;
+  restore(): number;
   hash(): number;
   pick(): number;
   profile(): number;
@@ -94,9 +99,10 @@ export class Core {
   private lacking: ByteRange[] = [];  ///< by the last frame
   private readonly buffers: ArrayBuffer[] = [];  ///< for changes to come
 
-  private constructor(private readonly wasm: Exports) {}
+  private constructor(private readonly wasm: Exports, private readonly kind?: Kind) {}
 
-  static async load(bytes: BufferSource): Promise<Core> {
+  /// kind: what the module shows, if it shows but one.
+  static async load(bytes: BufferSource, kind?: Kind): Promise<Core> {
     let memory: WebAssembly.Memory;
     const imports = {
       env: {emscripten_notify_memory_growth: () => {}},
@@ -114,7 +120,7 @@ export class Core {
     const wasm = instance.exports as unknown as Exports;
     memory = wasm.memory;
     wasm._initialize();
-    return new Core(wasm);
+    return new Core(wasm, kind);
   }
 
   addFile(name: string, bytes: number): void {
@@ -133,7 +139,8 @@ export class Core {
     const n = this.numbers(12);
     return {
       box: n.slice(0, 6),
-      triangles: n[6] === 1,
+      kind: this.kind ?? (n[6] === 1 ? 'raster' : 'points'),
+      scan: n[7] === 1,
       colours: {rgb: n[8] === 1, intensity: n[10] === 1, classes: this.numbers(12 + n[11]).slice(12)}
     };
   }
@@ -186,6 +193,10 @@ export class Core {
   /// Takes the buffer of changes back that are done with: new ones are slow to come by.
   recycle(buffer: ArrayBuffer): void {
     if (this.buffers.length < MOST_BUFFERS) this.buffers.push(buffer);
+  }
+  /// Computes the surface of a scan from scratch; what that changes is among the next changes.
+  restore(): void {
+    this.check(this.wasm.restore());
   }
   hash(): string {
     this.check(this.wasm.hash());

@@ -6,7 +6,8 @@ import type {Stats} from './ranges';
 import type {Manifest} from './store';
 
 export type ToWorker =
-    |{type: 'open', wasm: string, store: string, start: string, maxPoints: number}
+    |{type: 'open', wasm: string, body: string, asPoints: boolean, store: string, start: string, maxPoints: number}
+    |{type: 'show', asPoints: boolean}  ///< how to show a scan
     |{type: 'view', camera: Camera, serial: number}
     |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}

@@ -11,6 +11,8 @@ export const SLOPE: Stop[] = ramps.slope;
 export const LEVELS: Stop[] =
     [[0, 68, 34, 112], [0.25, 49, 104, 142], [0.5, 53, 183, 121], [0.75, 180, 221, 44], [1, 253, 231, 80]];
 export const GREYS: Stop[] = [[0, 28, 30, 34], [1, 245, 245, 240]];
+/// Surfaces without other colours, as `terrace render` draws them.
+export const PLAIN: Stop[] = [[0, 205, 205, 200], [1, 205, 205, 200]];
 /// The colours of classes; after the last they begin again.
 export const CATEGORIES = ramps.categories;
 export const LIGHT = ramps.light;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// Draws the scene by WebGL 2 from buffers that are indexed by the core's slots.
 
-import {BLOCK, type Changes, type State, VERTEX_BYTES} from './core';
-import type {OrbitCamera} from './camera';
-import {CATEGORIES, GREYS, heightStops, LEVELS, LIGHT, SLOPE, type Stop, texels} from './ramps';
+import {BLOCK, type Changes, type Kind, type State, VERTEX_BYTES} from './core';
+import {add, dot, type OrbitCamera, unit, type Vec3} from './camera';
+import {CATEGORIES, GREYS, heightStops, LEVELS, LIGHT, PLAIN, SLOPE, type Stop, texels} from './ramps';
 
-export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity'] as const;
+export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity', 'grey'] as const;
 export type Colour = typeof COLOURS[number];
 
 export interface Look {
@@ -26,10 +26,10 @@ layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in float level;
 layout(location = 3) in vec2 start;
-layout(location = 4) in vec3 rgb;        // of points, in the bytes of the normal
-layout(location = 5) in vec2 attributes; // of points, in those of the start: class, intensity
+layout(location = 4) in vec3 rgb;        // of points and surfaces, in the bytes of the start
+layout(location = 5) in vec2 attributes; // likewise: class, intensity
 uniform mat4 matrix;
-uniform bool points;
+uniform bool slides;
 uniform float time, pointSize;
 out vec3 at;
 out vec3 up;
@@ -38,7 +38,7 @@ out vec3 own;
 out vec2 attributesOf;
 void main() {
   at = place;
-  if (!points) {
+  if (slides) {
     float t = clamp((time - start.y) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0);
     at.z = mix(start.x, place.z, t * t * (3.0 - 2.0 * t));
   }
@@ -61,7 +61,9 @@ uniform sampler2D ramp;
 uniform int mode;  // as in COLOURS; -1 for the wire
 uniform vec2 heights;
 uniform float top;
-uniform bool lit;
+uniform int lit;   // 0 not, 1 as a map, 2 as a body
+uniform vec3 axis;  // upward
+uniform float flatLight;  // on what faces the eye
 uniform vec4 wire;
 uniform vec3 sun;
 uniform vec3 sky;
@@ -73,16 +75,18 @@ void main() {
     colour = wire;
     return;
   }
-  vec3 n = lit ? normalize(up) : vec3(0.0, 0.0, 1.0);
-  float share = mode == 0 ? (at.z - heights.x) / max(heights.y - heights.x, 1e-6)
+  vec3 n = lit > 0 ? normalize(up) : vec3(0.0, 0.0, 1.0);
+  float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-6)
       : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
       : mode == 2 ? 1.0 - levelOf / max(top, 1.0)
       : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
       : attributesOf.y;
   vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
-  if (lit) {
-    // As the command's pictures have it: flat ground keeps its tint, slopes toward the light grow paler, the others darker.
-    float light = ${LIGHT.ambient.toFixed(2)} + ${((1 - LIGHT.ambient) * LIGHT.strength).toFixed(4)} * max(dot(n, sun), 0.0) / sun.z;
+  if (lit > 0) {
+    // As the command's pictures have it: what faces the eye (the ground of a map) keeps its tint, slopes toward the light grow
+    // paler, the others darker. A body has two sides.
+    if (lit == 2 && dot(n, eye - at) < 0.0) n = -n;
+    float light = ${LIGHT.ambient.toFixed(2)} + ${((1 - LIGHT.ambient) * LIGHT.strength).toFixed(4)} * max(dot(n, sun), 0.0) / flatLight;
     base = light <= 1.0 ? base * light : base + (1.0 - base) * min(light - 1.0, 1.0);
   }
   float far = 1.0 - exp(-pow(distance(at, eye) / haze, 2.0));
@@ -140,7 +144,7 @@ export class Renderer {
   private state: State|null = null;
   private box = [0, 0, 0, 1, 1, 1];
   private top = 1;
-  private asTriangles = true;
+  private kind: Kind = 'raster';
   private slidingUntil = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -165,7 +169,8 @@ export class Renderer {
       level: this.ramp(LEVELS),
       rgb: this.ramp(GREYS),
       class: this.ramp(categories),
-      intensity: this.ramp(GREYS)
+      intensity: this.ramp(GREYS),
+      grey: this.ramp(PLAIN)
     };
     gl.enable(gl.DEPTH_TEST);
     this.clear();
@@ -185,17 +190,17 @@ export class Renderer {
     this.linesStale = true;
     this.state = null;
   }
-  show(box: number[], top: number, triangles: boolean): void {
+  show(box: number[], top: number, kind: Kind, scan: boolean): void {
     this.box = box;
     this.top = top;
-    this.asTriangles = triangles;
-    this.fill(this.ramps.height, heightStops(box[2], box[5]));
+    this.kind = kind;
+    this.fill(this.ramps.height, scan ? heightStops(0, 1) : heightStops(box[2], box[5]));
   }
   apply(state: State, changes: Changes, time: number): void {
     this.state = state;
     if (changes.vertexBlocks.length > 0) {
       this.vertices.put(changes.vertexBlocks, changes.vertices, state.vertexSlots);
-      this.slidingUntil = time + SLIDE_SECONDS;
+      if (this.kind === 'raster') this.slidingUntil = time + SLIDE_SECONDS;
     }
     if (changes.triangleBlocks.length > 0) {
       const bytes = new Uint8Array(changes.triangles.buffer, changes.triangles.byteOffset, changes.triangles.byteLength);
@@ -249,21 +254,27 @@ export class Renderer {
     gl.uniformMatrix4fv(this.uniform('matrix'), false, camera.matrix(aspect, near, far));
     gl.uniform1f(this.uniform('time'), time);
     gl.uniform1f(this.uniform('pointSize'), look.pointSize);
-    gl.uniform2f(this.uniform('heights'), box[2], box[5]);
+    const yUp = camera.body && camera.yUp;
+    gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
+    gl.uniform2f(this.uniform('heights'), yUp ? box[1] : box[2], yUp ? box[4] : box[5]);
     gl.uniform1f(this.uniform('top'), this.top);
-    gl.uniform1i(this.uniform('lit'), this.asTriangles ? 1 : 0);
-    // Cartographic light from the upper left, turned with the viewer.
+    gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);
+    // Cartographic light from the upper left, turned with the viewer; on a body from beside the eye.
     const turn = (camera.azimuth + LIGHT.turn) * Math.PI / 180, elevation = LIGHT.elevation * Math.PI / 180;
-    gl.uniform3f(this.uniform('sun'), Math.sin(turn) * Math.cos(elevation), Math.cos(turn) * Math.cos(elevation), Math.sin(elevation));
+    const toward = add([0, 0, 0], camera.direction, -1), surface = this.kind === 'surface';
+    const sun: Vec3 = surface ? unit(add(add(toward, camera.up, 0.45), camera.right, -0.45)) :
+                                [Math.sin(turn) * Math.cos(elevation), Math.cos(turn) * Math.cos(elevation), Math.sin(elevation)];
+    gl.uniform3f(this.uniform('sun'), ...sun);
+    gl.uniform1f(this.uniform('flatLight'), surface ? dot(sun, toward) : sun[2]);
     gl.uniform3f(this.uniform('sky'), sky[0], sky[1], sky[2]);
     gl.uniform3f(this.uniform('eye'), eye[0], eye[1], eye[2]);
-    gl.uniform1f(this.uniform('haze'), extent * 2.5);
+    gl.uniform1f(this.uniform('haze'), extent * (camera.body ? 100 : 2.5));
     const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
     gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
-    gl.uniform1i(this.uniform('points'), this.asTriangles ? 0 : 1);
+    gl.uniform1i(this.uniform('slides'), this.kind === 'raster' ? 1 : 0);
     gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
-    if (!this.asTriangles) {
+    if (this.kind === 'points') {
       gl.bindVertexArray(this.surface);
       gl.drawArrays(gl.POINTS, 0, this.state.vertexSlots);
       return;
@@ -321,8 +332,8 @@ export class Renderer {
     gl.vertexAttribPointer(1, 3, gl.BYTE, true, VERTEX_BYTES, 12);
     gl.vertexAttribPointer(2, 1, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 15);
     gl.vertexAttribPointer(3, 2, gl.FLOAT, false, VERTEX_BYTES, 16);
-    gl.vertexAttribPointer(4, 3, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 12);
-    gl.vertexAttribPointer(5, 2, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 16);
+    gl.vertexAttribPointer(4, 3, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 16);
+    gl.vertexAttribPointer(5, 2, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 19);
     for (let i = 0; i < 6; ++i) gl.enableVertexAttribArray(i);
     gl.bindVertexArray(null);
     return array;

@@ -2,7 +2,7 @@
 /// The page: what the user does goes to the camera and the worker, what comes back to the renderer.
 
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
-import type {Hit, Opened} from './core';
+import type {Hit, Kind, Opened} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {CATEGORIES, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
 import {type Colour, COLOURS, type Look, Renderer} from './render';
@@ -41,7 +41,9 @@ class Viewer {
   private worker: Worker|null = null;
   private manifest: Manifest|null = null;
   private box: number[] = [];
-  private asTriangles = true;
+  private kind: Kind = 'raster';
+  private scan = false;     ///< of a body
+  private asPoints = false; ///< how a scan is to be shown
   private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
   private picks = new Map<number, (hit: Hit|null) => void>();
   private hashes = new Map<number, (hash: string) => void>();
@@ -108,7 +110,8 @@ class Viewer {
       triangles: this.status?.state.triangles ?? 0,
       bytes: this.status?.stats.bytes ?? 0,
       requests: this.status?.stats.requests ?? 0,
-      outlined: this.renderer.outlined
+      outlined: this.renderer.outlined,
+      kind: this.kind
     };
   }
   /// For tests: the view of a recorded flight.
@@ -143,6 +146,8 @@ class Viewer {
     this.tell({
       type: 'open',
       wasm: at('core.wasm'),
+      body: at('body.wasm'),
+      asPoints: this.asPoints,
       store: at(`stores/${encodeURIComponent(name)}/`),
       start: at(`stores/${encodeURIComponent(name)}.start`),
       maxPoints: MOST_POINTS
@@ -156,30 +161,43 @@ class Viewer {
       case 'progress':
         element('progress-text').textContent = `Loading, ${readable(message.bytes)}`;
         break;
-      case 'opened':
+      case 'opened': {
+        const again = this.manifest !== null;  // the same scan, shown otherwise
+        if (again) this.renderer.clear();
         this.manifest = message.manifest;
         this.box = message.scene.box;
-        this.asTriangles = message.scene.triangles;
+        this.kind = message.scene.kind;
+        this.scan = this.camera.body = message.scene.scan;
         this.colours = message.scene.colours;
         element<HTMLInputElement>('level').max = String(message.manifest.levels.length - 1);
         element('with-level').hidden = message.manifest.levels.length < 2;
         if (this.level !== 255) this.level = Math.min(this.level, message.manifest.levels.length - 1);
-        this.renderer.show(this.box, message.manifest.levels.length - 1, this.asTriangles);
-        this.camera.fit(this.box, this.aspect);
-        if (first) this.applyLink();
-        element('with-wire').hidden = !this.asTriangles;
-        element('with-size').hidden = this.asTriangles;
-        if (!this.offers(this.look.colour) || (this.colours.rgb && !this.link.has('c'))) {
-          this.look.colour = this.colours.rgb ? 'rgb' : 'height';
+        this.renderer.show(this.box, message.manifest.levels.length - 1, this.kind, this.scan);
+        if (!again) {
+          // Most scans have Y upward; what is tallest along Z stands on it.
+          const [x, y, z] = [0, 1, 2].map(i => this.box[i + 3] - this.box[i]);
+          if (!first || !this.link.has('u')) this.camera.yUp = z <= 1.2 * Math.max(x, y);
+          this.camera.fit(this.box, this.aspect);
+        }
+        if (first && !again) this.applyLink();
+        element('with-wire').hidden = this.kind === 'points';
+        element('with-size').hidden = this.kind !== 'points';
+        element('as').hidden = element('upright').hidden = !this.scan;
+        element('keys').textContent = this.scan ?
+            'Drag to turn, right-drag or Ctrl-drag to move, wheel or pinch to zoom, click for a point.' :
+            'Drag to move, right-drag or Ctrl-drag to turn, wheel or pinch to zoom, click for the height.';
+        if (!this.offers(this.look.colour) || (!again && (this.colours.rgb || this.scan) && !this.link.has('c'))) {
+          this.look.colour = this.colours.rgb ? 'rgb' : this.kind === 'surface' ? 'grey' : 'height';
         }
         for (const colour of COLOURS) element(`by-${colour}`).hidden = !this.offers(colour);
         this.showControls();
         this.sendView();
         break;
+      }
       case 'frame': {
         // The clock of the worker has another origin; slides count from now.
         const shift = this.now - message.time;
-        if (this.asTriangles && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
+        if (this.kind === 'raster' && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
         this.renderer.apply(message.state, message.changes, this.now);
         this.status = message;
         if (this.hit && message.changes.vertexBlocks.length > 0) this.followSurface(400);
@@ -287,7 +305,7 @@ class Viewer {
     const s = this.status;
     if (!s) return;
     const parts = [`<b>${count(s.state.points)}</b> points`];
-    if (this.asTriangles) parts.push(`<b>${count(s.state.triangles)}</b> triangles`);
+    if (this.kind !== 'points') parts.push(`<b>${count(s.state.triangles)}</b> triangles`);
     parts.push(`<b>${readable(s.stats.bytes)}</b>`);
     parts[parts.length - 1] += `<span class="wide"> · <b>${count(s.stats.requests)}</b> requests · ` +
         `<b>${this.frameTime.toFixed(0)}</b> ms a frame</span>`;
@@ -297,13 +315,14 @@ class Viewer {
   /// Whether the store can be drawn by it.
   private offers(colour: Colour): boolean {
     const {rgb, intensity, classes} = this.colours;
-    return {height: true, slope: this.asTriangles, level: true, rgb, class: classes.length > 0, intensity}[colour];
+    const raster = this.kind === 'raster', grey = this.kind === 'surface';
+    return {height: true, slope: raster, level: true, rgb, class: classes.length > 0, intensity, grey}[colour];
   }
   private legend(): void {
     if (!this.manifest) return;
     const colour = this.look.colour;
     const ramps: Partial<Record<Colour, Stop[]>> =
-        {height: heightStops(this.box[2], this.box[5]), slope: SLOPE, level: LEVELS, intensity: GREYS};
+        {height: this.scan ? heightStops(0, 1) : heightStops(this.box[2], this.box[5]), slope: SLOPE, level: LEVELS, intensity: GREYS};
     const ramp = ramps[colour];
     element('legend').hidden = !ramp;
     element('classes').hidden = colour !== 'class';
@@ -315,7 +334,7 @@ class Viewer {
     }));
     if (!ramp) return;
     const texts: Partial<Record<Colour, [string, string]>> = {
-      height: [metres(this.box[2]), metres(this.box[5])],
+      height: this.scan ? ['low', 'high'] : [metres(this.box[2]), metres(this.box[5])],
       slope: ['0°', '60°'],
       level: ['coarse', 'fine'],
       intensity: ['weak', 'strong']
@@ -334,13 +353,12 @@ class Viewer {
     const world = worldPoint(this.manifest, hit.stored);
     const digits = crs.geographic ? 6 : 2;
     const unit = this.manifest.coordinates[2].unit;
-    const rows: Array<[string, string]> = [
+    const rows: Array<[string, string]> = this.scan ? world.map((c, i): [string, string] => ['XYZ'[i], this.plain(c)]) : [
       [crs.geographic ? 'Longitude' : 'East', world[0].toFixed(digits)],
       [crs.geographic ? 'Latitude' : 'North', world[1].toFixed(digits)],
-      ['Height', `${world[2].toFixed(2)}${unit ? ` ${unit === 'metre' ? 'm' : unit}` : ''}`],
-      ['Level', `${hit.level}`],
-      ['Cluster', `${hit.clusterLevel}/${hit.clusterOrdinal}`]
+      ['Height', `${world[2].toFixed(2)}${unit ? ` ${unit === 'metre' ? 'm' : unit}` : ''}`]
     ];
+    rows.push(['Level', `${hit.level}`], ['Cluster', `${hit.clusterLevel}/${hit.clusterOrdinal}`]);
     if (crs.epsg) rows.push(['CRS', `EPSG:${crs.epsg}`]);
     this.manifest.attributes.forEach((channel, i) => {
       if (i >= hit.attributes.length) return;
@@ -350,7 +368,7 @@ class Viewer {
     });
     if (this.before) {
       const way = add(hit.place as Vec3, this.before.place as Vec3, -1);
-      rows.push(['From the last', `${metres(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${metres(Math.abs(way[2]))}`]);
+      rows.push(['From the last', this.scan ? this.plain(length(way)) : `${metres(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${metres(Math.abs(way[2]))}`]);
     }
     element('place-text').replaceChildren(...rows.flatMap(([name, value]) => {
       const dt = document.createElement('dt'), dd = document.createElement('dd');
@@ -362,6 +380,11 @@ class Viewer {
     element('profile').hidden = true;
     this.redraw = true;
     this.followSurface(0);
+  }
+  /// A number of a scan without units, to a hundred-thousandth of its size.
+  private plain(n: number): string {
+    const size = Math.max(...[0, 1, 2].map(i => this.box[i + 3] - this.box[i]));
+    return n.toFixed(Math.min(12, Math.max(0, 5 - Math.floor(Math.log10(size || 1)))));
   }
   private closePlace(): void {
     this.hit = this.before = null;
@@ -375,9 +398,9 @@ class Viewer {
     clearTimeout(this.detailTimer);
     this.detailTimer = window.setTimeout(() => {
       this.detailTimer = 0;
-      if (!this.hit || !this.asTriangles) return;
+      if (!this.hit || this.kind === 'points') return;
       this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
-      if (this.before) void this.showProfile(this.before.place, this.hit.place);
+      if (this.before && this.kind === 'raster') void this.showProfile(this.before.place, this.hit.place);
     }, delay);
   }
   private async showProfile(from: number[], to: number[]): Promise<void> {
@@ -425,6 +448,8 @@ class Viewer {
     const colour = this.link.get('c');
     if (COLOURS.includes(colour as Colour)) this.look.colour = colour as Colour;
     this.look.wire = this.link.get('w') === '1';
+    this.asPoints = this.link.get('p') === '1';
+    this.camera.yUp = this.link.get('u') !== 'z';
     const level = this.link.get('l');
     this.level = level !== null && /^\d{1,2}$/.test(level) ? Number(level) : 255;
     const error = Number(this.link.get('q'));
@@ -435,14 +460,16 @@ class Viewer {
     if (numbers.length !== 6 || !numbers.every(Number.isFinite) || numbers[5] <= 0) return;
     this.camera.target = [numbers[0], numbers[1], numbers[2]];
     this.camera.azimuth = numbers[3];
-    this.camera.tilt = Math.min(89.9, Math.max(2, numbers[4]));
+    this.camera.tilt = this.camera.within(numbers[4]);
     this.camera.distance = numbers[5];
   }
   private writeLink(): void {
     const c = this.camera;
-    const view = [...c.target.map(n => n.toFixed(2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
+    const view = [...c.target.map(n => this.scan ? this.plain(n) : n.toFixed(2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
     const parts = [`s=${encodeURIComponent(this.store)}`, `v=${view.join(',')}`, `c=${this.look.colour}`, `q=${this.error}`];
     if (this.look.wire) parts.push('w=1');
+    if (this.scan && this.asPoints) parts.push('p=1');
+    if (this.scan) parts.push(`u=${c.yUp ? 'y' : 'z'}`);
     if (this.level !== 255) parts.push(`l=${this.level}`);
     history.replaceState(null, '', `#${parts.join('&')}`);
   }
@@ -460,6 +487,8 @@ class Viewer {
       input.checked = input.value === this.look.colour;
     }
     element<HTMLInputElement>('wire').checked = this.look.wire;
+    element<HTMLInputElement>(this.asPoints ? 'as-points' : 'as-surface').checked = true;
+    element<HTMLInputElement>(this.camera.yUp ? 'up-y' : 'up-z').checked = true;
     element<HTMLInputElement>('detail').value = String(4 - Math.log2(this.error));
     element('detail-text').textContent = `within ${this.error} px`;
     const top = (this.manifest?.levels.length ?? 1) - 1;
@@ -467,8 +496,10 @@ class Viewer {
     element('level-text').textContent = this.level >= top ? 'the top' : `level ${this.level}`;
     this.legend();
   }
-  private change(): void {
+  private change(zoomed = false): void {
     this.moved = true;
+    // A body is turned about its middle until one goes nearer.
+    if (this.scan && !zoomed) return;
     this.pivoting = true;
     clearTimeout(this.pivotTimer);
     this.pivotTimer = window.setTimeout(() => void this.turnAboutWhatIsSeen(), 250);
@@ -495,7 +526,7 @@ class Viewer {
     canvas.addEventListener('pointerdown', event => {
       canvas.setPointerCapture(event.pointerId);
       pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
-      turning = event.button === 2 || event.button === 1 || event.ctrlKey || event.shiftKey;
+      turning = (event.button === 2 || event.button === 1 || event.ctrlKey || event.shiftKey) !== this.scan;
       travelled = pointers.size > 1 ? 1e9 : 0;
     });
     canvas.addEventListener('pointermove', event => {
@@ -511,21 +542,25 @@ class Viewer {
         const middle = {clientX: (event.clientX + other.x) / 2, clientY: (event.clientY + other.y) / 2};
         this.camera.zoom(before / Math.max(after, 1), ...this.at(middle), this.aspect);
         const degrees = (turn * 180 / Math.PI + 540) % 360 - 180;
-        this.camera.orbit(-degrees, 0);
-        this.camera.pan(dx / 2, 0, canvas.clientHeight);
-        this.camera.orbit(0, dy * 0.08);
-      } else if (turning) {
+        if (this.scan) {
+          this.camera.pan(dx / 2, dy / 2, canvas.clientHeight);
+        } else {
+          this.camera.orbit(-degrees, 0);
+          this.camera.pan(dx / 2, 0, canvas.clientHeight);
+          this.camera.orbit(0, dy * 0.08);
+        }
+      } else if (turning && travelled > 4) {
         this.camera.orbit(dx * 0.3, dy * 0.25);
       } else if (travelled > 4) {
         this.camera.pan(dx, dy, canvas.clientHeight);
       }
       last.x = event.clientX;
       last.y = event.clientY;
-      if (travelled > 4) this.change();
+      if (travelled > 4) this.change(pointers.size === 2);
     });
     const up = (event: PointerEvent) => {
       pointers.delete(event.pointerId);
-      if (event.type === 'pointerup' && travelled <= 4 && pointers.size === 0 && !turning && this.manifest) {
+      if (event.type === 'pointerup' && travelled <= 4 && pointers.size === 0 && turning === this.scan && this.manifest) {
         void this.pick(...this.at(event), 12).then(hit => this.showPlace(hit));
       }
     };
@@ -535,11 +570,11 @@ class Viewer {
       event.preventDefault();
       const lines = event.deltaMode === 1 ? 16 : 1;
       this.camera.zoom(Math.exp(Math.max(-240, Math.min(240, event.deltaY * lines)) * 0.0016), ...this.at(event), this.aspect);
-      this.change();
+      this.change(true);
     }, {passive: false});
     canvas.addEventListener('dblclick', event => {
       this.camera.zoom(0.5, ...this.at(event), this.aspect);
-      this.change();
+      this.change(true);
     });
     canvas.addEventListener('keydown', event => this.key(event));
 
@@ -553,6 +588,22 @@ class Viewer {
       this.look.wire = (event.target as HTMLInputElement).checked;
       this.changeLook();
     });
+    for (const points of [false, true]) {
+      element(points ? 'as-points' : 'as-surface').addEventListener('change', () => {
+        this.asPoints = points;
+        this.closePlace();
+        this.status = null;
+        this.tell({type: 'show', asPoints: points});
+        this.writeLink();
+      });
+    }
+    for (const yUp of [false, true]) {
+      element(yUp ? 'up-y' : 'up-z').addEventListener('change', () => {
+        this.camera.yUp = yUp;
+        this.fit();
+        this.legend();
+      });
+    }
     element('detail').addEventListener('input', event => {
       this.error = Math.round(100 * 2 ** (4 - Number((event.target as HTMLInputElement).value))) / 100;
       this.showControls();
@@ -644,7 +695,7 @@ class Viewer {
     if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     act();
-    this.change();
+    this.change('+=-'.includes(event.key));
   }
 }
 

@@ -9,6 +9,12 @@ import {type Manifest, parseManifest, parseStart} from './store';
 /// What a frame may take in the worker, in milliseconds, and what of it is kept in hand for what the core cannot foresee:
 /// garbage to collect, requests to start, other programs.
 const FRAME = 10, IN_HAND = 3;
+/// Points of a surface in space take so many times the work and memory of others.
+const SURFACE_COST = 4;
+/// Bytes of a scan that are kept for the other module at most.
+const MOST_GIVEN = 64 << 20;
+/// The surface is computed from scratch once nothing has changed for so many milliseconds.
+const REST = 700;
 /// Frames that the page may be behind.
 const AHEAD = 6;
 
@@ -34,6 +40,15 @@ async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBu
 
 class Session {
   private core!: Core;
+  private points!: Core;                ///< shows rasters and points
+  private surface: Core|null = null;    ///< shows the surface of a scan
+  private scan = false;
+  private asPoints: boolean;
+  private restored = false;             ///< just now
+  private followed = false;             ///< the surface has followed changes since it was computed from scratch
+  private restTimer: ReturnType<typeof setTimeout>|undefined;
+  private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< of a scan
+  private givenBytes = 0;
   private ranges!: Ranges;
   private manifest!: Manifest;
   private ground: number[] = [];
@@ -46,13 +61,15 @@ class Session {
   private scheduled = false;
   private idle = false;  ///< nothing to do before something new comes
 
-  constructor(private readonly request: ToWorker&{type: 'open'}) {}
+  constructor(private readonly request: ToWorker&{type: 'open'}) {
+    this.asPoints = request.asPoints;
+  }
 
   async open(): Promise<void> {
     try {
       const [wasm, bytes] =
           await Promise.all([fetchWhole(this.request.wasm, 'the viewer'), fetchWhole(this.request.start, 'the store')]);
-      this.core = await Core.load(wasm as BufferSource);
+      this.core = this.points = await Core.load(wasm as BufferSource);
       let start;
       try {
         start = await parseStart(bytes);
@@ -64,10 +81,10 @@ class Session {
       this.manifest = parseManifest(manifest.data);
       this.ground = start.ground;
       for (const [name, size] of this.manifest.files) this.core.addFile(name, size);
-      for (const part of start.parts) this.core.give(part.file, part.offset, part.data);
+      for (const part of start.parts) this.give(part.file, part.offset, part.data);
       this.ranges = new Ranges(
           this.request.store, this.manifest.files,
-          (range, data) => this.core.give(range.file, range.offset, data), fault => this.fail(fault.message),
+          (range, data) => this.give(range.file, range.offset, data), fault => this.fail(fault.message),
           () => this.wake());
       this.ranges.stats.requests = 1;
       this.ranges.stats.bytes = bytes.length;
@@ -89,6 +106,7 @@ class Session {
     this.wake();
   }
   view(camera: Camera, serial: number): void {
+    clearTimeout(this.restTimer);
     this.camera = camera;
     this.serial = serial;
     this.wake();
@@ -112,7 +130,17 @@ class Session {
     if (this.opened) this.core.pin(how);
     this.wake();
   }
+  /// Shows a scan by its surface or as points.
+  async show(asPoints: boolean): Promise<void> {
+    if (asPoints === this.asPoints || !this.scan) return;
+    this.asPoints = asPoints;
+    if (this.opened) await this.choose();
+  }
   hash(id: number): void {
+    if (this.opened && this.showsSurface) {
+      this.restore();
+      this.frame();
+    }
     post({type: 'hashed', id, hash: this.opened ? this.core.hash() : ''});
   }
 
@@ -149,20 +177,82 @@ class Session {
   /// Bytes whose checksum is wrong are fetched once more, past all caches.
   private suspect(error: Error): void {
     if (!(error instanceof CoreError) || ++this.damaged > 1) return this.fail(error.message);
-    for (const name of this.manifest.files.keys()) this.core.forget(name);
+    this.dropGiven();
+    for (const name of this.manifest.files.keys()) {
+      this.points.forget(name);
+      this.surface?.forget(name);
+    }
     this.ranges.distrust();
     this.schedule();
   }
+  private give(file: string, offset: number, data: Uint8Array): void {
+    // Whether it is a scan is known once the scene is open; few bytes come before that.
+    if (!this.opened || this.scan) {
+      this.given.push({file, offset, data});
+      this.givenBytes += data.length;
+      while (this.givenBytes > MOST_GIVEN && this.given.length > 1) this.givenBytes -= this.given.shift()!.data.length;
+    }
+    this.core.give(file, offset, data);
+  }
   private tryToOpen(): void {
-    const result = this.core.open(this.ground, this.request.maxPoints);
+    const maxPoints = Math.round(this.request.maxPoints / (this.showsSurface ? SURFACE_COST : 1));
+    const result = this.core.open(this.ground, maxPoints);
     if ('missing' in result) {
       post({type: 'progress', bytes: this.ranges.stats.bytes});
       this.ranges.want(result.missing, 0, performance.now());
       return;
     }
+    this.scan ||= result.scan;
+    if (this.scan && this.showsSurface === this.asPoints) {
+      void this.choose();
+      return;
+    }
+    if (!this.scan) this.dropGiven();
     this.opened = true;
-    post({type: 'opened', manifest: this.manifest, scene: result});
+    post({type: 'opened', manifest: this.manifest, scene: {...result, scan: this.scan}});
     this.schedule();
+  }
+  private dropGiven(): void {
+    this.given = [];
+    this.givenBytes = 0;
+  }
+  private get showsSurface(): boolean {
+    return this.core === this.surface;
+  }
+  /// Goes on with the module for what a scan is to be shown as, and with the bytes that are there.
+  private async choose(): Promise<void> {
+    this.opened = false;
+    clearTimeout(this.restTimer);
+    const asPoints = this.asPoints;
+    try {
+      if (!asPoints && this.surface === null) {
+        const core = await Core.load(await fetchWhole(this.request.body, 'the viewer') as BufferSource, 'surface');
+        for (const [name, size] of this.manifest.files) core.addFile(name, size);
+        this.surface ??= core;
+      }
+    } catch (error) {
+      return this.fail((error as Error).message);
+    }
+    if (asPoints !== this.asPoints) return;
+    this.core = asPoints ? this.points : this.surface!;
+    for (const {file, offset, data} of this.given) this.core.give(file, offset, data);
+    this.wake();
+  }
+  private restore(): void {
+    this.core.restore();
+    this.followed = false;
+    this.restored = true;
+  }
+  /// The surface of a scan as its points alone make it, once the camera rests.
+  private settle(settled: boolean, changed: boolean): void {
+    clearTimeout(this.restTimer);
+    this.followed ||= changed;
+    if (!settled || !this.followed) return;
+    this.restTimer = setTimeout(() => {
+      if (!this.opened || !this.showsSurface || this.failed) return;
+      this.restore();
+      this.wake();
+    }, REST);
   }
   private frame(): void {
     if (!this.camera) return;
@@ -172,6 +262,8 @@ class Session {
     this.ranges.want(missing, this.serial, begin);
     const milliseconds = performance.now() - begin;
     const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
+    if (this.showsSurface) this.settle(state.settled, changed && !this.restored);
+    this.restored = false;
     // What is missing wakes it again.
     this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);
     ++this.undrawn;
@@ -216,6 +308,9 @@ self.onmessage = event => {
       break;
     case 'pin':
       session?.pin(message.how);
+      break;
+    case 'show':
+      void session?.show(message.asPoints);
       break;
     case 'hash':
       session?.hash(message.id);

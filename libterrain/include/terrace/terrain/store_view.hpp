@@ -34,6 +34,14 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
   using type = tri::DynamicSurface<Coord>;
 };
 
+/// Whether the points of a store are taken for the scan of a body, to be shown by its surface: no
+/// raster, in no reference system, without classes as laser clouds have them, and the Delaunay
+/// triangles of their horizontal places, at the top, are steeper than 60 degrees by more than half
+/// of their area, as those between the two sides of a body are. ground: the linear map from stored
+/// coordinates to metres. O(n log n) for the n points of the top.
+/// Throws: stream::Error if the top is damaged; stream::MissingBytes.
+[[nodiscard]] bool is_scan(const stream::Store& store, const stream::LinearMap& ground);
+
 /// A store under a camera: clusters expand where the camera comes near and collapse where it has
 /// been, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
 /// large geometric data, section 8.4; the control is tri::ViewControl, which this feeds.)

@@ -209,11 +209,14 @@ void wrap_hole(Mesh<Kernel>& mesh) {
   wrap_rest(mesh, filling);
 }
 
+#ifdef TERRACE_TRI_CORE
 template void wrap_rest(Mesh<IntKernel>&, HoleFilling<IntKernel>&);
+template void wrap_hole(Mesh<IntKernel>&);
+#else
 template void wrap_rest(Mesh<DoubleKernel>&, HoleFilling<DoubleKernel>&);
 template void wrap_rest(Mesh<EllipticalKernel>&, HoleFilling<EllipticalKernel>&);
-template void wrap_hole(Mesh<IntKernel>&);
 template void wrap_hole(Mesh<DoubleKernel>&);
 template void wrap_hole(Mesh<EllipticalKernel>&);
+#endif
 
 }  // namespace terrace::tri::spatial

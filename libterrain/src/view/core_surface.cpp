@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/view_impl.hpp"
+
+/// Likewise for surfaces of scans, apart from core.cpp because they need the triangulation in
+/// space.
+
+namespace terrace::terrain {
+
+template class StoreView<tri::DynamicSurface<std::int32_t>>;
+
+}  // namespace terrace::terrain

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <terrace/tri/delaunay2.hpp>
+
+#include "terrace/terrain/store_source.hpp"
+#include "terrace/terrain/store_view.hpp"
+#include "view/view_frame.hpp"
+
+namespace terrace::terrain {
+
+bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
+  const stream::StoreSchema& schema = store.schema();
+  if (schema.grid || schema.crs.epsg != 0 || !schema.crs.wkt.empty()) return false;
+  for (const auto& attribute : schema.attributes) {
+    if (attribute.name == "classification") return false;
+  }
+  if (store.bounds().empty()) return false;
+  const ViewFrame frame(store, ground);
+  const ViewLattice lattice(store, frame);
+  StoreSource source(store);
+  const std::span<const stream::Point3> points =
+      source.read(tri::cluster_id(source.top(), 0)).positions;
+  std::vector<tri::Delaunay2<std::int32_t>::Point> places;
+  places.reserve(points.size());
+  std::vector<stream::Point3> nodes;
+  for (const stream::Point3& p : points) {
+    nodes.push_back(lattice.node(frame(p)));
+    places.push_back(
+        {static_cast<std::int32_t>(nodes.back()[0]), static_cast<std::int32_t>(nodes.back()[1])});
+  }
+  tri::Delaunay2<std::int32_t> triangulation;
+  const std::vector<tri::VertexId> vertices = triangulation.build(places);
+  std::vector<double> heights(triangulation.vertex_slots());
+  for (std::size_t i = 0; i < nodes.size(); ++i) heights[slot(vertices[i])] = nodes[i][2];
+  double steep = 0, all = 0;
+  for (const tri::TriangleId triangle : triangulation.all_triangles()) {
+    std::array<stream::Point3, 3> p;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const tri::VertexId vertex = triangulation.vertices(triangle)[i];
+      const auto place = triangulation.point(vertex);
+      p[i] = {static_cast<double>(place[0]), static_cast<double>(place[1]), heights[slot(vertex)]};
+    }
+    const stream::Point3 u{p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]},
+        v{p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]};
+    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2],
+                 z = u[0] * v[1] - u[1] * v[0];
+    const double area = std::sqrt(x * x + y * y + z * z);
+    all += area;
+    if (std::abs(z) < 0.5 * area) steep += area;
+  }
+  return steep > 0.5 * all;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/control.hpp"
+
+/// The model of a surface in space, and its control by a view, on integers. Apart from those of the
+/// plane, for which space is not needed.
+
+namespace terrace::tri {
+
+template class MultiresolutionModel<DynamicSurface<std::int32_t>>;
+template class ViewControl<DynamicSurface<std::int32_t>>;
+
+}  // namespace terrace::tri
