@@ -28,13 +28,14 @@ struct FewValues {
 
 Point2 place_of(std::uint64_t edge) { return {static_cast<double>(edge), 0.5}; }
 
-struct Segment {
+struct JoinerSegment {
   Crossing from, to;
 };
 
 /// Lines of some edges each, closed or not, and their segments, shuffled.
-std::vector<Segment> shuffled_segments(std::mt19937_64& random, std::vector<ContourLine>& lines) {
-  std::vector<Segment> segments;
+std::vector<JoinerSegment> shuffled_segments(std::mt19937_64& random,
+                                             std::vector<ContourLine>& lines) {
+  std::vector<JoinerSegment> segments;
   std::uint64_t edge = 0;
   for (int i = 0; i < 60; ++i) {
     ContourLine line{static_cast<std::int64_t>(random() % 3), random() % 2 == 0, {}};
@@ -67,7 +68,7 @@ TEST(LineJoiner, JoinsSegmentsInAnyOrder) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     std::vector<ContourLine> lines;
-    const std::vector<Segment> segments = shuffled_segments(random, lines);
+    const std::vector<JoinerSegment> segments = shuffled_segments(random, lines);
     std::map<Point2, ContourLine> expected;
     for (const ContourLine& line : lines) expected[line.points.front()] = line;
     std::uint64_t points = 0;
@@ -89,7 +90,7 @@ TEST(LineJoiner, JoinsSegmentsInAnyOrder) {
       ++later[segments[i].to.edge];
     }
     for (std::size_t i = 0; i < segments.size(); ++i) {
-      const Segment& s = segments[i];
+      const JoinerSegment& s = segments[i];
       joiner.add(s.from, place_of(s.from.edge), s.to, place_of(s.to.edge));
       if (i + 1 == half) {
         joiner.emit_whole([&](const Crossing& c) { return later.contains(c.edge); });

@@ -21,7 +21,7 @@ using spatial::EllipticalKernel;
 /// Three boxes with different ellipsoids within the bounding box of the points, two of them
 /// overlapping.
 template <class Coord>
-MetricField3 three_regions(const std::vector<std::array<Coord, 3>>& points) {
+MetricField3 three_spatial_regions(const std::vector<std::array<Coord, 3>>& points) {
   Space low{}, high{};
   for (std::size_t k = 0; k < 3; ++k) {
     low[k] = high[k] = static_cast<double>(points[0][k]);
@@ -222,7 +222,7 @@ TYPED_TEST(MetricTetrahedraTest, KeepWhatIsGuaranteed) {
       const auto points = make_points3<TypeParam>(kind, count, 41);
       Delaunay3<TypeParam> triangulation;
       triangulation.build(points);
-      const MetricField3 field = three_regions(points);
+      const MetricField3 field = three_spatial_regions(points);
       const MetricTetrahedra result = metric_tetrahedra(triangulation, field);
       const auto before = own_tetrahedra(triangulation);
       const auto after = corners_of_all(triangulation, result.tetrahedra);
@@ -240,7 +240,7 @@ TYPED_TEST(MetricTetrahedraTest, AreOfThePointsAlone) {
     if (kind == PointSet3::kCurves) continue;
     SCOPED_TRACE(name(kind));
     auto points = make_points3<TypeParam>(kind, 200, 42);
-    const MetricField3 field = three_regions(points);
+    const MetricField3 field = three_spatial_regions(points);
     Delaunay3<TypeParam> one;
     one.build(points);
     const MetricTetrahedra expected = metric_tetrahedra(one, field);
