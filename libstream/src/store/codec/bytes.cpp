@@ -3,8 +3,13 @@
 
 #include <array>
 
-#ifndef TERRACE_STREAM_PORTABLE_CRC
+#ifdef TERRACE_STREAM_PORTABLE_CRC
+// Computed at the start: in a module that is fetched, tables are bytes that no compression makes
+// fewer.
+#define TERRACE_CONSTANT
+#else
 #include <libdeflate.h>
+#define TERRACE_CONSTANT constexpr
 #endif
 
 namespace terrace::stream::store {
@@ -13,7 +18,7 @@ namespace {
 /// Tables of a CRC that takes the most significant bit first. [k][b]: what byte b followed by k
 /// zero bytes leaves in the register, so that eight bytes are taken at once ("slicing by eight").
 template <class Register>
-constexpr std::array<std::array<Register, 256>, 8> crc_tables(unsigned polynomial) {
+TERRACE_CONSTANT std::array<std::array<Register, 256>, 8> crc_tables(unsigned polynomial) {
   constexpr unsigned kBits = 8 * sizeof(Register), kTop = 1u << (kBits - 1);
   std::array<std::array<Register, 256>, 8> tables{};
   for (unsigned byte = 0; byte < 256; ++byte) {
@@ -25,11 +30,11 @@ constexpr std::array<std::array<Register, 256>, 8> crc_tables(unsigned polynomia
   }
   return tables;
 }
-constexpr auto kCrc16Tables = crc_tables<std::uint16_t>(0x11021);
-constexpr auto kCrc8Tables = crc_tables<std::uint8_t>(0x107);
+TERRACE_CONSTANT const auto kCrc16Tables = crc_tables<std::uint16_t>(0x11021);
+TERRACE_CONSTANT const auto kCrc8Tables = crc_tables<std::uint8_t>(0x107);
 
 /// The same for the CRC-32, which takes the least significant bit first.
-constexpr std::array<std::array<std::uint32_t, 256>, 8> kCrc32Tables = [] {
+TERRACE_CONSTANT std::array<std::array<std::uint32_t, 256>, 8> crc32_tables() {
   std::array<std::array<std::uint32_t, 256>, 8> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
     std::uint32_t crc = byte;
@@ -39,7 +44,8 @@ constexpr std::array<std::array<std::uint32_t, 256>, 8> kCrc32Tables = [] {
     }
   }
   return tables;
-}();
+}
+TERRACE_CONSTANT const auto kCrc32Tables = crc32_tables();
 
 }  // namespace
 
