@@ -158,7 +158,7 @@ class Stores(StoreCase):
         np.testing.assert_array_equal(terrace.xyz(some), self.points[order := np.argsort(
             np.where(self.classes == one, distances, np.inf))[:25]])
         self.assertTrue((self.classes[order] == one).all())
-        with self.assertRaises(ValueError):
+        with self.assertRaisesRegex(terrace.Error, "no 'height'"):
             self.scan.query(near=place, k=1, where='height of')
 
     def test_other_reference_systems(self):

@@ -45,7 +45,7 @@ class FrameReader final : public ClusterReader {
       const std::size_t kind = tri::level_of(request.cluster) > 0 ? 1 : 0;
       if (!meter_.has(members, kind) || missing_.size() >= kMostMissing) break;
       auto lacking = lacking_.find(request.cluster);
-      if (lacking == lacking_.end() || given_(lacking->second.front())) {
+      if (lacking == lacking_.end() || has_come(lacking->second.front())) {
         try {
           give(source_.load(request));
           meter_.spend(members, kind);
@@ -71,13 +71,18 @@ class FrameReader final : public ClusterReader {
     std::uint64_t told = 0;  ///< in which frame it was added to missing_
   };
 
+  /// Of bytes that were missing; who is not told looks again in the next frame.
+  [[nodiscard]] bool has_come(const stream::ByteRange& range) const {
+    return given_ && given_(range);
+  }
+
   /// False once the time is over.
   bool bring_record(tri::ClusterId id, double end, const GiveRecord& give_record) {
     const tri::ClusterId page = FramedSource::page_of(id);
     const bool same = page == page_;
     page_ = page;
     auto lacking = lacking_pages_.find(page);
-    if (lacking == lacking_pages_.end() || given_(lacking->second.range)) {
+    if (lacking == lacking_pages_.end() || has_come(lacking->second.range)) {
       // The next ones of a page take next to no time.
       if (!same && steady_seconds() > end) return false;
       try {
