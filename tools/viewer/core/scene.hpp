@@ -88,7 +88,7 @@ class Scene {
   virtual const SceneChanges& take_changes() = 0;
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const = 0;
   /// Computes a surface in space from scratch, which frames only follow: then it depends on the
-  /// points alone. 3 us per point natively, twice that in a browser. Nothing to do for others.
+  /// points alone. 3 us per point natively. Nothing to do for others.
   virtual void restore() = 0;
   /// The hash of the triangulation, or of the set of points.
   [[nodiscard]] virtual std::uint64_t hash() const = 0;
