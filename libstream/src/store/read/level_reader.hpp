@@ -55,7 +55,7 @@ class SequentialBytes {
   /// The bytes, with kPadding readable ones before and behind, until the next call. Requires that
   /// they exist.
   ByteView at(std::uint64_t offset, std::size_t size) {
-    if (offset < begin_ || offset + size > begin_ + size_) {
+    if (bytes_.empty() || offset < begin_ || offset + size > begin_ + size_) {
       const std::uint64_t left = file_.size() - offset;
       size_ = std::max(size, static_cast<std::size_t>(std::min<std::uint64_t>(left, kAtOnce)));
       begin_ = offset;
