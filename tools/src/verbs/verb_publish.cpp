@@ -30,9 +30,8 @@ class PublishCommand final : public Command {
     for (const std::string& path : stores_) stores.push_back(open_store(path));
     const Published published = publish(make_site(stores), stores, output_, common.force);
     Summary summary;
-    summary.json = {{"stores", stores.size()},
-                    {"files", published.files},
-                    {"bytes", published.bytes}};
+    summary.json = {
+        {"stores", stores.size()}, {"files", published.files}, {"bytes", published.bytes}};
     summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(published.files) + " files, " +
                    readable_bytes(published.bytes) + ", in " + readable_seconds(watch.seconds()) +

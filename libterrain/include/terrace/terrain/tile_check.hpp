@@ -47,8 +47,8 @@ bool is_tile_folder(const std::string& folder);
 /// neighbours share, across the antimeridian too, and the heights against every sample of
 /// the store if one is given. The result does not depend on the number of threads. Memory: of one
 /// row of tiles' borders, and of a tile and a part of its samples per thread; at least 176 MiB.
-/// Throws: stream::Error if there is no set, layer.json cannot be read, the store is damaged or the memory does not
-/// suffice; UsageError as write_tiles(); stream::Stopped.
+/// Throws: stream::Error if there is no set, layer.json cannot be read, the store is damaged or the
+/// memory does not suffice; UsageError as write_tiles(); stream::Stopped.
 TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context = {});
 
 }  // namespace terrace::terrain
