@@ -81,7 +81,7 @@ TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
   EXPECT_LT(read, index / 20);
 }
 
-/// Of a store whose index has many chapters, the contents of those that are near are read, once.
+/// In an index of many chapters the contents of those nearby are read, once, and no others.
 TEST(StoreQuery, ReadsTheContentsOfTheIndexThatAreNearAlone) {
   const TemporaryFolder folder;
   const std::vector<testing::Block> blocks =

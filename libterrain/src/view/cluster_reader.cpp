@@ -71,7 +71,8 @@ class FrameReader final : public ClusterReader {
     std::uint64_t told = 0;  ///< in which frame it was added to missing_
   };
 
-  /// Of bytes that were missing; who is not told looks again in the next frame.
+  /// Whether bytes that were missing are there now. Without `given` they are looked for once a
+  /// frame.
   [[nodiscard]] bool has_come(const stream::ByteRange& range) const {
     return given_ && given_(range);
   }

@@ -61,7 +61,7 @@ class FramedSource final : public tri::ClusterSource {
   const ViewLattice* lattice_;
   bool bounds_;
   std::vector<stream::Point3> nodes_;  ///< what the last read() shows, with a lattice
-  /// Of the records of the cluster being loaded: where, and in which bytes.
+  /// The index pages and bytes that the cluster being loaded still lacks.
   std::vector<tri::ClusterId> missing_pages_;
   std::vector<stream::ByteRange> missing_;
   std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;

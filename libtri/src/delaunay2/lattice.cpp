@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kFewestOnLattice = 24;
 /// Nor those whose box has so many more nodes than that.
 constexpr std::int64_t kMostSparse = 8;
-/// Of so many points one must be inside.
+/// At least one point in this many must have all eight neighbours.
 constexpr std::size_t kLeastInside = 4;
 
 /// In Triangle::corner[0], while squares are cut out.

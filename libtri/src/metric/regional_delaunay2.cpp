@@ -85,7 +85,7 @@ class Around {
   }
   [[nodiscard]] bool done() const { return t_ == planar::kNone; }
   [[nodiscard]] std::uint32_t triangle() const { return t_; }
-  /// Of the vertex.
+  /// The index of the vertex in that triangle.
   [[nodiscard]] std::uint32_t index() const { return index_; }
   void advance() {
     if (forward_) {

@@ -27,7 +27,7 @@ class BodyNormals {
   void add(const Corners& corners) { change(corners, 1); }
   /// Requires that its corners are where they were when it was added.
   void remove(const Corners& corners) { change(corners, -1); }
-  /// Of unit length, times 127; up if there is none.
+  /// The unit normal times 127; up if there is none.
   [[nodiscard]] std::array<std::int8_t, 3> operator[](std::uint32_t slot) const {
     std::array<double, 3> sum{};
     for (std::size_t k = 0; k < 3; ++k) sum[k] = static_cast<double>(sums_[slot][k]);

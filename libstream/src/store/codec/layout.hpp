@@ -75,7 +75,7 @@ struct Layout {
   /// common, and short checksums.
   [[nodiscard]] bool small() const { return version > 4 && grid && level == 0; }
   [[nodiscard]] unsigned checksum_bits() const { return small() ? 8 : 16; }
-  /// Of a cluster's bytes.
+  /// The checksum that the index keeps for the bytes of a cluster.
   [[nodiscard]] std::uint16_t checksum(ByteView bytes) const {
     return small() ? crc8(bytes) : crc16(bytes);
   }

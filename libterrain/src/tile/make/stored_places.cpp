@@ -25,7 +25,8 @@ constexpr unsigned kPlaceSteps = 24;
 constexpr double kSmall = 1.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
-/// Of polynomials that stand for a projection: how long, and how many metres a place may be off.
+/// The length of a patch whose polynomials stand for a projection, and their largest error in
+/// metres.
 constexpr double kPatchDegrees = 0.18;
 constexpr double kPlaneTolerance = 1e-5;
 
