@@ -207,7 +207,7 @@ TEST(OctreeBuilder, NodesOfCloudsThatFillSpaceAreBounded) {
 std::string write_copc(const std::string& path, const AllPoints& all, std::size_t block = 5000,
                        unsigned threads = 1) {
   PointHeader header{.attributes = all.info.attributes};
-  header.crs = all.info.crs;
+  header.crs = [&all] { return all.info.crs; };
   header.lattice = lattice_of(all.info);
   const auto writer = open_point_writer(path, header, {.replace = true, .threads = threads});
   const std::size_t bytes = all.info.payload_size();

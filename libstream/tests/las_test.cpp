@@ -25,10 +25,11 @@ class Las : public ::testing::Test {
   [[nodiscard]] std::string copy_of(const AllPoints& all,
                                     const std::string& name = "copy.las") const {
     const std::string path = folder_.path() / name;
-    const auto writer = open_point_writer(
-        path,
-        {.attributes = all.info.attributes, .crs = all.info.crs, .lattice = lattice_of(all.info)},
-        {.replace = true});
+    const auto writer = open_point_writer(path,
+                                          {.attributes = all.info.attributes,
+                                           .crs = [&all] { return all.info.crs; },
+                                           .lattice = lattice_of(all.info)},
+                                          {.replace = true});
     AllPoints world = all;
     to_world(all.info, world.points);
     writer->append(world.points);

@@ -45,6 +45,7 @@ OutputColumns::OutputColumns(std::span<const Channel> attributes) {
                         .offset = channel.offset,
                         .real = real});
     record_bytes_ += size_of(channel.type);
+    written_bytes_ += size_of(columns_.back().written);
   }
 }
 
@@ -70,19 +71,20 @@ void OutputColumns::append_text(std::string& out, const PointBlock& block, std::
   }
 }
 
-void OutputColumns::append_bytes(std::string& out, const PointBlock& block, std::size_t i) const {
+char* OutputColumns::put_bytes(char* at, const PointBlock& block, std::size_t i) const {
   const std::byte* raw = block.payload.data() + i * record_bytes_;
   for (const OutputColumn& column : columns_) {
     if (column.real) {
-      append_little_endian(out, to_double(column.stored, raw) * column.scale + column.offset);
+      at = store_little_endian(at, to_double(column.stored, raw) * column.scale + column.offset);
     } else {
-      with_type(column.stored, [&](auto value) {
+      at = with_type(column.stored, [&](auto value) {
         std::memcpy(&value, raw, sizeof value);
-        append_little_endian(out, value);
+        return store_little_endian(at, value);
       });
     }
     raw += size_of(column.stored);
   }
+  return at;
 }
 
 }  // namespace terrace::stream

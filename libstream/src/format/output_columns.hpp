@@ -26,8 +26,10 @@ class OutputColumns {
   void check(const PointBlock& block) const;
   /// Appends the values of point `i` as text, `separator` before each.
   void append_text(std::string& out, const PointBlock& block, std::size_t i, char separator) const;
-  /// Appends the values of point `i` as little-endian bytes.
-  void append_bytes(std::string& out, const PointBlock& block, std::size_t i) const;
+  /// The bytes that put_bytes() puts.
+  [[nodiscard]] std::size_t written_bytes() const { return written_bytes_; }
+  /// Puts the values of point `i` at `at` as little-endian bytes; returns their end.
+  char* put_bytes(char* at, const PointBlock& block, std::size_t i) const;
 
  private:
   struct OutputColumn {
@@ -37,7 +39,7 @@ class OutputColumns {
     bool real;  ///< whether scale and offset are applied
   };
   std::vector<OutputColumn> columns_;
-  std::size_t record_bytes_ = 0;
+  std::size_t record_bytes_ = 0, written_bytes_ = 0;
 };
 
 }  // namespace terrace::stream

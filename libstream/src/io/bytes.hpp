@@ -8,12 +8,18 @@
 
 namespace terrace::stream {
 
-/// Appends the bytes of a number in little-endian order on every machine.
+/// Puts the bytes of a number at `at` in little-endian order on every machine; returns their end.
+template <class T>
+char* store_little_endian(char* at, T value) {
+  std::memcpy(at, &value, sizeof(T));
+  if constexpr (std::endian::native == std::endian::big) std::reverse(at, at + sizeof(T));
+  return at + sizeof(T);
+}
+
 template <class T>
 void append_little_endian(std::string& out, T value) {
   char bytes[sizeof(T)];
-  std::memcpy(bytes, &value, sizeof(T));
-  if constexpr (std::endian::native == std::endian::big) std::reverse(bytes, bytes + sizeof(T));
+  store_little_endian(bytes, value);
   out.append(bytes, sizeof(T));
 }
 

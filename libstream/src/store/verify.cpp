@@ -130,12 +130,13 @@ class Verification {
 
   void check_level(unsigned l) {
     const LevelReader& level = *levels_[l];
+    SequentialBytes ahead(level.data());
     std::uint64_t data_end = 0;
     for (std::uint64_t p = 0; p < level.pages(); ++p) {
       std::uint64_t offset = 0;
       try {
         offset = level.page_offset(p);
-        check_page(l, p, data_end);
+        check_page(l, p, ahead, data_end);
       } catch (const Error& error) {
         problem(level.index().name(), offset, error.what());
       } catch (const Damage& damage) {
@@ -152,27 +153,28 @@ class Verification {
     }
   }
 
-  void check_page(unsigned l, std::uint64_t number, std::uint64_t& data_end) {
+  void check_page(unsigned l, std::uint64_t number, SequentialBytes& ahead,
+                  std::uint64_t& data_end) {
     check_stop();
     const LevelReader& level = *levels_[l];
     const auto page = level.page(number);
     for (std::uint32_t i = 0; i < page->clusters(); ++i) {
       const std::uint64_t ordinal = number * level.layout().page_clusters() + i;
       // Bytes that clusters before have are read again, the others follow one another.
+      const std::uint64_t offset = page->offset(i);
       const bool follows =
-          page->offset(i) == data_end || (level.layout().small() && page->end(i) <= data_end);
+          offset == data_end || (level.layout().small() && page->end(i) <= data_end);
       if (!follows) {
-        cluster_problem(l, ordinal, page->offset(i), "its bytes do not follow those before");
+        cluster_problem(l, ordinal, offset, "its bytes do not follow those before");
       }
       data_end = std::max(data_end, page->end(i));
       try {
-        std::uint64_t offset = 0;
-        const Entry entry = level.entry(ordinal, offset);
-        level.read(ordinal, space_, points_);
+        const Entry entry = level.entry(*page, ordinal);
+        level.read(ordinal, entry, offset, ahead, decoder_, points_);
         check_cluster(l, ordinal, record_of(entry, l, offset, level.top()));
         check_ranges(l, ordinal, offset);
       } catch (const Error& error) {
-        problem(level.data().name(), page->offset(i), error.what());
+        problem(level.data().name(), offset, error.what());
       }
     }
   }
@@ -322,7 +324,7 @@ class Verification {
   const std::stop_token& stop_;
   const std::function<void(const Problem&)>& report_;
   std::vector<LevelSums> sums_;
-  ReadSpace space_;
+  ClusterDecoder decoder_;
   ClusterPoints points_;
   std::vector<KeyRange> ranges_;
   Box3 bounds_;

@@ -102,11 +102,14 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
     }
     const std::unique_ptr<stream::PointSource> from = open(options);
     const stream::SourceInfo& info = from->info();
-    stream::PointHeader header{
-        .attributes = info.attributes, .crs = info.crs, .lattice = lattice_of(info)};
-    if (const auto system = terrain::CoordinateSystem::of(info.crs, path)) {
-      header.crs = system->crs_with_wkt1();
-    }
+    stream::PointHeader header{.attributes = info.attributes,
+                               .crs =
+                                   [&info, &path] {
+                                     const auto system =
+                                         terrain::CoordinateSystem::of(info.crs, path);
+                                     return system ? system->crs_with_wkt1() : info.crs;
+                                   },
+                               .lattice = lattice_of(info)};
     if (info.bounds) header.bounds = world_box(info, *info.bounds);
     const auto writer = stream::open_point_writer(
         path, header,

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
@@ -105,13 +106,15 @@ bool written_by_terrace(const std::string& path) {
   return marked ? *marked : is_our_table(path);
 }
 
-stream::Crs crs_to_write(const stream::Crs& recorded) {
-  try {
-    const auto system = CoordinateSystem::of(recorded, {});
-    return system ? system->crs_with_wkt1() : recorded;
-  } catch (const stream::Error&) {
-    return recorded;
-  }
+std::function<stream::Crs()> crs_to_write(stream::Crs recorded) {
+  return [recorded = std::move(recorded)] {
+    try {
+      const auto system = CoordinateSystem::of(recorded, {});
+      return system ? system->crs_with_wkt1() : recorded;
+    } catch (const stream::Error&) {
+      return recorded;
+    }
+  };
 }
 
 void tell_rounding(const stream::PointWriter& writer, Summary& summary) {

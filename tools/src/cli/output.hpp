@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -25,9 +26,9 @@ inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 /// it.
 bool written_by_terrace(const std::string& path);
 
-/// A CRS for the header of points: with WKT 1, which LAS asks for. A CRS that cannot be
-/// interpreted is written as it is recorded.
-stream::Crs crs_to_write(const stream::Crs& recorded);
+/// A CRS for the header of points, found when it is asked for: with WKT 1, which LAS wants. A CRS
+/// that cannot be interpreted is written as it is recorded.
+std::function<stream::Crs()> crs_to_write(stream::Crs recorded);
 
 /// Reports in the summary if coordinates were rounded to fit the file's format.
 void tell_rounding(const stream::PointWriter& writer, Summary& summary);

@@ -2,6 +2,7 @@
 // convert: a stream of points from one format to another.
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -104,12 +105,14 @@ class ConvertCommand : public Command {
 
  private:
   /// The CRS of the file, or of the .prj beside it.
-  static stream::Crs crs_of(const stream::SourceInfo& info) {
-    try {
-      return crs_to_write(crs_of_source(info).crs);
-    } catch (const stream::Error&) {
-      return info.crs;
-    }
+  static std::function<stream::Crs()> crs_of(const stream::SourceInfo& info) {
+    return [&info] {
+      try {
+        return crs_to_write(crs_of_source(info).crs)();
+      } catch (const stream::Error&) {
+        return info.crs;
+      }
+    };
   }
   static std::optional<stream::Box3> bounds_of(const stream::SourceInfo& info) {
     if (!info.bounds) return std::nullopt;

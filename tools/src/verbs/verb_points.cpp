@@ -186,7 +186,7 @@ class PointsCommand final : public Command {
                                .comments = {kWriterMark},
                                .crs = crs_to_write(store.schema().crs)};
     if (to) {
-      wanted.crs = to->to().crs_with_wkt1();
+      wanted.crs = [system = to->to()] { return system.crs_with_wkt1(); };
     } else {
       wanted.lattice = lattice_of(store.schema());
       wanted.bounds = world_box(store.schema(), store.bounds());

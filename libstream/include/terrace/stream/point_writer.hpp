@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -19,8 +20,9 @@ struct PointHeader {
   /// (float64).
   std::vector<Channel> attributes{};
   std::vector<std::string> comments{};  ///< written if the format has comments (PLY)
-  /// The CRS of the coordinates; its WKT is written if the format has a place for it (LAS).
-  Crs crs{};
+  /// The CRS of the coordinates, of which formats that have a place for it (LAS) write the WKT. The
+  /// others do not ask: WKT is mostly searched for in a database. Null if the CRS is unknown.
+  std::function<Crs()> crs{};
   /// The lattice on which coordinates lie: text gets its decimals (849393.95, not
   /// 849393.9500000001), and formats with integer coordinates (LAS) use it. Without a lattice these
   /// take a power of ten that suits the first points and the bounds.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/ply/writer.hpp"
 
+#include <algorithm>
 #include <string_view>
 #include <utility>
 
@@ -42,11 +43,11 @@ class PlyWriter final : public PointWriter {
 
   void append(const PointBlock& block) override {
     columns_.check(block);
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      ascii_ ? append_line(block, i) : append_row(block, i);
-      if (piece_.size() >= kPieceBytes) flush();
+    if (ascii_) {
+      append_lines(block);
+    } else {
+      append_rows(block);
     }
-    flush();
     points_ += block.size();
   }
 
@@ -58,19 +59,32 @@ class PlyWriter final : public PointWriter {
   std::uint64_t points() const override { return points_; }
 
  private:
-  void append_line(const PointBlock& block, std::size_t i) {
-    const Point3& p = block.positions[i];
-    append_number(piece_, p[0]);
-    piece_ += ' ';
-    append_number(piece_, p[1]);
-    piece_ += ' ';
-    append_number(piece_, p[2]);
-    columns_.append_text(piece_, block, i, ' ');
-    piece_ += '\n';
+  void append_lines(const PointBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Point3& p = block.positions[i];
+      append_number(piece_, p[0]);
+      piece_ += ' ';
+      append_number(piece_, p[1]);
+      piece_ += ' ';
+      append_number(piece_, p[2]);
+      columns_.append_text(piece_, block, i, ' ');
+      piece_ += '\n';
+      if (piece_.size() >= kPieceBytes) flush();
+    }
+    flush();
   }
-  void append_row(const PointBlock& block, std::size_t i) {
-    for (const double value : block.positions[i]) append_little_endian(piece_, value);
-    columns_.append_bytes(piece_, block, i);
+  void append_rows(const PointBlock& block) {
+    const std::size_t row = sizeof(Point3) + columns_.written_bytes(), rows = kPieceBytes / row + 1;
+    for (std::size_t i = 0; i < block.size();) {
+      const std::size_t end = std::min(block.size(), i + rows);
+      piece_.resize((end - i) * row);
+      for (char* at = piece_.data(); i < end; ++i) {
+        for (const double value : block.positions[i]) at = store_little_endian(at, value);
+        at = columns_.put_bytes(at, block, i);
+      }
+      sink_.write(piece_);
+    }
+    piece_.clear();
   }
   void flush() {
     sink_.write(piece_);

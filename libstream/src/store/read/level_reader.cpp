@@ -123,13 +123,18 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
                  .remedy = {}});
   }
   const auto page = this->page(ordinal / layout_.page_clusters());
-  const auto i = static_cast<std::uint32_t>(ordinal % layout_.page_clusters());
+  offset = page->offset(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
+  return entry(*page, ordinal);
+}
+
+Entry LevelReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
+  const Entry entry = page.entry(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
   try {
-    offset = page->offset(i);
-    return entry(*page, i);
+    check_entry(entry);
   } catch (const Damage& damage) {
     throw damaged_file(*index_, page_offset(ordinal / layout_.page_clusters()), damage.what());
   }
+  return entry;
 }
 
 void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
@@ -150,11 +155,10 @@ void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) cons
   }
 }
 
-Entry LevelReader::entry(const IndexPage& page, std::uint32_t i) const {
-  const Entry entry = page.entry(i);
+void LevelReader::check_entry(const Entry& entry) const {
   if (entry.points == 0) {
     if (store_points_ > 0) throw Damage("an index entry has no points");
-    return entry;
+    return;
   }
   if (entry.points > most_points_) throw Damage("an index entry has more points than possible");
   const bool counted =
@@ -176,7 +180,6 @@ Entry LevelReader::entry(const IndexPage& page, std::uint32_t i) const {
       throw Damage("an index entry has an impossible box");
     }
   }
-  return entry;
 }
 
 std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal) const {
@@ -255,6 +258,12 @@ void LevelReader::read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& o
               std::as_writable_bytes(std::span(space.bytes).subspan(kPadding, entry.bytes)));
   decode(ordinal, entry, offset, ByteView(space.bytes).subspan(kPadding, entry.bytes),
          space.decoder, out);
+}
+
+void LevelReader::read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
+                       SequentialBytes& ahead, ClusterDecoder& decoder, ClusterPoints& out) const {
+  check_range(ordinal, offset, entry.bytes);
+  decode(ordinal, entry, offset, ahead.at(offset, entry.bytes), decoder, out);
 }
 
 }  // namespace terrace::stream::store

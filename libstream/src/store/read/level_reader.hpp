@@ -47,7 +47,8 @@ class SlotCache {
   std::vector<Slot> slots_;
 };
 
-/// Parts of a file that mostly follow one another, read many at a time.
+/// Parts of a file that mostly follow one another, read many at a time. Parts of before may come
+/// again.
 class SequentialBytes {
  public:
   explicit SequentialBytes(const ByteSource& file) : file_(file) {}
@@ -55,23 +56,37 @@ class SequentialBytes {
   /// The bytes, with kPadding readable ones before and behind, until the next call. Requires that
   /// they exist.
   ByteView at(std::uint64_t offset, std::size_t size) {
-    if (bytes_.empty() || offset < begin_ || offset + size > begin_ + size_) {
-      const std::uint64_t left = file_.size() - offset;
-      size_ = std::max(size, static_cast<std::size_t>(std::min<std::uint64_t>(left, kAtOnce)));
-      begin_ = offset;
-      bytes_.resize(size_ + 2 * kPadding);
-      file_.read(offset, std::as_writable_bytes(std::span(bytes_).subspan(kPadding, size_)));
+    const std::uint64_t end = ahead_.begin + ahead_.size();
+    if (offset >= ahead_.begin && offset + size <= end) return ahead_.part(offset, size);
+    if (offset < ahead_.begin) {
+      again_.read(file_, offset, size);
+      return again_.part(offset, size);
     }
-    return ByteView(bytes_).subspan(kPadding + static_cast<std::size_t>(offset - begin_), size);
+    const std::uint64_t left = file_.size() - offset;
+    ahead_.read(file_, offset, std::max(size, static_cast<std::size_t>(std::min(left, kAtOnce))));
+    return ahead_.part(offset, size);
   }
 
  private:
   static constexpr std::uint64_t kAtOnce = std::uint64_t{32} << 10;
 
+  struct Window {
+    Bytes padded = Bytes(2 * kPadding);
+    std::uint64_t begin = 0;
+
+    [[nodiscard]] std::size_t size() const { return padded.size() - 2 * kPadding; }
+    void read(const ByteSource& file, std::uint64_t offset, std::size_t bytes) {
+      begin = offset;
+      padded.resize(bytes + 2 * kPadding);
+      file.read(offset, std::as_writable_bytes(std::span(padded).subspan(kPadding, bytes)));
+    }
+    [[nodiscard]] ByteView part(std::uint64_t offset, std::size_t bytes) const {
+      return ByteView(padded).subspan(kPadding + static_cast<std::size_t>(offset - begin), bytes);
+    }
+  };
+
   const ByteSource& file_;
-  Bytes bytes_;
-  std::uint64_t begin_ = 0;
-  std::size_t size_ = 0;
+  Window ahead_, again_;
 };
 
 /// What one thread needs to read clusters.
@@ -106,29 +121,22 @@ class LevelReader {
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
   /// The entry and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
-  /// The entry of the i-th cluster of `page`, checked against the manifest. Throws: Damage.
-  [[nodiscard]] Entry entry(const IndexPage& page, std::uint32_t i) const;
+  /// The entry of a cluster that `page` has, checked against the manifest. Throws: Error.
+  [[nodiscard]] Entry entry(const IndexPage& page, std::uint64_t ordinal) const;
   /// The ranges of a cluster that exists. Throws: Error.
   void ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const;
   /// Throws: Error.
   void read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const;
-  /// `bytes`: of the cluster, padded. Its points lie in the entry's box and in the bounds of the
-  /// store, and what they head exists. Throws: Error.
-  void decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, ByteView bytes,
-              ClusterDecoder& decoder, ClusterPoints& out) const;
-  /// Calls visit(ordinal, IndexPage, number in the page, its bytes, padded) for each cluster.
-  /// Throws: Error.
+  /// A cluster whose entry and offset are known. `ahead`: of data(). The points lie in the entry's
+  /// box and in the bounds of the store, and what they head exists. Throws: Error.
+  void read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, SequentialBytes& ahead,
+            ClusterDecoder& decoder, ClusterPoints& out) const;
+  /// Calls visit(page, the ordinal of its first cluster) for each page of the index. Throws: Error.
   template <class Visit>
-  void for_each_cluster(Visit&& visit) const {
-    SequentialBytes pages_ahead(*index_), clusters_ahead(*data_);
+  void for_each_page(Visit&& visit) const {
+    SequentialBytes ahead(*index_);
     for (std::uint64_t number = 0; number < pages(); ++number) {
-      const auto page = read_page(number, &pages_ahead);
-      for (std::uint32_t i = 0; i < page->clusters(); ++i) {
-        const std::uint64_t ordinal = number * layout_.page_clusters() + i;
-        const std::uint64_t begin = page->offset(i), size = page->end(i) - begin;
-        check_range(ordinal, begin, size);
-        visit(ordinal, *page, i, clusters_ahead.at(begin, memory_size(size)));
-      }
+      visit(*read_page(number, &ahead), number * layout_.page_clusters());
     }
   }
 
@@ -142,7 +150,11 @@ class LevelReader {
   [[nodiscard]] std::shared_ptr<const IndexPage> read_page(std::uint64_t number,
                                                            SequentialBytes* ahead = nullptr) const;
   [[nodiscard]] std::shared_ptr<const DecodingTables> tables(std::uint64_t ordinal) const;
+  void check_entry(const Entry& entry) const;
   void check_range(std::uint64_t ordinal, std::uint64_t offset, std::uint64_t size) const;
+  /// `bytes`: of the cluster, padded. Throws: Error.
+  void decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, ByteView bytes,
+              ClusterDecoder& decoder, ClusterPoints& out) const;
   void check_points(const Entry& entry, const ClusterPoints& points) const;
 
   Layout layout_;

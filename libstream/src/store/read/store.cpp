@@ -144,24 +144,21 @@ void Store::for_each(
                            " members that the manifest tells",
                   .remedy = "restore the file or build the store anew"});
   };
+  SequentialBytes ahead(level.data());
   ClusterDecoder decoder;
   ClusterPoints points;
   std::uint64_t visited = 0;
-  level.for_each_cluster(
-      [&](std::uint64_t ordinal, const IndexPage& page, std::uint32_t i, ByteView bytes) {
-        check_stop();
-        Entry entry;
-        try {
-          entry = level.entry(page, i);
-        } catch (const Damage& damage) {
-          throw level.damaged(ordinal, damage.what());
-        }
-        level.decode(ordinal, entry, page.offset(i), bytes, decoder, points);
-        visited += points.size();
-        if (visited > members) throw miscounted();
-        visit(cluster_id(number, ordinal), record_of(entry, number, page.offset(i), level.top()),
-              points);
-      });
+  level.for_each_page([&](const IndexPage& page, std::uint64_t first) {
+    for (std::uint32_t i = 0; i < page.clusters(); ++i) {
+      check_stop();
+      const std::uint64_t ordinal = first + i, offset = page.offset(i);
+      const Entry entry = level.entry(page, ordinal);
+      level.read(ordinal, entry, offset, ahead, decoder, points);
+      visited += points.size();
+      if (visited > members) throw miscounted();
+      visit(cluster_id(number, ordinal), record_of(entry, number, offset, level.top()), points);
+    }
+  });
   if (visited != members) throw miscounted();
 }
 
