@@ -5,7 +5,9 @@
 #include <mutex>
 #include <utility>
 
+#include "io/text.hpp"
 #include "store/read/level_reader.hpp"
+#include "store/read/view.hpp"
 #include "store/verify.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
@@ -61,6 +63,19 @@ void Store::check_stop() const {
   if (stop_.stop_requested()) throw Stopped();
 }
 
+const Where* Store::condition() const { return view_ ? &view_->condition : nullptr; }
+
+Store Store::whole() const {
+  Store other = *this;
+  other.view_.reset();
+  return other;
+}
+
+bool Store::may_match(ClusterId id) const {
+  return !view_ || view_->condition.possible(world_box(schema(), record(id).summary.box),
+                                             attribute_ranges(id));
+}
+
 Store Store::open(const std::string& name, const OpenByName& files) {
   auto impl = std::make_shared<Impl>();
   impl->path = name;
@@ -90,7 +105,17 @@ std::span<const LevelInfo> Store::levels() const { return impl_->infos; }
 std::uint64_t Store::points() const { return impl_->manifest.points; }
 std::uint32_t Store::checksum() const { return impl_->manifest.checksum; }
 std::uint64_t Store::bytes() const { return impl_->bytes; }
-const Box3& Store::bounds() const { return impl_->manifest.bounds; }
+const Box3& Store::bounds() const {
+  if (!view_) return impl_->manifest.bounds;
+  std::call_once(view_->once, [this] { view_->bounds = view_->find_bounds(*this); });
+  if (view_->bounds.empty()) {
+    throw Error({.file = path().string(),
+                 .where = {},
+                 .cause = "no point meets the condition " + in_quotes(view_->condition.text()),
+                 .remedy = "give another `where`"});
+  }
+  return view_->bounds;
+}
 double Store::mean_height() const { return impl_->manifest.mean_height; }
 ClusterId Store::root() const { return cluster_id(top(), 0); }
 
@@ -130,12 +155,30 @@ void Store::read(ClusterId id, ClusterPoints& out) const {
   auto space = impl_->borrow();
   level.read(ordinal_of(id), *space, out);
   impl_->give_back(std::move(space));
+  mark(out);
+}
+
+void Store::mark(ClusterPoints& points) const {
+  points.matches.clear();
+  if (!view_) return;
+  points.matches.resize(points.size());
+  view_->condition.test(points.positions, points.payload, points.matches);
 }
 
 void Store::for_each(
     unsigned number,
     const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>& visit) const {
   const LevelReader& level = impl_->level(number);
+  ClusterPoints points;
+  if (view_ && number == 0) {
+    for (std::uint64_t c = 0; c < impl_->infos[0].clusters; ++c) {
+      const ClusterId id = cluster_id(0, c);
+      if (!may_match(id)) continue;
+      read(id, points);
+      visit(id, record(id), points);
+    }
+    return;
+  }
   const std::uint64_t members = impl_->infos[number].members;
   const auto miscounted = [&] {
     return Error({.file = level.data().name(),
@@ -145,7 +188,6 @@ void Store::for_each(
                   .remedy = "restore the file or build the store anew"});
   };
   ClusterDecoder decoder;
-  ClusterPoints points;
   std::uint64_t visited = 0;
   level.for_each_cluster(
       [&](std::uint64_t ordinal, const IndexPage& page, std::uint32_t i, ByteView bytes) {
@@ -159,6 +201,7 @@ void Store::for_each(
         level.decode(ordinal, entry, page.offset(i), bytes, decoder, points);
         visited += points.size();
         if (visited > members) throw miscounted();
+        mark(points);
         visit(cluster_id(number, ordinal), record_of(entry, number, page.offset(i), level.top()),
               points);
       });
