@@ -247,12 +247,13 @@ class Store {
 
  private:
   struct Impl;
-  struct View;
+  class View;
+  class ConditionView;
   explicit Store(std::shared_ptr<Impl> impl);
   void mark(ClusterPoints& points) const;
 
   std::shared_ptr<Impl> impl_;
-  std::shared_ptr<View> view_;
+  std::shared_ptr<const View> view_;
   std::stop_token stop_;
 };
 

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <mutex>
 #include <numeric>
 #include <optional>
 #include <utility>
 
+#include "io/text.hpp"
 #include "store/read/view.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -311,11 +313,36 @@ double StoreQuery::estimate(const Box3& box, double limit) {
   return sum;
 }
 
-Store Store::where(const std::string& condition) const {
-  if (condition.empty()) return *this;
-  Where parsed(condition, schema());
-  if (view_) parsed = Where('(' + view_->condition.text() + ") && (" + condition + ')', schema());
-  const auto find_bounds = [](const Store& view) {
+/// The points that meet a condition.
+class Store::ConditionView final : public Store::View {
+ public:
+  explicit ConditionView(Where condition) : condition_(std::move(condition)) {}
+
+  const Where& condition() const override { return condition_; }
+
+  void mark(ClusterPoints& points) const override {
+    points.matches.resize(points.size());
+    condition_.test(points.positions, points.payload, points.matches);
+  }
+
+  bool may_match(const Store& view, ClusterId id) const override {
+    return condition_.possible(world_box(view.schema(), view.record(id).summary.box),
+                               view.attribute_ranges(id));
+  }
+
+  const Box3& bounds(const Store& view) const override {
+    std::call_once(once_, [&] { find_bounds(view); });
+    if (bounds_.empty()) {
+      throw Error({.file = view.path().string(),
+                   .where = {},
+                   .cause = "no point meets the condition " + in_quotes(condition_.text()),
+                   .remedy = "give another `where`"});
+    }
+    return bounds_;
+  }
+
+ private:
+  void find_bounds(const Store& view) const {
     Box3 found;
     StoreQuery(view).descend(
         0,
@@ -325,10 +352,20 @@ Store Store::where(const std::string& condition) const {
         [&](const StoreQuery::Node& node) {
           for (const Point3& p : node.positions) found.include(p);
         });
-    return found;
-  };
+    bounds_ = found;
+  }
+
+  Where condition_;
+  mutable std::once_flag once_;
+  mutable Box3 bounds_;
+};
+
+Store Store::where(const std::string& condition) const {
+  if (condition.empty()) return *this;
+  Where parsed(condition, schema());
+  if (view_) parsed = Where('(' + view_->condition().text() + ") && (" + condition + ')', schema());
   Store view = *this;
-  view.view_ = std::make_shared<View>(std::move(parsed), find_bounds);
+  view.view_ = std::make_shared<const ConditionView>(std::move(parsed));
   return view;
 }
 

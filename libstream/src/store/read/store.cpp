@@ -5,7 +5,6 @@
 #include <mutex>
 #include <utility>
 
-#include "io/text.hpp"
 #include "store/read/level_reader.hpp"
 #include "store/read/view.hpp"
 #include "store/verify.hpp"
@@ -63,7 +62,7 @@ void Store::check_stop() const {
   if (stop_.stop_requested()) throw Stopped();
 }
 
-const Where* Store::condition() const { return view_ ? &view_->condition : nullptr; }
+const Where* Store::condition() const { return view_ ? &view_->condition() : nullptr; }
 
 Store Store::whole() const {
   Store other = *this;
@@ -71,10 +70,7 @@ Store Store::whole() const {
   return other;
 }
 
-bool Store::may_match(ClusterId id) const {
-  return !view_ || view_->condition.possible(world_box(schema(), record(id).summary.box),
-                                             attribute_ranges(id));
-}
+bool Store::may_match(ClusterId id) const { return !view_ || view_->may_match(*this, id); }
 
 Store Store::open(const std::string& name, const OpenByName& files) {
   auto impl = std::make_shared<Impl>();
@@ -105,17 +101,7 @@ std::span<const LevelInfo> Store::levels() const { return impl_->infos; }
 std::uint64_t Store::points() const { return impl_->manifest.points; }
 std::uint32_t Store::checksum() const { return impl_->manifest.checksum; }
 std::uint64_t Store::bytes() const { return impl_->bytes; }
-const Box3& Store::bounds() const {
-  if (!view_) return impl_->manifest.bounds;
-  std::call_once(view_->once, [this] { view_->bounds = view_->find_bounds(*this); });
-  if (view_->bounds.empty()) {
-    throw Error({.file = path().string(),
-                 .where = {},
-                 .cause = "no point meets the condition " + in_quotes(view_->condition.text()),
-                 .remedy = "give another `where`"});
-  }
-  return view_->bounds;
-}
+const Box3& Store::bounds() const { return view_ ? view_->bounds(*this) : impl_->manifest.bounds; }
 double Store::mean_height() const { return impl_->manifest.mean_height; }
 ClusterId Store::root() const { return cluster_id(top(), 0); }
 
@@ -160,9 +146,7 @@ void Store::read(ClusterId id, ClusterPoints& out) const {
 
 void Store::mark(ClusterPoints& points) const {
   points.matches.clear();
-  if (!view_) return;
-  points.matches.resize(points.size());
-  view_->condition.test(points.positions, points.payload, points.matches);
+  if (view_) view_->mark(points);
 }
 
 void Store::for_each(
