@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <random>
 #include <span>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -321,8 +324,8 @@ TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
   for (const double share : {0.0, 0.001, 0.5, 0.999, 1.0}) {
     const double least =
         sums[static_cast<std::size_t>(share * static_cast<double>(sums.size() - 1))];
-    StoreQuery query(queried.store(), 1 << 16,
-                     Where("sum > " + std::to_string(least), queried.store().schema()));
+    const Store view = queried.store().where("sum > " + std::to_string(least));
+    StoreQuery query(view, 1 << 16);
     const auto meets = [&](const Point3& p) {
       return p[0] + p[1] + p[2] > std::stod(std::to_string(least));
     };
@@ -347,6 +350,13 @@ TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
       }
       EXPECT_EQ(query.in_box(box).size(), inside.size());
       EXPECT_EQ(query.count(box), inside.size());
+      for (unsigned level = 0; level <= view.top(); ++level) {
+        const auto of_level = [level](const FoundPoint& p) { return level_of(p.cluster) >= level; };
+        std::vector<FoundPoint> expected;
+        std::copy_if(inside.begin(), inside.end(), std::back_inserter(expected), of_level);
+        EXPECT_EQ(keys_of(query.in_box(box, level), false), keys_of(expected, false));
+        EXPECT_EQ(query.count(box, level), expected.size());
+      }
       std::sort(near.begin(), near.end(),
                 [](const FoundPoint& a, const FoundPoint& b) { return key_of(a) < key_of(b); });
       near.resize(std::min<std::size_t>(near.size(), 7));
@@ -357,6 +367,75 @@ TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
       EXPECT_GE(query.within(place, near.back().distance).size(), near.size());
     }
   }
+}
+
+TEST(StoreView, CountsThePointsThatMeetItsConditionAlone) {
+  const QueriedStore queried = store_of_sums();
+  const Store& store = queried.store();
+  for (const char* condition : {"sum > 150", "sum > 150 && sum < 150.5", "x > 40 && y < 20",
+                                "sum == sum", "x + y + z == sum"}) {
+    SCOPED_TRACE(condition);
+    const Where where(condition, store.schema());
+    const Store view = store.where(condition);
+    ASSERT_NE(view.condition(), nullptr);
+    EXPECT_EQ(view.condition()->text(), condition);
+    EXPECT_EQ(view.whole().condition(), nullptr);
+    EXPECT_EQ(view.whole().bounds(), store.bounds());
+    Box3 bounds;
+    std::size_t left_out = 0;
+    for (unsigned level = 0; level <= store.top(); ++level) {
+      // By all points of all clusters, whatever their ranges say.
+      std::vector<std::pair<ClusterId, std::uint32_t>> expected, marked;
+      std::size_t clusters = 0;
+      store.for_each(level, [&](ClusterId id, const ClusterRecord&, const ClusterPoints& points) {
+        std::vector<std::uint8_t> matches(points.size());
+        where.test(points.positions, points.payload, matches);
+        for (std::uint32_t i = 0; i < points.size(); ++i) {
+          EXPECT_TRUE(points.match(i));
+          if (matches[i] == 0) continue;
+          expected.emplace_back(id, i);
+          bounds.include(points.positions[i]);
+        }
+        ClusterPoints again;
+        view.read(id, again);
+        EXPECT_EQ(again.matches, matches);
+        ++clusters;
+      });
+      view.for_each(level, [&](ClusterId id, const ClusterRecord&, const ClusterPoints& points) {
+        for (std::uint32_t i = 0; i < points.size(); ++i) {
+          if (points.match(i)) marked.emplace_back(id, i);
+        }
+        --clusters;
+      });
+      EXPECT_EQ(marked, expected) << "level " << level;
+      EXPECT_TRUE(level == 0 || clusters == 0) << "level " << level;
+      left_out += clusters;
+    }
+    EXPECT_EQ(view.bounds(), bounds);
+    EXPECT_EQ(view.with_stop({}).bounds(), bounds);
+    // The first has points everywhere, of the second few clusters have one.
+    const std::string_view text = condition;
+    EXPECT_EQ(text == "sum == sum" && left_out > 0, false);
+    EXPECT_EQ(text == "sum > 150 && sum < 150.5" && left_out == 0, false);
+  }
+  // A view of a view; an empty condition; one that none meets; one that is none.
+  const Store both = store.where("sum > 150 || x < 5").where("y < 30 || z < 1");
+  EXPECT_EQ(
+      StoreQuery(both).count(store.bounds()),
+      StoreQuery(store.where("(sum > 150 || x < 5) && (y < 30 || z < 1)")).count(store.bounds()));
+  EXPECT_EQ(store.where("").condition(), nullptr);
+  EXPECT_EQ(StoreQuery(store.where("sum < -1")).count(store.bounds()), 0U);
+  try {
+    static_cast<void>(store.where("sum < -1").bounds());
+    FAIL() << "there are bounds of nothing";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.parts().cause, "no point meets the condition 'sum < -1'");
+  }
+  EXPECT_THROW(static_cast<void>(store.where("sum <")), Error);
+  std::stop_source stop;
+  stop.request_stop();
+  const Store stopped = store.with_stop(stop.get_token()).where("sum > 0");
+  EXPECT_THROW(static_cast<void>(stopped.bounds()), Stopped);
 }
 
 TEST(StoreQuery, EndsOnceTheStoreIsAskedToStop) {

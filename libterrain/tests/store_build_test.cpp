@@ -83,8 +83,8 @@ TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
   request.store = folder.path() / "store";
   request.block_points = 2000;
   build_store(request);
-  const stream::Store store = stream::Store::open(request.store);
-  Detail detail;
+  stream::Store store = stream::Store::open(request.store);
+  const Detail detail;
   const auto visit = [&](std::uint64_t& clusters, std::uint64_t& met) {
     for_each_wanted(store, detail,
                     [&](stream::ClusterId id, const stream::ClusterRecord&,
@@ -98,13 +98,13 @@ TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
   };
   std::uint64_t all = 0, expected = 0, read = 0, met = 0;
   visit(all, expected);
-  detail.where.emplace("class == 3", store.schema());
+  store = store.where("class == 3");
   visit(read, met);
   EXPECT_EQ(met, expected);
   EXPECT_GT(met, 1000u);
   EXPECT_LT(read, all / 3);
   EXPECT_GT(read, 0u);
-  detail.where.emplace("x < -1 || class > 42", store.schema());
+  store = store.whole().where("x < -1 || class > 42");
   read = met = 0;
   visit(read, met);
   EXPECT_EQ(read, 0u);

@@ -263,6 +263,107 @@ class SelectionTest(unittest.TestCase):
         for key in ('samples', 'max_error', 'duplicates'):
             self.assertEqual(found[0][key], found[1][key], key)
 
+    def bytes_of(self, name):
+        with open(self.path(name), 'rb') as file:
+            return file.read()
+
+    def test_every_query_of_a_part_is_that_of_a_store_of_the_part(self):
+        """Law: what does not meet the condition has no influence at all."""
+        self.run_ok('build', self.file, '-o', self.path('ground.alone.st'), '-q', '--where', LAST_ON_THE_GROUND,
+                    '--crs', 'EPSG:32632', '--block', '1000')
+        self.run_ok('build', self.file, '-o', self.path('ground.all.st'), '-q', '--crs', 'EPSG:32632', '--block', '1000')
+        with open(self.path('places.csv'), 'w', encoding='ascii') as file:
+            file.write('x,y\n' + ''.join(f'{x},{y}\n' for x in range(-50, 1050, 37) for y in range(-50, 1050, 41)))
+        where = LAST_ON_THE_GROUND
+        queries = {'s.csv': ['sample', '--points', self.path('places.csv'), '--where', where],
+                   'n.csv': ['sample', '--points', self.path('places.csv'), '--method', 'natural', '--max-edge', '90',
+                             '--where', where],
+                   'p.csv': ['profile', '--line', '0,0,999,999', '--where', where],
+                   'r.tif': ['raster', '--where', where],
+                   'h.tif': ['raster', '--value', 'hillshade', '--region', '200,200,800,700', '--where', where],
+                   'c.geojson': ['contour', '--interval', '5', '--own-crs', '--where', where],
+                   'p.png': ['render', '--size', '200x150', '--where', where],
+                   'w.png': ['render', '--size', '200x150', '--wire', '--where', where]}
+        for name, (verb, *options) in queries.items():
+            with self.subTest(query=name):
+                for kind, given in (('alone', options[:-2]), ('all', options)):
+                    self.run_ok(verb, self.path(f'ground.{kind}.st'), '-o', self.path(kind + name), '-q', *given)
+                self.assertGreater(len(self.bytes_of('all' + name)), 200)
+                self.assertEqual(self.bytes_of('all' + name), self.bytes_of('alone' + name))
+                self.run_ok(verb, self.path('ground.all.st'), '-o', self.path('whole' + name), '-q', *options[:-2])
+                self.assertNotEqual(self.bytes_of('whole' + name), self.bytes_of('all' + name))
+
+    def test_tiles_of_a_part_hold_for_a_store_of_the_part(self):
+        self.run_ok('build', self.file, '-o', self.path('t.alone.st'), '-q', '--where', LAST_ON_THE_GROUND,
+                    '--crs', 'EPSG:32632')
+        self.run_ok('build', self.file, '-o', self.path('t.all.st'), '-q', '--crs', 'EPSG:32632')
+        where = LAST_ON_THE_GROUND
+        options = ['--zoom', '10-15', '--max-error', '0.5', '--vertical', 'ignore']
+        made = json.loads(self.run_ok('tile', self.path('t.all.st'), '-o', self.path('tiles'), '--json', *options,
+                                      '--where', where))
+        self.assertGreater(made['tiles'], 6)
+        for check in (['verify', self.path('tiles'), '--store', self.path('t.alone.st')],
+                      ['verify', self.path('tiles'), '--store', self.path('t.all.st'), '--where', where]):
+            checked = json.loads(self.run_ok(*check, '--json', '--vertical', 'ignore'))
+            self.assertTrue(checked['ok'])
+            self.assertGreater(checked['samples'], sum(map(last_on_the_ground, self.points)))
+            self.assertEqual(sum(zoom['uncovered'] for zoom in checked['zooms']), 0)
+        self.assertEqual(self.terrace('verify', self.path('tiles'), '--vertical', 'ignore',
+                                      '--store', self.path('t.all.st')).returncode, 1)
+        # The same again is up to date; of another condition it is not.
+        again = json.loads(self.run_ok('tile', self.path('t.all.st'), '-o', self.path('tiles'), '--json', '--force',
+                                       *options, '--where', where))
+        self.assertEqual(again['made'], 0)
+        other = json.loads(self.run_ok('tile', self.path('t.all.st'), '-o', self.path('tiles'), '--json', '--force',
+                                       *options, '--where', 'classification == 2'))
+        self.assertGreater(other['made'], 0)
+
+    def test_mesh_of_detail_too(self):
+        """At level 0 the triangles are those of a store of the part; a coarser level has its points that qualify."""
+        where = 'classification == 2'
+        self.run_ok('build', self.file, '-o', self.path('d.st'), '-q', '--where', where)
+        counts = [json.loads(self.run_ok(*query, '-o', self.path('d.ply'), '--json', '--force'))
+                  for query in (['mesh', self.path('d.st')], ['mesh', self.path('all.st'), '--where', where])]
+        for key in ('vertices', 'triangles'):
+            self.assertEqual(counts[0][key], counts[1][key])
+        for level in ('1', 'top'):
+            self.run_ok('points', self.path('all.st'), '-o', self.path('d.csv'), '-q', '--force', '--level', level,
+                        '--where', where)
+            mesh = json.loads(self.run_ok('mesh', self.path('all.st'), '-o', self.path('d.ply'), '--json', '--force',
+                                          '--level', level, '--where', where))
+            self.assertEqual(mesh['vertices'], len(self.rows('d.csv')[1]))
+            self.assertGreater(mesh['vertices'], 10)
+
+    def test_surface_of_a_part(self):
+        rng = random.Random(3)
+        with open(self.path('ball.csv'), 'w', encoding='ascii') as file:
+            file.write('x,y,z,part\n')
+            for i in range(4000):
+                v = [rng.gauss(0, 1) for _ in range(3)]
+                size = sum(c * c for c in v) ** 0.5 / (1 + i % 2)
+                file.write(','.join(f'{c / size:.6f}' for c in v) + f',{i % 2}\n')
+        self.run_ok('build', self.path('ball.csv'), '-o', self.path('ball.st'), '-q', '--block', '500')
+        self.run_ok('build', self.path('ball.csv'), '-o', self.path('ball.alone.st'), '-q', '--where', 'part == 1')
+        found = [json.loads(self.run_ok(*query, '-o', self.path('ball.ply'), '--json', '--force'))
+                 for query in (['surface', self.path('ball.alone.st')],
+                               ['surface', self.path('ball.st'), '--where', 'part == 1'])]
+        self.assertEqual(found[0]['vertices'], 2000)
+        for key in ('vertices', 'triangles'):
+            self.assertEqual(found[0][key], found[1][key])
+
+    def test_a_raster_is_asked_by_heights_alone(self):
+        self.raster('h.asc')
+        self.run_ok('build', self.path('h.asc'), '-o', self.path('h.st'), '-q')
+        self.run_ok('build', self.path('h.asc'), '-o', self.path('h.alone.st'), '-q', '--where', 'z > 600')
+        for store, more in (('h.alone.st', []), ('h.st', ['--where', 'z > 600'])):
+            self.run_ok('raster', self.path(store), '-o', self.path(store + '.tif'), '-q', *more)
+            self.run_ok('mesh', self.path(store), '-o', self.path(store + '.ply'), '-q', '--max-error', '3', *more)
+        for ending in ('.tif', '.ply'):
+            self.assertEqual(self.bytes_of('h.st' + ending), self.bytes_of('h.alone.st' + ending))
+        result = self.terrace('raster', self.path('h.st'), '-o', self.path('none.tif'), '--where', 'classification == 2')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("no 'classification'; known are x, y, z", result.stderr)
+
     def test_says_what_is_wrong(self):
         for args, code, text in (
                 (['build', self.file, '-o', self.path('e.st'), '--where', 'klass == 2'], 1, "no 'klass'; known are x, y, z, classification"),
@@ -278,7 +379,11 @@ class SelectionTest(unittest.TestCase):
                 (['convert', self.file, '-o', self.path('e.csv'), '--region', 'nowhere.geojson'], 1, 'neither a box nor a file'),
                 (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '1'], 1, 'has no octree'),
                 (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '0'], 2, '--resolution'),
-                (['mesh', self.path('all.st'), '-o', self.path('e.ply'), '--where', 'z > 1'], 2, '--max-error')):
+                (['raster', self.path('all.st'), '-o', self.path('e.tif'), '--where', 'z > 1000'], 1, "no point meets the condition 'z > 1000'; give another --where"),
+                (['contour', self.path('all.st'), '-o', self.path('e.geojson'), '--interval', '1', '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
+                (['verify', self.path('all.st'), '--where', 'z > 1'], 2, 'are for tile sets'),
+                (['points', self.path('all.st'), '-o', self.path('e.csv'), '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
+                (['render', self.file, '-o', self.path('e.png'), '--where', 'z > 1'], 2, 'is not a store')):
             with self.subTest(args=args):
                 result = self.terrace(*args)
                 self.assertEqual(result.returncode, code, result.stderr)

@@ -35,8 +35,8 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
                const std::optional<std::pair<unsigned, std::uint64_t>>& cluster,
                const std::string& metric, const py::dict& heights, const std::string& crs,
                const py::tuple& how) {
-  const stream::Store store = open.get();
-  terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  const stream::Store store = open.get(where);
+  terrain::Detail detail = detail_of(store, level, region, focuses);
   if (cluster) {
     const tri::ClusterId id = cluster_of(store, cluster->first, cluster->second);
     detail.cluster = static_cast<stream::ClusterId>(id);
@@ -80,8 +80,8 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
 /// As arrays_of(), and the tetrahedra inside the surface in place of its triangles if asked for.
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
                   const std::string& where, bool tetrahedra, const py::tuple& how) {
-  const stream::Store store = open.get();
-  const terrain::Detail detail = detail_of(store, level, region, py::list(), where);
+  const stream::Store store = open.get(where);
+  const terrain::Detail detail = detail_of(store, level, region, py::list());
   terrain::ScanSurface made = Job(how).run([&](const terrain::Context& context) {
     return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
   });
@@ -93,8 +93,8 @@ py::tuple surface(const OpenStore& open, unsigned level, const py::object& regio
 /// (vertices, the first vertex of each line and their number, the number of each line)
 py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
                 const py::list& focuses, const std::string& where, const py::tuple& how) {
-  const stream::Store store = open.get();
-  const terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  const stream::Store store = open.get(where);
+  const terrain::Detail detail = detail_of(store, level, region, focuses);
   terrain::LineSet made = Job(how).run(
       [&](const terrain::Context& context) { return detail_lines(store, detail, context); });
   std::vector<std::int64_t> begins{0}, numbers;
@@ -108,7 +108,7 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
                       const py::tuple& how) {
-  const stream::Store store = open.get();
+  const stream::Store store = open.get(given["where"].cast<std::string>());
   terrain::BoundedMeshOptions options;
   options.path = path;
   const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
@@ -116,9 +116,6 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   set("max_points", options.max_points);
   set("replace", options.writer.replace);
   options.region = region_of(given["region"]);
-  if (const auto where = given["where"].cast<std::string>(); !where.empty()) {
-    options.where.emplace(where, store.schema());
-  }
   options.quality = quality_named(given["quality"].cast<std::string>());
   options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
   options.fill = fill_named(given["fill"].cast<std::string>());

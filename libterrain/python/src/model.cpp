@@ -34,7 +34,7 @@ class SharedModel {
 
   SharedModel(const OpenStore& open, unsigned level,
               const std::vector<std::pair<FlatBox, unsigned>>& focuses)
-      : store_(open.get()), source_(store_) {
+      : store_(open.get_whole()), source_(store_) {
     const tri::Detail start = detail_of(level, focuses);
     released([&] { model_ = std::make_unique<Model>(source_, start); });
   }

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <pybind11/stl.h>
-#include <terrace/stream/where.hpp>
 #include <terrace/terrain/near_points.hpp>
 
 #include "arrays.hpp"
@@ -17,13 +16,48 @@
 namespace terrace::python {
 namespace {
 
+/// The number of points of each level and above, the mean height of all, and the box around them.
+struct Extent {
+  std::vector<std::uint64_t> points;
+  double mean_height = 0.0;
+  stream::Box3 bounds;
+};
+
+Extent extent_of(const stream::Store& store) {
+  Extent extent;
+  if (store.condition() == nullptr) {
+    for (const stream::LevelInfo& level : store.levels()) extent.points.push_back(level.points);
+    extent.mean_height = store.mean_height();
+    extent.bounds = store.bounds();
+    return extent;
+  }
+  extent.points.resize(store.top() + 1);
+  double sum = 0.0;
+  std::uint64_t points = 0;
+  for (unsigned level = store.top() + 1; level-- > 0;) {
+    store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
+                              const stream::ClusterPoints& of) {
+      for (std::size_t i = 0; i < of.size(); ++i) {
+        if (!of.match(i)) continue;
+        ++points;
+        sum += of.positions[i][2];
+        extent.bounds.include(of.positions[i]);
+      }
+    });
+    extent.points[level] = points;
+  }
+  extent.mean_height = sum / static_cast<double>(points);
+  return extent;
+}
+
 py::dict info_of(const OpenStore& open) {
   const stream::Store store = open.get();
   const stream::StoreSchema& schema = store.schema();
-  const stream::Box3 box = world_box(schema, store.bounds());
+  const Extent extent = released([&] { return extent_of(store); });
+  const stream::Box3 box = world_box(schema, extent.bounds);
   py::dict info;
   info["path"] = store.path().string();
-  info["points"] = store.points();
+  info["points"] = extent.points.front();
   info["bytes"] = store.bytes();
   info["format"] = schema.format;
   info["grid"] = schema.grid;
@@ -33,7 +67,7 @@ py::dict info_of(const OpenStore& open) {
   info["bounds"] =
       py::make_tuple(box.min[0], box.min[1], box.min[2], box.max[0], box.max[1], box.max[2]);
   const stream::Channel& z = schema.coordinates[2];
-  info["mean_height"] = store.mean_height() * z.scale + z.offset;
+  info["mean_height"] = extent.mean_height * z.scale + z.offset;
   info["vertical"] = schema.vertical;
   info["transform"] = py::cast(schema.world.xy);
   info["crs"] = crs_info(schema.crs);
@@ -43,7 +77,7 @@ py::dict info_of(const OpenStore& open) {
   for (const stream::LevelInfo& of : store.levels()) {
     py::dict level;
     level["level"] = of.level;
-    level["points"] = of.points;
+    level["points"] = extent.points[of.level];
     level["clusters"] = of.clusters;
     level["bytes"] = of.bytes;
     levels.append(level);
@@ -66,8 +100,8 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
                  const py::list& focuses, const std::string& where,
                  std::optional<std::pair<unsigned, std::uint64_t>> cluster, const std::string& crs,
                  const py::tuple& how) {
-  const stream::Store store = open.get();
-  terrain::Detail detail = detail_of(store, level, region, focuses, where);
+  const stream::Store store = open.get(where);
+  terrain::Detail detail = detail_of(store, level, region, focuses);
   if (cluster) {
     const tri::ClusterId id = cluster_of(store, cluster->first, cluster->second);
     detail.cluster = static_cast<stream::ClusterId>(id);
@@ -77,7 +111,7 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
     const auto to = change_to(store, crs);
     std::vector<std::byte> bytes;
     // Known beforehand where everything is wanted.
-    if (!detail.region && detail.focuses.empty() && !detail.cluster && !detail.where) {
+    if (!detail.region && detail.focuses.empty() && !detail.cluster && where.empty()) {
       bytes.reserve(store.levels()[level].points * (sizeof(stream::Point3) + payload));
     }
     for_each_wanted_point(store.with_stop(context.stop), detail,
@@ -136,15 +170,13 @@ std::vector<std::byte> records_of(const stream::StoreQuery& query,
 py::array near(const OpenStore& open, const std::vector<double>& place,
                std::optional<std::size_t> count, std::optional<double> radius, unsigned level,
                const std::string& where) {
-  const stream::Store store = open.get();
+  const stream::Store store = open.get(where);
   if (place.size() != 2 && place.size() != 3)
     throw py::value_error("`near` has two or three numbers");
   terrain::NearPlace wanted{.xy = {place[0], place[1]}};
   if (place.size() == 3) wanted.z = place[2];
   std::vector<std::byte> records = released([&] {
-    std::optional<stream::Where> condition;
-    if (!where.empty()) condition.emplace(where, store.schema());
-    stream::StoreQuery query(store, 0, std::move(condition));
+    stream::StoreQuery query(store);
     return records_of(query, count ? nearest_points(query, wanted, *count, level)
                                    : points_within(query, wanted, radius.value(), level));
   });
@@ -154,7 +186,7 @@ py::array near(const OpenStore& open, const std::vector<double>& place,
 }  // namespace
 
 terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
-                          const py::list& focuses, const std::string& where) {
+                          const py::list& focuses) {
   const auto check = [&](unsigned wanted) {
     if (wanted <= store.top()) return;
     throw py::value_error("the store has no level " + std::to_string(wanted) +
@@ -169,7 +201,6 @@ terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::
     detail.focuses.push_back({region_of(pair[0]).value(), pair[1].cast<unsigned>()});
     check(detail.focuses.back().level);
   }
-  if (!where.empty()) detail.where.emplace(where, store.schema());
   return detail;
 }
 
@@ -214,6 +245,12 @@ void bind_store(py::module_& module) {
       .def(py::init<const std::string&>())
       .def("close", &OpenStore::close)
       .def("closed", &OpenStore::closed)
+      .def("where",
+           [](const OpenStore& open, const std::string& condition) {
+             const stream::Store view = open.get(condition);
+             released([&] { return view.bounds(); });  // throws if no point is left
+             return OpenStore(view);
+           })
       .def("info", &info_of)
       .def("points", &points)
       .def("near", &near)

@@ -20,12 +20,22 @@ namespace terrace::python {
 class OpenStore {
  public:
   explicit OpenStore(const std::string& path) : store_(stream::Store::open(path)) {}
+  explicit OpenStore(const stream::Store& store) : store_(store) {}
 
-  /// A copy, which is cheap: another thread may close this store meanwhile.
-  /// Throws: ValueError once it is closed.
-  [[nodiscard]] stream::Store get() const {
+  /// A copy, which is cheap: another thread may close this store meanwhile. where: the condition of
+  /// a view. Throws: ValueError once it is closed; terrace.Error for a bad condition.
+  [[nodiscard]] stream::Store get(const std::string& where = {}) const {
     if (!store_) throw py::value_error("the store is closed");
-    return *store_;
+    return store_->where(where);
+  }
+  /// Throws: ValueError for a view, too.
+  [[nodiscard]] stream::Store get_whole() const {
+    stream::Store store = get();
+    if (store.condition() != nullptr) {
+      throw py::value_error(
+          "it has all points of a store, and no condition: give the store itself");
+    }
+    return store;
   }
   /// Work under way goes on with the files that it has.
   void close() { store_.reset(); }
@@ -35,10 +45,10 @@ class OpenStore {
   std::optional<stream::Store> store_;
 };
 
-/// level, region, focuses (pairs of region and level) and condition.
-/// Throws: ValueError for a level that the store does not have; terrace.Error for a bad condition.
+/// level, region and focuses (pairs of region and level).
+/// Throws: ValueError for a level that the store does not have.
 terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
-                          const py::list& focuses, const std::string& where);
+                          const py::list& focuses);
 
 /// A cluster by its level and its number there. Throws: ValueError for one that the store does not
 /// have.

@@ -120,7 +120,7 @@ class SharedView {
  public:
   SharedView(const OpenStore& open, const std::string& kind, bool reads_in_frame,
              const py::dict& given)
-      : process_(getpid()), store_(open.get()) {
+      : process_(getpid()), store_(open.get_whole()) {
     tri::ViewOptions options;
     take_option(given, "max_points", options.max_points);
     take_option(given, "max_bytes", options.max_cached_bytes);

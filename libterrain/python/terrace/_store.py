@@ -197,6 +197,25 @@ class Store:
         """The coarsest level; level 0 has all points."""
         return self._info['top']
 
+    def where(self, condition):
+        """A view of the store: a Store that has only the points that meet a condition on attributes, x, y and z, such
+        as 'classification == 2 && return_number == last'. What a store can answer a view answers for these points, as
+        a store built of them alone would at level 0; a coarser level has those of its points that meet the condition.
+        Only clusters(), models and views under a camera know nothing of conditions.
+
+        The points are counted once, for which the clusters that may have some are read, with all attributes: 0.2 us for
+        each of their points from a laser survey. A view reads the files of its store, but each of the two is closed by
+        itself. Raises: Error for a bad condition, or if no point meets it.
+
+        >>> import tempfile
+        >>> points = np.random.default_rng(1).random((2000, 3))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     with build(points, folder + '/cube', attributes={'class': np.arange(2000) % 5}) as store:
+        ...         len(store.where('class == 3')), len(store.where('class == 3').where('z < 0.5'))
+        (400, 181)
+        """
+        return Store(self._core.where(condition))
+
     def level_within(self, most_points):
         """The finest level of at most so many points; the top if none has so few."""
         return _core.level_within(self._core, whole(most_points, 'most_points'))

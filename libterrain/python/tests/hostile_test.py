@@ -87,7 +87,7 @@ def calls(luck, terrace, shared, folder):
           'block_points', 'facility_cost', 'channels', 'outlier_price', 'seed', 'keep', 'order', 'metric', 'entities']),
         (terrace.build, [lambda: os.path.join(folder, luck.choice(['dem', 'a.ply', 'none'])), lambda: os.path.join(folder, 'new')],
          ['replace', 'input_format', 'skip_damaged', 'vertical', 'band', 'cell', 'resolution', 'datum_shift', 'drop', 'z_weight']),
-        (store.points, [box], ['level', 'where', 'focus', 'crs']), (store.points, [], ['cluster', 'level', 'where', 'region']),
+        (store.where, [lambda: luck.choice(['class == 1', 'z >', 'x < -1e9', 3, None])], []), (store.points, [box], ['level', 'where', 'focus', 'crs']), (store.points, [], ['cluster', 'level', 'where', 'region']),
         (lambda a: store.points(cluster=a), [lambda: (luck.randrange(3), luck.randrange(9))], []),
         (store.tiles, [lambda: os.path.join(folder, 'tiles'), lambda: (0, number())],
          ['max_error', 'quality', 'vertical', 'geoid', 'fill', 'flat_height', 'water', 'normals', 'gzip', 'name', 'resume', 'replace']),

@@ -68,6 +68,65 @@ class Stores(StoreCase):
         self.assertGreaterEqual(len(focused), inside.sum())
         self.assertLess(len(focused), len(self.points))
 
+    def test_a_view_answers_as_a_store_of_its_points_alone(self):
+        condition, keeps = 'class == 3', self.classes == 3
+        part = self.points[keeps]
+        alone = terrace.build(part, self.path('alone'), crs=32632, block_points=500)
+        self.addCleanup(alone.close)
+        view = self.scan.where(condition)
+        self.assertEqual(len(view), keeps.sum())
+        self.assertEqual(view.bounds, alone.bounds)
+        self.assertAlmostEqual(view.info['mean_height'], part[:, 2].mean(), 9)
+        self.assertEqual(view.count(view.bounds), keeps.sum())
+        np.testing.assert_array_equal(sorted_rows(terrace.xyz(view.points())), sorted_rows(part))
+        for level in view.info['levels']:
+            self.assertEqual(len(view.points(level=level['level'])), level['points'])
+            self.assertEqual(len(self.scan.points(level=level['level'], where=condition)), level['points'])
+        low, high = np.array(view.bounds[:2]), np.array(view.bounds[3:5])
+        xy = np.random.default_rng(5).uniform(low - 20, high + 20, (500, 2))
+        for method in ('linear', 'natural', 'nearest'):
+            heights = view.heights(xy, method)
+            np.testing.assert_array_equal(heights, alone.heights(xy, method))
+            self.assertFalse(np.array_equal(heights, self.scan.heights(xy, method), equal_nan=True))
+        np.testing.assert_array_equal(view.gradients(xy), alone.gradients(xy))
+        line = np.array([low, high])
+        np.testing.assert_array_equal(view.profile(line), alone.profile(line))
+        one, other = view.raster(), alone.raster()
+        np.testing.assert_array_equal(one.values, other.values)
+        self.assertEqual(tuple(one.transform), tuple(other.transform))
+        self.assertEqual(view.contours(20, lonlat=False), alone.contours(20, lonlat=False))
+
+        def corners(mesh):
+            triangles = mesh.vertices[mesh.triangles]
+            return sorted(tuple(map(tuple, sorted(map(tuple, t)))) for t in triangles)
+
+        triangles = corners(alone.mesh(level=0))
+        self.assertEqual(corners(view.mesh(level=0)), triangles)
+        self.assertEqual(corners(self.scan.mesh(level=0, where=condition)), triangles)
+        self.assertEqual(view.level_within(keeps.sum()), 0)
+        self.assertGreater(view.level_within(keeps.sum() - 1), 0)
+        mesh = view.bounded_mesh(2, duplicates='mean')
+        self.assertEqual(mesh.samples, keeps.sum())
+        self.assertLessEqual(mesh.errors(part)['max_error'], 2 + 1e-9)
+        self.assertLessEqual(self.scan.bounded_mesh(2, duplicates='mean', where=condition).errors(part)['max_error'], 2 + 1e-9)
+        view.tiles(self.path('tiles'), (8, 12), max_error=5, vertical='ignore')
+        checked = terrace.verify_tiles(self.path('tiles'), alone, vertical='ignore')
+        self.assertEqual(checked['faults'], [])
+        self.assertGreater(checked['samples'], keeps.sum())
+
+        both = view.where('z > 100')
+        self.assertEqual(len(both), (part[:, 2] > 100).sum())
+        for none in ('class == 77', 'class ==', 'colour == 1'):
+            with self.assertRaises(terrace.Error):
+                self.scan.where(none)
+        for whole in (terrace.View, terrace.Multiresolution):
+            with self.assertRaisesRegex(ValueError, 'give the store itself'):
+                whole(view)
+        view.close()
+        with self.assertRaises(ValueError):
+            view.points()
+        self.assertEqual(len(self.scan.points()), len(self.points))
+
     def test_clusters(self):
         level = self.scan.info['levels'][1]
         parts = [self.scan.points(cluster=(1, number), level=0) for number in range(level['clusters'])]

@@ -9,12 +9,14 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/store_query.hpp>
 #include <terrace/tri/metric.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
 #include "base/stored_entities.hpp"
 #include "earth/ground.hpp"
 #include "mesh/detail_triangles.hpp"
+#include "mesh/matching_points.hpp"
 #include "mesh/mesh_heights.hpp"
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/error.hpp"
@@ -78,7 +80,7 @@ tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& wor
 
 /// Triangles that reach out of a polygon have corners in the clusters beside it.
 Detail with_margin(const stream::Store& store, Detail detail, const stream::Placement& placement) {
-  const stream::Box3 all = world_box(placement, store.bounds());
+  const stream::Box3 all = world_box(placement, store.whole().bounds());
   const auto clusters =
       static_cast<double>(store.levels()[std::min(detail.finest(), store.top())].clusters);
   detail.margin = 2 * std::sqrt((all.max[0] - all.min[0]) * (all.max[1] - all.min[1]) / clusters);
@@ -108,17 +110,10 @@ tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement&
 /// The triangles of a field of metrics.
 constexpr std::uint64_t kBytesToFlip = 120;
 
-/// Counts what `detail` wants from the index alone and refuses what cannot fit.
+/// Refuses what cannot fit.
 void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
                   std::uint64_t more_per_vertex) {
-  std::uint64_t points = 0;
-  if (!detail.region && detail.focuses.empty() && !detail.cluster) {
-    points = store.levels()[detail.level].points;
-  } else {
-    for_each_wanted_record(
-        store, detail,
-        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
-  }
+  const std::uint64_t points = wanted_points(store, detail);
   constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
   const std::uint64_t needed =
       points * (kBytesPerVertex + more_per_vertex) + (std::uint64_t{32} << 20);
@@ -170,10 +165,9 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
 }
 
 /// `heights`: by slot in real units; empty: the model's.
-template <class Coord>
-TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model,
-                           const stream::Placement& placement, const std::optional<Region>& region,
-                           const std::vector<double>& heights,
+template <class Model>
+TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placement,
+                           const std::optional<Region>& region, const std::vector<double>& heights,
                            const std::optional<tri::MetricField2>& field) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
@@ -224,22 +218,25 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model,
 template <class Coord>
 TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
                      const DetailMeshOptions& options) {
-  StoreSource whole(store);
-  std::optional<ClusterTop> part;
-  if (detail.cluster) part.emplace(store, *detail.cluster);
-  tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
   const stream::Placement& placement = store.schema();
   std::optional<tri::MetricField2> field;
   if (options.metric.kind == MetricChoice::Kind::elliptical) {
     field = field_of(options.metric, store, placement);
   }
-  const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
-                                           {.deltas = false});
-  std::vector<double> heights;
-  if (options.heights.any()) {
-    heights = changed_heights(model, placement, detail.region, options.heights);
-  }
-  return mesh_of_model(model, placement, detail.region, heights, field);
+  const auto finish = [&](const auto& model) {
+    std::vector<double> heights;
+    if (options.heights.any()) {
+      heights = changed_heights(model, placement, detail.region, options.heights);
+    }
+    return mesh_of_model(model, placement, detail.region, heights, field);
+  };
+  if (store.condition() != nullptr) return finish(MatchingPoints<Coord>(store, detail));
+  StoreSource whole(store);
+  std::optional<ClusterTop> part;
+  if (detail.cluster) part.emplace(store, *detail.cluster);
+  tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
+  return finish(tri::Multiresolution2<Coord>(source, in_stored_coordinates(detail, placement),
+                                             {.deltas = false}));
 }
 
 }  // namespace
@@ -314,6 +311,13 @@ TriangleMesh detail_points(const stream::Store& store, const Detail& detail) {
 }
 
 unsigned level_within(const stream::Store& store, std::uint64_t most_points) {
+  if (store.condition() != nullptr) {
+    stream::StoreQuery query(store);
+    const stream::Box3 all = store.whole().bounds();
+    unsigned level = store.top();
+    while (level > 0 && query.count(all, level - 1) <= most_points) --level;
+    return level;
+  }
   for (const stream::LevelInfo& level : store.levels()) {
     if (level.points <= most_points) return level.level;
   }

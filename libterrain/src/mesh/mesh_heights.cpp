@@ -20,8 +20,8 @@ stream::ClusterId stored_id(tri::ClusterId id) {
 }
 
 /// All vertices in the order of overlays.
-template <class Coord>
-std::vector<Named> by_point(const tri::Multiresolution2<Coord>& model) {
+template <class Model>
+std::vector<Named> by_point(const Model& model) {
   std::vector<Named> named;
   named.reserve(model.triangulation().vertex_count());
   for (const tri::VertexId v : model.triangulation().all_vertices()) {
@@ -66,9 +66,8 @@ double rms_step(const tri::Delaunay2<Coord>& triangulation, const std::vector<do
 }
 
 /// Heights of the store, before and after the change.
-template <class Coord>
-std::vector<tri::HeightChange> smoothed(const tri::Multiresolution2<Coord>& model,
-                                        const stream::Placement& placement,
+template <class Model>
+std::vector<tri::HeightChange> smoothed(const Model& model, const stream::Placement& placement,
                                         const std::optional<Region>& region,
                                         const std::vector<double>& heights,
                                         tri::SmoothingOptions options) {
@@ -98,9 +97,8 @@ std::uint64_t height_bytes_per_vertex(const HeightOptions& options) {
   return bytes;
 }
 
-template <class Coord>
-std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
-                                    const stream::Placement& placement,
+template <class Model>
+std::vector<double> changed_heights(const Model& model, const stream::Placement& placement,
                                     const std::optional<Region>& region,
                                     const HeightOptions& options) {
   const auto& triangulation = model.triangulation();
@@ -147,6 +145,12 @@ template std::vector<double> changed_heights(const tri::Multiresolution2<std::in
                                              const stream::Placement&, const std::optional<Region>&,
                                              const HeightOptions&);
 template std::vector<double> changed_heights(const tri::Multiresolution2<double>&,
+                                             const stream::Placement&, const std::optional<Region>&,
+                                             const HeightOptions&);
+template std::vector<double> changed_heights(const MatchingPoints<std::int32_t>&,
+                                             const stream::Placement&, const std::optional<Region>&,
+                                             const HeightOptions&);
+template std::vector<double> changed_heights(const MatchingPoints<double>&,
                                              const stream::Placement&, const std::optional<Region>&,
                                              const HeightOptions&);
 

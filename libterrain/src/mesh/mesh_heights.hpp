@@ -7,6 +7,7 @@
 
 #include <terrace/tri/multiresolution.hpp>
 
+#include "mesh/matching_points.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -16,11 +17,11 @@ namespace terrace::terrain {
 std::uint64_t height_bytes_per_vertex(const HeightOptions& options);
 
 /// The heights in real units by the slot of the vertex. Of points with equal x and y only the one
-/// that stands for the vertex counts. Throws: stream::Error on a damaged overlay, or where it
-/// cannot be written; std::invalid_argument where smoothing leaves the range of doubles.
-template <class Coord>
-std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
-                                    const stream::Placement& placement,
+/// that stands for the vertex counts. Model: tri::Multiresolution2 or MatchingPoints. Throws:
+/// stream::Error on a damaged overlay, or where it cannot be written; std::invalid_argument where
+/// smoothing leaves the range of doubles.
+template <class Model>
+std::vector<double> changed_heights(const Model& model, const stream::Placement& placement,
                                     const std::optional<Region>& region,
                                     const HeightOptions& options);
 
@@ -29,6 +30,14 @@ extern template std::vector<double> changed_heights(const tri::Multiresolution2<
                                                     const std::optional<Region>&,
                                                     const HeightOptions&);
 extern template std::vector<double> changed_heights(const tri::Multiresolution2<double>&,
+                                                    const stream::Placement&,
+                                                    const std::optional<Region>&,
+                                                    const HeightOptions&);
+extern template std::vector<double> changed_heights(const MatchingPoints<std::int32_t>&,
+                                                    const stream::Placement&,
+                                                    const std::optional<Region>&,
+                                                    const HeightOptions&);
+extern template std::vector<double> changed_heights(const MatchingPoints<double>&,
                                                     const stream::Placement&,
                                                     const std::optional<Region>&,
                                                     const HeightOptions&);

@@ -22,10 +22,7 @@ constexpr std::uint64_t kPolesBytesPerPoint = 420;
 
 void check_surface_memory(const stream::Store& store, const Detail& detail,
                           std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
-  std::uint64_t points = 0;
-  for_each_wanted_record(
-      store, detail,
-      [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+  const std::uint64_t points = wanted_points(store, detail);
   const std::uint64_t needed = points * bytes_per_point;
   if (needed <= memory_bytes) return;
   throw stream::Error({.file = store.path().string(),

@@ -64,7 +64,7 @@ double points_met_by_a_place(const stream::Store& store, unsigned level) {
   const auto area = [](const stream::Box3& box) {
     return (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]);
   };
-  const double whole = area(store.bounds());
+  const double whole = area(store.whole().bounds());
   const stream::LevelInfo& info = store.levels()[level];
   if (level == store.top() || !(whole > 0)) return 0;
   constexpr std::uint64_t kLookedAt = 500;

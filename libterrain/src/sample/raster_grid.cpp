@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/store_query.hpp>
 
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
@@ -70,6 +71,11 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
   return result;
 }
 
+std::uint64_t points_of(const stream::Store& store, unsigned level) {
+  if (store.condition() == nullptr) return store.levels()[level].points;
+  return stream::StoreQuery(store).count(store.bounds(), level);
+}
+
 /// To two digits.
 double rounded_cell(double value) {
   std::array<char, 32> digits{};
@@ -85,7 +91,7 @@ double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned
   const std::array<double, 6>& m = store.schema().world.xy;
   if (store.schema().grid && level == 0) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
   const double size = (area.max[0] - area.min[0]) * (area.max[1] - area.min[1]);
-  const std::uint64_t points = std::max<std::uint64_t>(store.levels()[level].points, 1);
+  const std::uint64_t points = std::max<std::uint64_t>(points_of(store, level), 1);
   return rounded_cell(std::sqrt(size / static_cast<double>(points)));
 }
 

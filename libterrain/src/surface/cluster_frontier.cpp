@@ -10,7 +10,10 @@ constexpr std::uint64_t kCacheBytes = std::uint64_t{2} << 20;
 }  // namespace
 
 ClusterFrontier::ClusterFrontier(const stream::Store& store, unsigned level)
-    : reader_(store, kCacheBytes), root_(store.root()), level_(level) {}
+    : reader_(store, kCacheBytes),
+      root_(store.root()),
+      level_(level),
+      skips_none_(store.condition() != nullptr) {}
 
 void ClusterFrontier::begin(const Take& take) {
   entries_.clear();
@@ -23,7 +26,7 @@ void ClusterFrontier::begin(const Take& take) {
 bool ClusterFrontier::settle(Open& open) const {
   while (true) {
     open.box = entries_[open.entry].box;
-    if (open.box.min != open.box.max) return true;
+    if (open.box.min != open.box.max || skips_none_) return true;
     if (open.level == level_) return false;
     --open.level;
     --open.entry;
@@ -33,7 +36,7 @@ bool ClusterFrontier::settle(Open& open) const {
 void ClusterFrontier::add_below(const stream::StoreQuery::Node& node) {
   const unsigned at = node.level();
   if (at <= level_) return;
-  for (std::size_t i = 0; i < node.positions.size(); ++i) {
+  for (std::size_t i = 0; i < node.heads(); ++i) {
     for (unsigned below = level_; below < at; ++below) {
       const stream::StoreQuery::Branch& branch = node.branch(i, below);
       entries_.push_back({flat(branch.box), branch.ordinal});

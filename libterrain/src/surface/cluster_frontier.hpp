@@ -52,12 +52,14 @@ class ClusterFrontier {
 
   void read_one(std::size_t at, const Take& take);
   void add_below(const stream::StoreQuery::Node& node);
-  /// Skips boxes that are one point: all below has the x,y of the head. False if none is left.
+  /// Skips boxes that are one point: all below has the x,y of the head, which counts, but for
+  /// views. False if none is left.
   bool settle(Open& open) const;
 
   stream::StoreQuery reader_;
   stream::ClusterId root_;
   unsigned level_;
+  bool skips_none_;
   std::vector<Entry> entries_;
   std::vector<Open> open_;
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -66,7 +67,7 @@ class Descent {
   [[nodiscard]] stream::ClusterId first() const { return first_; }
 
   /// The first and the wanted clusters down to `lowest`; of level 0 those of which points may meet
-  /// the condition.
+  /// the condition of a view.
   void run(unsigned lowest) {
     stream::ClusterPoints points;
     store_.read(first_, points);
@@ -76,36 +77,26 @@ class Descent {
                             points.representative_payload.end());
       points.children.insert(points.children.end(), points.representative_children.begin(),
                              points.representative_children.end());
+      if (const stream::Where* condition = store_.condition()) {
+        points.matches.push_back(0);
+        condition->test({&points.representative, 1}, points.representative_payload,
+                        std::span(points.matches).last(1));
+      }
     }
     deliver(first_, store_.record(first_), points);
     for (unsigned level = stream::level_of(first_); level-- > lowest;) {
-      if (whole(level) && (level > 0 || !detail_.where)) {
+      if (whole(level)) {
         store_.for_each(level, [this](stream::ClusterId id, const stream::ClusterRecord& record,
                                       const stream::ClusterPoints& p) { deliver(id, record, p); });
         continue;
       }
-      const auto read = [&](stream::ClusterId id, const stream::ClusterRecord& record) {
-        if (!possible(id, record)) return;
+      for_each_head(level, [&](stream::ClusterId id, const stream::ClusterRecord& record) {
+        // Those above are read in any case, for the clusters that they head.
+        if (level == 0 && !store_.may_match(id)) return;
         store_.read(id, points);
         deliver(id, record, points);
-      };
-      if (!whole(level)) {
-        for_each_head(level, read);
-        continue;
-      }
-      for (std::uint64_t c = 0; c < store_.levels()[level].clusters; ++c) {
-        const stream::ClusterId id = stream::cluster_id(level, c);
-        read(id, store_.record(id));
-      }
+      });
     }
-  }
-
-  /// Whether points of a cluster of level 0 may meet the condition. Clusters above are read in any
-  /// case, for the clusters that they head.
-  [[nodiscard]] bool possible(stream::ClusterId id, const stream::ClusterRecord& record) const {
-    return !detail_.where || stream::level_of(id) > 0 ||
-           detail_.where->possible(world_box(placement_, record.summary.box),
-                                   store_.attribute_ranges(id));
   }
 
   /// A level that is wanted everywhere needs no list of its clusters.
@@ -169,15 +160,12 @@ void for_each_wanted_point(const stream::Store& store, const Detail& detail,
            std::any_of(detail.focuses.begin(), detail.focuses.end(),
                        [&](const FinerRegion& focus) { return focus.region.contains(place); });
   };
-  std::vector<std::uint8_t> matches;
   const auto visit_cluster = [&](stream::ClusterId id, const stream::ClusterRecord& record,
                                  const stream::ClusterPoints& points) {
     const bool whole = !detail.region || detail.region->overlap(world_box(
                                              placement, record.summary.box)) == Overlap::whole;
-    matches.assign(points.size(), 1);
-    if (detail.where) detail.where->test(points.positions, points.payload, matches);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (matches[i] == 0) continue;
+      if (!points.match(i)) continue;
       const stream::Point3 place = world_point(placement, points.positions[i]);
       if (whole || inside(place)) visit(id, points, i, place);
     }
@@ -203,6 +191,24 @@ void for_each_wanted_record(
   } else {
     descent.for_each_head(finest, visit);
   }
+}
+
+std::uint64_t wanted_points(const stream::Store& store, const Detail& detail) {
+  std::uint64_t points = 0;
+  if (store.condition() != nullptr) {
+    for_each_wanted(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& of) {
+          points += static_cast<std::uint64_t>(std::count(of.matches.begin(), of.matches.end(), 1));
+        });
+  } else if (!detail.region && detail.focuses.empty() && !detail.cluster) {
+    points = store.levels()[detail.level].points;
+  } else {
+    for_each_wanted_record(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+  }
+  return points;
 }
 
 }  // namespace terrace::terrain

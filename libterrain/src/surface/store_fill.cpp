@@ -177,8 +177,9 @@ StoreFill::StoreFill(const stream::Store& store) {
   for_each_wanted(
       store, layout.detail,
       [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
-        for (const stream::Point3& p : points.positions) {
-          if (!std::isfinite(p[2])) continue;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const stream::Point3& p = points.positions[i];
+          if (!points.match(i) || !std::isfinite(p[2])) continue;
           const std::array<double, 2> at = in_cells({p[0], p[1]});
           const std::size_t cell = cell_at(at[1], rows) * columns + cell_at(at[0], columns);
           sum[cell] += p[2] * channel.scale + channel.offset;

@@ -27,10 +27,12 @@ std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const S
   ClusterHeights found{.low = kFar, .high = -kFar, .some = {}};
   query.cut(
       tall(box),
-      [&](const stream::Point3& head, const stream::StoreQuery::Branch& cluster) {
+      [&](const stream::Point3* head, const stream::StoreQuery::Branch& cluster) {
         found.low = std::min(found.low, cluster.box.min[2]);
         found.high = std::max(found.high, cluster.box.max[2]);
-        if (found.some.size() < kMostSome && box.contains(head)) found.some.push_back(head);
+        if (head != nullptr && found.some.size() < kMostSome && box.contains(*head)) {
+          found.some.push_back(*head);
+        }
         return true;
       },
       [&](const stream::StoreQuery::Branch& cluster) {

@@ -8,6 +8,8 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
+/// Of a view, whose share of a level is not known, finer levels are read until there are so many.
+constexpr std::size_t kFewestCounted = std::size_t{1} << 14;
 /// Halvings of the store's area. More come only where points lie on each other.
 constexpr unsigned kDeepestTree = 48;
 
@@ -20,12 +22,20 @@ WindowTree::WindowTree(const stream::Store& store, unsigned level, std::size_t p
   std::vector<Point2> sample;
   {
     WindowPoints read;
-    StoreWindow(store).points({{-kAll, -kAll}, {kAll, kAll}}, read, counted);
+    StoreWindow window(store);
+    const auto read_counted = [&] {
+      window.points({{-kAll, -kAll}, {kAll, kAll}}, read, counted);
+      return read.positions.size();
+    };
+    while (read_counted() < kFewestCounted && store.condition() != nullptr && counted > level) {
+      --counted;
+    }
     sample.reserve(read.positions.size());
     for (const stream::Point3& p : read.positions) sample.push_back({p[0], p[1]});
   }
-  const double each = static_cast<double>(store.levels()[level].points) /
-                      static_cast<double>(std::max<std::size_t>(sample.size(), 1));
+  const double each =
+      static_cast<double>(store.levels()[level].points) /
+      static_cast<double>(std::max<std::uint64_t>(store.levels()[counted].points, 1));
   const auto most = static_cast<std::size_t>(std::max(1.0, static_cast<double>(points) / each));
   const StoredBox all{{store.bounds().min[0], store.bounds().min[1]},
                       {store.bounds().max[0], store.bounds().max[1]}};

@@ -112,8 +112,8 @@ std::stop_token stop_token() {
   return source.get_token();
 }
 
-stream::Store open_store(const std::filesystem::path& path) {
-  return stream::Store::open(path).with_stop(stop_token());
+stream::Store open_store(const std::filesystem::path& path, const std::string& where) {
+  return stream::Store::open(path).with_stop(stop_token()).where(where);
 }
 
 void call_library(const std::string& file, const std::string& method,

@@ -27,9 +27,10 @@ void install_signal_handlers();
 /// Throws Interrupted if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
 
-/// A store whose reading throws stream::Stopped once the user has asked to stop. Throws: as
-/// stream::Store::open.
-[[nodiscard]] stream::Store open_store(const std::filesystem::path& path);
+/// A store whose reading throws stream::Stopped once the user has asked to stop, or the view of it
+/// that --where asks for. Throws: as stream::Store::open and where.
+[[nodiscard]] stream::Store open_store(const std::filesystem::path& path,
+                                       const std::string& where = {});
 
 /// The same request as a token: reading and writing pipes ends with stream::Stopped.
 [[nodiscard]] std::stop_token stop_token();

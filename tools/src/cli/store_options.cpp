@@ -8,6 +8,7 @@
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
+#include "cli/selection_options.hpp"
 
 namespace terrace::tools {
 
@@ -59,6 +60,7 @@ void PartOptions::define(CLI::App& app, const std::string& kept) {
                  kept + ": a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
   app.add_option("--focus", focuses, "BOX:L, all points of level L inside the box; repeatable")
       ->allow_extra_args(false);
+  add_where(app, where);
   crs.define(app);
 }
 
@@ -96,13 +98,14 @@ void SurfaceOptions::define_triangles(CLI::App& app) {
              "ground) are no data, as over water and in shadows (default: none)",
              kAboveZero)
       ->type_name("METRES");
+  add_where(app, where);
 }
 
 stream::Store SurfaceOptions::open(SamplerOptions& sampler) const {
   sampler.method = parse_interpolation(method);
   sampler.max_edge = max_edge;
   const std::optional<unsigned> wanted = parse_level(level);
-  stream::Store store = open_store(path);
+  stream::Store store = open_store(path, where);
   sampler.level = wanted.value_or(store.top());
   return store;
 }

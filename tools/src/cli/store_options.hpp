@@ -46,10 +46,10 @@ class CrsOptions {
   std::string region_, to_, shift_;
 };
 
-/// Which part of a store at which detail: the store, --level, --region, --focus, --cluster and
-/// CrsOptions.
+/// Which part of a store at which detail: the store, --level, --region, --focus, --cluster, --where
+/// and CrsOptions.
 struct PartOptions {
-  std::string path, level, region, cluster;
+  std::string path, level, region, cluster, where;
   std::vector<std::string> focuses;
   CrsOptions crs;
 
@@ -61,9 +61,9 @@ struct PartOptions {
   [[nodiscard]] Detail detail(const stream::Store& store, const CommonOptions& common) const;
 };
 
-/// The surface between a store's samples: the store, --level, --max-edge and --method.
+/// The surface between a store's samples: the store, --level, --max-edge, --where and --method.
 struct SurfaceOptions {
-  std::string path, level = "0", method = "linear";
+  std::string path, level = "0", method = "linear", where;
   std::optional<double> max_edge;
 
   void define(CLI::App& app);

@@ -17,7 +17,6 @@
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
 #include "cli/output.hpp"
-#include "cli/selection_options.hpp"
 #include "cli/store_options.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/detail.hpp"
@@ -93,7 +92,6 @@ class MeshCommand final : public Command {
                    "(holes), flat (at the lowest height), interpolate")
         ->capture_default_str()
         ->type_name("NAME");
-    add_where(app, where_);
     not_yet(app, {"--base"});
   }
 
@@ -130,14 +128,13 @@ class MeshCommand final : public Command {
     }
     options.fill = parse_fill(fill_);
     options.path = output_;
-    const stream::Store store = open_store(part_.path);
+    const stream::Store store = open_store(part_.path, part_.where);
     options.region = part_.detail(store, common).region;
     if (part_.crs.places(store, common).has_effect()) {
       throw UsageError(
           "--to-crs: between other coordinates the triangles would be other surfaces, and the "
           "bound would not hold; write the mesh in the store's CRS");
     }
-    if (!where_.empty()) options.where.emplace(where_, store.schema());
     options.writer = {
         .format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()};
     keep_freed_memory();
@@ -190,9 +187,8 @@ class MeshCommand final : public Command {
 
   Summary multiresolution(const CommonOptions& common) const {
     const Stopwatch watch;
-    if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none" || !where_.empty()) {
-      throw UsageError(
-          "--quality, --duplicates, --fill and --where belong to --max-error and --max-points");
+    if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
+      throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
     }
     DetailMeshOptions options{{.smoothing = parse_smoothing(smooth_)},
                               MetricChoice::parse(metric_)};
@@ -201,7 +197,7 @@ class MeshCommand final : public Command {
     if (save && save_overlay_ == output_) {
       throw UsageError("--save-overlay and --output are the same file");
     }
-    const stream::Store store = open_store(part_.path);
+    const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
     const PlaceConversion places = part_.crs.places(store, common);
     const bool replace = may_replace(output_, common.force);
@@ -234,7 +230,7 @@ class MeshCommand final : public Command {
 
   PartOptions part_;
   std::string output_, format_, smooth_, metric_ = "euclidean";
-  std::string overlay_, save_overlay_, where_;
+  std::string overlay_, save_overlay_;
   std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
   std::optional<double> max_error_;
 };

@@ -127,7 +127,6 @@ class PointsCommand final : public Command {
         ->excludes("-k");
     part_.define_cluster(app, "the points of --level (default: L) that it stands for")
         ->excludes("--near");
-    add_where(app, where_);
     app.add_option("--overlay", overlay_,
                    "a file of mesh --save-overlay: its heights in place of the store's")
         ->type_name("FILE")
@@ -138,9 +137,8 @@ class PointsCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const stream::Store store = open_store(part_.path);
-    Detail detail = part_.detail(store, common);
-    if (!where_.empty()) detail.where.emplace(where_, store.schema());
+    const stream::Store store = open_store(part_.path, part_.where);
+    const Detail detail = part_.detail(store, common);
     if (!near_.empty()) return near(store, detail, watch, common);
     if (format_ == "geojson" || (format_.empty() && output_.ends_with(".geojson"))) {
       return lines(store, detail, watch, common);
@@ -189,7 +187,7 @@ class PointsCommand final : public Command {
       wanted.crs = [system = to->to()] { return system.crs_with_wkt1(); };
     } else {
       wanted.lattice = lattice_of(store.schema());
-      wanted.bounds = world_box(store.schema(), store.bounds());
+      wanted.bounds = world_box(store.schema(), store.whole().bounds());
     }
     return wanted;
   }
@@ -224,7 +222,7 @@ class PointsCommand final : public Command {
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
     NearPlace place{.xy = {v[0], v[1]}};
     if (v.size() == 3) place.z = v[2];
-    stream::StoreQuery query(store, 0, detail.where);
+    stream::StoreQuery query(store);
     const std::vector<stream::FoundPoint> found =
         count_ ? nearest_points(query, place, *count_, detail.level)
                : points_within(query, place, *radius_, detail.level);
@@ -252,7 +250,7 @@ class PointsCommand final : public Command {
   }
 
   PartOptions part_;
-  std::string output_, format_, overlay_, near_, where_;
+  std::string output_, format_, overlay_, near_;
   std::optional<std::size_t> count_;
   std::optional<double> radius_;
 };

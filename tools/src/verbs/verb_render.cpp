@@ -44,6 +44,7 @@ namespace {
 struct PictureSelection {
   std::string level;   ///< empty: as much as a picture can show
   std::string region;  ///< empty: everywhere
+  std::string where;   ///< empty: all points
   std::vector<std::string> focuses;
   stream::HeightsOfColour colours = stream::HeightsOfColour::none;
   bool triangles = false;  ///< triangles are wanted, not points or cells
@@ -155,7 +156,9 @@ TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
     store.for_each(level.level, [&](stream::ClusterId, const stream::ClusterRecord&,
                                     const stream::ClusterPoints& cluster) {
       check_interrupt();
-      for (const stream::Point3& p : cluster.positions) grid.add(p);
+      for (std::size_t i = 0; i < cluster.size(); ++i) {
+        if (cluster.match(i)) grid.add(cluster.positions[i]);
+      }
       points += cluster.size();
       meter.update(points, static_cast<double>(points) / static_cast<double>(store.points()));
     });
@@ -170,18 +173,14 @@ std::string finest_level(const stream::Store& store, const std::string& region) 
   if (region.empty()) return std::to_string(level_within(store, kMost));
   for (unsigned level = 0; level < store.top(); ++level) {
     const Detail detail = parse_detail(store, std::to_string(level), region, {});
-    std::uint64_t points = 0;
-    for_each_wanted_record(
-        store, detail,
-        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
-    if (points <= kMost) return std::to_string(level);
+    if (wanted_points(store, detail) <= kMost) return std::to_string(level);
   }
   return "top";
 }
 
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
                         std::uint64_t most_cells, const CommonOptions& common) {
-  const stream::Store store = open_store(path);
+  const stream::Store store = open_store(path, selection.where);
   const bool whole = selection.focuses.empty() && selection.region.empty();
   const stream::Placement& stored = store.schema();
   PictureInput input;
@@ -234,6 +233,7 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
                  "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")
       ->allow_extra_args(false)
       ->type_name("BOX:L");
+  add_where(app, selection.where);
   add_heights_of_colour(app, selection.colours);
 }
 
@@ -250,8 +250,10 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
     no_colours();
     return from_store(path, selection, most_cells, common);
   }
-  if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty()) {
-    throw UsageError("'" + path + "' is not a store: --level, --region and --focus do not apply");
+  if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty() ||
+      !selection.where.empty()) {
+    throw UsageError("'" + path +
+                     "' is not a store: --level, --region, --focus and --where do not apply");
   }
   if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
     no_colours();

@@ -56,7 +56,7 @@ class SurfaceCommand final : public Command {
     if (tetrahedra_ && options.method) {
       throw UsageError("--tetrahedra is for --criterion poles, gabriel and edge");
     }
-    const stream::Store store = open_store(part_.path);
+    const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
     const PlaceConversion places = part_.crs.places(store, common);
     const bool replace = may_replace(output_, common.force);

@@ -14,6 +14,7 @@
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
+#include "cli/selection_options.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tiles.hpp"
 #include "verbs/verbs.hpp"
@@ -86,6 +87,7 @@ class TileCommand final : public Command {
     app.add_flag(
         "--resume", resume_,
         "go on with a run that was interrupted, or mend a finished set: what is whole is kept");
+    add_where(app, where_);
     app.add_option("--name", name_, "of the tile set, in layer.json");
   }
 
@@ -95,7 +97,7 @@ class TileCommand final : public Command {
   [[nodiscard]] TilesRequest request(const CommonOptions& common) const;
 
   std::string store_, output_, format_ = "quantized-mesh", zoom_, quality_ = "removal";
-  std::string fill_ = "interpolate", water_, vertical_, geoid_, name_;
+  std::string fill_ = "interpolate", water_, vertical_, geoid_, name_, where_;
   std::optional<double> max_error_;
   bool gzip_ = false, normals_ = false, metadata_ = false, resume_ = false;
 };
@@ -123,7 +125,8 @@ TilesRequest TileCommand::request(const CommonOptions& common) const {
 
 Summary TileCommand::run(const CommonOptions& common) {
   const Stopwatch watch;
-  const TilesOutcome result = write_tiles(open_store(store_), request(common), common.context());
+  const TilesOutcome result =
+      write_tiles(open_store(store_, where_), request(common), common.context());
 
   Summary summary;
   nlohmann::ordered_json zooms = nlohmann::ordered_json::array();

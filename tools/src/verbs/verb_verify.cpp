@@ -33,6 +33,7 @@ class VerifyCommand final : public Command {
     app.add_option("PATH", path_, "the store, or the folder of tiles, to check")->required();
     app.add_option("--store", store_,
                    "where the tiles' samples come from: heights are checked against all of them");
+    add_where(app, where_);
     add_number(app, "--max-error", max_error_,
                "error bound of the deepest zoom in metres, twice as much at each zoom above; else "
                "what layer.json states",
@@ -47,18 +48,22 @@ class VerifyCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     if (is_tile_folder(path_)) return tiles(common);
-    if (!store_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty()) {
-      throw UsageError("--store, --max-error, --vertical and --geoid are for tile sets, and " +
-                       path_ + " is not one");
+    if (!store_.empty() || has_store_options()) {
+      throw UsageError(
+          "--store, --where, --max-error, --vertical and --geoid are for tile sets, and " + path_ +
+          " is not one");
     }
     return store();
   }
 
  private:
+  [[nodiscard]] bool has_store_options() const {
+    return !where_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty();
+  }
   [[nodiscard]] Summary store() const;
   [[nodiscard]] Summary tiles(const CommonOptions& common) const;
 
-  std::string path_, store_, vertical_, geoid_;
+  std::string path_, store_, where_, vertical_, geoid_;
   std::optional<double> max_error_;
 };
 
@@ -83,11 +88,12 @@ Summary VerifyCommand::store() const {
 
 Summary VerifyCommand::tiles(const CommonOptions& common) const {
   const Stopwatch watch;
-  if (store_.empty() && (max_error_ || !vertical_.empty() || !geoid_.empty())) {
-    throw UsageError("--max-error, --vertical and --geoid have a meaning with --store alone");
+  if (store_.empty() && has_store_options()) {
+    throw UsageError(
+        "--where, --max-error, --vertical and --geoid have a meaning with --store alone");
   }
   std::optional<stream::Store> store;
-  if (!store_.empty()) store.emplace(open_store(store_));
+  if (!store_.empty()) store.emplace(open_store(store_, where_));
   const TileCheckResult result = check_tiles({.folder = path_,
                                               .max_error = max_error_,
                                               .store = store ? &*store : nullptr,

@@ -16,6 +16,7 @@
 
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/schema.hpp"
+#include "terrace/stream/where.hpp"
 
 /// The store: a folder that holds every input point exactly once in a hierarchy of clusters, each
 /// of which can be read alone. FORMAT.md describes the bytes.
@@ -130,8 +131,13 @@ struct ClusterPoints {
   Point3 representative{};
   std::vector<std::byte> representative_payload;
   std::vector<std::uint64_t> representative_children;  ///< its `level` ordinals, level 0 first
+  /// Of a view (Store::where()): 1 for members that meet the condition. Empty: all do.
+  std::vector<std::uint8_t> matches;
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
+  [[nodiscard]] bool match(std::size_t member) const {
+    return matches.empty() || matches[member] != 0;
+  }
 };
 
 /// The index entry of a cluster.
@@ -182,6 +188,22 @@ class Store {
   /// Throws: Stopped once that is requested. For loops that continue without reading.
   void check_stop() const;
 
+  /// A view: the same store, of which those points alone count that meet a condition (see Where).
+  /// bounds() is theirs, read() and for_each() mark them, StoreQuery finds no others; what counts
+  /// points, clusters and bytes remains that of the whole store. The points of a level of a view
+  /// are those of the level that meet the condition: a representative that does not is left out,
+  /// whatever it stands for. Of a view, a view of the points that meet both conditions; an empty
+  /// condition gives the same store. Copies share the bounds once they are known.
+  /// Throws: Error that names the character of a bad condition.
+  [[nodiscard]] Store where(const std::string& condition) const;
+  /// Of a view its condition, else null. Valid as long as a copy of the view exists.
+  [[nodiscard]] const Where* condition() const;
+  /// The store that this is a view of, or itself.
+  [[nodiscard]] Store whole() const;
+  /// False if the index tells that no point of the cluster, its representative aside, meets the
+  /// condition. Its children may head clusters with some. Throws: as record().
+  [[nodiscard]] bool may_match(ClusterId id) const;
+
   [[nodiscard]] const StoreSchema& schema() const;
   [[nodiscard]] int version() const;
   [[nodiscard]] const std::filesystem::path& path() const;
@@ -191,7 +213,9 @@ class Store {
   [[nodiscard]] std::uint64_t bytes() const;
   /// The CRC-32 of the manifest, which contains those of all files: it identifies the store.
   [[nodiscard]] std::uint32_t checksum() const;
-  /// The bounding box of all points, in stored coordinates.
+  /// The bounding box of all points, in stored coordinates. Of a view it is found when first asked
+  /// for, from the root down to the clusters at the border. Throws, of a view: Error if no point
+  /// meets the condition or the store is damaged; Stopped.
   [[nodiscard]] const Box3& bounds() const;
   /// Mean of stored coordinate 2 over all points.
   [[nodiscard]] double mean_height() const;
@@ -213,7 +237,8 @@ class Store {
   [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
   /// Throws: Error for damage (checksum, counts), never returns a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;
-  /// Visits every cluster of `level` in order of ordinals; reads sequentially.
+  /// Visits every cluster of `level` in order of ordinals; reads sequentially. Of a view, clusters
+  /// of level 0 that may_match() excludes are neither read nor visited.
   void for_each(unsigned level,
                 const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>&
                     visit) const;
@@ -222,9 +247,13 @@ class Store {
 
  private:
   struct Impl;
+  class View;
+  class ConditionView;
   explicit Store(std::shared_ptr<Impl> impl);
+  void mark(ClusterPoints& points) const;
 
   std::shared_ptr<Impl> impl_;
+  std::shared_ptr<const View> view_;
   std::stop_token stop_;
 };
 

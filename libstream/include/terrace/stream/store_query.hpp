@@ -7,13 +7,11 @@
 #include <cstdint>
 #include <limits>
 #include <list>
-#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "terrace/stream/store.hpp"
-#include "terrace/stream/where.hpp"
 
 namespace terrace::stream {
 
@@ -37,7 +35,8 @@ struct FoundPoint {
 ///
 /// A query reads the clusters whose boxes may matter, about 25 ns per point, and the index entries
 /// on the way. The root and 6 MiB of the decoded clusters above level 0 are cached, so nearby
-/// queries cost a tenth of that.
+/// queries cost a tenth of that. Of a view (Store::where()) only points that meet its condition are
+/// found and counted, and clusters of level 0 in which none can are not read.
 ///
 /// One object per thread; any number of them share a Store, which must outlive them. All functions
 /// throw Error for a damaged store and Stopped if the store is stopped.
@@ -51,36 +50,42 @@ class StoreQuery {
     /// this one yet, and the box is Store::coarse_box() or page_box().
     std::uint64_t descendants = 0;
   };
-  /// A decoded cluster and the clusters that its members head.
+  /// A decoded cluster and the clusters that its members head. Those of a view that do not meet the
+  /// condition have no position, but they are heads all the same, behind the others.
   class Node {
    public:
     ClusterId id{};
-    std::vector<Point3> positions;      ///< of the members
-    std::vector<std::uint8_t> matches;  ///< 1 for members that meet the condition; empty: all do
+    std::vector<Point3> positions;  ///< of the members, of a view of those that meet the condition
     std::uint64_t bytes = 0;
 
-    [[nodiscard]] bool match(std::size_t member) const {
-      return matches.empty() || matches[member] != 0;
-    }
     [[nodiscard]] unsigned level() const { return level_of(id); }
-    /// The cluster that a member heads on a level below this node's. Throws: Error.
-    [[nodiscard]] const Branch& branch(std::size_t member, unsigned below) const {
-      Branch& branch = branches_[member * level() + below];
+    /// The member that position i is of.
+    [[nodiscard]] std::uint32_t member(std::size_t i) const {
+      return members_.empty() ? static_cast<std::uint32_t>(i) : members_[i];
+    }
+    /// The number of heads: the members, or 0 on level 0. Head i is the point of position i, if
+    /// there are so many.
+    [[nodiscard]] std::size_t heads() const {
+      return level() == 0 ? 0 : branches_.size() / level();
+    }
+    /// The cluster that a head has on a level below this node's. Throws: Error.
+    [[nodiscard]] const Branch& branch(std::size_t head, unsigned below) const {
+      Branch& branch = branches_[head * level() + below];
       if (branch.descendants == 0) look_up(branch, below);
       return branch;
     }
     /// The same, but its box may be that of its page of the index, which is not read. Throws:
     /// Error.
-    [[nodiscard]] const Branch& near_branch(std::size_t member, unsigned below) const {
-      Branch& branch = branches_[member * level() + below];
+    [[nodiscard]] const Branch& near_branch(std::size_t head, unsigned below) const {
+      Branch& branch = branches_[head * level() + below];
       if (branch.descendants == 0) {
         branch.box = store_->page_box(cluster_id(below, branch.ordinal));
       }
       return branch;
     }
     /// The same as far as it is known without reading.
-    [[nodiscard]] const Branch& known_branch(std::size_t member, unsigned below) const {
-      return branches_[member * level() + below];
+    [[nodiscard]] const Branch& known_branch(std::size_t head, unsigned below) const {
+      return branches_[head * level() + below];
     }
 
    private:
@@ -88,15 +93,13 @@ class StoreQuery {
     void look_up(Branch& branch, unsigned below) const;
 
     const Store* store_ = nullptr;
-    mutable std::vector<Branch> branches_;  ///< level() per member, level 0 first
+    std::vector<std::uint32_t> members_;    ///< of a view: the number of each head
+    mutable std::vector<Branch> branches_;  ///< level() per head, level 0 first
   };
 
   /// leaf_bytes: cache for decoded clusters of level 0 (LRU), for callers that query nearby places
   /// repeatedly. Without it, ranges that do not overlap are read fastest.
-  /// where: only points that meet it are found and counted; clusters of level 0 in which none can
-  /// are not read, and are nodes without members.
-  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0,
-                      std::optional<Where> where = std::nullopt);
+  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0);
   StoreQuery(const StoreQuery&) = delete;
   StoreQuery& operator=(const StoreQuery&) = delete;
 
@@ -117,12 +120,12 @@ class StoreQuery {
   /// The attributes of found points, in their order: Schema::payload_size() bytes each. Reads each
   /// of their clusters once.
   [[nodiscard]] std::vector<std::byte> attributes(std::span<const FoundPoint> found) const;
-  /// The number of points (of level 0 and above) in the box. Without a condition only clusters that
-  /// cross its border are read.
-  [[nodiscard]] std::uint64_t count(const Box3& box);
-  /// An estimate of count() without the condition, from the index alone: of clusters that cross the
-  /// border, the share of their boxes inside counts. Ends early with any number above `limit` if
-  /// there are more.
+  /// The number of points of `level` and above in the box. For level 0, but of a view, only
+  /// clusters that cross its border are read.
+  [[nodiscard]] std::uint64_t count(const Box3& box, unsigned level = 0);
+  /// An estimate of count(), of a view without its condition, from the index alone: of clusters
+  /// that cross the border, the share of their boxes inside counts. Ends early with any number
+  /// above `limit` if there are more.
   [[nodiscard]] double estimate(const Box3& box,
                                 double limit = std::numeric_limits<double>::infinity());
 
@@ -144,8 +147,9 @@ class StoreQuery {
 
   /// Cuts the hierarchy below the root at the border of a box: take(head, branch) is called for
   /// clusters that lie completely inside and for those of level 0 on the border, until it returns
-  /// false. Before a cluster on the border is opened, opens(branch) is asked. In a store of one
-  /// block every point is such a branch, without other descendants.
+  /// false; head is null if that does not meet the condition of a view. Before a cluster on the
+  /// border is opened, opens(branch) is asked. In a store of one block every point is such a
+  /// branch, without other descendants.
   template <class Take, class Opens>
   void cut(const Box3& box, const Take& take, const Opens& opens);
 
@@ -172,7 +176,6 @@ class StoreQuery {
   void check_looked(std::uint64_t clusters) const;
 
   const Store& store_;
-  std::optional<Where> where_;
   std::uint64_t clusters_ = 0;  ///< of all levels
   Node root_, passing_;         ///< passing: the node that is not cached
   Cache leaves_, inner_;
@@ -189,7 +192,7 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
     visit(node);
     const unsigned at = node.level();
     if (at <= level) return;
-    for (std::size_t i = 0; i < node.positions.size(); ++i) {
+    for (std::size_t i = 0; i < node.heads(); ++i) {
       for (unsigned below = at; below-- > level;) {
         const Branch& branch = node.known_branch(i, below);
         const bool known = branch.descendants > 0;
@@ -221,7 +224,7 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
   const auto look_into = [&](const Node& node) {
     bound = visit(node);
     const unsigned at = node.level();
-    for (std::size_t i = 0; i < node.positions.size(); ++i) {
+    for (std::size_t i = 0; i < node.heads(); ++i) {
       for (unsigned below = level; below < at; ++below) {
         const auto beyond = [bound](double distance) {
           return distance > bound || distance == std::numeric_limits<double>::infinity();
@@ -253,7 +256,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
   if (root_.level() == 0) {
     for (const Point3& p : root_.positions) {
       if (!box.contains(p)) continue;
-      if (!take(p, Branch{.box = {p, p}, .ordinal = 0, .descendants = 1})) return;
+      if (!take(&p, Branch{.box = {p, p}, .ordinal = 0, .descendants = 1})) return;
     }
     return;
   }
@@ -262,7 +265,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
     check_looked(looked);
     const Node& at = node(crossing_.back());
     crossing_.pop_back();
-    for (std::size_t i = 0; i < at.positions.size(); ++i) {
+    for (std::size_t i = 0; i < at.heads(); ++i) {
       // What a point heads on a level lies within what it heads on the level above.
       for (unsigned below = at.level(); below-- > 0;) {
         if (!box.intersects(at.known_branch(i, below).box)) break;
@@ -270,7 +273,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
         const Branch& branch = at.branch(i, below);
         if (!box.intersects(branch.box)) break;
         if (below == 0 || (box.contains(branch.box.min) && box.contains(branch.box.max))) {
-          if (!take(at.positions[i], branch)) return;
+          if (!take(i < at.positions.size() ? &at.positions[i] : nullptr, branch)) return;
           break;
         }
         if (!opens(branch)) break;

@@ -6,10 +6,13 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <mutex>
 #include <numeric>
 #include <optional>
 #include <utility>
 
+#include "io/text.hpp"
+#include "store/read/view.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -94,9 +97,8 @@ double share_inside(const Box3& box, const Box3& other) {
 
 }  // namespace
 
-StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes, std::optional<Where> where)
+StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
     : store_(store),
-      where_(std::move(where)),
       leaves_{.most_bytes = leaf_bytes},
       inner_{.most_bytes = kInnerBytes},
       wanted_(store.top() + 1) {
@@ -115,32 +117,38 @@ void StoreQuery::check_looked(std::uint64_t clusters) const {
 void StoreQuery::fill(Node& node, ClusterId id) {
   const unsigned level = level_of(id);
   node.id = id;
-  if (where_ && level == 0 &&
-      !where_->possible(world_box(store_.schema(), store_.record(id).summary.box),
-                        store_.attribute_ranges(id))) {
+  node.store_ = &store_;
+  node.members_.clear();
+  node.branches_.clear();
+  if (level == 0 && !store_.may_match(id)) {
     node.positions.clear();
-    node.matches.clear();
-    node.branches_.clear();
     node.bytes = sizeof(Node) + 64;
     return;
   }
   store_.read(id, points_);
-  if (where_) {
-    node.matches.resize(points_.size());
-    where_->test(points_.positions, points_.payload, node.matches);
+  if (points_.matches.empty()) {
+    // Not copied: the next cluster is read into what the node held before.
+    std::swap(node.positions, points_.positions);
+  } else {
+    node.positions.clear();
+    for (std::uint32_t i = 0; i < points_.size(); ++i) node.members_.push_back(i);
+    const auto others = std::stable_partition(node.members_.begin(), node.members_.end(),
+                                              [this](std::uint32_t i) { return points_.match(i); });
+    for (auto i = node.members_.begin(); i != others; ++i) {
+      node.positions.push_back(points_.positions[*i]);
+    }
+    if (level == 0) node.members_.erase(others, node.members_.end());
   }
-  // Not copied: the next cluster is read into what the node held before.
-  std::swap(node.positions, points_.positions);
-  node.store_ = &store_;
-  node.branches_.clear();
-  for (std::size_t i = 0; i < node.positions.size(); ++i) {
+  const std::size_t heads = level == 0 ? 0 : points_.children.size() / level;
+  for (std::size_t i = 0; i < heads; ++i) {
     for (unsigned below = 0; below < level; ++below) {
-      const std::uint64_t ordinal = points_.children[i * level + below];
+      const std::uint64_t ordinal = points_.children[node.member(i) * level + below];
       node.branches_.push_back({store_.coarse_box(cluster_id(below, ordinal)), ordinal, 0});
     }
   }
   // The node itself and its entries in list and map count too.
-  node.bytes = node.positions.capacity() * sizeof(Point3) + node.matches.capacity() +
+  node.bytes = node.positions.capacity() * sizeof(Point3) +
+               node.members_.capacity() * sizeof(std::uint32_t) +
                node.branches_.capacity() * sizeof(Branch) + sizeof(Node) + 64;
 }
 
@@ -208,10 +216,9 @@ std::vector<FoundPoint> StoreQuery::in_box(const Box3& box, unsigned level) {
       level, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
-          if (!box.contains(node.positions[i]) || !node.match(i)) continue;
-          found.push_back({.position = node.positions[i],
-                           .cluster = node.id,
-                           .member = static_cast<std::uint32_t>(i)});
+          if (!box.contains(node.positions[i])) continue;
+          found.push_back(
+              {.position = node.positions[i], .cluster = node.id, .member = node.member(i)});
         }
       });
   return found;
@@ -229,10 +236,10 @@ std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
           const double distance = distance_of(metric, node.positions[i], place);
-          if (!(distance <= radius) || !node.match(i)) continue;
+          if (!(distance <= radius)) continue;
           found.push_back({.position = node.positions[i],
                            .cluster = node.id,
-                           .member = static_cast<std::uint32_t>(i),
+                           .member = node.member(i),
                            .distance = distance});
         }
       });
@@ -248,10 +255,9 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
       level, [&](const Box3& box) { return least_distance(metric, place, box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
-          if (!node.match(i)) continue;
           const FoundPoint point{.position = node.positions[i],
                                  .cluster = node.id,
-                                 .member = static_cast<std::uint32_t>(i),
+                                 .member = node.member(i),
                                  .distance = distance_of(metric, node.positions[i], place)};
           if (found.size() == count) {
             if (!is_nearer(point, found.front())) continue;
@@ -268,27 +274,25 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
   return found;
 }
 
-std::uint64_t StoreQuery::count(const Box3& box) {
+std::uint64_t StoreQuery::count(const Box3& box, unsigned level) {
   std::uint64_t sum = 0;
-  if (where_) {
+  if (level > 0 || store_.condition() != nullptr) {
     descend(
-        0, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
+        level, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
         [&](const Node& node) {
-          for (std::size_t i = 0; i < node.positions.size(); ++i) {
-            sum += node.match(i) && box.contains(node.positions[i]) ? 1 : 0;
-          }
+          for (const Point3& p : node.positions) sum += box.contains(p) ? 1 : 0;
         });
     return sum;
   }
   ClusterPoints border;
   cut(
       box,
-      [&](const Point3& head, const Branch& branch) {
+      [&](const Point3* head, const Branch& branch) {
         if (box.contains(branch.box.min) && box.contains(branch.box.max)) {
           sum += branch.descendants;
           return true;
         }
-        sum += box.contains(head) ? 1 : 0;
+        sum += box.contains(*head) ? 1 : 0;
         store_.read(cluster_id(0, branch.ordinal), border);
         for (const Point3& p : border.positions) sum += box.contains(p) ? 1 : 0;
         return true;
@@ -301,12 +305,68 @@ double StoreQuery::estimate(const Box3& box, double limit) {
   double sum = 0.0;
   cut(
       box,
-      [&](const Point3&, const Branch& branch) {
+      [&](const Point3*, const Branch& branch) {
         sum += static_cast<double>(branch.descendants) * share_inside(box, branch.box);
         return sum <= limit;
       },
       [](const Branch&) { return true; });
   return sum;
+}
+
+/// The points that meet a condition.
+class Store::ConditionView final : public Store::View {
+ public:
+  explicit ConditionView(Where condition) : condition_(std::move(condition)) {}
+
+  const Where& condition() const override { return condition_; }
+
+  void mark(ClusterPoints& points) const override {
+    points.matches.resize(points.size());
+    condition_.test(points.positions, points.payload, points.matches);
+  }
+
+  bool may_match(const Store& view, ClusterId id) const override {
+    return condition_.possible(world_box(view.schema(), view.record(id).summary.box),
+                               view.attribute_ranges(id));
+  }
+
+  const Box3& bounds(const Store& view) const override {
+    std::call_once(once_, [&] { find_bounds(view); });
+    if (bounds_.empty()) {
+      throw Error({.file = view.path().string(),
+                   .where = {},
+                   .cause = "no point meets the condition " + in_quotes(condition_.text()),
+                   .remedy = "give another `where`"});
+    }
+    return bounds_;
+  }
+
+ private:
+  void find_bounds(const Store& view) const {
+    Box3 found;
+    StoreQuery(view).descend(
+        0,
+        [&](unsigned, const StoreQuery::Branch& branch) {
+          return !(found.contains(branch.box.min) && found.contains(branch.box.max));
+        },
+        [&](const StoreQuery::Node& node) {
+          for (const Point3& p : node.positions) found.include(p);
+        });
+    bounds_ = found;
+  }
+
+  Where condition_;
+  mutable std::once_flag once_;
+  mutable Box3 bounds_;
+};
+
+Store Store::where(const std::string& condition) const {
+  if (condition.empty()) return *this;
+  Where parsed(condition, schema());
+  if (view_) parsed = Where('(' + view_->condition().text() + ") && (" + condition + ')', schema());
+  Store view = *this;
+  view.view_ = std::make_shared<const ConditionView>(std::move(parsed));
+  return view;
 }
 
 }  // namespace terrace::stream

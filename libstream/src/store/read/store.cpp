@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "store/read/level_reader.hpp"
+#include "store/read/view.hpp"
 #include "store/verify.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
@@ -61,6 +62,16 @@ void Store::check_stop() const {
   if (stop_.stop_requested()) throw Stopped();
 }
 
+const Where* Store::condition() const { return view_ ? &view_->condition() : nullptr; }
+
+Store Store::whole() const {
+  Store other = *this;
+  other.view_.reset();
+  return other;
+}
+
+bool Store::may_match(ClusterId id) const { return !view_ || view_->may_match(*this, id); }
+
 Store Store::open(const std::string& name, const OpenByName& files) {
   auto impl = std::make_shared<Impl>();
   impl->path = name;
@@ -90,7 +101,7 @@ std::span<const LevelInfo> Store::levels() const { return impl_->infos; }
 std::uint64_t Store::points() const { return impl_->manifest.points; }
 std::uint32_t Store::checksum() const { return impl_->manifest.checksum; }
 std::uint64_t Store::bytes() const { return impl_->bytes; }
-const Box3& Store::bounds() const { return impl_->manifest.bounds; }
+const Box3& Store::bounds() const { return view_ ? view_->bounds(*this) : impl_->manifest.bounds; }
 double Store::mean_height() const { return impl_->manifest.mean_height; }
 ClusterId Store::root() const { return cluster_id(top(), 0); }
 
@@ -130,12 +141,28 @@ void Store::read(ClusterId id, ClusterPoints& out) const {
   auto space = impl_->borrow();
   level.read(ordinal_of(id), *space, out);
   impl_->give_back(std::move(space));
+  mark(out);
+}
+
+void Store::mark(ClusterPoints& points) const {
+  points.matches.clear();
+  if (view_) view_->mark(points);
 }
 
 void Store::for_each(
     unsigned number,
     const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>& visit) const {
   const LevelReader& level = impl_->level(number);
+  ClusterPoints points;
+  if (view_ && number == 0) {
+    for (std::uint64_t c = 0; c < impl_->infos[0].clusters; ++c) {
+      const ClusterId id = cluster_id(0, c);
+      if (!may_match(id)) continue;
+      read(id, points);
+      visit(id, record(id), points);
+    }
+    return;
+  }
   const std::uint64_t members = impl_->infos[number].members;
   const auto miscounted = [&] {
     return Error({.file = level.data().name(),
@@ -146,7 +173,6 @@ void Store::for_each(
   };
   SequentialBytes ahead(level.data());
   ClusterDecoder decoder;
-  ClusterPoints points;
   std::uint64_t visited = 0;
   level.for_each_page([&](const IndexPage& page, std::uint64_t first) {
     for (std::uint32_t i = 0; i < page.clusters(); ++i) {
@@ -156,6 +182,7 @@ void Store::for_each(
       level.read(ordinal, entry, offset, ahead, decoder, points);
       visited += points.size();
       if (visited > members) throw miscounted();
+      mark(points);
       visit(cluster_id(number, ordinal), record_of(entry, number, offset, level.top()), points);
     }
   });

@@ -8,7 +8,6 @@
 
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
-#include <terrace/stream/where.hpp>
 #include <terrace/tri/grid_tin.hpp>
 #include <terrace/tri/point_tin.hpp>
 
@@ -28,8 +27,6 @@ struct BoundedMeshOptions {
   tri::PointDuplicates duplicates = tri::PointDuplicates::kAll;
   Fill fill = Fill::none;          ///< of a raster's cells
   std::optional<Region> region{};  ///< in the store's CRS
-  /// Only irregular samples that meet this condition count, as if there were no others.
-  std::optional<stream::Where> where{};
   std::string path{};              ///< of the mesh; "-" is standard output
   stream::WriterOptions writer{};  ///< its format; the context's stop counts, not this one's
   /// Irregular samples meshed at once, at most; the mesh depends on it.
@@ -41,7 +38,7 @@ struct BoundedMeshOptions {
 struct BoundedMeshResult {
   std::uint64_t vertices = 0, triangles = 0;
   double max_error = 0.0, rms_error = 0.0;  ///< metres
-  std::uint64_t samples = 0;                ///< with data, in the region, that meet the condition
+  std::uint64_t samples = 0;                ///< with data, in the region; of a view those of it
   std::uint64_t uncovered = 0;              ///< of these, those on no triangle: they have no error
   std::uint64_t duplicates = 0;             ///< samples at the place of another
   double reading_seconds = 0.0;             ///< of all threads together, decoding included

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
-#include <terrace/stream/where.hpp>
 
 #include "terrace/terrain/region.hpp"
 
@@ -29,8 +29,6 @@ struct Detail {
   /// Only the points of `level` and above that this cluster stands for, its representative as its
   /// last member; of its own level or a coarser one than `level`. Without region and focuses.
   std::optional<stream::ClusterId> cluster{};
-  /// Only points that meet this condition are wanted.
-  std::optional<stream::Where> where{};
   /// In units of the CRS: what lies so far outside polygons, but in the box around them, is wanted
   /// as well.
   double margin = 0;
@@ -46,10 +44,11 @@ struct Detail {
 
 /// Visits every cluster that `detail` wants, the root (or `cluster`) first, then level by level
 /// downward; within a level in order of ordinals. A wanted cluster's parent is always wanted as
-/// well. Clusters of level 0 of which no point can meet the condition, by the ranges of its
-/// attributes, are left out. Memory: the ordinals of the wanted clusters of two levels where only a
-/// part is wanted; constant where a whole level is. Throws: stream::Error on a damaged store;
-/// UsageError for a cluster that the store does not have or that is finer than the level.
+/// well. Of a view (stream::Store::where()), clusters of level 0 of which no point can meet its
+/// condition are left out; of others stream::ClusterPoints::match() tells which do. Memory: the
+/// ordinals of the wanted clusters of two levels where only a part is wanted; constant where a
+/// whole level is. Throws: stream::Error on a damaged store; UsageError for a cluster that the
+/// store does not have or that is finer than the level.
 void for_each_wanted(const stream::Store& store, const Detail& detail,
                      const std::function<void(stream::ClusterId, const stream::ClusterRecord&,
                                               const stream::ClusterPoints&)>& visit);
@@ -59,8 +58,12 @@ void for_each_wanted_record(
     const stream::Store& store, const Detail& detail,
     const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit);
 
-/// Visits every point of the wanted clusters that meets the condition of `detail` and, where there
-/// is a region, lies in it or in a focus, in the order of for_each_wanted(): its cluster, its place
+/// The number of points of the wanted clusters, from the index alone; of a view those that meet its
+/// condition, for which the clusters are read.
+[[nodiscard]] std::uint64_t wanted_points(const stream::Store& store, const Detail& detail);
+
+/// Visits every point of the wanted clusters that meets the condition of a view and, where there is
+/// a region, lies in it or in a focus, in the order of for_each_wanted(): its cluster, its place
 /// among the points of that, and where it lies in the CRS of the store.
 void for_each_wanted_point(const stream::Store& store, const Detail& detail,
                            const std::function<void(stream::ClusterId, const stream::ClusterPoints&,

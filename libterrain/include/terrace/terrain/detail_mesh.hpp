@@ -64,7 +64,9 @@ struct DetailMeshOptions {
 /// Throws: stream::Error on a damaged store.
 [[nodiscard]] TriangleMesh detail_points(const stream::Store& store, const Detail& detail);
 
-/// The finest level with at most `most_points` points; the top if none has so few.
+/// The finest level with at most `most_points` points; the top if none has so few. Reads the points
+/// of a view, down to that level and the next, to count them. Throws, of a view: stream::Error on a
+/// damaged store; stream::Stopped.
 [[nodiscard]] unsigned level_within(const stream::Store& store, std::uint64_t most_points);
 
 /// Opens an overlay with other heights of a store's points. Throws: stream::Error, as

@@ -57,6 +57,8 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
 /// in stored coordinates but on a lattice in the view frame, of a power of two metres, 2^-29 to
 /// 2^-28 of the longest side of the store's box, to which points are rounded.
 ///
+/// All points of a store are shown, whatever condition it was given (stream::Store::where()).
+///
 /// Members may be called by one thread at a time.
 template <class Shown>
 class StoreView {

@@ -61,9 +61,6 @@ BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMe
   need_points(store, "a bounded mesh");
   const stream::Store source = store.with_stop(context.stop);
   if (store.schema().grid) {
-    if (options.where) {
-      throw UsageError("`where` is for irregular points: a raster is meshed with all its samples");
-    }
     return mesh_by(RasterMesher(source, options, context), options, context.stop);
   }
   if (options.fill != Fill::none) {

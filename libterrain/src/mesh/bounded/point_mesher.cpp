@@ -163,7 +163,6 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
   const Stopwatch reading;
   Detail detail;
   detail.region = options.region;
-  detail.where = options.where;
   scan_ = scan_point_mesh(store, detail, options.window_points);
   if (!scan_.whole && scan_.hull.size() >= 3) {
     cuts_ = cut_for_point_mesh(std::move(scan_.some), scan_.period, options.window_points);

@@ -52,7 +52,9 @@ void CloudSamples::sort_into_cells(const stream::Store& store) {
     for (unsigned level = store.top() + 1; level-- > 0;) {
       store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
                                 const stream::ClusterPoints& cluster) {
-        for (const stream::Point3& p : cluster.positions) visit(p);
+        for (std::size_t i = 0; i < cluster.size(); ++i) {
+          if (cluster.match(i)) visit(cluster.positions[i]);
+        }
       });
     }
   };

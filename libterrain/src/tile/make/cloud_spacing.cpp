@@ -16,6 +16,8 @@ namespace {
 constexpr std::uint64_t kSeeds = 32;
 constexpr double kMostPointsAround = 3000;
 constexpr unsigned kRank = 8;
+/// Of a view: boxes grow until there are so many points around.
+constexpr std::size_t kFewestPointsAround = 200;
 
 /// A point, and a box around points near it.
 struct Seed {
@@ -24,22 +26,35 @@ struct Seed {
 };
 
 /// Seeds from clusters of level 0, evenly over the store, or from its points if it is one block.
+/// Those of a view are points of it.
 std::vector<Seed> some_seeds(const stream::Store& store, const StoredPlaces& places) {
   std::vector<Seed> seeds;
   stream::ClusterPoints points;
   if (store.top() == 0) store.read(store.root(), points);
   const std::uint64_t all = store.top() == 0 ? points.size() : store.levels()[0].clusters;
   const std::uint64_t count = std::min(all, kSeeds);
-  for (std::uint64_t i = 0; i < count; ++i) {
-    const std::uint64_t number = i * (all / count) + all / count / 2;
+  const auto is_seed = [&](std::uint64_t number) {
     if (store.top() == 0) {
+      if (!points.match(number)) return false;
       seeds.push_back({points.positions[number], places.stored_bounds()});
-      continue;
+      return true;
     }
     const stream::ClusterId id = stream::cluster_id(0, number);
+    if (!store.may_match(id)) return false;
     store.read(id, points);
-    const stream::Box3 box = store.record(id).summary.box;
-    seeds.push_back({points.representative, flat(box)});
+    stream::Point3 at = points.representative;
+    if (store.condition() != nullptr) {
+      const auto found = std::find(points.matches.begin(), points.matches.end(), 1);
+      if (found == points.matches.end()) return false;
+      at = points.positions[static_cast<std::size_t>(found - points.matches.begin())];
+    }
+    seeds.push_back({at, flat(store.record(id).summary.box)});
+    return true;
+  };
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::uint64_t each = all / count;
+    for (std::uint64_t k = 0; k < each && !is_seed(i * each + (each / 2 + k) % each); ++k) {
+    }
   }
   return seeds;
 }
@@ -51,6 +66,21 @@ StoredBox grown(StoredBox box) {
     box.max[axis] += more;
   }
   return box;
+}
+
+/// The box, larger on all sides, even if it has no size.
+StoredBox widened(StoredBox box, const stream::Box3& store) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double more =
+        0.25 * (box.max[axis] - box.min[axis]) + 1e-3 * (store.max[axis] - store.min[axis]);
+    box.min[axis] -= more;
+    box.max[axis] += more;
+  }
+  return box;
+}
+
+bool holds(const StoredBox& outer, const stream::Box3& inner) {
+  return outer.contains(inner.min) && outer.contains(inner.max);
 }
 
 /// The seed's box, or a smaller one around the seed that has not too many points near it.
@@ -100,10 +130,16 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
   WindowPoints points;
   std::vector<Point2> stored;
   for (const Seed& seed : some_seeds(store, places)) {
-    const StoredBox box = box_of(seed, reader.query()), around = grown(box);
+    StoredBox box = box_of(seed, reader.query()), around = grown(box);
     if (reader.query().estimate(tall(around), kMostPointsAround) > kMostPointsAround) continue;
-    points.clear();
     reader.points(around, points);
+    // Of a view there may be few where the store has many.
+    while (store.condition() != nullptr && points.positions.size() < kFewestPointsAround &&
+           !holds(around, store.bounds())) {
+      box = widened(box, store.bounds());
+      around = grown(box);
+      reader.points(around, points);
+    }
     const std::vector<stream::Point3> ground = on_the_ground(points, places, stored);
     if (ground.size() < 2) continue;
     const auto rank = static_cast<unsigned>(std::min<std::size_t>(kRank, ground.size() - 1));

@@ -47,7 +47,9 @@ HeightBlocks::HeightBlocks(const stream::Store& store)
   for (unsigned level = 0; level <= store.top(); ++level) {
     store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
                               const stream::ClusterPoints& cluster) {
-      for (const stream::Point3& p : cluster.positions) {
+      for (std::size_t i = 0; i < cluster.size(); ++i) {
+        if (!cluster.match(i)) continue;
+        const stream::Point3& p = cluster.positions[i];
         const auto column = static_cast<std::int64_t>(p[0]), row = static_cast<std::int64_t>(p[1]);
         const auto at = static_cast<std::size_t>(row / side_ * across_ + column / side_);
         Block& block = blocks_[at];

@@ -292,6 +292,7 @@ std::uint64_t PointTileSurface::digest(const GeographicBox& /*box*/) {
   Digest digest;
   digest.add(std::uint64_t{cloud_.store.checksum()});
   digest.add(cloud_.store.points());
+  if (const stream::Where* condition = cloud_.store.condition()) digest.add(condition->text());
   cloud_.add_to(digest);
   return digest.value();
 }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/multiresolution.hpp>
+
+#include "terrace/terrain/detail.hpp"
+
+namespace terrace::terrain {
+
+/// The triangulation of those points of a view that are in the wanted clusters and meet its
+/// condition, read like a tri::Multiresolution2, which has all points of its clusters.
+template <class Coord>
+class MatchingPoints {
+ public:
+  /// Throws: stream::Error on a damaged store; stream::Stopped.
+  MatchingPoints(const stream::Store& view, const Detail& detail) {
+    std::vector<std::array<Coord, 2>> places;
+    std::vector<Vertex> points;
+    for_each_wanted(
+        view, detail,
+        [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& of) {
+          const unsigned level = stream::level_of(id);
+          for (std::uint32_t i = 0; i < of.size(); ++i) {
+            if (!of.match(i)) continue;
+            const stream::Point3& p = of.positions[i];
+            places.push_back({static_cast<Coord>(p[0]), static_cast<Coord>(p[1])});
+            points.push_back({{tri::cluster_id(level, stream::ordinal_of(id)), i}, p[2]});
+          }
+        });
+    const std::vector<tri::VertexId> vertices = triangulation_.build(places);
+    vertices_.resize(triangulation_.vertex_slots());
+    // The first of several points at one place stands for them, so it comes last.
+    for (std::size_t i = points.size(); i-- > 0;) vertices_[tri::slot(vertices[i])] = points[i];
+  }
+
+  [[nodiscard]] const tri::Delaunay2<Coord>& triangulation() const { return triangulation_; }
+  [[nodiscard]] tri::PointId point_id(tri::VertexId v) const {
+    return vertices_[tri::slot(v)].point;
+  }
+  [[nodiscard]] unsigned level(tri::VertexId v) const { return level_of(point_id(v).cluster); }
+  [[nodiscard]] double height(tri::VertexId v) const { return vertices_[tri::slot(v)].height; }
+
+ private:
+  struct Vertex {
+    tri::PointId point{};
+    double height = 0.0;
+  };
+
+  tri::Delaunay2<Coord> triangulation_;
+  std::vector<Vertex> vertices_;  ///< by slot
+};
+
+}  // namespace terrace::terrain
