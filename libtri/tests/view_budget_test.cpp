@@ -187,7 +187,8 @@ TEST(ViewBudget, ClusterLargerThanTheCache) {
 }
 
 // With a clock that advances by 1 ms at each reading: a step ends in time, except for its first
-// operation, and everything is done in the end. Without a time limit the clock is not read.
+// operation and for looks at the clock that no step before has needed, and everything is done in
+// the end. Without a time limit the clock is not read.
 TEST(ViewBudget, TimeIsKept) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     World world(seed, Shape::random, 500);
@@ -208,7 +209,7 @@ TEST(ViewBudget, TimeIsKept) {
         const auto& step = timed.step(view, limited);
         const double took = time - before;
         if (step.expanded + step.collapsed > 1) {
-          ASSERT_LE(took, 0.0105);
+          ASSERT_LE(took, 0.0125);
         }
         if (step.settled && step.wanted.empty()) break;
         for (const ViewRequest& r : std::vector<ViewRequest>(step.wanted)) {

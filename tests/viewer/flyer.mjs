@@ -55,10 +55,14 @@ const picture = {fov: FOV, aspect: 1.6, height: 1000, up: [0, 1, 0]};
 const sizeOf = box => Math.hypot(box[3] - box[0], box[4] - box[1]);
 const middleOf = box => [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2];
 
-/// Level flight over the middle, looking ahead and down, there and back, each frame 1 % of the picture's width further,
-/// with so small an error that `points` are kept in the mean: found by flights before the one that counts. Returns the
-/// milliseconds of the worker's frames, the mean number of points, and the error in pixels.
-export async function cruise(connect, base, name, points, frames) {
+/// Milliseconds from one picture of a flight to the next.
+const PICTURE = 1000 / 60;
+
+/// Level flight over the middle, looking ahead and down, there and back, each picture 1 % of its width further and 1/60 s
+/// after the one before, with so small an error that `points` are kept in the mean: found by flights before the one that
+/// counts, unless it is given. Returns the milliseconds of the worker's frames, the mean number of points, and the error in
+/// pixels.
+export async function cruise(connect, base, name, points, frames, error) {
   let milliseconds = [];
   const flyer = new Flyer(connect, base, name, {
     heard: message => {
@@ -78,13 +82,17 @@ export async function cruise(connect, base, name, points, frames) {
     await flyer.view(view(-0.2, error));
     milliseconds = [];
     let mean = 0;
-    for (let i = 0; i < frames; ++i) {
+    for (let i = 0, due = performance.now(); i < frames; ++i) {
       const steps = Math.min(i % (2 * turn), 2 * turn - i % (2 * turn));
       mean += (await flyer.view(view(-0.2 + step * steps, error), false)).state.points / frames;
+      due = Math.max(due + PICTURE, performance.now());
+      await new Promise(resume => setTimeout(resume, due - performance.now()));
     }
     return mean;
   };
-  let error = 64, there = 0;
+  if (error) return {points: Math.round(await fly(error)), milliseconds, error};
+  error = 64;
+  let there = 0;
   while (there < points && error > 0.25) {
     error /= 1.05;
     there = (await flyer.view(view(-0.2, error))).state.points;

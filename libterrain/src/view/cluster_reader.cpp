@@ -10,13 +10,7 @@
 namespace terrace::terrain {
 namespace {
 
-double steady_seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// Share of a frame's time that the calling thread spends reading.
-constexpr double kReadingShare = 0.4;
-/// And how much of it when it looks for bytes that turn out to be missing.
+/// Share of a frame's time that the calling thread spends looking for bytes that are missing.
 constexpr double kMissingShare = 0.25;
 /// More missing ranges are not looked for in a frame: requests for these take longer than it does.
 constexpr std::size_t kMostMissing = 512;
@@ -113,6 +107,10 @@ class FrameReader final : public ClusterReader {
 };
 
 }  // namespace
+
+double steady_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 tri::ClusterRecord FramedSource::exact_record(tri::ClusterId id) {
   tri::ClusterRecord record = inner_.record(id);

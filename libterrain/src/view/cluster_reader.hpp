@@ -67,6 +67,11 @@ class FramedSource final : public tri::ClusterSource {
   std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
 };
 
+/// Share of a frame's time that the calling thread spends bringing clusters.
+inline constexpr double kReadingShare = 0.4;
+
+double steady_seconds();
+
 class ClusterReader {
  public:
   using Give = std::function<void(tri::GivenCluster)>;

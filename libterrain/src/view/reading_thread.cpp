@@ -5,6 +5,7 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -27,23 +28,37 @@ class ReadingThread final : public ClusterReader {
   ReadingThread(const ReadingThread&) = delete;
   ReadingThread& operator=(const ReadingThread&) = delete;
 
-  void bring(double, const Give& give, const GiveRecord&) override {
-    taken_.clear();
-    {
-      const std::lock_guard lock(mutex_);
+  // Neither of these two waits for the thread: what it holds the lock for now comes with the next
+  // frame.
+  void bring(double seconds, const Give& give, const GiveRecord&) override {
+    if (next_ == taken_.size()) {
+      taken_.clear();
+      next_ = 0;
+      const std::unique_lock lock(mutex_, std::try_to_lock);
+      if (!lock) return;
       if (failure_) std::rethrow_exception(failure_);
       taken_.swap(ready_);
     }
-    for (tri::GivenCluster& cluster : taken_) give(std::move(cluster));
+    const double end = steady_seconds() + kReadingShare * seconds;
+    while (next_ < taken_.size() && steady_seconds() < end) give(std::move(taken_[next_++]));
   }
   void ask(const std::vector<tri::ViewRequest>&, const std::vector<tri::ViewRequest>& requests,
            const std::vector<tri::ClusterId>& withdrawn) override {
-    if (requests.empty() && withdrawn.empty()) return;
-    const std::lock_guard lock(mutex_);
-    std::erase_if(queue_, [&](const tri::ViewRequest& request) {
+    std::erase_if(asked_, [&](const tri::ViewRequest& request) {
       return std::binary_search(withdrawn.begin(), withdrawn.end(), request.cluster);
     });
-    queue_.insert(queue_.end(), requests.begin(), requests.end());
+    asked_.insert(asked_.end(), requests.begin(), requests.end());
+    withdrawn_.insert(withdrawn.begin(), withdrawn.end());
+    for (const tri::ViewRequest& request : requests) withdrawn_.erase(request.cluster);
+    if (asked_.empty() && withdrawn_.empty()) return;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return;
+    if (!withdrawn_.empty()) {
+      std::erase_if(queue_, [&](const auto& request) { return withdrawn_.count(request.cluster); });
+    }
+    queue_.insert(queue_.end(), asked_.begin(), asked_.end());
+    asked_.clear();
+    withdrawn_.clear();
     wake_.notify_one();
   }
 
@@ -69,7 +84,10 @@ class ReadingThread final : public ClusterReader {
 
   FramedSource& source_;
   std::vector<tri::GivenCluster> taken_;
-  std::mutex mutex_;  ///< of what follows
+  std::size_t next_ = 0;                          ///< of taken_, to be given
+  std::vector<tri::ViewRequest> asked_;           ///< not in queue_ yet
+  std::unordered_set<tri::ClusterId> withdrawn_;  ///< may be in queue_ still
+  std::mutex mutex_;                              ///< of what follows
   std::condition_variable wake_;
   std::deque<tri::ViewRequest> queue_;
   std::vector<tri::GivenCluster> ready_;

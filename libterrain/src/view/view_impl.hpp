@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cassert>
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <type_traits>
@@ -43,11 +42,6 @@ struct StoreView<Shown>::Impl {
     root_values = root.values;
     return root;
   }
-  static double now() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
-        .count();
-  }
-
   stream::Store store;
   ViewFrame frame;
   ViewLattice lattice;
@@ -73,15 +67,15 @@ template <class Shown>
 const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& view,
                                                                double seconds,
                                                                const std::array<double, 2>& after) {
-  const double begin = Impl::now();
+  const double begin = steady_seconds();
   impl_->reader->bring(
       seconds, [&](tri::GivenCluster cluster) { impl_->control.give(std::move(cluster)); },
       [&](tri::ClusterId id, const tri::ClusterRecord& record) {
         impl_->control.give_record(id, record);
       });
-  const double left = seconds - (Impl::now() - begin);
+  const double left = seconds - (steady_seconds() - begin);
   const Step& step =
-      impl_->control.step(view, {.seconds = left, .clock = Impl::now, .after = after});
+      impl_->control.step(view, {.seconds = left, .clock = steady_seconds, .after = after});
   impl_->reader->ask(step.wanted, step.requests, step.withdrawn);
   impl_->settled = step.settled && step.wanted.empty();
   return step;

@@ -78,6 +78,15 @@ struct MultiresolutionModel<Triangulation>::Impl {
   // See the public members of the same names.
   const Delta& expand(ClusterId cluster);
   const Delta& collapse(ClusterId cluster);
+  /// In a step: removes points of an expanded cluster, below which nothing is expanded, until
+  /// `left` of them are there. Before 0 are left, and the cluster is collapsed, nothing else may be
+  /// expanded or collapsed.
+  void collapse_to(ClusterTree::Slot cluster, std::uint32_t left);
+  /// The points of an expanded cluster that are there.
+  [[nodiscard]] std::span<const VertexId> present(ClusterTree::Slot cluster) {
+    const std::span<const VertexId> vertices = tree_.vertices(cluster);
+    return cluster == partial_ ? vertices.first(left_) : vertices;
+  }
   const Delta& refine(const Box3& region, unsigned level) {
     return change_region(region, level, true, false);
   }
@@ -124,7 +133,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
   const Delta& change_region(const Box3& region, unsigned level, bool refine, bool coarsen);
   const Delta& apply(const ClusterTree::Plan& plan);
   void check_room() const;
-  void remove_cluster(Slot cluster);
+  void remove_points(Slot cluster, std::uint32_t left);
   void reserve(std::size_t vertices);
   void insert_clusters(bool list_created);
   void build_clusters();
@@ -140,7 +149,9 @@ struct MultiresolutionModel<Triangulation>::Impl {
   VertexOwners owners_;
   std::size_t points_ = 0;
   bool deltas_, old_heights_;
-  bool open_ = false;  // between open_step() and close_step()
+  bool open_ = false;                    // between open_step() and close_step()
+  Slot partial_ = ClusterTree::kNoSlot;  // of which collapse_to() has left some points: left_
+  std::uint32_t left_ = 0;
   Delta delta_;
   Stage stage_;
   std::vector<VertexId> created_;         // in a step that also collapses
@@ -148,7 +159,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
   std::vector<double> heights_before_;    // with old_heights, by slot
   std::vector<bool> noted_;               // marks the valid entries of heights_before_
   std::vector<VertexId> noted_vertices_;  // the same as a list
-  std::vector<VertexId> gone_;            // scratch of remove_cluster()
+  std::vector<VertexId> gone_;            // scratch of remove_points()
   std::vector<typename Triangulation::Insertion> inserted_;  // scratch of insert_clusters()
 };
 
@@ -259,7 +270,7 @@ auto MultiresolutionModel<Triangulation>::Impl::apply(const ClusterTree::Plan& p
   if (!open_) start_delta();
   // Collapsing first keeps the peak memory low. Expanding first would keep vertices of points
   // present before and after, but those are few.
-  for (const Slot cluster : plan.collapsed) remove_cluster(cluster);
+  for (const Slot cluster : plan.collapsed) remove_points(cluster, 0);
   if (!plan.staged.empty()) insert_clusters(deltas_ && (open_ || !plan.collapsed.empty()));
   if constexpr (kFollows) triangulation_.follow();  // so that what it takes is the operation's
   if (!open_) finish_delta();
@@ -292,18 +303,29 @@ auto MultiresolutionModel<Triangulation>::Impl::restore([[maybe_unused]] unsigne
 }
 
 template <class Triangulation>
-void MultiresolutionModel<Triangulation>::Impl::remove_cluster(Slot cluster) {
+void MultiresolutionModel<Triangulation>::Impl::collapse_to(Slot cluster, std::uint32_t left) {
+  assert(open_);
+  remove_points(cluster, left);
+  if constexpr (kFollows) triangulation_.follow();
+}
+
+// Removes points of a cluster until `left` of them are there, and with the last one the cluster.
+template <class Triangulation>
+void MultiresolutionModel<Triangulation>::Impl::remove_points(Slot cluster, std::uint32_t left) {
+  assert(partial_ == ClusterTree::kNoSlot || partial_ == cluster);
   gone_.clear();
-  const std::span<const VertexId> vertices = tree_.vertices(cluster);
-  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+  const std::span<const VertexId> vertices = present(cluster);
+  for (std::uint32_t i = left; i < vertices.size(); ++i) {
     const double height = old_heights_ ? owners_.height(vertices[i]) : 0.0;
     const VertexOwners::Change change = owners_.remove(vertices[i], {cluster, i}, tree_);
     if (change == VertexOwners::Change::last) gone_.push_back(vertices[i]);
     note(change, vertices[i], height);
   }
   triangulation_.remove(gone_);
-  points_ -= vertices.size();
-  tree_.release(cluster);
+  points_ -= vertices.size() - left;
+  partial_ = left > 0 ? cluster : ClusterTree::kNoSlot;
+  left_ = left;
+  if (left == 0) tree_.release(cluster);
 }
 
 template <class Triangulation>

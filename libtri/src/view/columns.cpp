@@ -15,6 +15,7 @@ constexpr double kFar = 1e150;
 constexpr double kMaxDemand = 1e299;
 constexpr std::size_t kBlock = 256;
 
+/// As many of its numbers are used as there are boxes.
 using Block = std::array<double, kBlock>;
 
 struct Boxes {
@@ -25,7 +26,7 @@ struct Boxes {
 // The minimum over the planes of the greatest signed distance of a point of the box: not negative
 // unless the box is wholly outside one plane.
 void depth_inside(const Camera& camera, const Boxes& boxes, Block& depth) {
-  depth.fill(std::numeric_limits<double>::infinity());
+  std::fill_n(depth.begin(), boxes.count, std::numeric_limits<double>::infinity());
   for (const Plane& plane : camera.planes) {
     std::array<const double*, 3> corner;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -42,8 +43,8 @@ void depth_inside(const Camera& camera, const Boxes& boxes, Block& depth) {
 
 // Euclidean distance to the nearest point; for the farthest, the greatest difference on an axis.
 void distances(const Point3& eye, const Boxes& boxes, Block& near, Block& far) {
-  near.fill(0.0);
-  far.fill(0.0);
+  std::fill_n(near.begin(), boxes.count, 0.0);
+  std::fill_n(far.begin(), boxes.count, 0.0);
   for (std::size_t k = 0; k < 3; ++k) {
     const double e = eye[k];
     const double* min = boxes.min[k];
@@ -89,8 +90,8 @@ void measure_camera(const View& view, const ViewOptions& options, const ViewColu
   Block depth, near, far, want_gain, keep_gain;
   depth_inside(camera, boxes, depth);
   distances(camera.position, boxes, near, far);
-  want_gain.fill(1.0);
-  keep_gain.fill(1.0);
+  std::fill_n(want_gain.begin(), boxes.count, 1.0);
+  std::fill_n(keep_gain.begin(), boxes.count, 1.0);
   if (cones) {
     const double gain = 1.0 / options.silhouette;
     outlines(camera, columns, first, boxes, 0.0, far, want_gain, gain);

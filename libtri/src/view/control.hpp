@@ -56,17 +56,25 @@ struct ViewControl<Triangulation>::Impl {
   void request(const Candidate& candidate, double importance, double bytes);
   void expand(const Candidate& candidate, const GivenCluster& given);
   /// In points of an ordinary place.
+  [[nodiscard]] std::size_t work_to_remove(std::span<const VertexId> vertices) const {
+    if constexpr (kTellsWork) return model_.triangulation().removal_work(vertices);
+    return vertices.size();
+  }
   [[nodiscard]] std::size_t work_to_collapse(Slot slot) {
-    if constexpr (kTellsWork) return model_.triangulation().removal_work(tree().vertices(slot));
-    return tree().size(slot);
+    return work_to_remove(model_.impl_->present(slot));
   }
   [[nodiscard]] bool has_time_to_collapse(Slot slot) {
     if constexpr (kTellsWork) return meter_.has(work_to_collapse(slot), StepMeter::kCollapse);
     return meter_.has_usual(StepMeter::kCollapse);
   }
-  void collapse(Slot slot);
+  [[nodiscard]] std::uint32_t fitting(Slot slot);
+  bool collapse(Slot slot);
   void withdraw();
 
+  /// Missing clusters that are asked for in a step: requests for these take longer than it does.
+  static constexpr std::size_t kMostAsked = 1024;
+  /// Clusters between two looks at the clock.
+  static constexpr std::size_t kLooks = 16;
   static constexpr bool kTellsWork = requires(const Triangulation& t) { t.removal_work({}); };
 
   ViewOptions options_;
@@ -76,6 +84,7 @@ struct ViewControl<Triangulation>::Impl {
   std::unordered_map<ClusterId, Asked> asked_;
   std::set<ClusterId> faulty_;
 
+  Slot partial_ = ClusterTree::kNoSlot;  // half collapsed; nothing else is done before it is gone
   Step result_;
   StepMeter meter_;
   std::uint64_t number_ = 0;  // of the step
@@ -120,6 +129,7 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   front_.start(view);
   meter_.ready();
   model_.open_step();
+  if (partial_ != ClusterTree::kNoSlot) collapse(partial_);
   expand_wanted();
   ask_soon();
   ask_for_records();
@@ -136,24 +146,30 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
 // first.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
+  if (partial_ != ClusterTree::kNoSlot) return false;
   while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
     const Slot slot = front_.next_to_collapse(options_.collapse_below);
     if (slot == ClusterTree::kNoSlot) break;
-    if (!has_time_to_collapse(slot)) return false;
-    collapse(slot);
+    if (!has_time_to_collapse(slot) || !collapse(slot)) return false;
   }
   return true;
 }
 
+// What a step looks at is bounded, or little would be expanded where thousands of clusters wait:
+// the most wanted are asked for, and once the budget is spent the others are left to later steps.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::expand_wanted() {
-  while (const auto candidate = front_.next()) {
+  for (std::size_t looks = 0; const auto candidate = front_.next();) {
+    const bool prepares = result_.pending > 0 || result_.missing > kMostAsked;
+    if (prepares && ++looks % kLooks == 0 && meter_.dwelt()) {
+      result_.pending += 1 + front_.candidates();
+      return;
+    }
     if (!faulty_.empty() && faulty_.count(candidate->id)) continue;
     const GivenCluster* given = cache_.find(candidate->id, false);
     Room room = Room::none;
     if (!given) {
-      ++result_.missing;
-      ask(*candidate);
+      if (++result_.missing <= kMostAsked) ask(*candidate);
     } else {
       room = make_room(*candidate);
       if (room == Room::later) ++result_.pending;
@@ -189,14 +205,14 @@ template <class Triangulation>
 auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> Room {
   const std::size_t members = static_cast<std::size_t>(candidate.members);
   collapse_unwanted(model_.point_count() / 4 + 1);
+  if (partial_ != ClusterTree::kNoSlot) return Room::later;
   if (lacking(members) > 0) {
     if (!could_fit(candidate, members)) return Room::none;
     const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
     while (lacking(members) > 0) {
       const Slot slot = front_.next_to_collapse(below);
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
-      if (!has_time_to_collapse(slot)) return Room::later;
-      collapse(slot);
+      if (!has_time_to_collapse(slot) || !collapse(slot)) return Room::later;
     }
   }
   // The collapsed cluster may have been above this one.
@@ -229,7 +245,9 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
 // Requests early what may be wanted soon, and keeps it if it is cached.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::ask_soon() {
+  std::size_t looks = 0;
   for (const Candidate& candidate : front_.soon()) {
+    if (++looks % kLooks == 0 && meter_.dwelt()) break;
     if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
     const double bytes = cache_.bytes_of(level_of(candidate.id), candidate.members);
     const bool known = asked_.count(candidate.id) != 0;
@@ -287,16 +305,40 @@ void ViewControl<Triangulation>::Impl::expand(const Candidate& candidate,
   meter_.spend(given.positions.size());
 }
 
+// To how many points a cluster can be collapsed in what is left of the step; to fewer than there
+// are in any case.
 template <class Triangulation>
-void ViewControl<Triangulation>::Impl::collapse(Slot slot) {
+std::uint32_t ViewControl<Triangulation>::Impl::fitting(Slot slot) {
+  const std::span<const VertexId> present = model_.impl_->present(slot);
+  if (meter_.fits(work_to_remove(present), StepMeter::kCollapse)) return 0;
+  std::size_t left = present.size();
+  for (std::size_t work = 0; left > 0; --left) {
+    work += work_to_remove(present.subspan(left - 1, 1));
+    if (left < present.size() && !meter_.fits(work, StepMeter::kCollapse)) break;
+  }
+  return static_cast<std::uint32_t>(left);
+}
+
+// False if there was no time for all of its points, where some cost far more than others: the step
+// then ends, and the next ones go on.
+template <class Triangulation>
+bool ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   const ClusterId id = tree().id(slot);
   const ChildRef place = tree().place(slot);
-  const std::size_t work = work_to_collapse(slot);
-  model_.collapse(id);
+  const auto present = model_.impl_->present(slot);
+  const std::uint32_t left = kTellsWork ? fitting(slot) : 0;
+  const std::size_t work = work_to_remove(present.subspan(left));
+  model_.impl_->collapse_to(slot, left);
+  meter_.spend(work, StepMeter::kCollapse);
+  partial_ = left > 0 ? slot : ClusterTree::kNoSlot;
+  if (left > 0) {
+    ++result_.pending;
+    return false;
+  }
   front_.drop(slot, place);
   cache_.find(id, true);  // likely to come back
   ++result_.collapsed;
-  meter_.spend(work, StepMeter::kCollapse);
+  return true;
 }
 
 // Clusters that were requested and are neither wanted now nor within the band of hysteresis.

@@ -133,6 +133,7 @@ void ViewFront::bound(std::uint32_t number) {
 void ViewFront::start(const View& view) {
   view_ = &view;
   candidates_.clear();
+  heaped_ = false;
   soon_.clear();
   unread_.clear();
   order_.clear();
@@ -159,6 +160,8 @@ void ViewFront::start(const View& view) {
       measure_group(group);
     }
   }
+  std::make_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
+  heaped_ = true;
 }
 
 void ViewFront::clamp_to_parents() {
@@ -226,7 +229,7 @@ void ViewFront::measure_group(std::uint32_t number) {
     std::vector<Candidate>& list = wanted ? candidates_ : soon_;
     list.push_back({scratch_.want[i], scratch_.keep[i], scratch_.distance[i], place,
                     tree_->child_id(place), group.members[i]});
-    if (!wanted) continue;
+    if (!wanted || !heaped_) continue;
     std::push_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
   }
 }
@@ -286,13 +289,9 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
   return std::nullopt;
 }
 
-// Those of the list that are still there: the first `most` by keep, the coarsest first on ties.
+// The first `most` by keep, the coarsest first on ties, as far as they are still there.
 std::span<const ViewFront::Candidate> ViewFront::first_of(std::vector<Candidate>& list,
                                                           std::size_t most) {
-  std::erase_if(list, [&](const Candidate& candidate) {
-    const auto place = tree_->find(candidate.id);
-    return !place || *place != candidate.place;
-  });
   const auto sooner = [](const Candidate& a, const Candidate& b) {
     if (a.keep != b.keep) return a.keep > b.keep;
     if (level_of(a.id) != level_of(b.id)) return level_of(a.id) > level_of(b.id);
@@ -303,6 +302,10 @@ std::span<const ViewFront::Candidate> ViewFront::first_of(std::vector<Candidate>
     std::nth_element(list.begin(), end, list.end(), sooner);
     list.erase(end, list.end());
   }
+  std::erase_if(list, [&](const Candidate& candidate) {
+    const auto place = tree_->find(candidate.id);
+    return !place || *place != candidate.place;
+  });
   std::sort(list.begin(), list.end(), sooner);
   return list;
 }

@@ -65,8 +65,10 @@ class ViewFront {
   /// The collapsed cluster with the greatest demand, on ties the coarsest, then the smallest id;
   /// nullopt if no demand above 1 is left. Children of added clusters take part.
   [[nodiscard]] std::optional<Candidate> next();
-  /// Clusters that may be wanted soon, the greatest demand first, a few thousand at most. To be
-  /// called when next() has no more.
+  /// No more than this many are left.
+  [[nodiscard]] std::size_t candidates() const { return candidates_.size(); }
+  /// Clusters that may be wanted soon, the greatest demand first, a thousand at most. To be called
+  /// after next().
   [[nodiscard]] std::span<const Candidate> soon() { return first_of(soon_, kMostSoon); }
   /// Clusters whose record must be read before it can be told whether they are wanted, now or soon;
   /// a thousand at most. `keep` is an estimate of it; the greatest first. To be called likewise.
@@ -85,7 +87,7 @@ class ViewFront {
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   /// More are not asked for ahead of time in a step: it would take too much of its time.
-  static constexpr std::size_t kMostSoon = 4096, kMostUnread = 1024;
+  static constexpr std::size_t kMostSoon = 1024, kMostUnread = 1024;
   // The children of one expanded cluster.
   struct Group {
     Slot parent = ClusterTree::kNoSlot;
@@ -130,7 +132,8 @@ class ViewFront {
 
   // State of the current step.
   const View* view_ = nullptr;
-  std::vector<Candidate> candidates_;  // a heap
+  std::vector<Candidate> candidates_;  // a heap once all groups are measured
+  bool heaped_ = false;
   std::vector<Candidate> soon_, unread_;
   ViewDemand scratch_;
   std::vector<Slot> by_level_;

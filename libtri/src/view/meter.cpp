@@ -34,8 +34,7 @@ void StepMeter::start(const StepBudget& budget) {
   begin_ = last_ = now();
 }
 
-bool StepMeter::has(std::size_t points, std::size_t kind) const {
-  if (operations_ == 0) return true;
+bool StepMeter::fits(std::size_t points, std::size_t kind) const {
   if (operations_ >= budget_->operations) return false;
   if (!timed_) return true;
   const double ahead = with_overhead(points) * operation_rate_[kind] +

@@ -139,12 +139,19 @@ class StepMeter {
   static constexpr std::size_t kExpand = 0, kCollapse = 1;
 
   void start(const StepBudget& budget);
-  /// Whether one more operation on this many points fits. The first one always does.
-  [[nodiscard]] bool has(std::size_t points, std::size_t kind = kExpand) const;
+  /// Whether one more operation on this many points may begin: if it fits, or is the first one.
+  [[nodiscard]] bool has(std::size_t points, std::size_t kind = kExpand) const {
+    return operations_ == 0 || fits(points, kind);
+  }
+  /// Whether one more operation on this many points fits.
+  [[nodiscard]] bool fits(std::size_t points, std::size_t kind = kExpand) const;
   /// The same for an operation of which it is not known yet on how many.
   [[nodiscard]] bool has_usual(std::size_t kind) const {
     return has(static_cast<std::size_t>(usual_points_[kind]), kind);
   }
+  /// Whether so much time has gone by since the last operation that what only prepares later steps
+  /// should wait for these. Asks the clock.
+  [[nodiscard]] bool dwelt() const { return timed_ && now() - last_ > kDwell * budget_->seconds; }
   /// To be called after each operation.
   void spend(std::size_t points, std::size_t kind = kExpand);
   /// To be called before the first operation.
@@ -155,6 +162,9 @@ class StepMeter {
   void end();
 
  private:
+  /// Share of a step's seconds.
+  static constexpr double kDwell = 0.1;
+
   [[nodiscard]] double now() const { return timed_ ? budget_->clock() : 0.0; }
 
   const StepBudget* budget_ = nullptr;
@@ -244,15 +254,16 @@ class ViewControl {
     const Delta* delta = nullptr;
     std::size_t expanded = 0, collapsed = 0;  ///< clusters
     /// Wanted clusters that remain collapsed: not given yet; given, but the step's budget was
-    /// spent; no room under max_points or max_cached_bytes.
+    /// spent, or not looked at because it was; no room under max_points or max_cached_bytes.
     std::size_t missing = 0, pending = 0, blocked = 0;
     /// The greatest demand among these; if at most 1, the view is as detailed as it should be.
     double worst = 0.0;
     /// Whether another step with the same view and no new clusters would change nothing.
     bool settled = false;
     /// The missing clusters that are worth loading, most important first, as far as max_points and
-    /// max_cached_bytes leave room for them; then those that may be wanted soon. Among them the
-    /// clusters of which only the record is missing, by an estimate of their importance.
+    /// max_cached_bytes leave room for them, a thousand at most; then those that may be wanted
+    /// soon, likewise, and as far as the budget leaves time to tell them. Among them the clusters
+    /// of which only the record is missing, by an estimate of their importance.
     std::vector<ViewRequest> wanted;
     /// The ones among these that no step has named before, or only before they were withdrawn or
     /// forgotten: for a caller that starts loading at once.
