@@ -114,8 +114,8 @@ class Stores(StoreCase):
         self.assertEqual(checked['faults'], [])
         self.assertGreater(checked['samples'], keeps.sum())
 
-        both = view.where('z > 100')
-        self.assertEqual(len(both), (part[:, 2] > 100).sum())
+        both = view.where('z > 60')
+        self.assertEqual(len(both), (part[:, 2] > 60).sum())
         for none in ('class == 77', 'class ==', 'colour == 1'):
             with self.assertRaises(terrace.Error):
                 self.scan.where(none)
