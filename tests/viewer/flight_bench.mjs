@@ -5,7 +5,7 @@
 // raster of 8192 x 8192 cells.
 //
 // The first flight keeps 500,000 points in the mean, 600 pictures at 60 a second; TERRACE_BENCH_ERROR: the pixels of error
-// for that, as an earlier run has found and printed them. The second goes down from the whole to full detail of 1 % of the
+// for that, as an earlier run has found and printed them; then it is flown twice. The second goes down from the whole to full detail of 1 % of the
 // area. Times are of the worker (the model's step, normals, slides and copies of what has changed), measured by the worker
 // itself, bytes those of requests, the start file included, against the stored bytes of all clusters read; start file, pages
 // of the index and clusters are shares of the ratio.
