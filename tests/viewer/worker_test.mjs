@@ -16,11 +16,11 @@ after(() => sites.remove());
 
 /// A worker over a store of the site.
 class Tested extends Flyer {
-  constructor(name, {fault, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
-    const {fetch, log} = folderFetch(sites.site, fault);
+  constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
+    const {fetch, log} = folderFetch(site, fault, latency);
     const messages = [];
     let blocks = 0;
-    super(heard => new Worker(join(sites.site, 'worker.js'), fetch, heard), 'http://folder/', name, {
+    super(heard => new Worker(join(site, 'worker.js'), fetch, heard), 'http://folder/', name, {
       maxPoints,
       asPoints,
       heard: message => {
@@ -199,6 +199,31 @@ test('a module for bodies that cannot be fetched: a message, and a retry that he
   const opened = flyer.opened();
   flyer.worker.tell({type: 'retry'});
   assert.equal((await opened).scene.kind, 'surface');
+});
+
+test('few requests: small ones wait for those under way, and an index comes in blocks', async () => {
+  sites.terrace('synth', 'dem', '--size', '2048x2048', '-o', 'made.tif', '-q');
+  sites.terrace('build', 'made.tif', '-o', 'made.store', '-q');
+  sites.terrace('publish', 'made.store', '-o', 'made', '-q');
+  const flyer = new Tested('made', {latency: 10, site: join(sites.folder, 'made')});
+  const {scene: {box}} = await flyer.opened();
+  const middle = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2], high = box[4] - box[1];
+  // All of it in sight, and the index of level 0 with it.
+  await flyer.settle({eye: [middle[0], middle[1] - high, box[5] + high], direction: [0, Math.SQRT1_2, -Math.SQRT1_2], error: 4});
+  let small = 0, pages = 0, bytes = 0;
+  for (const {path, range, unanswered} of flyer.log.filter(request => request.range)) {
+    const [first, last] = /(\d+)-(\d+)/.exec(range).slice(1).map(Number);
+    if (path.endsWith('.index')) {
+      ++pages;
+      bytes += last - first + 1;
+    }
+    if (last - first + 1 >= 4096) continue;
+    ++small;
+    assert.equal(unanswered, 0, `${path} ${range}`);
+  }
+  assert.ok(small > 0);
+  // Many pages are a tenth of that.
+  assert.ok(pages > 5 && bytes / pages >= 1024, `${pages} requests for ${bytes} bytes of the index`);
 });
 
 test('the first picture needs the start file alone', async () => {
