@@ -56,8 +56,9 @@ export class Asked {
   /// How far one can go from here both ways without meeting any.
   around(file: string, from: number, to: number): [number, number] {
     const list = this.extents.get(file) ?? [];
-    if (this.meets(file, from, to)) return [from, to];
-    return [list[Asked.after(list, from + 1) - 1]?.[1] ?? 0, list[Asked.after(list, to, 0)]?.[0] ?? Infinity];
+    return [
+      Math.min(from, list[Asked.after(list, from, 0) - 1]?.[1] ?? 0), Math.max(to, list[Asked.after(list, to + 1)]?.[0] ?? Infinity)
+    ];
   }
   /// The first extent that ends (1) or begins (0) at `place` or behind it.
   private static after(list: Array<[number, number]>, place: number, side = 1): number {
