@@ -10,6 +10,7 @@
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
+#include "../tests/read_pieces.hpp"
 #include "../tests/stand_in_hierarchy.hpp"
 #include "../tests/store_inputs.hpp"
 #include "terrace/stream/store.hpp"
@@ -148,12 +149,38 @@ void read_one(benchmark::State& state, bool grid) {
   }
 }
 
+/// A store written anew in the order of the curve, the one that TERRACE_BENCH_STORE names if it
+/// does; how much larger it is, and in how many pieces a window of a tenth of each side is read,
+/// the same before.
+void repack_store(benchmark::State& state, bool grid) {
+  const char* const named = std::getenv("TERRACE_BENCH_STORE");
+  const Store store = named != nullptr ? Store::open(std::filesystem::path(named)) : built(grid);
+  const auto path = store_path(grid).string() + "-packed";
+  std::uint64_t bytes = 0;
+  for (auto _ : state) bytes = repack(store, path, /*replace=*/true);
+  count_points(state, store.points());
+  const auto boxes = testing::windows(store.bounds(), 0.1, 40, 1);
+  const auto before = testing::pieces_read(store.path(), boxes);
+  const auto after = testing::pieces_read(path, boxes);
+  std::filesystem::remove_all(path);
+  const auto mean = [&](std::size_t pieces) {
+    return static_cast<double>(pieces) / static_cast<double>(boxes.size());
+  };
+  state.counters["size"] = static_cast<double>(bytes) / static_cast<double>(store.bytes());
+  state.counters["clusters_before"] = mean(before.clusters);
+  state.counters["clusters_after"] = mean(after.clusters);
+  state.counters["index_before"] = mean(before.index);
+  state.counters["index_after"] = mean(after.index);
+}
+
 BENCHMARK_CAPTURE(encode, grid, true)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read_all, grid, true)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read_one, grid, true)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode, cloud, false)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read_all, cloud, false)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read_one, cloud, false)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(repack_store, grid, true)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(repack_store, cloud, false)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

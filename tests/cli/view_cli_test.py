@@ -234,6 +234,46 @@ class PublishTest(Stores):
         # Nothing else is left beside it.
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
 
+    def test_repacked(self):
+        """The same points, in a store that is valid and does not depend on threads, under the name it would have anyway."""
+        for threads in '1', '3':
+            done = terrace('publish', self.store, self.store, '-o', self.path(f'repacked{threads}'), '--repack', '--json',
+                           '--threads', threads)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        summary = json.loads(done.stdout)
+        files = sorted(os.path.relpath(os.path.join(folder, name), self.path('repacked3'))
+                       for folder, _, names in os.walk(self.path('repacked3')) for name in names)
+        terrace('publish', self.store, self.store, '-o', self.path('plain'), '-q')
+        self.assertEqual(files, sorted(os.path.relpath(os.path.join(folder, name), self.path('plain'))
+                                       for folder, _, names in os.walk(self.path('plain')) for name in names))
+        self.assertEqual(summary['files'], len(files))
+        self.assertEqual(summary['bytes'], sum(os.path.getsize(self.path('repacked3', file)) for file in files))
+        for file in files:
+            self.assertEqual(self.digest('repacked1', file), self.digest('repacked3', file), file)
+        self.assertEqual(self.digest('repacked3', 'stores', 'alps', 'manifest.json'),
+                         self.digest('repacked3', 'stores', 'alps-2', 'manifest.json'))
+        packed = self.path('repacked3', 'stores', 'alps')
+        self.assertNotEqual(self.digest('repacked3', 'stores', 'alps', 'level-0.0.clusters'), self.digest('alps.store', 'level-0.0.clusters'))
+        self.assertEqual(terrace('verify', packed).returncode, 0)
+        points = []
+        for store in self.store, packed:
+            done = terrace('points', store, '--level', '0', '-o', '-', '--format', 'xyz')
+            self.assertEqual(done.returncode, 0, done.stderr)
+            points.append(sorted(done.stdout.splitlines()))
+        self.assertEqual(*points)
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
+        # A fault on the way leaves nothing.
+        damaged = self.path('damaged.store')
+        shutil.copytree(self.store, damaged)
+        with open(os.path.join(damaged, 'level-0.0.clusters'), 'r+b') as file:
+            file.seek(1000)
+            file.write(b'damage')
+        done = terrace('publish', damaged, '-o', self.path('spoiled'), '--repack')
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('checksum', done.stderr)
+        self.assertFalse(os.path.exists(self.path('spoiled')))
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
+
     def test_start_file(self):
         terrace('publish', self.store, '-o', self.path('started'), '-q')
         with open(self.path('started', 'stores', 'alps.start'), 'rb') as file:

@@ -6,9 +6,9 @@
 //
 // The first flight keeps 500,000 points in the mean, 600 pictures at 60 a second; TERRACE_BENCH_ERROR: the pixels of error
 // for that, as an earlier run has found and printed them; then it is flown twice. The second goes down from the whole to full detail of 1 % of the
-// area. Times are of the worker (the model's step, normals, slides and copies of what has changed), measured by the worker
-// itself, bytes those of requests, the start file included, against the stored bytes of all clusters read; start file, pages
-// of the index and clusters are shares of the ratio.
+// area; where answers come late, 30 frames a second. Times are of the worker (the model's step, normals, slides and copies of what
+// has changed), measured by the worker itself, seconds those from the last view to full detail, bytes those of requests, the start
+// file included, against the stored bytes of all clusters read; start file, pages of the index and clusters are shares of the ratio.
 import {existsSync, mkdtempSync, readFileSync, rmSync, statSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join, resolve} from 'node:path';
@@ -84,11 +84,11 @@ try {
 
   // A log of each flight: the worker of the one before may go on for a while.
   let files;
-  const inNode = (fly, ...args) => {
-    files = folderFetch(site);
+  const inNodeAfter = latency => (fly, ...args) => {
+    files = folderFetch(site, undefined, latency);
     return fly(heard => new Worker(join(site, 'worker.js'), files.fetch, heard), 'http://folder/', name, ...args);
   };
-  const hosts = [['node', inNode, () => files.log]];
+  const hosts = [['node', inNodeAfter(1), () => files.log]];
   if (process.env.CHROMIUM && process.argv[2]) {
     const {launch} = await import('../clients/globe.mjs');
     server = await serveSite(site);
@@ -101,14 +101,15 @@ try {
     console.log(`| ${host} | ${milliseconds.length} | ${quantile(milliseconds, 0.5).toFixed(1)} | ` +
                 `${quantile(milliseconds, 0.99).toFixed(1)} | ${Math.max(...milliseconds).toFixed(1)} | ${count(points)} | ${error.toFixed(2)} |`);
   }
-  console.log('\n| down to 1 % of the area | points | requests | fetched | clusters read | ratio | start file | index | clusters |\n' +
-              '|---|---|---|---|---|---|---|---|---|');
-  for (const [host, fly, log] of hosts) {
+  hosts.push(['node, answers after 30 ms', inNodeAfter(30), () => files.log, 33]);
+  console.log('\n| down to 1 % of the area | points | requests | fetched | clusters read | ratio | start file | index | clusters | seconds |\n' +
+              '|---|---|---|---|---|---|---|---|---|---|');
+  for (const [host, fly, log, pace] of hosts) {
     if (server) server.log.length = 0;
-    const {state, stats} = await fly(dive);
+    const {state, stats, seconds} = pace ? await fly(dive, pace) : await fly(dive);
     const share = ending => (fetched(log(), ending) / state.storedBytes).toFixed(2);
     console.log(`| ${host} | ${count(state.points)} | ${stats.requests} | ${count(stats.bytes)} | ${count(state.storedBytes)} | ` +
-                `${(stats.bytes / state.storedBytes).toFixed(2)} | ${share('.start')} | ${share('.index')} | ${share('.clusters')} |`);
+                `${(stats.bytes / state.storedBytes).toFixed(2)} | ${share('.start')} | ${share('.index')} | ${share('.clusters')} | ${seconds.toFixed(1)} |`);
   }
 } finally {
   await browser?.close();

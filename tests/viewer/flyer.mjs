@@ -108,16 +108,20 @@ export async function cruise(connect, base, name, points, frames, error) {
   return {milliseconds, points: Math.round(mean), error};
 }
 
-/// From above the whole down to full detail of 1 % of the area in 60 frames. Returns the last frame.
-export async function dive(connect, base, name) {
+/// From above the whole down to full detail of 1 % of the area in 60 frames, each of at least `pace` milliseconds. Returns
+/// the state and the statistics of the last frame, and the seconds from the last view to it.
+export async function dive(connect, base, name, pace = 0) {
   const flyer = new Flyer(connect, base, name);
   const {scene: {box}} = await flyer.opened();
   const middle = middleOf(box), from = 1.2 * sizeOf(box), to = 0.1 * (box[4] - box[1]) / (2 * HALF);
+  let begin = 0;
   for (let i = 0; i <= 60; ++i) {
-    const above = from * (to / from) ** (i / 60);
+    const above = from * (to / from) ** (i / 60), paced = new Promise(resume => setTimeout(resume, pace));
+    begin = performance.now();
     await flyer.view(
         {...picture, eye: [...middle, box[5] + above], direction: [0, 0, -1], error: i < 60 ? 4 : 0.01}, i === 60);
+    if (i < 60) await paced;
   }
   const {state, stats} = flyer.last;
-  return {state, stats};
+  return {state, stats, seconds: (performance.now() - begin) / 1000};
 }

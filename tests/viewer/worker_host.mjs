@@ -5,14 +5,14 @@ import {join} from 'node:path';
 import vm from 'node:vm';
 
 /// fetch() of the files of a folder under http://folder/, with ranges. `fault(request, response)` may change what
-/// comes; `log` is of all requests.
-export function folderFetch(folder, fault = (_, response) => response) {
+/// comes, `latency` milliseconds after the request; `log` is of all requests, with the number of those
+/// made before that were still `unanswered`, without those made at once with it.
+export function folderFetch(folder, fault = (_, response) => response, latency = 1) {
   const log = [];
-  const answer = (url, options = {}) => {
-    const path = join(folder, decodeURIComponent(new URL(url).pathname));
-    const range = options.headers?.Range;
-    const request = {path: new URL(url).pathname, range, cache: options.cache};
-    log.push(request);
+  let batch = 0;
+  const waiting = new Map();  // batches by request
+  const answer = (url, request) => {
+    const path = join(folder, decodeURIComponent(new URL(url).pathname)), {range} = request;
     if (!existsSync(path)) return fault(request, {status: 404, headers: {}, body: Buffer.alloc(0)});
     if (!range) return fault(request, {status: 200, headers: {}, body: readFileSync(path)});
     const file = openSync(path, 'r');
@@ -26,10 +26,16 @@ export function folderFetch(folder, fault = (_, response) => response) {
         first >= size ? {status: 416, headers: {}, body: Buffer.alloc(0)} :
                         {status: 206, headers: {'Content-Range': `bytes ${first}-${first + body.length - 1}/${size}`}, body});
   };
-  const fetch = async (url, options) => {
-    await new Promise(resume => setTimeout(resume, 1));
-    if (options?.signal?.aborted) throw new DOMException('aborted', 'AbortError');
-    const response = answer(url, options);
+  const fetch = async (url, options = {}) => {
+    const request = {path: new URL(url).pathname, range: options.headers?.Range, cache: options.cache};
+    request.unanswered = [...waiting.values()].filter(other => other !== batch).length;
+    log.push(request);
+    waiting.set(request, batch);
+    queueMicrotask(() => ++batch);
+    await new Promise(resume => setTimeout(resume, latency));
+    waiting.delete(request);
+    if (options.signal?.aborted) throw new DOMException('aborted', 'AbortError');
+    const response = answer(url, request);
     if (response === null) throw new TypeError('fetch failed');
     const bytes = Uint8Array.from(response.body);
     return {

@@ -2,7 +2,7 @@
 // worker_test.mjs: the viewer's worker, as it is shipped, in node over published stores. TERRACE names the command,
 // FLIGHT_HASHES the native flight.
 import assert from 'node:assert/strict';
-import {readFileSync} from 'node:fs';
+import {readFileSync, statSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
@@ -16,11 +16,11 @@ after(() => sites.remove());
 
 /// A worker over a store of the site.
 class Tested extends Flyer {
-  constructor(name, {fault, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
-    const {fetch, log} = folderFetch(sites.site, fault);
+  constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
+    const {fetch, log} = folderFetch(site, fault, latency);
     const messages = [];
     let blocks = 0;
-    super(heard => new Worker(join(sites.site, 'worker.js'), fetch, heard), 'http://folder/', name, {
+    super(heard => new Worker(join(site, 'worker.js'), fetch, heard), 'http://folder/', name, {
       maxPoints,
       asPoints,
       heard: message => {
@@ -199,6 +199,34 @@ test('a module for bodies that cannot be fetched: a message, and a retry that he
   const opened = flyer.opened();
   flyer.worker.tell({type: 'retry'});
   assert.equal((await opened).scene.kind, 'surface');
+});
+
+test('few requests: small ones wait for those under way, and an index comes in blocks', async () => {
+  sites.terrace('synth', 'dem', '--size', '2048x2048', '-o', 'made.tif', '-q');
+  sites.terrace('build', 'made.tif', '-o', 'made.store', '-q');
+  sites.terrace('publish', 'made.store', '-o', 'made', '-q');
+  const flyer = new Tested('made', {latency: 10, site: join(sites.folder, 'made')});
+  const {scene: {box}} = await flyer.opened();
+  const middle = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2], high = box[4] - box[1];
+  // All of it in sight, and the index of level 0 with it.
+  await flyer.settle({eye: [middle[0], middle[1] - high, box[5] + high], direction: [0, Math.SQRT1_2, -Math.SQRT1_2], error: 4});
+  let small = 0;
+  const asked = [];  // parts of indices
+  for (const {path, range, unanswered} of flyer.log.filter(request => request.range)) {
+    const [first, last] = /(\d+)-(\d+)/.exec(range).slice(1).map(Number);
+    if (path.endsWith('.index')) {
+      for (const place of [first, last + 1]) {
+        const known = asked.some(part => part.path === path && part.first <= place && place <= part.last + 1);
+        assert.ok(place % 1024 === 0 || known || place === statSync(join(sites.folder, 'made', path)).size, `${path} ${range}`);
+      }
+      asked.push({path, first, last});
+    }
+    if (last - first + 1 >= 4096) continue;
+    ++small;
+    assert.equal(unanswered, 0, `${path} ${range}`);
+  }
+  assert.ok(small > 0);
+  assert.ok(asked.length > 5);
 });
 
 test('the first picture needs the start file alone', async () => {

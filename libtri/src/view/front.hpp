@@ -71,7 +71,8 @@ class ViewFront {
   /// after next().
   [[nodiscard]] std::span<const Candidate> soon() { return first_of(soon_, kMostSoon); }
   /// Clusters whose record must be read before it can be told whether they are wanted, now or soon;
-  /// a thousand at most. `keep` is an estimate of it; the greatest first. To be called likewise.
+  /// a few thousand at most. `keep` is an estimate of it; the greatest first. To be called
+  /// likewise.
   [[nodiscard]] std::span<const Candidate> unread() { return first_of(unread_, kMostUnread); }
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
@@ -87,7 +88,7 @@ class ViewFront {
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   /// More are not asked for ahead of time in a step: it would take too much of its time.
-  static constexpr std::size_t kMostSoon = 1024, kMostUnread = 1024;
+  static constexpr std::size_t kMostSoon = 1024, kMostUnread = 4096;
   // The children of one expanded cluster.
   struct Group {
     Slot parent = ClusterTree::kNoSlot;

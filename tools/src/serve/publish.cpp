@@ -66,8 +66,8 @@ bool check_target(const fs::path& target, bool replace) {
 
 }  // namespace
 
-Published publish(const Site& site, std::span<const stream::Store> stores, const fs::path& folder,
-                  bool replace) {
+Published publish(std::span<const stream::Store> stores, const fs::path& folder, bool replace,
+                  unsigned repack_threads) {
   fs::path target = folder;
   if (!target.has_filename()) target = target.parent_path();
   if (!target.has_filename() || target.filename() == "." || target.filename() == "..") {
@@ -96,7 +96,10 @@ Published publish(const Site& site, std::span<const stream::Store> stores, const
   try {
     std::vector<std::byte> piece(kCopied);
     const auto copy = [&](const std::string& name, const stream::ByteSource& source) {
+      ++published.files;
+      published.bytes += source.size();
       const fs::path path = staged / name;
+      if (fs::exists(path)) return;
       fs::create_directories(path.parent_path());
       stream::AtomicFile file(path);
       for (std::uint64_t at = 0; at < source.size(); at += piece.size()) {
@@ -107,9 +110,18 @@ Published publish(const Site& site, std::span<const stream::Store> stores, const
         file.write(part);
       }
       file.commit();
-      ++published.files;
-      published.bytes += source.size();
     };
+    std::vector<stream::Store> shown(stores.begin(), stores.end());
+    if (repack_threads > 0) {
+      fs::create_directories(staged / "stores");
+      const std::vector<std::string> names = site_names(stores);
+      for (std::size_t i = 0; i < shown.size(); ++i) {
+        const fs::path path = staged / "stores" / names[i];
+        stream::repack(stores[i], path, /*replace=*/false, repack_threads);
+        shown[i] = stream::Store::open(path);
+      }
+    }
+    const Site site = make_site(shown);
     for (const auto& [name, resource] : site) {
       if (name != "stores.json") copy(name, *resource.bytes);
     }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <mutex>
 #include <new>
-#include <set>
 #include <system_error>
 #include <utility>
 
@@ -77,14 +76,17 @@ std::vector<std::string> files_of(const stream::Store& store) {
   return names;
 }
 
-std::string name_of(const stream::Store& store, const std::set<std::string>& taken) {
+std::string name_of(const stream::Store& store, const std::vector<std::string>& taken) {
   fs::path path = fs::absolute(store.path()).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   std::string name = path.filename().string();
-  for (const std::string_view ending : {".store", ".terrace"}) {
-    if (name.size() > ending.size() && name.ends_with(ending)) {
-      name.resize(name.size() - ending.size());
-    }
+  // All of them, so that a copy under this name gets it again.
+  const auto cut = [&](std::string_view ending) {
+    if (name.size() <= ending.size() || !name.ends_with(ending)) return false;
+    name.resize(name.size() - ending.size());
+    return true;
+  };
+  while (cut(".store") || cut(".terrace")) {
   }
   // Names that every web server serves as they are.
   for (char& c : name) {
@@ -93,7 +95,10 @@ std::string name_of(const stream::Store& store, const std::set<std::string>& tak
     if (!plain) c = '_';
   }
   std::string unique = name;
-  for (int i = 2; taken.contains(unique); ++i) unique = name + "-" + std::to_string(i);
+  const auto is_taken = [&] {
+    return std::find(taken.begin(), taken.end(), unique) != taken.end();
+  };
+  for (int i = 2; is_taken(); ++i) unique = name + "-" + std::to_string(i);
   return unique;
 }
 
@@ -166,14 +171,20 @@ std::string start_file(const stream::Store& store) {
   return head.dump() + "\n" + packed(bytes);
 }
 
+std::vector<std::string> site_names(std::span<const stream::Store> stores) {
+  std::vector<std::string> names;
+  for (const stream::Store& store : stores) names.push_back(name_of(store, names));
+  return names;
+}
+
 Site make_site(std::span<const stream::Store> stores) {
   Site site;
   for (const ViewerFile& file : viewer_files()) add_text(site, std::string(file.name), file.bytes);
   Json list = Json::array();
-  std::set<std::string> names;
-  for (const stream::Store& store : stores) {
-    const std::string name = name_of(store, names);
-    names.insert(name);
+  const std::vector<std::string> names = site_names(stores);
+  for (std::size_t i = 0; i < stores.size(); ++i) {
+    const stream::Store& store = stores[i];
+    const std::string& name = names[i];
     const std::string folder = "stores/" + name + "/";
     const std::string checksum = hexadecimal(store.checksum());
     for (const std::string& file : files_of(store)) {

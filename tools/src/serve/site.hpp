@@ -32,6 +32,9 @@ using Site = std::map<std::string, Resource>;
 /// file of a store is a link.
 Site make_site(std::span<const stream::Store> stores);
 
+/// The name of each store in a site.
+std::vector<std::string> site_names(std::span<const stream::Store> stores);
+
 /// The parts of a store that a view needs to begin: a line of JSON with the ground map and the list
 /// of parts, then their bytes. tools/viewer/README.md describes it.
 std::string start_file(const stream::Store& store);
@@ -40,10 +43,11 @@ struct Published {
   std::uint64_t files = 0, bytes = 0;
 };
 
-/// Writes the site as a folder for any web server. It appears whole and synced, by one rename.
-/// replace: a folder that terrace has published before gives way.
-/// Throws: stream::Error; stream::Stopped if a store is to stop.
-Published publish(const Site& site, std::span<const stream::Store> stores,
-                  const std::filesystem::path& folder, bool replace);
+/// Writes the site of the stores as a folder for any web server. It appears whole and synced, by
+/// one rename. replace: a folder that terrace has published before gives way. repack_threads:
+/// unless 0, stores are repacked, by so many. Throws: stream::Error; stream::Stopped if a store is
+/// to stop.
+Published publish(std::span<const stream::Store> stores, const std::filesystem::path& folder,
+                  bool replace, unsigned repack_threads);
 
 }  // namespace terrace::tools

@@ -21,14 +21,17 @@ class PublishCommand final : public Command {
   void define(CLI::App& app) override {
     app.add_option("STORE", stores_, "what to show; several may be named")->required();
     add_output(app, output_, "the folder to write: viewer and copies of the stores");
-    not_yet(app, {"--repack"});
+    app.add_flag("--repack", repack_,
+                 "write the clusters of each level along a curve through them, for fewer requests: "
+                 "for stores of points that came in no order");
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     std::vector<stream::Store> stores;
     for (const std::string& path : stores_) stores.push_back(open_store(path));
-    const Published published = publish(make_site(stores), stores, output_, common.force);
+    const Published published =
+        publish(stores, output_, common.force, repack_ ? common.threads : 0);
     Summary summary;
     summary.json = {
         {"stores", stores.size()}, {"files", published.files}, {"bytes", published.bytes}};
@@ -42,6 +45,7 @@ class PublishCommand final : public Command {
  private:
   std::vector<std::string> stores_;
   std::string output_;
+  bool repack_ = false;
 };
 
 }  // namespace

@@ -8,7 +8,13 @@ const GAP = 1200;
 /// And this near even if some of the gap is known.
 const SMALL_GAP = 200;
 const MOST_BYTES = 256 * 1024;
-const MOST_REQUESTS = 6;
+/// An index is fetched in aligned blocks of so many bytes: its pages are smaller than the head of a request, and those of
+/// neighbours are wanted next.
+const INDEX_BLOCK = 1024;
+/// Ranges of fewer bytes wait for the requests under way, and for so many milliseconds after the last was begun: by then
+/// more is known of what lies near, to come along.
+const SMALL = 4096, PAUSE = 20;
+const MOST_REQUESTS = 4;
 const TRIES = 4;
 /// A request that another view does not want is given up after this time.
 const PATIENCE = 700;
@@ -46,6 +52,13 @@ export class Asked {
   meets(file: string, from: number, to: number): boolean {
     const list = this.extents.get(file) ?? [], at = Asked.after(list, from + 1);
     return at < list.length && list[at][0] < to;
+  }
+  /// How far one can go from here both ways without meeting any.
+  around(file: string, from: number, to: number): [number, number] {
+    const list = this.extents.get(file) ?? [];
+    return [
+      Math.min(from, list[Asked.after(list, from, 0) - 1]?.[1] ?? 0), Math.max(to, list[Asked.after(list, to + 1)]?.[0] ?? Infinity)
+    ];
   }
   /// The first extent that ends (1) or begins (0) at `place` or behind it.
   private static after(list: Array<[number, number]>, place: number, side = 1): number {
@@ -87,6 +100,8 @@ export class Ranges {
   private readonly tags = new Map<string, string>();
   private readonly asked = new Asked();
   private fresh = false;
+  private begun = -PAUSE;  ///< when the last request was
+  private pause: ReturnType<typeof setTimeout>|undefined;
 
   /// sizes: of the files, by name. `give`: takes what has come. `failed`: what cannot be had. `ended`: after
   /// each request, however it went.
@@ -96,7 +111,7 @@ export class Ranges {
       private readonly failed: (fault: FetchFault) => void, private readonly ended: () => void) {}
 
   get waiting(): boolean {
-    return this.flights.length > 0;
+    return this.flights.length > 0 || this.pause !== undefined;
   }
   /// From now on no cache is to be believed: what came was damaged.
   distrust(): void {
@@ -114,22 +129,38 @@ export class Ranges {
         flight.wanted = now;
         flight.view = view;
       } else {
-        left.push(range);
+        left.push(range.file.endsWith('.index') ? this.widened(range) : range);
       }
     }
     for (const flight of this.flights) {
       if (flight.view !== view && now - flight.wanted > PATIENCE) flight.abort.abort();
     }
-    if (this.flights.length >= MOST_REQUESTS) return;
-    for (const range of joined(left, this.asked).slice(0, MOST_REQUESTS - this.flights.length)) {
+    const alone = this.flights.length === 0;
+    const ready = joined(left, this.asked).filter(({bytes}) => bytes >= SMALL || (alone && now >= this.begun + PAUSE));
+    for (const range of ready.slice(0, Math.max(0, MOST_REQUESTS - this.flights.length))) {
+      this.begun = now;
       void this.start({...range, abort: new AbortController(), wanted: now, view});
+    }
+    if (left.length > 0 && this.flights.length === 0) {
+      this.pause ??= setTimeout(() => {
+        this.pause = undefined;
+        this.ended();
+      }, this.begun + PAUSE - now);
     }
   }
   stop(): void {
     for (const flight of this.flights) flight.abort.abort();
     this.flights = [];
+    clearTimeout(this.pause);
+    this.pause = undefined;
   }
 
+  private widened({file, offset, bytes}: ByteRange): ByteRange {
+    const [low, high] = this.asked.around(file, offset, offset + bytes);
+    const begin = Math.max(low, offset - offset % INDEX_BLOCK);
+    const end = Math.min(high, Math.ceil((offset + bytes) / INDEX_BLOCK) * INDEX_BLOCK, this.sizes.get(file) ?? 0);
+    return {file, offset: begin, bytes: end - begin};
+  }
   private async start(flight: Flight): Promise<void> {
     this.flights.push(flight);
     this.asked.add(flight);

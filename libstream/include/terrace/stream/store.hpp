@@ -129,6 +129,7 @@ struct ClusterPoints {
   std::vector<std::uint64_t> children;  ///< `level` ordinals per member, level 0 first
   bool has_representative = false;      ///< false only for the root
   Point3 representative{};
+  std::uint32_t before_representative = 0;  ///< so many members come first in the order of coding
   std::vector<std::byte> representative_payload;
   std::vector<std::uint64_t> representative_children;  ///< its `level` ordinals, level 0 first
   /// Of a view (Store::where()): 1 for members that meet the condition. Empty: all do.
@@ -256,5 +257,14 @@ class Store {
   std::shared_ptr<const View> view_;
   std::stop_token stop_;
 };
+
+/// Writes a store of the same clusters, those of each level in the order in which a Hilbert curve
+/// passes through the middles of their boxes: what lies together is then read in few ranges of
+/// bytes. Its checksum differs, so overlays of the one do not fit the other. Boxes above level 0
+/// may be a step of coding wider. Returns the bytes of the new store, which do not depend on
+/// `threads`. Memory: 16 bytes a cluster of level 0, and 64 blocks of 10,000 points. Throws: Error
+/// as StoreWriter, and for damage; Stopped.
+std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool replace = false,
+                     unsigned threads = 1);
 
 }  // namespace terrace::stream

@@ -95,7 +95,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   if (root ? coded != 0 : coded >= n)
     throw Damage("a cluster's representative is not one of its points");
   const std::uint32_t last = layout.version > 4 && !root ? uncentred(coded, n) : coded;
-  representative_ = last;
+  out.before_representative = last;
   deliver(entry, root ? n : last, out);
 
   // Everything but the representative, in the order of coding.

@@ -20,8 +20,6 @@ class ClusterDecoder {
   /// Throws: Damage if the bytes are not a cluster of entry.points points in the entry's box.
   void decode(const Layout& layout, const DecodingTables& tables, const Entry& entry,
               ByteView bytes, bool root, ClusterPoints& out);
-  /// The place of the last representative in the order of coding.
-  [[nodiscard]] std::uint32_t representative() const { return representative_; }
 
  private:
   /// False if the points come in a sequence, whose coordinates follow.
@@ -34,7 +32,6 @@ class ClusterDecoder {
                  unsigned number, std::uint32_t n);
   void deliver(const Entry& entry, std::uint32_t representative, ClusterPoints& out) const;
 
-  std::uint32_t representative_ = 0;
   IntegerBox box_;
   std::array<std::vector<std::uint64_t>, 3> relative_;
   GridCodec grid_;

@@ -15,6 +15,29 @@ RawBlock::RawBlock(const ClusteredBlock& block)
       representatives(block.representatives.begin(), block.representatives.end()),
       summaries(block.summaries.begin(), block.summaries.end()) {}
 
+void RawBlock::add(const ClusterPoints& cluster) {
+  if (first.empty()) first.push_back(0);
+  const auto at = std::ptrdiff_t{first.back()} + cluster.before_representative;
+  positions.insert(positions.end(), cluster.positions.begin(), cluster.positions.end());
+  payload.insert(payload.end(), cluster.payload.begin(), cluster.payload.end());
+  children.insert(children.end(), cluster.children.begin(), cluster.children.end());
+  if (cluster.has_representative) {
+    representatives.push_back(static_cast<std::uint32_t>(at));
+    positions.insert(positions.begin() + at, cluster.representative);
+    const auto insert = [at](auto& all, const auto& added) {
+      all.insert(all.begin() + at * static_cast<std::ptrdiff_t>(added.size()), added.begin(),
+                 added.end());
+    };
+    insert(payload, cluster.representative_payload);
+    insert(children, cluster.representative_children);
+  } else {
+    representatives.push_back(UINT32_MAX);
+  }
+  first.push_back(static_cast<std::uint32_t>(positions.size()));
+  order.resize(positions.size());
+  std::iota(order.begin() + first[first.size() - 2], order.end(), first[first.size() - 2]);
+}
+
 ClusteredBlock RawBlock::view() const {
   return {level, positions, payload, children, first, order, representatives, summaries};
 }
@@ -30,7 +53,6 @@ RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& 
   RawBlock block;
   block.level = layout.level;
   block.summaries = std::move(summaries);
-  block.first.push_back(0);
   ClusterDecoder decoder;
   ClusterPoints points;
   std::size_t offset = kPadding;
@@ -38,29 +60,8 @@ RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& 
     decoder.decode(layout, decoding, entry, ByteView(padded).subspan(offset, entry.bytes), root,
                    points);
     offset += entry.bytes;
-    // The representative goes back to its place in the order of coding: among points at one
-    // position, order is what tells them apart.
-    const auto start = static_cast<std::uint32_t>(block.positions.size());
-    block.positions.insert(block.positions.end(), points.positions.begin(), points.positions.end());
-    block.payload.insert(block.payload.end(), points.payload.begin(), points.payload.end());
-    block.children.insert(block.children.end(), points.children.begin(), points.children.end());
-    if (points.has_representative) {
-      const auto at = std::ptrdiff_t{start} + decoder.representative();
-      block.representatives.push_back(static_cast<std::uint32_t>(at));
-      block.positions.insert(block.positions.begin() + at, points.representative);
-      block.payload.insert(
-          block.payload.begin() + at * static_cast<std::ptrdiff_t>(layout.payload_size),
-          points.representative_payload.begin(), points.representative_payload.end());
-      block.children.insert(block.children.begin() + at * static_cast<std::ptrdiff_t>(layout.level),
-                            points.representative_children.begin(),
-                            points.representative_children.end());
-    } else {
-      block.representatives.push_back(UINT32_MAX);
-    }
-    block.first.push_back(static_cast<std::uint32_t>(block.positions.size()));
+    block.add(points);
   }
-  block.order.resize(block.positions.size());
-  std::iota(block.order.begin(), block.order.end(), 0u);
   return block;
 }
 

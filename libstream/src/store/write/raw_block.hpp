@@ -20,6 +20,9 @@ struct RawBlock {
 
   RawBlock() = default;
   explicit RawBlock(const ClusteredBlock& block);
+  /// Adds a cluster, but no summary. The representative goes back to its place in the order of
+  /// coding: among points at one position, order is what tells them apart.
+  void add(const ClusterPoints& cluster);
   [[nodiscard]] ClusteredBlock view() const;
 };
 

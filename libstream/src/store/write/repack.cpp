@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "store/write/hilbert.hpp"
+#include "store/write/raw_block.hpp"
+#include "store/write/side_by_side.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+
+using namespace store;
+
+namespace {
+
+/// Points of a block. Boxes are coded in steps of their block's extent, and where the curve leaves
+/// a surface in space and comes back elsewhere, blocks are wide unless they have few points.
+constexpr std::uint64_t kRasterBlock = 10'000, kCloudBlock = 2'000;
+/// Blocks that are encoded side by side.
+constexpr std::size_t kBlocksAtOnce = 64;
+
+/// Ordinals of clusters: of each level below, by ordinals.
+using Ordinals = std::vector<std::vector<std::uint64_t>>;
+
+/// Where along an axis of the store's bounds a value lies, 0 to 1. Halves do not overflow.
+double share_of(double value, double low, double high) {
+  const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0.0;
+  return std::clamp(share, 0.0, 1.0);
+}
+
+/// The ordinals of a level's clusters along the curve. Axes count by the mean extents of the boxes,
+/// so that units and steepness do not matter; heights of rasters do not count at all.
+std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
+  const std::size_t axes = store.schema().grid ? 2 : 3;
+  const unsigned bits = 62 / static_cast<unsigned>(axes);
+  const std::uint64_t clusters = store.levels()[level].clusters;
+  const Box3& bounds = store.bounds();
+  const auto share = [&](double value, std::size_t axis) {
+    return share_of(value, bounds.min[axis], bounds.max[axis]);
+  };
+  std::array<double, 3> extents{};
+  for (std::uint64_t i = 0; i < clusters; ++i) {
+    const Box3 box = store.record(cluster_id(level, i)).summary.box;
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      extents[axis] += share(box.max[axis], axis) - share(box.min[axis], axis);
+    }
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (const double extent : extents) {
+    if (extent > 0) least = std::min(least, extent);
+  }
+
+  // The place on the curve, as far as there are bits for it, above the ordinal.
+  const auto ordinal_bits = static_cast<unsigned>(std::bit_width(clusters));
+  const unsigned curve_bits = bits * static_cast<unsigned>(axes);
+  const unsigned lost = curve_bits + ordinal_bits > 64 ? curve_bits + ordinal_bits - 64 : 0;
+  std::vector<std::uint64_t> order(clusters);
+  for (std::uint64_t i = 0; i < clusters; ++i) {
+    const Box3 box = store.record(cluster_id(level, i)).summary.box;
+    std::array<std::uint32_t, 3> cell{};
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      const double scale = extents[axis] > 0 ? least / extents[axis] : 1.0;
+      const double place = share(0.5 * box.min[axis] + 0.5 * box.max[axis], axis) * scale;
+      cell[axis] = static_cast<std::uint32_t>(place * static_cast<double>((1u << bits) - 1));
+    }
+    order[i] = hilbert_place(std::span(cell).first(axes), bits) >> lost << ordinal_bits | i;
+  }
+  std::sort(order.begin(), order.end());
+  for (std::uint64_t& place : order) place &= (std::uint64_t{1} << ordinal_bits) - 1;
+  return order;
+}
+
+/// Adds a cluster whose points head clusters that have moved.
+void add(const Store& store, ClusterId id, const Ordinals& moved, RawBlock& block) {
+  ClusterPoints points;
+  store.read(id, points);
+  for (auto* const children : {&points.children, &points.representative_children}) {
+    for (std::size_t i = 0; i < children->size(); ++i) {
+      (*children)[i] = moved[i % block.level][(*children)[i]];
+    }
+  }
+  block.add(points);
+  block.summaries.push_back(store.record(id).summary);
+  // That of points alone is found anew, and is not enlarged twice.
+  if (block.level == 0) block.summaries.back().box = {};
+}
+
+}  // namespace
+
+std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool replace,
+                     unsigned threads) {
+  StoreWriter writer(path, store.schema(), replace, threads);
+  const std::uint64_t block_points = store.schema().grid ? kRasterBlock : kCloudBlock;
+  Ordinals moved;
+  for (unsigned level = 0; level < store.top(); ++level) {
+    const std::vector<std::uint64_t> order = along_curve(store, level);
+    for (std::uint64_t next = 0; next < order.size();) {
+      std::vector<std::uint64_t> begins{next};
+      while (begins.size() <= kBlocksAtOnce && next < order.size()) {
+        std::uint64_t points = 0;
+        while (points < block_points && next < order.size()) {
+          points += store.record(cluster_id(level, order[next++])).points;
+        }
+        begins.push_back(next);
+      }
+      std::vector<StoreWriter::EncodedPtr> blocks(begins.size() - 1);
+      side_by_side(threads, blocks.size(), [&](std::size_t b, std::size_t) {
+        RawBlock block;
+        block.level = level;
+        for (std::uint64_t i = begins[b]; i < begins[b + 1]; ++i) {
+          add(store, cluster_id(level, order[i]), moved, block);
+        }
+        blocks[b] = writer.encode(block.view());
+      });
+      for (StoreWriter::EncodedPtr& block : blocks) writer.append(std::move(block));
+    }
+    std::vector<std::uint64_t>& to = moved.emplace_back(order.size());
+    for (std::uint64_t i = 0; i < order.size(); ++i) to[order[i]] = i;
+  }
+  RawBlock root;
+  root.level = store.top();
+  add(store, store.root(), moved, root);
+  return writer.finish(root.view());
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "read_pieces.hpp"
+#include "store/write/hilbert.hpp"
+#include "store_mending.hpp"
+#include "store_testing.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+namespace {
+
+using testing::Block;
+using testing::TemporaryFolder;
+using testing::uniform;
+
+/// The law of the curve: it comes to every cell once, and each step is to a neighbour.
+TEST(Repack, TheCurveGoesFromNeighbourToNeighbour) {
+  for (const auto& [axes, bits] : {std::array{1u, 6u}, {2u, 5u}, {3u, 4u}}) {
+    std::vector<std::array<std::uint32_t, 3>> cells(std::size_t{1} << (axes * bits));
+    std::set<std::uint64_t> places;
+    for (std::uint32_t i = 0; i < cells.size(); ++i) {
+      std::array<std::uint32_t, 3> cell{};
+      for (unsigned axis = 0; axis < axes; ++axis)
+        cell[axis] = i >> (axis * bits) & ((1 << bits) - 1);
+      auto given = cell;
+      const std::uint64_t place = store::hilbert_place(std::span(given).first(axes), bits);
+      ASSERT_LT(place, cells.size());
+      places.insert(place);
+      cells[place] = cell;
+    }
+    ASSERT_EQ(places.size(), cells.size());
+    EXPECT_EQ(cells[0], (std::array<std::uint32_t, 3>{}));
+    for (std::size_t i = 1; i < cells.size(); ++i) {
+      std::uint32_t steps = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        steps += std::max(cells[i][axis], cells[i - 1][axis]) -
+                 std::min(cells[i][axis], cells[i - 1][axis]);
+      }
+      ASSERT_EQ(steps, 1u) << "step " << i << " in " << axes << " dimensions";
+    }
+  }
+}
+
+template <class T>
+void append_bytes(std::string& text, const T& value) {
+  text.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// A hash of everything below the root that does not depend on where clusters and members are:
+/// points with their attributes, what they head, errors and counts.
+std::size_t content_of(const Store& store) {
+  const std::size_t stride = store.schema().payload_size();
+  std::vector<std::vector<std::size_t>> contents;  // of clusters, level by level
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    std::vector<std::size_t>& found = contents.emplace_back();
+    store.for_each(level, [&](ClusterId, const ClusterRecord& record, const ClusterPoints& points) {
+      const auto point = [&](const Point3& position, const std::byte* payload,
+                             const std::uint64_t* children) {
+        std::string text;
+        append_bytes(text, position);
+        text.append(reinterpret_cast<const char*>(payload), stride);
+        for (unsigned below = 0; below < level; ++below) {
+          append_bytes(text, contents[below][children[below]]);
+        }
+        return text;
+      };
+      std::vector<std::string> members;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        members.push_back(point(points.positions[i], points.payload.data() + i * stride,
+                                points.children.data() + i * level));
+      }
+      std::sort(members.begin(), members.end());
+      std::string text;
+      for (const std::string& member : members) text += member;
+      if (points.has_representative) {
+        text += point(points.representative, points.representative_payload.data(),
+                      points.representative_children.data());
+      }
+      append_bytes(text, record.summary.error);
+      append_bytes(text, record.summary.descendants);
+      found.push_back(std::hash<std::string>()(text));
+    });
+  }
+  return contents.back().front();
+}
+
+/// Repacks, and compares with the store as it was.
+void check_repacked(const std::filesystem::path& folder) {
+  const Store before = Store::open(folder / "s");
+  const std::uint64_t bytes = repack(before, folder / "r", false, 3);
+  const Store after = Store::open(folder / "r");
+  EXPECT_EQ(after.bytes(), bytes);
+  EXPECT_TRUE(after.verify(testing::expect_no_problem));
+  EXPECT_EQ(content_of(after), content_of(before));
+  EXPECT_EQ(after.points(), before.points());
+  EXPECT_EQ(after.bounds(), before.bounds());
+  EXPECT_EQ(after.schema().nodata, before.schema().nodata);
+  EXPECT_EQ(after.schema().parameters, before.schema().parameters);
+  repack(before, folder / "one", false, 1);
+  EXPECT_TRUE(testing::read_files(folder / "one") == testing::read_files(folder / "r"))
+      << "threads matter";
+  // And what is in order already stays whole.
+  repack(after, folder / "again", false, 2);
+  const Store again = Store::open(folder / "again");
+  EXPECT_TRUE(again.verify(testing::expect_no_problem));
+  EXPECT_EQ(content_of(again), content_of(before));
+}
+
+std::vector<Block> reordered(std::vector<Block> blocks, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  for (std::size_t i = blocks.size(); i > 1; --i) std::swap(blocks[i - 1], blocks[random() % i]);
+  return blocks;
+}
+
+TEST(Repack, KeepsAllThatRastersHave) {
+  for (const ScalarType type : {ScalarType::i16, ScalarType::f32, ScalarType::u64}) {
+    for (const auto relief : {testing::Relief::flat, testing::Relief::fractal,
+                              testing::Relief::extreme, testing::Relief::decimal}) {
+      SCOPED_TRACE(static_cast<int>(type) * 10 + static_cast<int>(relief));
+      const TemporaryFolder folder;
+      testing::write_store(folder.path() / "s", testing::grid_schema(type),
+                           reordered(testing::grid_blocks(type, relief, 100, 90, 20, 1), 2),
+                           {.block_points = 400, .cluster_points = 9});
+      check_repacked(folder.path());
+    }
+  }
+}
+
+TEST(Repack, KeepsAllThatCloudsHave) {
+  std::mt19937_64 random(7);
+  for (const auto numbers :
+       {testing::Numbers::decimals, testing::Numbers::floats, testing::Numbers::doubles,
+        testing::Numbers::extremes, testing::Numbers::mixed, testing::Numbers::lines}) {
+    SCOPED_TRACE(static_cast<int>(numbers));
+    StoreSchema schema = testing::cloud_schema();
+    for (const ScalarType type : testing::kAllTypes) {
+      schema.attributes.push_back(testing::channel("a", type));
+      schema.attributes.back().name += std::to_string(schema.attributes.size());
+    }
+    std::vector<Block> blocks = testing::cloud_blocks(numbers, 6000, 300, 3);
+    for (Block& block : blocks) {
+      block.payload.resize(block.positions.size() * schema.payload_size());
+      const bool still = random() % 3 == 0;
+      for (std::byte& byte : block.payload) byte = still ? std::byte{1} : std::byte(random() % 256);
+    }
+    const TemporaryFolder folder;
+    testing::write_store(folder.path() / "s", schema, blocks,
+                         {.block_points = 300, .cluster_points = 10});
+    check_repacked(folder.path());
+  }
+}
+
+/// More than one segment, whose tables differ, and more than are encoded side by side.
+TEST(Repack, KeepsStoresOfManyBlocks) {
+  const TemporaryFolder folder;
+  testing::write_store(
+      folder.path() / "s", testing::grid_schema(ScalarType::u8),
+      testing::grid_blocks(ScalarType::u8, testing::Relief::fractal, 960, 900, 30, 5),
+      {.block_points = 900, .cluster_points = 20});
+  check_repacked(folder.path());
+}
+
+TEST(Repack, KeepsStoresOfFewPoints) {
+  for (const std::size_t points : {0u, 1u, 40u}) {
+    const TemporaryFolder folder;
+    testing::write_store(folder.path() / "s", testing::cloud_schema(),
+                         testing::cloud_blocks(testing::Numbers::decimals, points, 20, 1),
+                         {.block_points = 50, .cluster_points = 5});
+    check_repacked(folder.path());
+  }
+}
+
+TEST(Repack, DoesNotReplaceUnasked) {
+  const TemporaryFolder folder;
+  testing::write_store(folder.path() / "s", testing::cloud_schema(),
+                       testing::cloud_blocks(testing::Numbers::decimals, 500, 100, 1),
+                       {.block_points = 100, .cluster_points = 5});
+  const Store store = Store::open(folder.path() / "s");
+  EXPECT_THROW(repack(store, folder.path() / "s"), Error);
+  const std::size_t content = content_of(store);
+  repack(store, folder.path() / "s", true);
+  EXPECT_EQ(content_of(Store::open(folder.path() / "s")), content);
+}
+
+/// What lies together is read together, however the store was built.
+TEST(Repack, WindowsAreReadInFewerPieces) {
+  const TemporaryFolder folder;
+  const auto write = [&](const char* name, const StoreSchema& schema,
+                         const std::vector<Block>& blocks) {
+    testing::write_store(folder.path() / name, schema, blocks,
+                         {.block_points = 400, .cluster_points = 10, .scale = {1, 1, 0}});
+    const Store store = Store::open(folder.path() / name);
+    const std::string packed = std::string(name) + "-packed";
+    repack(store, folder.path() / packed);
+    const std::vector<Box3> boxes = testing::windows(store.bounds(), 0.12, 30, 11);
+    return std::array{testing::pieces_read(folder.path() / name, boxes).clusters,
+                      testing::pieces_read(folder.path() / packed, boxes).clusters};
+  };
+  const auto grid =
+      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 400, 400, 20, 4);
+  const auto in_order = write("rows", testing::grid_schema(ScalarType::i16), grid);
+  const auto mixed = write("shuffled", testing::grid_schema(ScalarType::i16), reordered(grid, 9));
+  EXPECT_LT(3 * in_order[1], 2 * in_order[0]);
+  EXPECT_LT(2 * mixed[1], mixed[0]);
+  // How they lay before matters next to nothing then.
+  EXPECT_LT(10 * mixed[1], 11 * in_order[1]);
+  // A flat cloud; its heights, though they have the largest numbers, tear nothing apart.
+  std::mt19937_64 random(3);
+  std::vector<Block> cloud;
+  for (int tile = 0; tile < 400; ++tile) {
+    Block& block = cloud.emplace_back();
+    for (int i = 0; i < 400; ++i) {
+      const double x = tile % 20 + uniform(random), y = tile / 20 + uniform(random);
+      block.positions.push_back(
+          {x / 1000, y / 1000, 1000 * (x + std::sin(y)) + 9 * uniform(random)});
+    }
+  }
+  const auto flat = write("cloud", testing::cloud_schema(), reordered(cloud, 10));
+  EXPECT_LT(3 * flat[1], 2 * flat[0]);
+}
+
+}  // namespace
+}  // namespace terrace::stream
