@@ -122,6 +122,23 @@ TEST(DoubleKernel, SignsAreExact) {
   }
 }
 
+TEST(DoubleKernel, SignsOfWholeNumbersAreExactFarFromZeroAndBelowIt) {
+  std::mt19937_64 random(6);
+  for (int round = 0; round < 20'000; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    // Few differences, so that many are collinear or cocircular, up to where they are exact.
+    const double step = std::ldexp(1.0, static_cast<int>(random() % 32));
+    const double middle =
+        std::floor(std::ldexp(to_unit(random()) - 0.5, static_cast<int>(random() % 55)));
+    std::array<std::array<double, 2>, 4> p;
+    for (auto& point : p) {
+      for (double& c : point) c = middle + step * (static_cast<double>(random() % 7) - 3);
+    }
+    expect_exact_signs(p[0], p[1], p[2], p[3]);
+    if (HasFatalFailure()) return;
+  }
+}
+
 // ---- Real files, if the environment names a folder ----------------------------------------------
 
 std::filesystem::path data_folder() {

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // CGAL's natural_neighbor_coordinates_2 with exact constructions as an oracle.
+#include <cmath>
 #include <map>
+#include <random>
+#include <string>
 
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
+#include <CGAL/Exact_rational.h>
 #include <CGAL/natural_neighbor_coordinates_2.h>
 #include <gtest/gtest.h>
 
+#include "interpolation/bounded_number.hpp"
 #include "interpolation_queries.hpp"
 
 namespace terrace::tri {
@@ -32,6 +37,67 @@ Weights weights_of(const ExactOracle& oracle, const Point2& query) {
         // of the interval the result is less exact
         CGAL::to_double(CGAL::exact(weight / result.second));
   return weights;
+}
+
+/// The values, bounds and roundings of random sums, products and quotients against rationals.
+TEST(BoundedNumber, IsWithinItsBoundOfTheExactResult) {
+  using planar::BoundedNumber;
+  using Rational = CGAL::Exact_rational;
+  const auto rational = [](BoundedNumber::Wide value) {
+    Rational sum = 0;
+    for (int part = 0; part < 3; ++part) {  // 113 bits
+      const auto leading = value.convert_to<double>();
+      sum += Rational(leading);
+      value -= leading;
+    }
+    return sum;
+  };
+  const auto distance = [](const Rational& a, const Rational& b) { return CGAL::abs(a - b); };
+  std::mt19937_64 random(11);
+  int certain = 0;
+  constexpr int kRounds = 2000;
+  for (int round = 0; round < kRounds; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    BoundedNumber number(0);
+    Rational exact = 0;
+    for (int step = 0; step < 12; ++step) {
+      // Small integers among them, so that much cancels.
+      const double other = random() % 2 == 0
+                               ? static_cast<double>(random() % 9) - 4
+                               : std::ldexp(to_unit(random()), static_cast<int>(random() % 60));
+      switch (random() % 4) {
+        case 0:
+          number += other;
+          exact += other;
+          break;
+        case 1:
+          number -= other;
+          exact -= other;
+          break;
+        case 2:
+          number = number * BoundedNumber(other);
+          exact *= other;
+          break;
+        default:
+          if (other == 0) break;
+          number = number / BoundedNumber(other);
+          exact /= other;
+      }
+      if (random() % 4 == 0 && exact != 0) {
+        number = BoundedNumber(1) / number;
+        exact = 1 / exact;
+      }
+    }
+    if (!std::isfinite(number.error())) continue;
+    ASSERT_LE(distance(rational(number.value()), exact), Rational(number.error()));
+    const double rounded = number.rounded();
+    if (std::isnan(rounded)) continue;
+    ++certain;
+    for (const double side : {-1e300, 1e300}) {
+      ASSERT_LE(distance(rounded, exact), distance(std::nextafter(rounded, side), exact));
+    }
+  }
+  EXPECT_GT(certain, kRounds / 2);
 }
 
 template <class Coord>

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -129,6 +130,36 @@ TEST(PointSurface, RefusesMoreThanThereIsRoomForAndCrowds) {
   EXPECT_FALSE(surface.load(all, 6000, false));
   EXPECT_TRUE(surface.load(all, 6000, true));
   EXPECT_TRUE(surface.load({{0, 0}, {0.4, 0.4}}, 6000, false));
+}
+
+/// All points at once, by any number of threads, are those of a box around them, in their cells'
+/// order.
+TEST(PointCells, AreTheSameHoweverManyThreadsLoadThem) {
+  const tests::TemporaryFolder folder;
+  for (const char* kind : {"random", "duplicates", "lattice", "nearly a line"}) {
+    SCOPED_TRACE(kind);
+    const stream::Store store =
+        stream::Store::open(cloud_store(folder.path() / kind, points_of(kind)));
+    for (unsigned level = 0; level <= store.top(); ++level) {
+      SCOPED_TRACE("level " + std::to_string(level));
+      const StoredBox all = terrain::flat(store.bounds());
+      const auto visited = [&](const terrain::PointCells& cells) {
+        std::vector<std::pair<Point2, double>> points;
+        cells.visit_cells(cells.cells_of(all),
+                          [&](const Point2& p) { points.emplace_back(p, cells.height(p)); });
+        return points;
+      };
+      stream::StoreQuery query(store);
+      terrain::PointCells expected;
+      const bool goes_apart = expected.load(query, level, all, store.points(), false);
+      for (const unsigned threads : {1U, 3U, 64U}) {
+        SCOPED_TRACE(threads);
+        terrain::PointCells cells;
+        ASSERT_EQ(cells.load_all(store, level, threads), goes_apart);
+        ASSERT_EQ(visited(cells), visited(expected));
+      }
+    }
+  }
 }
 
 /// A part of the area that has more points than memory allows is halved, again and again.

@@ -24,6 +24,8 @@
 namespace terrace::stream {
 namespace {
 
+constexpr std::size_t kLeastBuffer = 4096;
+
 /// Pipes whose first bytes have been read: they cannot be reopened without losing them.
 std::map<std::string, std::unique_ptr<Input>>& heads() {
   thread_local std::map<std::string, std::unique_ptr<Input>> kept;
@@ -170,8 +172,12 @@ std::string_view Input::fill(std::size_t wanted) {
     end_ -= begin_;
     begin_ = 0;
   }
-  if (begin_ + wanted > buffer_.size()) buffer_.resize(begin_ + wanted);
-  while (end_ - begin_ < wanted && read_more()) {
+  while (end_ - begin_ < wanted) {
+    // Grows as bytes come: most inputs are shorter than what may be asked for.
+    if (end_ == buffer_.size()) {
+      buffer_.resize(std::min(begin_ + wanted, std::max(2 * end_, kLeastBuffer)));
+    }
+    if (!read_more()) break;
   }
   return window();
 }

@@ -145,7 +145,7 @@ class PointSampler final : public HeightSampler {
                   std::max(65536.0, whole / (kPartsPerThread * static_cast<double>(threads)))});
     const double met = points_met_by_a_place(store, options.level);
     points_per_place_ = kPointsPerPlace + kReadShare * met;
-    takes_whole_ = whole * kBytesPerExpected <= static_cast<double>(memory_);
+    takes_whole_ = store.levels()[options.level].points * PointCells::kBytesPerPoint <= memory_;
     if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
   }
 
@@ -226,10 +226,7 @@ class PointSampler final : public HeightSampler {
   /// windows: rather once for all.
   void take_whole() {
     auto cells = std::make_unique<PointCells>();
-    stream::StoreQuery query(store_);
-    takes_whole_ =
-        cells->load(query, options_.level, flat(store_.bounds()),
-                    static_cast<std::size_t>(memory_ / PointCells::kBytesPerPoint), false);
+    takes_whole_ = cells->load_all(store_, options_.level, static_cast<unsigned>(workers_.size()));
     if (takes_whole_) whole_ = std::move(cells);
   }
 

@@ -3,6 +3,11 @@
 
 #include <cmath>
 #include <numeric>
+#include <string>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/parallel.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -13,6 +18,8 @@ constexpr double kPointsPerCell = 2;
 constexpr double kCrowd = 48;
 /// So many are sorted without more memory.
 constexpr std::size_t kFewInCells = 16;
+/// That a thread decodes at a time.
+constexpr std::uint64_t kClustersAtOnce = 256;
 
 }  // namespace
 
@@ -20,8 +27,8 @@ void PointCells::clear() {
   known_ = {{kFar, kFar}, {-kFar, -kFar}};
   columns_ = rows_ = 1;
   per_unit_ = {};
-  places_.clear();
-  heights_.clear();
+  places_.reset();
+  heights_.reset();
   begin_.assign(2, 0);
   sums_.assign(4, 0);
 }
@@ -47,8 +54,65 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
         }
         too_many = places.size() > most_points;
       });
-  if (too_many) return false;
+  return !too_many && sort(store, box, places, heights, may_crowd, 1);
+}
 
+bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned threads) {
+  clear();
+  const stream::Channel& channel = store.schema().coordinates[2];
+  /// Clusters whose points come one after another from `begin` on.
+  struct Piece {
+    unsigned level = 0;
+    std::uint64_t first = 0, end = 0;  ///< ordinals
+    std::size_t begin = 0, points = 0;
+  };
+  std::vector<Piece> pieces;
+  for (unsigned at = store.top() + 1; at-- > level;) {
+    const std::uint64_t clusters = store.levels()[at].clusters;
+    for (std::uint64_t first = 0; first < clusters; first += kClustersAtOnce) {
+      pieces.push_back({at, first, std::min(first + kClustersAtOnce, clusters)});
+    }
+  }
+  parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {
+    Piece& piece = pieces[i];
+    for (std::uint64_t k = piece.first; k < piece.end; ++k) {
+      piece.points += store.record(stream::cluster_id(piece.level, k)).points;
+    }
+  });
+  std::size_t count = 0;
+  for (Piece& piece : pieces) {
+    piece.begin = count;
+    count += piece.points;
+  }
+  const std::uint64_t expected = store.levels()[level].points;
+  if (count != expected) {
+    throw stream::Error({.file = store.path().string(),
+                         .where = "level " + std::to_string(level),
+                         .cause = "the clusters have " + std::to_string(count) +
+                                  " points and not the " + std::to_string(expected) +
+                                  " that the manifest tells",
+                         .remedy = "restore the files or build the store anew"});
+  }
+  const auto places = std::make_unique_for_overwrite<Point2[]>(count);
+  const auto heights = std::make_unique_for_overwrite<double[]>(count);
+  parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {
+    std::size_t at = pieces[i].begin;
+    stream::ClusterPoints cluster;
+    for (std::uint64_t k = pieces[i].first; k < pieces[i].end; ++k) {
+      store.read(stream::cluster_id(pieces[i].level, k), cluster);
+      for (const stream::Point3& p : cluster.positions) {
+        places[at] = {p[0], p[1]};
+        heights[at++] = p[2] * channel.scale + channel.offset;
+      }
+    }
+  });
+  return sort(store, flat(store.bounds()), {places.get(), count}, {heights.get(), count}, false,
+              threads);
+}
+
+bool PointCells::sort(const stream::Store& store, const StoredBox& box,
+                      std::span<const Point2> places, std::span<const double> heights,
+                      bool may_crowd, unsigned threads) {
   for (std::size_t k = 0; k < 2; ++k) {
     box_.min[k] = std::max(box.min[k], store.bounds().min[k]);
     box_.max[k] = std::min(box.max[k], store.bounds().max[k]);
@@ -70,7 +134,19 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
   }
 
   begin_.assign(std::size_t{columns_} * rows_ + 1, 0);
-  for (const Point2& p : places) ++begin_[cell(p) + 1];
+  // Each thread looks at all places and takes those of its band, in their order.
+  const auto in_bands = [&](const auto& take) {
+    const std::uint32_t bands = std::clamp(threads, 1U, rows_);
+    parallel_for(bands, threads, [&](unsigned, std::size_t band) {
+      const auto from = static_cast<std::uint32_t>(std::uint64_t{rows_} * band / bands);
+      const auto to = static_cast<std::uint32_t>(std::uint64_t{rows_} * (band + 1) / bands);
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        const std::uint32_t row = index(1, places[i][1], rows_);
+        if (row >= from && row < to) take(cell(places[i]), i);
+      }
+    });
+  };
+  in_bands([&](std::size_t at, std::size_t) { ++begin_[at + 1]; });
   double shared = 0;
   for (const std::uint32_t count : begin_) shared += static_cast<double>(count) * count;
   if (!may_crowd && shared > kCrowd * static_cast<double>(places.size())) {
@@ -78,14 +154,13 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
     return false;
   }
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-  places_.resize(places.size());
-  heights_.resize(places.size());
+  places_ = std::make_unique_for_overwrite<Point2[]>(places.size());
+  heights_ = std::make_unique_for_overwrite<double[]>(places.size());
   // begin_[c] goes from the cell's begin to its end, which is where the next one begins.
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const std::uint32_t at = begin_[cell(places[i])]++;
-    places_[at] = places[i];
-    heights_[at] = heights[i];
-  }
+  in_bands([&](std::size_t at, std::size_t i) {
+    places_[begin_[at]] = places[i];
+    heights_[begin_[at]++] = heights[i];
+  });
   std::copy_backward(begin_.begin(), begin_.end() - 2, begin_.end() - 1);
   begin_.front() = 0;
   drop_duplicates();
@@ -136,8 +211,6 @@ void PointCells::drop_duplicates() {
     first = end;
   }
   begin_.back() = kept;
-  places_.resize(kept);
-  heights_.resize(kept);
 }
 
 StoredBox PointCells::box_of(const Range& range) const {
@@ -158,10 +231,10 @@ StoredBox PointCells::box_of(const Range& range) const {
 
 double PointCells::height(const Point2& point) const {
   const std::size_t c = cell(point);
-  const auto from = places_.begin() + begin_[c], to = places_.begin() + begin_[c + 1];
-  const auto found = std::find(from, to, point);
-  return found == to ? std::numeric_limits<double>::quiet_NaN()
-                     : heights_[static_cast<std::size_t>(found - places_.begin())];
+  for (std::uint32_t i = begin_[c]; i < begin_[c + 1]; ++i) {
+    if (places_[i] == point) return heights_[i];
+  }
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace terrace::terrain

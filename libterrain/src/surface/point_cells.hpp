@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
 #include "surface/circle_cover.hpp"
@@ -30,6 +32,9 @@ class PointCells {
   /// held then. 60 ns per point. Throws: stream::Error on a damaged store, stream::Stopped.
   bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
             std::size_t most_points, bool may_crowd);
+  /// The same for all points of a store, by several threads: each decodes clusters that follow each
+  /// other, and then sorts a band of rows. False if they crowd. Throws as above.
+  bool load_all(const stream::Store& store, unsigned level, unsigned threads);
   void clear();
 
   /// All points in it are held. It reaches to infinity where the store has no points beyond.
@@ -123,6 +128,9 @@ class PointCells {
   }
   /// A box that holds the points in a range of cells.
   [[nodiscard]] StoredBox box_of(const Range& range) const;
+  /// Takes points of the box in the order of StoreWindow::points(). False: they crowd.
+  bool sort(const stream::Store& store, const StoredBox& box, std::span<const Point2> places,
+            std::span<const double> heights, bool may_crowd, unsigned threads);
   void drop_duplicates();
 
   /// Whether there is a point in a range of cells.
@@ -158,9 +166,10 @@ class PointCells {
   StoredBox box_{}, known_{};
   std::array<double, 2> per_unit_{}, cell_size_{};
   std::uint32_t columns_ = 1, rows_ = 1;
-  std::vector<Point2> places_;        ///< by cells, row by row
-  std::vector<double> heights_;       ///< of places_
-  std::vector<std::uint32_t> begin_;  ///< in places_, by cell; at last their number
+  // Not cleared first: each page of them is touched once, by the thread that fills it.
+  std::unique_ptr<Point2[]> places_;   ///< by cells, row by row
+  std::unique_ptr<double[]> heights_;  ///< of places_
+  std::vector<std::uint32_t> begin_;   ///< in places_, by cell; at last their number
   /// Points in the cells left of and above each corner of the grid, row by row.
   std::vector<std::uint32_t> sums_;
 };

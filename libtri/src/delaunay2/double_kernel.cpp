@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "double_kernel.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include "int_kernel.hpp"
@@ -12,22 +16,26 @@ using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 Epick::Point_2 cgal(const DoubleKernel::Point& p) { return {p[0], p[1]}; }
 
-// Converts to integers that IntKernel can take: with them ties, which are frequent on rasters, are
-// cheap.
-bool to_integers(const DoubleKernel::Point& p, IntKernel::Point& result) {
-  for (std::size_t k = 0; k < 2; ++k) {
-    if (!(p[k] >= 0 && p[k] < IntKernel::kLimit)) return false;
-    result[k] = static_cast<IntKernel::Coord>(p[k]);
-    if (result[k] != p[k]) return false;
-  }
-  return true;
-}
-
+// Converts to integers that IntKernel can take, counted from the least of them: with them ties,
+// which are frequent on rasters and scans, are cheap. The predicates depend on differences alone.
 template <std::size_t N>
 bool to_integers(const std::array<const DoubleKernel::Point*, N>& points,
                  std::array<IntKernel::Point, N>& result) {
-  for (std::size_t i = 0; i < N; ++i)
-    if (!to_integers(*points[i], result[i])) return false;
+  constexpr double kWhole = 0x1p52;  ///< below it differences of integers are exact
+  for (std::size_t k = 0; k < 2; ++k) {
+    double least = kWhole;
+    for (const DoubleKernel::Point* p : points) {
+      const double at = (*p)[k];
+      if (!(std::abs(at) < kWhole) || static_cast<double>(static_cast<std::int64_t>(at)) != at)
+        return false;
+      least = std::min(least, at);
+    }
+    for (std::size_t i = 0; i < N; ++i) {
+      const double difference = (*points[i])[k] - least;
+      if (!(difference < IntKernel::kLimit)) return false;
+      result[i][k] = static_cast<IntKernel::Coord>(difference);
+    }
+  }
   return true;
 }
 

@@ -15,6 +15,7 @@ using Rational = CGAL::Exact_rational;
 
 template <>
 struct Rounded<Rational> {
+  static constexpr bool kShortens = true;
   static double of(const Rational& value) { return CGAL::to_double(value); }
   static Rational shortened(const Rational& value) {
     using Integer = boost::multiprecision::mpz_int;
@@ -33,6 +34,7 @@ struct Rounded<Rational> {
 
 template <class Kernel>
 struct Sampler<Kernel>::Exact {
+  VoronoiCell<BoundedNumber> bounded;
   VoronoiCell<Rational> cell;
 };
 
@@ -127,7 +129,8 @@ bool Sampler<Kernel>::measure(const Query& p) {
 
 template <class Kernel>
 template <class Number>
-void Sampler<Kernel>::take_weights(const VoronoiCell<Number>& cell) {
+bool Sampler<Kernel>::take_weights(const VoronoiCell<Number>& cell) {
+  weights_.clear();
   for (std::size_t i = 0; i < cell.area.size(); ++i) {
     double weight = 0;
     if constexpr (std::is_same_v<Number, double>) {
@@ -135,9 +138,11 @@ void Sampler<Kernel>::take_weights(const VoronoiCell<Number>& cell) {
     } else {
       weight = Rounded<Number>::of(Number(cell.area[i] / cell.total));
     }
+    if (std::isnan(weight)) return false;
     weights_.push_back({VertexId{cavity_.corner[i].vertex}, weight});
   }
   divide_by_sum();
+  return true;
 }
 
 template <class Kernel>
@@ -145,10 +150,12 @@ void Sampler<Kernel>::weigh_neighbours(const Query& p, std::uint32_t t) {
   find_cavity(mesh_, p, t, cavity_);
   if (measure(p)) {
     take_weights(cell_);
-  } else {
-    exact().cell.measure(cavity_, p);
-    take_weights(exact().cell);
+    return;
   }
+  exact().bounded.measure(cavity_, p);
+  if (take_weights(exact().bounded)) return;
+  exact().cell.measure(cavity_, p);
+  take_weights(exact().cell);
 }
 
 template <class Kernel>
@@ -156,8 +163,11 @@ Gradient Sampler<Kernel>::gradient_of_cell(const Query& p, const Heights& height
                                            VertexId centre) {
   const bool on_vertex = centre != kNoVertex;
   if (!measure(p) || !cell_.differentiate(cavity_, on_vertex, slopes_)) {
-    exact().cell.measure(cavity_, p);
-    exact().cell.differentiate(cavity_, on_vertex, slopes_);
+    exact().bounded.measure(cavity_, p);
+    if (!exact().bounded.differentiate(cavity_, on_vertex, slopes_)) {
+      exact().cell.measure(cavity_, p);
+      exact().cell.differentiate(cavity_, on_vertex, slopes_);
+    }
   }
   // The slopes of the weights add up to zero, so heights are taken relative to one of them; this
   // keeps the digits of their differences.

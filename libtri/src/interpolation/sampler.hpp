@@ -36,8 +36,9 @@ class Sampler {
   void weigh_neighbours(const Query& p, std::uint32_t t);
   /// Measures the cell of p in cavity_. Returns false if double precision does not suffice.
   bool measure(const Query& p);
+  /// Returns false if the numbers leave a weight open.
   template <class Number>
-  void take_weights(const VoronoiCell<Number>& cell);
+  bool take_weights(const VoronoiCell<Number>& cell);
   void divide_by_sum();
   /// centre: the vertex at p, or kNoVertex.
   Gradient gradient_of_cell(const Query& p, const Heights& heights, VertexId centre);

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "bounded_number.hpp"
 #include "cavity.hpp"
 
 /// The Voronoi cell that a query would get, and the areas it would take from its neighbours.
@@ -28,20 +29,25 @@ inline constexpr double kRoundings = 4;
 inline constexpr double kLeastSquare = 1e-130;
 inline constexpr double kGreatestSquare = 1e130;
 
-/// Rounded to a double, or to a relative 2^-kShortBits; specialised for rational numbers where they
-/// are used.
+/// Rounded to a double (NaN: the number is not known so well), or, if it kShortens, to a relative
+/// 2^-kShortBits; specialised for rational numbers where they are used.
 inline constexpr int kShortBits = 512;
 template <class Number>
 struct Rounded;
 template <>
+struct Rounded<BoundedNumber> {
+  static constexpr bool kShortens = false;
+  static double of(const BoundedNumber& value) { return value.rounded(); }
+};
+template <>
 struct Rounded<double> {
+  static constexpr bool kShortens = false;
   static double of(double value) { return value; }
-  static double shortened(double value) { return value; }
 };
 /// Sums of so many exact quotients get too long: their digits would grow with every term.
 inline constexpr std::size_t kLongSum = 32;
 
-/// Number = double, or exact rationals.
+/// Number = double, BoundedNumber, or exact rationals.
 template <class Number>
 struct VoronoiCell {
   struct Vector {
@@ -65,7 +71,7 @@ struct VoronoiCell {
   /// The derivatives of the weights area / total by the query's coordinates, per corner. On a
   /// vertex (find_link()): numbers s(i) such that the sum of s(i) * (height(i) - height of the
   /// vertex) is the mean gradient over the cell. To be called after measure(). Returns false if not
-  /// accurate to kTolerance.
+  /// accurate to kTolerance, or if a bounded number leaves one open.
   bool differentiate(const Cavity& cavity, bool on_vertex,
                      std::vector<std::array<double, 2>>& slopes);
 
@@ -76,7 +82,10 @@ struct VoronoiCell {
   Vector circumcentre(const Vector& b, const Vector& c);
   void measure(const Cavity& cavity, const Query& p, bool shortens);
   static Vector shortened(const Vector& a) {
-    return {Rounded<Number>::shortened(a.x), Rounded<Number>::shortened(a.y)};
+    if constexpr (!Rounded<Number>::kShortens)
+      return a;
+    else
+      return {Rounded<Number>::shortened(a.x), Rounded<Number>::shortened(a.y)};
   }
 
   bool shortens_ = false;
@@ -97,9 +106,9 @@ auto VoronoiCell<Number>::circumcentre(const Vector& b, const Vector& c) -> Vect
 
 template <class Number>
 void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
-  constexpr bool kExact = !std::is_same_v<Number, double>;
-  measure(cavity, p, kExact && cavity.rim.size() > kLongSum);
-  if constexpr (kExact) {
+  constexpr bool kShortens = Rounded<Number>::kShortens;
+  measure(cavity, p, kShortens && cavity.rim.size() > kLongSum);
+  if constexpr (kShortens) {
     if (!shortens_) return;
     // Each area that is added is wrong by less than 2^-kShortBits of the sum of all squares.
     Number doubt = 0;
@@ -206,6 +215,7 @@ bool VoronoiCell<Number>::differentiate(const Cavity& cavity, bool on_vertex,
       slope.y -= weight * sum.y;
     }
     slopes[i] = {Rounded<Number>::of(slope.x), Rounded<Number>::of(slope.y)};
+    if (std::isnan(slopes[i][0]) || std::isnan(slopes[i][1])) return false;
   }
   // The sum of slopes times corners is the identity, so errors are relative to 1.
   return !std::is_same_v<Number, double> ||
