@@ -96,16 +96,31 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
   const auto places = std::make_unique_for_overwrite<Point2[]>(count);
   const auto heights = std::make_unique_for_overwrite<double[]>(count);
   parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {
-    std::size_t at = pieces[i].begin;
+    Piece& piece = pieces[i];
+    std::size_t at = piece.begin;
     stream::ClusterPoints cluster;
-    for (std::uint64_t k = pieces[i].first; k < pieces[i].end; ++k) {
-      store.read(stream::cluster_id(pieces[i].level, k), cluster);
-      for (const stream::Point3& p : cluster.positions) {
+    for (std::uint64_t k = piece.first; k < piece.end; ++k) {
+      const stream::ClusterId id = stream::cluster_id(piece.level, k);
+      if (!store.may_match(id)) continue;
+      store.read(id, cluster);
+      for (std::size_t m = 0; m < cluster.size(); ++m) {
+        if (!cluster.match(m)) continue;
+        const stream::Point3& p = cluster.positions[m];
         places[at] = {p[0], p[1]};
         heights[at++] = p[2] * channel.scale + channel.offset;
       }
     }
+    piece.points = at - piece.begin;
   });
+  // Of a view, closes the gaps that the others leave.
+  count = 0;
+  for (const Piece& piece : pieces) {
+    if (count < piece.begin) {
+      std::copy_n(places.get() + piece.begin, piece.points, places.get() + count);
+      std::copy_n(heights.get() + piece.begin, piece.points, heights.get() + count);
+    }
+    count += piece.points;
+  }
   return sort(store, flat(store.bounds()), {places.get(), count}, {heights.get(), count}, false,
               threads);
 }
