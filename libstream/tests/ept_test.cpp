@@ -120,7 +120,11 @@ TEST(Ept, NodesOfLazAgree) {
     parts.metadata["srs"] = Json::object();
     const std::string file = parts.write(folder.path());
     PointHeader header{.attributes = {{.name = "intensity", .type = ScalarType::u16}}};
-    header.crs = [] { return Crs{.wkt = "LOCAL_CS[\"made\"]"}; };
+    header.crs = [] {
+      Crs crs;
+      crs.wkt = "LOCAL_CS[\"made\"]";
+      return crs;
+    };
     const auto write = [&](const char* name, std::size_t count, double scale) {
       header.lattice = Lattice{.scale = {scale, scale, scale}, .offset = {}};
       const auto writer = open_point_writer((folder.path() / "ept-data" / name).string(), header);

@@ -33,7 +33,11 @@ void write_scan(const std::filesystem::path& file, unsigned format, std::size_t 
   for (unsigned band = 0; band < bands; ++band) {
     header.attributes.push_back({.name = kBands[band], .type = ScalarType::u16});
   }
-  header.crs = [] { return Crs{.wkt = "LOCAL_CS[\"made\"]"}; };
+  header.crs = [] {
+    Crs crs;
+    crs.wkt = "LOCAL_CS[\"made\"]";
+    return crs;
+  };
   header.lattice = Lattice{.scale = {0.01, 0.01, 0.01}, .offset = {500'000, 5'000'000, 0}};
   const auto writer =
       page_nodes > 0 ? open_paged_copc_writer(file.string(), header, {.replace = true}, page_nodes)
