@@ -128,13 +128,13 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
 }
 
 Entry LevelReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
-  const Entry entry = page.entry(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
   try {
+    const Entry entry = page.entry(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
     check_entry(entry);
+    return entry;
   } catch (const Damage& damage) {
     throw damaged_file(*index_, page_offset(ordinal / layout_.page_clusters()), damage.what());
   }
-  return entry;
 }
 
 void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
