@@ -183,7 +183,7 @@ TEST_F(ScanViews, OfAMadeBodyFollowTheCameraAndEndAtTheSameWhoeverReads) {
   for (const ScanView::Reader reader : {ScanView::Reader::thread, ScanView::Reader::in_frame}) {
     ScanView view(store, {}, reader);
     Flown flown;
-    ASSERT_NO_FATAL_FAILURE(fly(view, round, 60, 4.0, 0.004, flown));
+    ASSERT_NO_FATAL_FAILURE(fly(view, round, 60, 4.0, 0.03, flown));
     EXPECT_GT(flown.expanded, 50u);
     EXPECT_GT(flown.collapsed, 20u);
     EXPECT_LE(flown.differed_first + flown.differed, flown.triangles / 500);
@@ -282,7 +282,7 @@ TEST_F(ScanViews, OfRealScansFollowTheCamera) {
     ScanView view(store, {}, ScanView::Reader::in_frame);
     EXPECT_TRUE(is_scan(store, view.ground()));
     Flown flown;
-    ASSERT_NO_FATAL_FAILURE(fly(view, round, 150, 5.0, 0.010, flown));
+    ASSERT_NO_FATAL_FAILURE(fly(view, round, 150, 5.0, 0.03, flown));
     std::printf(
         "%s: %zu points, %zu triangles, %zu clusters came and %zu went; %zu, %zu differed\n",
         scan.file, view.model().point_count(), flown.triangles, flown.expanded, flown.collapsed,
