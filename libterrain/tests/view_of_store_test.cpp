@@ -92,7 +92,7 @@ class ViewOfStore : public testing::Test {
     build_store(request);
     return stream::Store::open(request.store);
   }
-  /// Of a cloud and of a raster, for every condition that is tried.
+  /// For a cloud and a raster, under every condition that is tried.
   void for_each_pair(const std::function<void(const Pair&)>& check) {
     const std::uint64_t seed = std::random_device()();
     const fs::path cloud = folder_.path() / "cloud.csv", raster = folder_.path() / "raster.tif";

@@ -112,7 +112,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
     }
     piece.points = at - piece.begin;
   });
-  // Of a view, closes the gaps that the others leave.
+  // Closes the gaps that points leave which a view does not have.
   count = 0;
   for (const Piece& piece : pieces) {
     if (count < piece.begin) {

@@ -8,7 +8,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
-/// Of a view, whose share of a level is not known, finer levels are read until there are so many.
+/// In a view, whose share of a level is not known, finer levels are read until there are so many.
 constexpr std::size_t kFewestCounted = std::size_t{1} << 14;
 /// Halvings of the store's area. More come only where points lie on each other.
 constexpr unsigned kDeepestTree = 48;

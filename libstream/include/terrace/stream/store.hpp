@@ -132,7 +132,7 @@ struct ClusterPoints {
   std::uint32_t before_representative = 0;  ///< so many members come first in the order of coding
   std::vector<std::byte> representative_payload;
   std::vector<std::uint64_t> representative_children;  ///< its `level` ordinals, level 0 first
-  /// Of a view (Store::where()): 1 for members that meet the condition. Empty: all do.
+  /// In a view (Store::where()): 1 for members that meet the condition. Empty: all do.
   std::vector<std::uint8_t> matches;
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
@@ -193,11 +193,11 @@ class Store {
   /// bounds() is theirs, read() and for_each() mark them, StoreQuery finds no others; what counts
   /// points, clusters and bytes remains that of the whole store. The points of a level of a view
   /// are those of the level that meet the condition: a representative that does not is left out,
-  /// whatever it stands for. Of a view, a view of the points that meet both conditions; an empty
-  /// condition gives the same store. Copies share the bounds once they are known.
-  /// Throws: Error that names the character of a bad condition.
+  /// whatever it stands for. Called on a view: one of the points that meet both conditions; an
+  /// empty condition gives the same store. Copies share the bounds once they are known. Throws:
+  /// Error that names the character of a bad condition.
   [[nodiscard]] Store where(const std::string& condition) const;
-  /// Of a view its condition, else null. Valid as long as a copy of the view exists.
+  /// The condition of a view, else null. Valid as long as a copy of the view exists.
   [[nodiscard]] const Where* condition() const;
   /// The store that this is a view of, or itself.
   [[nodiscard]] Store whole() const;
@@ -214,7 +214,7 @@ class Store {
   [[nodiscard]] std::uint64_t bytes() const;
   /// The CRC-32 of the manifest, which contains those of all files: it identifies the store.
   [[nodiscard]] std::uint32_t checksum() const;
-  /// The bounding box of all points, in stored coordinates. Of a view it is found when first asked
+  /// The bounding box of all points, in stored coordinates. For a view it is found when first asked
   /// for, from the root down to the clusters at the border. Throws, of a view: Error if no point
   /// meets the condition or the store is damaged; Stopped.
   [[nodiscard]] const Box3& bounds() const;
@@ -238,7 +238,7 @@ class Store {
   [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
   /// Throws: Error for damage (checksum, counts), never returns a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;
-  /// Visits every cluster of `level` in order of ordinals; reads sequentially. Of a view, clusters
+  /// Visits every cluster of `level` in order of ordinals; reads sequentially. In a view, clusters
   /// of level 0 that may_match() excludes are neither read nor visited.
   void for_each(unsigned level,
                 const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>&

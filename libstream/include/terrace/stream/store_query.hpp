@@ -35,7 +35,7 @@ struct FoundPoint {
 ///
 /// A query reads the clusters whose boxes may matter, about 25 ns per point, and the index entries
 /// on the way. The root and 6 MiB of the decoded clusters above level 0 are cached, so nearby
-/// queries cost a tenth of that. Of a view (Store::where()) only points that meet its condition are
+/// queries cost a tenth of that. In a view (Store::where()) only points that meet its condition are
 /// found and counted, and clusters of level 0 in which none can are not read.
 ///
 /// One object per thread; any number of them share a Store, which must outlive them. All functions

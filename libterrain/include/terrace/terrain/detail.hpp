@@ -44,7 +44,7 @@ struct Detail {
 
 /// Visits every cluster that `detail` wants, the root (or `cluster`) first, then level by level
 /// downward; within a level in order of ordinals. A wanted cluster's parent is always wanted as
-/// well. Of a view (stream::Store::where()), clusters of level 0 of which no point can meet its
+/// well. In a view (stream::Store::where()), clusters of level 0 of which no point can meet its
 /// condition are left out; of others stream::ClusterPoints::match() tells which do. Memory: the
 /// ordinals of the wanted clusters of two levels where only a part is wanted; constant where a
 /// whole level is. Throws: stream::Error on a damaged store; UsageError for a cluster that the

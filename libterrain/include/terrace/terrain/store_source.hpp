@@ -7,7 +7,7 @@
 namespace terrace::terrain {
 
 /// Lets libtri's multiresolution model read libstream's store, in stored coordinates; values are
-/// the attributes, as records of the store's schema. Of a view (stream::Store::where()) all points
+/// the attributes, as records of the store's schema. In a view (stream::Store::where()) all points
 /// come, as a model has no conditions. The two libraries do not know each other;
 /// their cluster ids are the same numbers.
 class StoreSource final : public tri::ClusterSource {

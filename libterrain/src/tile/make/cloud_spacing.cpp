@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint64_t kSeeds = 32;
 constexpr double kMostPointsAround = 3000;
 constexpr unsigned kRank = 8;
-/// Of a view: boxes grow until there are so many points around.
+/// In a view: boxes grow until there are so many points around.
 constexpr std::size_t kFewestPointsAround = 200;
 
 /// A point, and a box around points near it.
@@ -133,7 +133,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
     StoredBox box = box_of(seed, reader.query()), around = grown(box);
     if (reader.query().estimate(tall(around), kMostPointsAround) > kMostPointsAround) continue;
     reader.points(around, points);
-    // Of a view there may be few where the store has many.
+    // A view may have few where the store has many.
     while (store.condition() != nullptr && points.positions.size() < kFewestPointsAround &&
            !holds(around, store.bounds())) {
       box = widened(box, store.bounds());
