@@ -28,8 +28,8 @@ class ReadingThread final : public ClusterReader {
   ReadingThread(const ReadingThread&) = delete;
   ReadingThread& operator=(const ReadingThread&) = delete;
 
-  // Neither of these two waits for the thread: what it holds the lock for now comes with the next
-  // frame.
+  // Neither bring() nor ask() waits for the thread: where it holds the lock, the next frame tries
+  // again.
   void bring(double seconds, const Give& give, const GiveRecord&) override {
     if (next_ == taken_.size()) {
       taken_.clear();

@@ -153,16 +153,6 @@ void Store::for_each(
     unsigned number,
     const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>& visit) const {
   const LevelReader& level = impl_->level(number);
-  ClusterPoints points;
-  if (view_ && number == 0) {
-    for (std::uint64_t c = 0; c < impl_->infos[0].clusters; ++c) {
-      const ClusterId id = cluster_id(0, c);
-      if (!may_match(id)) continue;
-      read(id, points);
-      visit(id, record(id), points);
-    }
-    return;
-  }
   const std::uint64_t members = impl_->infos[number].members;
   const auto miscounted = [&] {
     return Error({.file = level.data().name(),
@@ -173,20 +163,24 @@ void Store::for_each(
   };
   SequentialBytes ahead(level.data());
   ClusterDecoder decoder;
-  std::uint64_t visited = 0;
+  ClusterPoints points;
+  std::uint64_t counted = 0;
   level.for_each_page([&](const IndexPage& page, std::uint64_t first) {
     for (std::uint32_t i = 0; i < page.clusters(); ++i) {
       check_stop();
       const std::uint64_t ordinal = first + i, offset = page.offset(i);
+      const ClusterId id = cluster_id(number, ordinal);
       const Entry entry = level.entry(page, ordinal);
+      const ClusterRecord record = record_of(entry, number, offset, level.top());
+      counted += record.points;
+      if (counted > members) throw miscounted();
+      if (number == 0 && !may_match(id)) continue;
       level.read(ordinal, entry, offset, ahead, decoder, points);
-      visited += points.size();
-      if (visited > members) throw miscounted();
       mark(points);
-      visit(cluster_id(number, ordinal), record_of(entry, number, offset, level.top()), points);
+      visit(id, record, points);
     }
   });
-  if (visited != members) throw miscounted();
+  if (counted != members) throw miscounted();
 }
 
 bool Store::verify(const std::function<void(const Problem&)>& report) const {
