@@ -2,7 +2,6 @@
 // Elevation grids other than GeoTIFF: what GDAL's tools make and say of them is the oracle.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -347,21 +346,29 @@ TEST_F(Grids, ArchivesOfSeveralTilesAreMosaics) {
   EXPECT_NE(refusal_of(path("place.zip")).find("srtm/tile.hgt"), std::string::npos);
 }
 
-/// An archive of very many tiles is a list of them, read once.
-TEST_F(Grids, ArchivesOfVeryManyTilesAreOpenedInNoTime) {
+/// An archive of very many tiles is a list of them, read once: not once for each tile.
+TEST_F(Grids, ArchivesOfVeryManyTilesAreReadOnce) {
   if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "no python3";
+  const auto bytes_read = [] {  // by this process so far, from whatever files
+    std::ifstream io("/proc/self/io");
+    std::string name;
+    std::uint64_t value = 0;
+    while (io >> name >> value)
+      if (name == "rchar:") return value;
+    return std::uint64_t{0};
+  };
+  if (bytes_read() == 0) GTEST_SKIP() << "no /proc/self/io";
   std::ofstream(path("make.py")) << "import zipfile\n"
                                     "with zipfile.ZipFile('many.zip', 'w') as archive:\n"
-                                    "    for i in range(20000):\n"
+                                    "    for i in range(5000):\n"
                                     "        archive.writestr(f'{i}/N46E008.hgt', bytes(8))\n";
   run("python3 make.py");
-  const auto begin = std::chrono::steady_clock::now();
+  const std::uint64_t before = bytes_read();
   const auto source = open_one(path("many.zip"));
   PointBlock block;
   ASSERT_TRUE(source->next(block));
   EXPECT_EQ(block.size(), 4u);
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-  EXPECT_LT(seconds.count(), 20);  // minutes, if every tile had the archive opened anew
+  EXPECT_LT(bytes_read() - before, 100 * fs::file_size(path("many.zip")));
 }
 
 TEST_F(Grids, DamagedArchivesAreRefused) {
