@@ -11,11 +11,11 @@
 
 #include <gtest/gtest.h>
 
+#include "ball_world.hpp"
 #include "delaunay3/access.hpp"
 #include "points3.hpp"
 #include "shape/nearby.hpp"
 #include "terrace/tri/shape.hpp"
-#include "view_world.hpp"
 
 namespace terrace::tri::test {
 namespace {
@@ -43,6 +43,12 @@ class Drawn {
   void check() const {
     ASSERT_EQ(drawn_.size(), surface_->triangle_count());
     ASSERT_EQ(drawn_, now());
+    std::map<VertexId, std::size_t> count;
+    for (const auto& [triangle, corners] : drawn_) {
+      for (const VertexId corner : surface_->vertices(triangle)) ++count[corner];
+    }
+    for (const VertexId v : surface_->all_vertices())
+      ASSERT_EQ(surface_->triangles_at(v), count[v]);
   }
   [[nodiscard]] std::multiset<Points> triangles() const {
     std::multiset<Points> all;
@@ -79,22 +85,6 @@ auto faces_of(const Shape3<Coord>& shape, const Delaunay3<Coord>& triangulation)
     all.insert(Drawn<Coord>::from_least(p));
   }
   return all;
-}
-
-/// Points of a bumpy ball; integers as doubles.
-std::vector<Point3> bumpy_ball(std::size_t count, std::mt19937_64& random) {
-  std::vector<Point3> points(count);
-  for (Point3& p : points) {
-    double length = 0.0;
-    do {
-      length = 0.0;
-      for (double& c : p) c = 2.0 * unit(random) - 1.0;
-      for (const double c : p) length += c * c;
-    } while (length > 1.0 || length < 0.01);
-    const double bumps = 1.0 + 0.1 * p[0] * p[1] / length;
-    for (double& c : p) c = std::round(0x1p20 + 0x1p19 * bumps * c / std::sqrt(length));
-  }
-  return points;
 }
 
 // Any points come and go: the deltas tell all, and the surface is that of the shape that follows
@@ -292,22 +282,6 @@ TYPED_TEST(DynamicSurfaceOf, WhatComesAndGoesUnseenIsNotTold) {
   EXPECT_TRUE(changes.added_triangles.empty());
   EXPECT_TRUE(changes.removed_triangles.empty());
   EXPECT_EQ(surface.hash(), hash);
-}
-
-/// A world of points on a bumpy ball.
-World ball_world(std::uint64_t seed, std::size_t count) {
-  World world(seed, Shape::random, 1);
-  const std::vector<Point3> points = bumpy_ball(count, world.random);
-  world.source = make_hierarchy(points, 2, 8.0, world.random);
-  fill_errors(world.source);
-  world.box = {points[0], points[0]};
-  for (const Point3& p : points) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      world.box.min[k] = std::min(world.box.min[k], p[k]);
-      world.box.max[k] = std::max(world.box.max[k], p[k]);
-    }
-  }
-  return world;
 }
 
 /// A surface made at once of the points that a model has.

@@ -125,11 +125,17 @@ template <class Shown>
 stream::Point3 StoreView<Shown>::in_view_frame(tri::VertexId vertex) const {
   if constexpr (shows_surface<Shown>) {
     const auto p = model().triangulation().point(vertex);
-    return impl_->lattice.in_view_frame(
+    return model_in_view_frame(
         {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
   } else {
     return impl_->frame(stored(vertex));
   }
+}
+
+template <class Shown>
+stream::Point3 StoreView<Shown>::model_in_view_frame(const stream::Point3& place) const {
+  if constexpr (shows_surface<Shown>) return impl_->lattice.in_view_frame(place);
+  return impl_->frame(place);
 }
 
 template <class Shown>

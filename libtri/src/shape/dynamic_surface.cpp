@@ -56,6 +56,7 @@ struct DynamicSurface<Coord>::Impl {
   Pool<spatial::Side> side;
   Pool<std::array<std::uint32_t, 4>> behind;
   FreeSlots free;
+  Pool<std::uint32_t> at_vertex;  ///< how many triangles have it as a corner, by vertex slot
   std::size_t count = 0;
   Journal<Point, 3> journal;
   // Scratch memory.
@@ -118,6 +119,9 @@ struct DynamicSurface<Coord>::Impl {
 
   /// Triangles that are there before and after keep their slots.
   void exchange() {
+    const std::uint32_t counted = at_vertex.size();
+    at_vertex.resize(std::max(counted, tetrahedra.vertex_slots()));
+    for (std::uint32_t v = counted; v < at_vertex.size(); ++v) at_vertex[v] = 0;
     fresh.resize(std::max<std::size_t>(fresh.size(), tetrahedra.vertex_slots()));
     for (const VertexId v : changes.added_vertices) fresh[slot(v)] = true;
     const auto stays = [&](const Facet& before, const Facet& after) {
@@ -143,6 +147,7 @@ struct DynamicSurface<Coord>::Impl {
   }
   void drop(std::uint32_t triangle) {
     if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
+    for (const std::uint32_t v : corners[triangle]) --at_vertex[v];
     corners[triangle].fill(spatial::kFreeCorner);
     free.put(triangle);
     --count;
@@ -156,6 +161,7 @@ struct DynamicSurface<Coord>::Impl {
     if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
     side[triangle] = facet.what;
     corners[triangle] = facet.corners;
+    for (const std::uint32_t v : facet.corners) ++at_vertex[v];
     at(facet.what) = triangle;
     ++count;
   }
@@ -170,6 +176,7 @@ struct DynamicSurface<Coord>::Impl {
     behind.reserve(of_tetrahedra);
     corners.reserve(of_triangles);
     side.reserve(of_triangles);
+    at_vertex.reserve(vertices + 1);
     state.degree.reserve(vertices + 1);
     state.labels_gone.reserve(vertices + 1);
     state.local_vertex.reserve(vertices + 1);
@@ -294,6 +301,11 @@ std::array<VertexId, 3> DynamicSurface<Coord>::vertices(TriangleId triangle) con
 }
 
 template <class Coord>
+std::size_t DynamicSurface<Coord>::triangles_at(VertexId vertex) const {
+  return slot(vertex) < impl_->at_vertex.size() ? impl_->at_vertex[slot(vertex)] : 0;
+}
+
+template <class Coord>
 std::uint32_t DynamicSurface<Coord>::vertex_slots() const {
   return impl_->tetrahedra.vertex_slots();
 }
@@ -334,8 +346,8 @@ template <class Coord>
 std::size_t DynamicSurface<Coord>::memory_bytes() const {
   const Impl& i = *impl_;
   return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.bytes() + i.side.bytes() +
-         i.behind.bytes() + i.examined.capacity() * sizeof(std::uint32_t) + i.free.bytes() +
-         i.journal.bytes() +
+         i.behind.bytes() + i.at_vertex.bytes() + i.examined.capacity() * sizeof(std::uint32_t) +
+         i.free.bytes() + i.journal.bytes() +
          (i.vanished.capacity() + i.appeared.capacity()) * sizeof(typename Impl::Facet) +
          i.fresh.capacity() / 8;
 }

@@ -39,8 +39,8 @@ std::vector<SurfaceEdge> sorted_edges(std::span<const std::array<std::uint32_t, 
 }
 
 /// Sets of faces that edges join.
-shape::DisjointSets parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
-  shape::DisjointSets parts(faces.size());
+DisjointSets parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
+  DisjointSets parts(faces.size());
   const std::vector<SurfaceEdge> edges = sorted_edges(faces);
   for (std::size_t i = 1; i < edges.size(); ++i)
     if (edges[i].ends == edges[i - 1].ends) parts.join(edges[i].face, edges[i - 1].face);
@@ -107,7 +107,7 @@ SurfaceMeasures measure(const Surface& surface) {
     for (const std::uint32_t v : face) used[v] = true;
   result.vertices = static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
   const std::vector<SurfaceEdge> edges = sorted_edges(surface.faces);
-  shape::DisjointSets parts(surface.faces.size());
+  DisjointSets parts(surface.faces.size());
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
     std::int64_t ways = 0;
     for (; end < edges.size() && edges[end].ends == edges[begin].ends; ++end) {
@@ -128,7 +128,7 @@ SurfaceMeasures measure(const Surface& surface) {
 
 void turn_outward(Surface& surface) {
   check(surface);
-  shape::DisjointSets parts = parts_of(surface.faces);
+  DisjointSets parts = parts_of(surface.faces);
   std::vector<double> volume(surface.faces.size());
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
     const std::uint32_t part = parts.root(f);

@@ -116,6 +116,8 @@ class StoreView {
   /// Metres east, north and up of a point in stored coordinates.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
+  /// The same of a place in the model's coordinates, in which slides are (tri::Geomorph).
+  [[nodiscard]] stream::Point3 model_in_view_frame(const stream::Point3& place) const;
 
   /// The attributes of a vertex's point, a record of the store's schema; empty if its cluster is no
   /// longer kept. Those of what a frame has added are there until the next frame, those of the root

@@ -83,6 +83,8 @@ class DynamicSurface {
   [[nodiscard]] Point point(VertexId vertex) const;
   /// Counter-clockwise seen from outside, the smallest handle first.
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;
+  /// How many triangles have this corner; none if the vertex is not on the surface. O(1).
+  [[nodiscard]] std::size_t triangles_at(VertexId vertex) const;
 
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t triangle_slots() const;

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-namespace terrace::tri::shape {
+namespace terrace::tri {
 
 /// Numbers below `count` in sets that are joined two by two.
 class DisjointSets {
@@ -34,4 +34,4 @@ class DisjointSets {
   std::size_t count_;
 };
 
-}  // namespace terrace::tri::shape
+}  // namespace terrace::tri
