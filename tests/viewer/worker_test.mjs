@@ -10,6 +10,9 @@ import {Flyer} from './flyer.mjs';
 import {MAX_POINTS, Sites} from './sites.mjs';
 import {folderFetch, Worker} from './worker_host.mjs';
 
+/// As in render.ts.
+const SLIDE = 0.45;
+
 const sites = new Sites();
 before(() => sites.build());
 after(() => sites.remove());
@@ -19,17 +22,22 @@ class Tested extends Flyer {
   constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
     const {fetch, log} = folderFetch(site, fault, latency);
     const messages = [];
-    let blocks = 0;
+    let blocks = 0, broken = null;
     super(heard => new Worker(join(site, 'worker.js'), fetch, heard), 'http://folder/', name, {
       maxPoints,
       asPoints,
       heard: message => {
         messages.push(message.type);
-        if (message.type === 'frame') changed(message);
+        // The worker would take what is thrown here for a fault of its own.
+        try {
+          if (message.type === 'frame') changed(message);
+        } catch (error) {
+          broken ??= error;
+        }
         if (message.type === 'frame') blocks += message.changes.vertexBlocks.length;
       }
     });
-    Object.assign(this, {log, messages, blocks: () => blocks});
+    Object.assign(this, {log, messages, blocks: () => blocks, broken: () => broken});
   }
   async settle({eye, direction, error}) {
     return (await this.view({eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error})).state;
@@ -38,6 +46,12 @@ class Tested extends Flyer {
     const done = this.until(message => message.type === 'hashed');
     this.worker.tell({type: 'hash', id: 1});
     return (await done).hash;
+  }
+  /// Until nothing is drawn that has gone.
+  async rest() {
+    if (this.broken()) throw this.broken();
+    if (this.last.state.waiting) await this.until(message => message.type === 'frame' && !message.state.waiting);
+    if (this.broken()) throw this.broken();
   }
   async failed() {
     return (await this.until(message => message.type === 'failed')).message;
@@ -77,6 +91,10 @@ for (const [name, kind] of Object.entries(FLIGHTS)) {
 class Arrays {
   vertices = new Uint8Array();
   triangles = new Uint32Array();
+  /// bytes: of a vertex.
+  constructor(bytes) {
+    this.bytes = bytes;
+  }
   apply({state, changes}) {
     const grown = (old, size) => {
       if (size <= old.length) return old;
@@ -84,20 +102,39 @@ class Arrays {
       array.set(old);
       return array;
     };
-    this.vertices = grown(this.vertices, Math.ceil(state.vertexSlots / 64) * 64 * 24);
+    const block = 64 * this.bytes;
+    this.vertices = grown(this.vertices, Math.ceil(state.vertexSlots / 64) * block);
     this.triangles = grown(this.triangles, Math.ceil(state.triangleSlots / 64) * 64 * 3);
-    changes.vertexBlocks.forEach((b, i) => this.vertices.set(changes.vertices.subarray(i * 1536, (i + 1) * 1536), b * 1536));
+    changes.vertexBlocks.forEach((b, i) => this.vertices.set(changes.vertices.subarray(i * block, (i + 1) * block), b * block));
     changes.triangleBlocks.forEach((b, i) => this.triangles.set(changes.triangles.subarray(i * 192, (i + 1) * 192), b * 192));
   }
+  /// All that is known of a vertex but its slide.
   vertex(slot) {
-    return Buffer.from(this.vertices.subarray(24 * slot, 24 * slot + 24)).toString('hex');
+    return Buffer.from(this.vertices.subarray(this.bytes * slot, this.bytes * slot + (this.bytes === 32 ? 21 : 16))).toString('hex');
+  }
+  /// When the slide of a vertex began.
+  began(slot) {
+    return new DataView(this.vertices.buffer).getFloat32(this.bytes * (slot + 1) - 4, true);
+  }
+  /// Where it is drawn at a time; without one at last. As in render.ts.
+  place(slot, time = Infinity) {
+    const view = new DataView(this.vertices.buffer), at = this.bytes * slot;
+    const place = [0, 4, 8].map(o => view.getFloat32(at + o, true));
+    const t = Math.min(1, Math.max(0, (time - this.began(slot)) / SLIDE)), left = 1 - t * t * (3 - 2 * t);
+    if (this.bytes === 24) return [place[0], place[1], place[2] + left * (view.getFloat32(at + 16, true) - place[2])];
+    return place.map((c, k) => c + left * view.getInt16(at + 22 + 2 * k, true) * 2 ** view.getInt8(at + 21));
+  }
+  /// The corners of each triangle that is drawn.
+  * drawn() {
+    for (let i = 0; i < this.triangles.length; i += 3) {
+      if (this.triangles[i] !== this.triangles[i + 1]) yield this.triangles.subarray(i, i + 3);
+    }
   }
   /// The triangles by all that is known of their corners, in order.
   listed() {
     const list = [];
-    for (let i = 0; i < this.triangles.length; i += 3) {
-      const corners = [...this.triangles.subarray(i, i + 3)].map(slot => this.vertex(slot));
-      if (this.triangles[i] === this.triangles[i + 1]) continue;
+    for (const slots of this.drawn()) {
+      const corners = [...slots].map(slot => this.vertex(slot));
       const first = corners.indexOf([...corners].sort()[0]);
       list.push([...corners.slice(first), ...corners.slice(0, first)].join());
     }
@@ -107,7 +144,7 @@ class Arrays {
 
 test('a surface: what changes have made of the arrays is what a new worker sends, closed and turned outward', async () => {
   const flight = sites.flight('ball', {kind: 'surface'});
-  const arrays = new Arrays(), fresh = new Arrays();
+  const arrays = new Arrays(32), fresh = new Arrays(32);
   const flyer = new Tested('ball', {changed: message => arrays.apply(message)});
   await flyer.opened();
   for (const stop of flight) await flyer.settle(stop);
@@ -126,6 +163,7 @@ test('a surface: what changes have made of the arrays is what a new worker sends
     await tested.settle({...last, error: 1e6});
     await tested.settle(last);
     await tested.hash();
+    await tested.rest();
   }
   const list = arrays.listed();
   assert.ok(list.length > 1000);
@@ -133,18 +171,170 @@ test('a surface: what changes have made of the arrays is what a new worker sends
   assert.deepEqual(list, fresh.listed());
   // Each edge is passed as often one way as the other, and normals point away from the middle.
   const edges = new Map(), view = new DataView(arrays.vertices.buffer);
-  for (let i = 0; i < arrays.triangles.length; i += 3) {
-    const c = arrays.triangles.subarray(i, i + 3);
-    if (c[0] === c[1]) continue;
+  for (const c of arrays.drawn()) {
     for (let k = 0; k < 3; ++k) {
       const [a, b] = [c[k], c[(k + 1) % 3]];
       edges.set(`${Math.min(a, b)} ${Math.max(a, b)}`, (edges.get(`${Math.min(a, b)} ${Math.max(a, b)}`) ?? 0) + (a < b ? 1 : -1));
-      const at = [0, 4, 8].map(o => view.getFloat32(24 * a + o, true)), n = [12, 13, 14].map(o => view.getInt8(24 * a + o));
+      const at = [0, 4, 8].map(o => view.getFloat32(32 * a + o, true)), n = [12, 13, 14].map(o => view.getInt8(32 * a + o));
       const size = Math.hypot(...at), steep = (at[0] * n[0] + at[1] * n[1] + at[2] * n[2]) / size / 127;
       assert.ok(steep > 0.5, `normal ${n} at ${at}`);
     }
   }
   assert.ok([...edges.values()].every(n => n === 0));
+});
+
+/// The distance of p to a triangle: to its plane if the foot is inside, else to its nearest edge.
+function distanceTo(p, [a, b, c]) {
+  const minus = (u, v) => u.map((x, k) => x - v[k]), dot = (u, v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+  const cross = (u, v) => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const normal = cross(minus(b, a), minus(c, a)), edges = [[a, b], [b, c], [c, a]];
+  if (edges.every(([u, v]) => dot(normal, cross(minus(v, u), minus(p, u))) >= 0)) {
+    return Math.abs(dot(normal, minus(p, a))) / Math.hypot(...normal);
+  }
+  return Math.min(...edges.map(([u, v]) => {
+    const way = minus(v, u), t = Math.min(1, Math.max(0, dot(way, minus(p, u)) / dot(way, way)));
+    return Math.hypot(...minus(p, u).map((x, k) => x - t * way[k]));
+  }));
+}
+
+test('a surface: what comes begins where the surface was', async () => {
+  const arrays = new Arrays(32);
+  let came = 0, waited = false;
+  const flyer = new Tested('ball', {
+    changed: message => {
+      // What is exchanged at once differs between its vertices.
+      const skip = waited;
+      waited = message.state.waiting;
+      if (skip) return arrays.apply(message);
+      const before = [...arrays.drawn()].map(corners => [...corners].map(slot => arrays.place(slot)));
+      arrays.apply(message);
+      if (before.length === 0) return;
+      const slots = new Set([...arrays.drawn()].flatMap(corners => [...corners]));
+      for (const slot of slots) {
+        if (arrays.began(slot) !== Math.fround(message.time) || ++came % 60 !== 0) continue;
+        const start = arrays.place(slot, message.time);
+        const away = Math.min(...before.map(triangle => distanceTo(start, triangle)));
+        assert.ok(away < 2e-4, `${start} is ${away} from the surface before`);
+      }
+    }
+  });
+  await flyer.opened();
+  for (const stop of sites.flight('ball', {kind: 'surface'}).slice(0, 4)) {
+    await flyer.settle(stop);
+    await flyer.rest();
+  }
+  assert.ok(came > 500, `${came} came`);
+});
+
+/// Triangles as they are drawn at a time, with corners to a thousandth of `unit`, as a set.
+function pictureOf(arrays, time, unit) {
+  return new Set([...arrays.drawn()].map(corners => {
+    const places = [...corners].map(slot => arrays.place(slot, time).map(c => Math.round(c / unit * 1000)).join());
+    return places.sort().join(' ');
+  }));
+}
+
+for (const [name, kind] of [['alps', 'raster'], ['ball', 'surface']]) {
+  test(`${name}: where points go, the same is drawn on until it has slid, and then what is left`, async () => {
+    const arrays = new Arrays(kind === 'raster' ? 24 : 32), unit = kind === 'raster' ? 10 : 0.01;
+    let begin = Infinity, compared = 0, gone = 0, last = null;
+    const flyer = new Tested(name, {
+      changed: message => {
+        const time = message.time, went = last === null ? 0 : last.points - message.state.points;
+        last = message.state;
+        if (begin === 0 && went > 0) begin = time;
+        const before = time >= begin && time < begin + SLIDE ? pictureOf(arrays, time, unit) : null;
+        arrays.apply(message);
+        if (before === null) return;
+        const after = pictureOf(arrays, time, unit);
+        const changed = [...before].filter(triangle => !after.has(triangle)).length;
+        // A few corners are rounded the other way.
+        assert.ok(changed <= 0.01 * before.size && Math.abs(after.size - before.size) <= 0.01 * before.size,
+                  `${changed} of ${before.size} triangles change, ${after.size} are there, ${time - begin} s after points began to go`);
+        ++compared;
+        gone += went;
+      }
+    });
+    await flyer.opened();
+    const [stop] = sites.flight(name, {kind}), fine = {...stop, error: stop.error / 4}, coarse = {...stop, error: 4 * stop.error};
+    await flyer.settle(fine);
+    await flyer.rest();
+    begin = 0;
+    await flyer.settle(coarse);
+    await flyer.rest();
+    assert.ok(compared > 0 && gone > 20, `${compared} frames, ${gone} points`);
+    if (kind === 'surface') await flyer.hash();
+    await flyer.rest();
+    const fresh = new Arrays(arrays.bytes), other = new Tested(name, {changed: message => fresh.apply(message)});
+    await other.opened();
+    await other.settle(fine);
+    await other.settle(coarse);
+    if (kind === 'surface') await other.hash();
+    await other.rest();
+    assert.equal([...arrays.drawn()].length, flyer.last.state.triangles);
+    assert.deepEqual(arrays.listed(), fresh.listed());
+  });
+}
+
+/// Heights of what is drawn at a time over a grid of places, NaN where nothing is; and how often one is covered twice.
+function heightsOf(arrays, time, box, side) {
+  const heights = new Float64Array(side * side).fill(NaN), step = [0, 1].map(k => (box[3 + k] - box[k]) / side);
+  let twice = 0;
+  for (const corners of arrays.drawn()) {
+    const [a, b, c] = [...corners].map(slot => arrays.place(slot, time));
+    const area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    // Places are half a step off the corners of the grid.
+    const range = k => [Math.min(a[k], b[k], c[k]), Math.max(a[k], b[k], c[k])].map(x => (x - box[k]) / step[k] - 0.5);
+    const [x0, x1] = range(0), [y0, y1] = range(1);
+    for (let j = Math.max(0, Math.ceil(y0)); j <= Math.min(side - 1, y1); ++j) {
+      for (let i = Math.max(0, Math.ceil(x0)); i <= Math.min(side - 1, x1); ++i) {
+        const x = box[0] + (i + 0.5) * step[0], y = box[1] + (j + 0.5) * step[1];
+        const v = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area;
+        const w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area;
+        if (v < 0 || w < 0 || v + w > 1) continue;
+        if (heights[j * side + i] >= -1e9) ++twice;
+        heights[j * side + i] = a[2] + v * (b[2] - a[2]) + w * (c[2] - a[2]);
+      }
+    }
+  }
+  return {heights, twice};
+}
+
+test('a raster that is left in a flight: no holes, nothing twice, and less moves at once than without slides', async () => {
+  const side = 60, arrays = new Arrays(24);
+  let box = null, last = null, jumps = 0, slides = 0, worst = 0, most = 0;
+  const flyer = new Tested('alps', {
+    changed: message => {
+      const moves = last !== null && last.points > message.state.points || last?.waiting;
+      last = message.state;
+      const before = moves && heightsOf(arrays, message.time, box, side).heights;
+      const ended = moves && heightsOf(arrays, Infinity, box, side).heights;
+      arrays.apply(message);
+      if (!moves) return;
+      const {heights, twice} = heightsOf(arrays, message.time, box, side);
+      const rest = heightsOf(arrays, Infinity, box, side).heights;
+      assert.ok(twice < 10, `${twice} places are covered twice`);
+      heights.forEach((z, i) => {
+        assert.equal(Number.isNaN(z), Number.isNaN(before[i]), `place ${i}`);
+        if (Number.isNaN(z)) return;
+        const jump = Math.abs(z - before[i]), slide = Math.abs(rest[i] - ended[i]);
+        jumps += jump, slides += slide;
+        worst = Math.max(worst, jump), most = Math.max(most, slide);
+      });
+    }
+  });
+  ({scene: {box}} = await flyer.opened());
+  const [stop] = sites.flight('alps', {kind: 'raster'}), close = {...stop, error: stop.error / 1.5};
+  await flyer.settle(close);
+  await flyer.rest();
+  // Away from there, so that the points go from near to far.
+  for (let i = 1; i <= 10; ++i) {
+    const [x, y, z] = close.eye;
+    await flyer.view({eye: [x, y, z * 1.08 ** i], direction: close.direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error: close.error}, false);
+    await new Promise(resume => setTimeout(resume, 30));
+  }
+  await flyer.rest();
+  assert.ok(slides > 0 && jumps < 0.3 * slides, `${jumps} of ${slides}`);
 });
 
 test('a scan as points and back, with the bytes that are there', async () => {

@@ -179,8 +179,8 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
 /// input: eye, direction, up; field of view in degrees, aspect, height in pixels; pixels of error;
 /// seconds to spend; the time; the level that is wanted everywhere, whatever the error (255: none).
 /// numbers: points, triangles, expanded clusters, slots of vertices and
-/// of triangles, whether it is settled, the worst demand, clusters and bytes read, whether the same
-/// is missing as after the last frame. text: what is missing.
+/// of triangles, whether it is settled, the worst demand, clusters and bytes read, whether what has
+/// gone is still drawn, whether the same is missing as after the last frame. text: what is missing.
 TERRACE_EXPORT(frame) int terrace_frame() {
   return guarded([&] {
     Module& m = module();
@@ -203,7 +203,8 @@ TERRACE_EXPORT(frame) int terrace_frame() {
                  s.settled ? 1.0 : 0.0,
                  s.worst,
                  static_cast<double>(s.clusters),
-                 static_cast<double>(s.stored_bytes)};
+                 static_cast<double>(s.stored_bytes),
+                 s.waiting ? 1.0 : 0.0};
     tell(m.scene->missing());
     m.numbers.push_back(m.text == m.told ? 1.0 : 0.0);
     m.told = m.text;
@@ -229,9 +230,9 @@ TERRACE_EXPORT(changes) int terrace_changes() {
 }
 
 /// Computes the surface of a scan from scratch; what that changes is among the next changes().
-TERRACE_EXPORT(restore) int terrace_restore() {
+TERRACE_EXPORT(restore) int terrace_restore(double time) {
   return guarded([&] {
-    module().scene->restore();
+    module().scene->restore(time);
     return kDone;
   });
 }

@@ -8,11 +8,14 @@
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
+#include <variant>
 
 #include <terrace/terrain/store_view.hpp>
 #include <terrace/tri/geomorph.hpp>
 
+#include "blocks.hpp"
 #include "body_normals.hpp"
+#include "waiting.hpp"
 
 namespace terrace::viewer {
 namespace {
@@ -27,57 +30,23 @@ Point3 cross(const Point3& a, const Point3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// An array of which blocks of slots are marked as changed.
-template <class Value>
-class Blocks {
- public:
-  void reserve(std::size_t slots) { values_.reserve(slots); }
-  /// Blocks that are added count as changed.
-  void grow(std::size_t slots) {
-    const std::size_t blocks = (slots + SceneChanges::kBlock - 1) / SceneChanges::kBlock;
-    if (blocks * SceneChanges::kBlock <= values_.size()) return;
-    values_.resize(blocks * SceneChanges::kBlock);
-    for (std::size_t b = marked_.size(); b < blocks; ++b)
-      changed_.push_back(static_cast<std::uint32_t>(b));
-    marked_.resize(blocks, true);
-  }
-  Value& change(std::uint32_t slot) {
-    const std::size_t block = slot / SceneChanges::kBlock;
-    if (!marked_[block]) {
-      marked_[block] = true;
-      changed_.push_back(static_cast<std::uint32_t>(block));
-    }
-    return values_[slot];
-  }
-  const Value& operator[](std::uint32_t slot) const { return values_[slot]; }
-  [[nodiscard]] std::size_t size() const { return values_.size(); }
-  void take(std::vector<std::uint32_t>& blocks, std::vector<Value>& values) {
-    std::sort(changed_.begin(), changed_.end());
-    blocks.clear();
-    values.clear();
-    for (const std::uint32_t block : changed_) {
-      marked_[block] = false;
-      blocks.push_back(block);
-      const auto begin =
-          values_.begin() + static_cast<std::ptrdiff_t>(block * SceneChanges::kBlock);
-      values.insert(values.end(), begin, begin + SceneChanges::kBlock);
-    }
-    changed_.clear();
-  }
-
- private:
-  std::vector<Value> values_;
-  std::vector<bool> marked_;
-  std::vector<std::uint32_t> changed_;
-};
-
 template <class Shown>
 class SceneOf final : public Scene {
+  /// Of SceneBodyPoint::start, without the sign; one is left for rounding.
+  static constexpr int kStartBits = 14;
+  /// What the page takes for a slide, and for how long what has gone is drawn on: a little longer.
+  /// What is drawn on and changes again and again ends in time, too.
+  static constexpr double kSlide = 0.45, kWait = 0.5, kLongestWait = 3.0;
+
  public:
   using View = terrain::StoreView<Shown>;
+  using Triangulation = terrain::ViewTriangulation<Shown>;
   static constexpr bool kRaster = std::is_integral_v<Shown>;
   static constexpr bool kTriangles = !std::is_same_v<Shown, tri::PointCloud>;
-  using Vertex = std::conditional_t<kRaster, SceneVertex, ScenePoint>;
+  using Vertex = std::conditional_t<kRaster, SceneVertex,
+                                    std::conditional_t<kTriangles, SceneBodyPoint, ScenePoint>>;
+  static constexpr std::uint32_t kSpareVertices = kTriangles ? Waiting<Vertex>::kVertices : 0,
+                                 kSpareTriangles = kTriangles ? Waiting<Vertex>::kTriangles : 0;
 
   SceneOf(const stream::Store& store, const stream::LinearMap& ground,
           const tri::ViewOptions& options,
@@ -96,13 +65,18 @@ class SceneOf final : public Scene {
     grow();
     for (const tri::VertexId vertex : mesh().all_vertices()) place(vertex);
     if constexpr (kTriangles) {
-      for (const tri::TriangleId triangle : mesh().all_triangles()) add(triangle);
+      for (const tri::TriangleId triangle : mesh().all_triangles()) {
+        triangles_.change(drawn(triangle)) = add(triangle);
+      }
       renew_normals();
     }
   }
 
   SceneState frame(const tri::View& wish, double seconds, double time) override {
-    const auto& step = view_.frame(wish, seconds, after_rate_);
+    const double start = now();
+    waiting_.end_until(time);
+    waiting_.sweep();
+    const auto& step = view_.frame(wish, seconds - (now() - start), after_rate_);
     const double begin = now();
     apply(*step.delta, time);
     came_ += static_cast<double>(step.delta->changes.added_vertices.size());
@@ -111,14 +85,15 @@ class SceneOf final : public Scene {
     const terrain::ViewTraffic traffic = view_.traffic();
     SceneState state{.points = view_.model().point_count(),
                      .expanded = view_.model().expanded_count(),
-                     .vertex_slots = mesh().vertex_slots(),
+                     .vertex_slots = kSpareVertices + mesh().vertex_slots(),
                      .settled = view_.settled(),
+                     .waiting = !waiting_.empty(),
                      .worst = step.worst,
                      .clusters = static_cast<std::size_t>(traffic.clusters),
                      .stored_bytes = static_cast<std::size_t>(traffic.bytes)};
     if constexpr (kTriangles) {
       state.triangles = mesh().triangle_count();
-      state.triangle_slots = mesh().triangle_slots();
+      state.triangle_slots = kSpareTriangles + mesh().triangle_slots();
     }
     return state;
   }
@@ -135,8 +110,8 @@ class SceneOf final : public Scene {
   [[nodiscard]] std::span<const stream::ByteRange> missing() const override {
     return view_.missing();
   }
-  void restore() override {
-    if constexpr (kTriangles && !kRaster) apply(view_.restore(), 0);
+  void restore(double time) override {
+    if constexpr (kTriangles && !kRaster) apply(view_.restore(), time);
   }
   [[nodiscard]] std::uint64_t hash() const override { return mesh().hash(); }
   [[nodiscard]] std::optional<SceneHit> pick(const Point3& origin, const Point3& direction,
@@ -194,24 +169,27 @@ class SceneOf final : public Scene {
     after_rate_[1] = std::max(0.0, after_rate_[1] + step * went_);
   }
   [[nodiscard]] const auto& mesh() const { return view_.model().triangulation(); }
+  [[nodiscard]] static std::uint32_t drawn(tri::VertexId v) { return kSpareVertices + slot(v); }
+  [[nodiscard]] static std::uint32_t drawn(tri::TriangleId t) { return kSpareTriangles + slot(t); }
+  [[nodiscard]] static SceneTriangle drawn(const std::array<tri::VertexId, 3>& corners) {
+    return {drawn(corners[0]), drawn(corners[1]), drawn(corners[2])};
+  }
   void grow() {
-    vertices_.grow(mesh().vertex_slots());
-    listed_.resize(vertices_.size());
-    if constexpr (kTriangles) triangles_.grow(mesh().triangle_slots());
-    if constexpr (kTriangles && !kRaster) normals_.grow(vertices_.size());
+    vertices_.grow(kSpareVertices + mesh().vertex_slots());
+    listed_.resize(mesh().vertex_slots());
+    if constexpr (kTriangles) triangles_.grow(kSpareTriangles + mesh().triangle_slots());
+    if constexpr (kTriangles && !kRaster) normals_.grow(mesh().vertex_slots());
   }
   /// Without sliding.
   void place(tri::VertexId vertex) {
     const Point3 p = view_.in_view_frame(vertex);
-    Vertex& v = vertices_.change(slot(vertex));
+    Vertex& v = vertices_.change(drawn(vertex));
     v.x = static_cast<float>(p[0]);
     v.y = static_cast<float>(p[1]);
     v.z = static_cast<float>(p[2]);
     v.level = static_cast<std::uint8_t>(view_.model().level(vertex));
-    if constexpr (kRaster) {
-      v.start_z = v.z;
-      v.start_time = -1e9F;
-    } else {
+    if constexpr (kTriangles) v.start_time = -1e9F;
+    if constexpr (!kRaster) {
       const CloudColour colour = colours_(view_.attributes(vertex));
       v.rgb = colour.rgb;
       v.group = colour.group;
@@ -221,14 +199,12 @@ class SceneOf final : public Scene {
   }
   template <class Delta>
   void apply(const Delta& delta, double time);
-  void add(tri::TriangleId triangle) {
-    SceneTriangle& corners = triangles_.change(slot(triangle));
-    const auto vertices = mesh().vertices(triangle);
-    for (std::size_t i = 0; i < 3; ++i) {
-      corners[i] = slot(vertices[i]);
-      list(vertices[i]);
-    }
-    if constexpr (!kRaster) normals_.add(corners);
+  /// How it is drawn.
+  SceneTriangle add(tri::TriangleId triangle) {
+    const auto corners = mesh().vertices(triangle);
+    for (const tri::VertexId corner : corners) list(corner);
+    if constexpr (!kRaster) normals_.add({slot(corners[0]), slot(corners[1]), slot(corners[2])});
+    return drawn(corners);
   }
   void list(tri::VertexId vertex) {
     if (slot(vertex) >= listed_.size() || listed_[slot(vertex)]) return;
@@ -236,15 +212,49 @@ class SceneOf final : public Scene {
     without_normal_.push_back(vertex);
   }
   void renew_normals();
-  void slide(const tri::Slides& slides, double time) {
-    for (std::size_t i = 0; i < slides.size(); ++i) {
-      SceneVertex& v = vertices_.change(slot(slides.vertices[i]));
-      v.start_z = static_cast<float>(view_.in_view_frame(slides.start[i])[2]);
-      v.start_time = static_cast<float>(time);
+  /// Where a vertex is drawn at a time, as the page has it.
+  [[nodiscard]] static Point3 place_at(const Vertex& v, double time) {
+    const double t = std::clamp((time - v.start_time) / kSlide, 0.0, 1.0);
+    const double left = 1 - t * t * (3 - 2 * t);
+    Point3 place{v.x, v.y, v.z};
+    if constexpr (kRaster) {
+      place[2] += left * (v.start_z - v.z);
+    } else {
+      for (std::size_t k = 0; k < 3; ++k)
+        place[k] += left * std::ldexp(v.start[k], v.start_exponent);
+    }
+    return place;
+  }
+  /// Lets a vertex slide.
+  static void move(Vertex& v, const Point3& from, const Point3& to, double time) {
+    v.x = static_cast<float>(to[0]);
+    v.y = static_cast<float>(to[1]);
+    v.z = static_cast<float>(to[2]);
+    v.start_time = static_cast<float>(time);
+    if constexpr (kRaster) {
+      v.start_z = static_cast<float>(from[2]);
+    } else {
+      const Point3 way = difference(from, to);
+      int exponent = 0;
+      std::frexp(std::max({std::abs(way[0]), std::abs(way[1]), std::abs(way[2])}), &exponent);
+      exponent = std::clamp(exponent - kStartBits, -128, 127);
+      v.start_exponent = static_cast<std::int8_t>(exponent);
+      for (std::size_t k = 0; k < 3; ++k) {
+        v.start[k] = static_cast<std::int16_t>(std::lround(std::ldexp(way[k], -exponent)));
+      }
     }
   }
-  [[nodiscard]] Point3 position(std::uint32_t slot) const {
-    return {vertices_[slot].x, vertices_[slot].y, vertices_[slot].z};
+  void slide(const tri::Slides& slides, double time) {
+    for (std::size_t i = 0; i < slides.size(); ++i) {
+      move(vertices_.change(drawn(slides.vertices[i])), view_.model_in_view_frame(slides.start[i]),
+           view_.model_in_view_frame(slides.end[i]), time);
+    }
+  }
+  template <class Delta>
+  void wait(const Delta& delta, double time);
+  [[nodiscard]] Point3 position(tri::VertexId vertex) const {
+    const Vertex& v = vertices_[drawn(vertex)];
+    return {v.x, v.y, v.z};
   }
 
   stream::Store store_;
@@ -262,28 +272,146 @@ class SceneOf final : public Scene {
   /// Seconds that the changes of a point that came, or went, cost after a step.
   std::array<double, 2> after_rate_{};
   double after_ = 0, came_ = 0, went_ = 0;  ///< since the changes were last taken
-  tri::Geomorph2<std::int32_t> morph_;      // of rasters
-  BodyNormals normals_;                     // of surfaces in space
+  /// Nothing for points.
+  std::conditional_t<kTriangles, tri::Geomorph<typename Triangulation::type>, std::monostate>
+      morph_;
+  BodyNormals normals_;  // of surfaces in space
+  Waiting<Vertex> waiting_{vertices_, triangles_};
+  /// Of the last step.
+  struct Part {
+    std::uint32_t vertices = 0, triangles = 0;  ///< that go
+    bool waits = true;
+    std::uint32_t group = 0;
+  };
+  std::vector<Part> parts_;
+  /// By drawn slot, none between calls: the part in which a vertex goes; then where it is drawn on.
+  std::vector<std::uint32_t> leaving_;
 };
+
+/// Of a step's connected parts those wait in which vertices go and none come: a collapse. Where a
+/// part changes what is hidden, it joins the group that does, or ends it if it does not wait.
+template <class Shown>
+template <class Delta>
+void SceneOf<Shown>::wait(const Delta& delta, double time) {
+  constexpr std::uint32_t kNone = Waiting<Vertex>::kNone;
+  const auto& changes = delta.changes;
+  const auto& numbers = morph_.parts;
+  parts_.assign(numbers.count, {});
+  for (const std::uint32_t p : numbers.removed) ++parts_[p].vertices;
+  for (const std::uint32_t p : numbers.removed_triangles) ++parts_[p].triangles;
+  for (const std::uint32_t p : numbers.added) parts_[p].waits = false;
+  std::size_t vertices = waiting_.vertex_room(), triangles = waiting_.triangle_room();
+  for (Part& part : parts_) {
+    part.waits =
+        part.waits && part.vertices > 0 && part.vertices <= vertices && part.triangles <= triangles;
+    if (!part.waits) continue;
+    vertices -= part.vertices;
+    triangles -= part.triangles;
+  }
+
+  leaving_.resize(vertices_.size(), kNone);
+  for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
+    leaving_[drawn(morph_.removed.vertices[i])] = numbers.removed[i];
+  }
+  const auto for_touched = [&](const auto& told) {
+    if (waiting_.empty()) return;
+    for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
+      const std::uint32_t group = waiting_.hiding(drawn(changes.removed_triangles[i]));
+      if (group != kNone) told(parts_[numbers.removed_triangles[i]], group);
+    }
+    // On the hull a vertex may have lost all its triangles without new ones.
+    if (numbers.removed.empty()) return;
+    waiting_.for_kept([&](std::uint32_t kept, std::uint32_t group) {
+      for (const std::uint32_t corner : triangles_[kept]) {
+        if (leaving_[corner] != kNone) told(parts_[leaving_[corner]], group);
+      }
+    });
+  };
+  for_touched([&](const Part& part, std::uint32_t group) {
+    if (!part.waits || time - waiting_.begin(group) > kLongestWait) waiting_.end(group);
+  });
+  waiting_.sweep();
+  for (Part& part : parts_) {
+    if (part.waits) part.group = waiting_.open(time, time + kWait);
+  }
+  for_touched([&](const Part& part, std::uint32_t group) { waiting_.join(part.group, group); });
+
+  for (std::size_t i = 0; i < waiting_.anchors().size(); ++i) {
+    const tri::Anchor& anchor = waiting_.anchors()[i];
+    if (!anchor.moved) continue;
+    Vertex& v = vertices_.change(waiting_.slot_of_anchor(i));
+    move(v, place_at(v, time), view_.model_in_view_frame(anchor.end), time);
+  }
+  for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
+    const Part& part = parts_[numbers.removed[i]];
+    std::uint32_t& on = leaving_[drawn(morph_.removed.vertices[i])];
+    on = kNone;
+    if (!part.waits) continue;
+    Vertex v = vertices_[drawn(morph_.removed.vertices[i])];
+    move(v, place_at(v, time), view_.model_in_view_frame(morph_.removed.end[i]), time);
+    on = waiting_.keep(
+        part.group, v,
+        {morph_.removed.start[i], morph_.removed.end[i], morph_.removed_on[i], false});
+  }
+  const auto drawn_on = [&](SceneTriangle corners) {
+    for (std::uint32_t& corner : corners) {
+      if (leaving_[corner] != kNone) corner = leaving_[corner];
+    }
+    return corners;
+  };
+  if (!numbers.removed.empty()) {
+    waiting_.for_kept([&](std::uint32_t kept, std::uint32_t) {
+      const SceneTriangle corners = drawn_on(triangles_[kept]);
+      if (corners != triangles_[kept]) triangles_.change(kept) = corners;
+    });
+  }
+  for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
+    const Part& part = parts_[numbers.removed_triangles[i]];
+    const std::uint32_t triangle = drawn(changes.removed_triangles[i]);
+    if (!part.waits) continue;
+    if (waiting_.hiding(triangle) != kNone) {
+      waiting_.forget(triangle);
+    } else {
+      waiting_.keep(part.group, drawn_on(triangles_[triangle]));
+    }
+  }
+  for (const tri::VertexId vertex : morph_.removed.vertices) leaving_[drawn(vertex)] = kNone;
+}
 
 template <class Shown>
 template <class Delta>
 void SceneOf<Shown>::apply(const Delta& delta, double time) {
   grow();
+  const auto& changes = delta.changes;
   if constexpr (kTriangles) {
-    for (const tri::TriangleId triangle : delta.changes.removed_triangles) {
-      if constexpr (!kRaster) normals_.remove(triangles_[slot(triangle)]);
-      triangles_.change(slot(triangle)) = {};
+    if (changes.removed_triangles.empty() && changes.added_triangles.empty() &&
+        changes.removed_vertices.empty() && changes.added_vertices.empty() &&
+        delta.reassigned.empty()) {
+      return;
+    }
+    morph_.make(view_.model(), delta, true, waiting_.anchors());
+    wait(delta, time);
+    for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
+      const auto& c = changes.removed_corners[i];
+      if constexpr (!kRaster) normals_.remove({slot(c[0]), slot(c[1]), slot(c[2])});
+      triangles_.change(drawn(changes.removed_triangles[i])) = {};
     }
   }
-  for (const tri::VertexId vertex : delta.changes.removed_vertices) {
-    vertices_.change(slot(vertex)) = {};
-  }
-  for (const tri::VertexId vertex : delta.changes.added_vertices) place(vertex);
+  for (const tri::VertexId vertex : changes.removed_vertices) vertices_.change(drawn(vertex)) = {};
+  for (const tri::VertexId vertex : changes.added_vertices) place(vertex);
   for (const tri::VertexId vertex : delta.reassigned) place(vertex);
   if constexpr (kTriangles) {
-    for (const tri::TriangleId triangle : delta.changes.added_triangles) add(triangle);
-    for (const auto& corners : delta.changes.removed_corners) {
+    for (std::size_t i = 0; i < changes.added_triangles.size(); ++i) {
+      const tri::TriangleId triangle = changes.added_triangles[i];
+      const Part& part = parts_[morph_.parts.added_triangles[i]];
+      const SceneTriangle corners = add(triangle);
+      if (part.waits) {
+        waiting_.hide(part.group, drawn(triangle), corners);
+      } else {
+        triangles_.change(drawn(triangle)) = corners;
+      }
+    }
+    for (const auto& corners : changes.removed_corners) {
       for (const tri::VertexId vertex : corners) list(vertex);
     }
     if constexpr (kRaster) {
@@ -294,10 +422,6 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
       }
     }
     renew_normals();
-  }
-  if constexpr (kRaster) {
-    if (delta.changes.added_vertices.empty() && delta.reassigned.empty()) return;
-    morph_.make(view_.model(), delta, false);
     slide(morph_.added, time);
     slide(morph_.reassigned, time);
   }
@@ -308,7 +432,7 @@ void SceneOf<Shown>::renew_normals() {
   if constexpr (kTriangles && !kRaster) {
     for (const tri::VertexId vertex : without_normal_) {
       listed_[slot(vertex)] = false;
-      if (mesh().alive(vertex)) vertices_.change(slot(vertex)).normal = normals_[slot(vertex)];
+      if (mesh().alive(vertex)) vertices_.change(drawn(vertex)).normal = normals_[slot(vertex)];
     }
     without_normal_.clear();
   }
@@ -317,7 +441,7 @@ void SceneOf<Shown>::renew_normals() {
       listed_[slot(vertex)] = false;
       if (!mesh().alive(vertex)) continue;
       mesh().adjacent(vertex, ring_);
-      const Point3 middle = position(slot(vertex));
+      const Point3 middle = position(vertex);
       const auto stored = mesh().point(vertex);
       Point3 sum{};
       for (std::size_t i = 0; i < ring_.size(); ++i) {
@@ -327,14 +451,13 @@ void SceneOf<Shown>::renew_normals() {
         const std::int64_t turn = std::int64_t{p[0] - stored[0]} * (q[1] - stored[1]) -
                                   std::int64_t{p[1] - stored[1]} * (q[0] - stored[0]);
         if (turn <= 0) continue;
-        Point3 normal =
-            cross(difference(position(slot(a)), middle), difference(position(slot(b)), middle));
+        Point3 normal = cross(difference(position(a), middle), difference(position(b), middle));
         // Rows grow downward: in the view frame the same triangle turns the other way.
         const double sign = normal[2] < 0 ? -1 : 1;
         for (std::size_t k = 0; k < 3; ++k) sum[k] += sign * normal[k];
       }
       const double length = std::sqrt(dot(sum, sum));
-      SceneVertex& v = vertices_.change(slot(vertex));
+      SceneVertex& v = vertices_.change(drawn(vertex));
       for (std::size_t k = 0; k < 3; ++k) {
         v.normal[k] = length > 0 ? static_cast<std::int8_t>(std::lround(127 * sum[k] / length))
                                  : static_cast<std::int8_t>(k == 2 ? 127 : 0);
@@ -371,7 +494,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     tri::TriangleId found = tri::kNoTriangle;
     std::array<double, 3> weights{};
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
-      const SceneTriangle& corners = triangles_[slot(triangle)];
+      const auto corners = mesh().vertices(triangle);
       const Point3 a = position(corners[0]);
       const Point3 ab = difference(position(corners[1]), a),
                    ac = difference(position(corners[2]), a);
@@ -403,7 +526,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
          {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
   } else {
     for (const tri::VertexId vertex : mesh().all_vertices()) {
-      const Point3 place = position(slot(vertex)), to = difference(place, origin);
+      const Point3 place = position(vertex), to = difference(place, origin);
       const double along = dot(to, way);
       if (along <= 0) continue;
       const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
@@ -425,7 +548,7 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from,
     const double length = std::sqrt(dx * dx + dy * dy);
     if (!(length > 0)) return line;
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
-      const SceneTriangle& corners = triangles_[slot(triangle)];
+      const auto corners = mesh().vertices(triangle);
       std::array<Point3, 3> at;
       // For each corner, how far along the line it is and how far to its left.
       std::array<double, 3> along, left;
@@ -484,14 +607,14 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
     std::sort(below.begin(), below.end());
     std::vector<bool> belongs(vertices_.size());
     for (const tri::VertexId vertex : mesh().all_vertices()) {
-      belongs[slot(vertex)] =
+      belongs[drawn(vertex)] =
           std::binary_search(below.begin(), below.end(), model.point_id(vertex).cluster);
     }
-    belongs[slot(model.head_vertex(cluster))] = true;
+    belongs[drawn(model.head_vertex(cluster))] = true;
     // An edge between two triangles inside comes twice, once each way.
     std::vector<std::array<std::uint32_t, 2>> edges;
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
-      const SceneTriangle& c = triangles_[slot(triangle)];
+      const SceneTriangle c = drawn(mesh().vertices(triangle));
       if (!belongs[c[0]] || !belongs[c[1]] || !belongs[c[2]]) continue;
       for (std::size_t i = 0; i < 3; ++i) edges.push_back({c[i], c[(i + 1) % 3]});
     }

@@ -31,25 +31,34 @@ struct SceneVertex {
 };
 static_assert(sizeof(SceneVertex) == 24);
 
-/// The same of a cloud and of the surface of a scan, whose points do not slide.
+/// The same of a cloud, whose points do not slide.
 struct ScenePoint {
   float x = 0, y = 0, z = 0;
   std::array<std::int8_t, 3> normal{};  ///< of a surface: outward, times 127; else 0
   std::uint8_t level = SceneVertex::kNone;
   std::array<std::uint8_t, 3> rgb{};
   std::uint8_t group = 0, intensity = 0;
-  std::array<std::uint8_t, 3> unused{};
 };
-static_assert(sizeof(ScenePoint) == sizeof(SceneVertex));
+static_assert(sizeof(ScenePoint) == 24);
+
+/// The same of the surface of a scan. What follows has a place in the bytes that the point leaves.
+struct SceneBodyPoint : ScenePoint {
+  std::int8_t start_exponent = 0;       ///< a power of two metres
+  std::array<std::int16_t, 3> start{};  ///< so many of these from x, y, z the slide begins
+  float start_time = -1e9F;             ///< and when
+};
+static_assert(sizeof(SceneBodyPoint) == 32);
 
 using SceneTriangle = std::array<std::uint32_t, 3>;  ///< slots of vertices; all 0: none
 
-/// What a frame has changed, in blocks of 64 slots: block b is slots 64 b ... 64 b + 63.
+/// What a frame has changed of what is drawn: what has gone may be drawn on for a while, in slots
+/// of its own before those of the model. In blocks of 64 slots: block b is slots 64 b ... 64 b
+/// + 63.
 struct SceneChanges {
   static constexpr std::size_t kBlock = 64;
   std::vector<std::uint32_t> vertex_blocks, triangle_blocks;
   std::span<const std::byte>
-      vertices;  ///< kBlock SceneVertex or ScenePoint for each of vertex_blocks
+      vertices;  ///< kBlock SceneVertex, ScenePoint or SceneBodyPoint for each of vertex_blocks
   std::vector<SceneTriangle> triangles;  ///< likewise
 };
 
@@ -57,7 +66,8 @@ struct SceneState {
   std::size_t points = 0, triangles = 0, expanded = 0;
   std::size_t vertex_slots = 0, triangle_slots = 0;
   bool settled = false;
-  double worst = 0.0;                          ///< as in tri::ViewControl::Step
+  bool waiting = false;  ///< what has gone is drawn on; a later frame will exchange it
+  double worst = 0.0;    ///< as in tri::ViewControl::Step
   std::size_t clusters = 0, stored_bytes = 0;  ///< read so far
 };
 
@@ -88,8 +98,8 @@ class Scene {
   virtual const SceneChanges& take_changes() = 0;
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const = 0;
   /// Computes a surface in space from scratch, which frames only follow: then it depends on the
-  /// points alone. 3 us per point natively. Nothing to do for others.
-  virtual void restore() = 0;
+  /// points alone. 3 us per point natively. Nothing to do for others. time: as in frame().
+  virtual void restore(double time) = 0;
   /// The hash of the triangulation, or of the set of points.
   [[nodiscard]] virtual std::uint64_t hash() const = 0;
   /// Where a ray meets the surface first; of points, the one nearest to the ray's line as seen from

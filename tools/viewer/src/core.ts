@@ -18,9 +18,10 @@ export interface State {
   worst: number;
   clusters: number;
   storedBytes: number;
+  waiting: boolean;  ///< what has gone is drawn on; a later frame will exchange it
 }
 
-/// Blocks of 64 slots that changed: 24 bytes a vertex, three numbers a triangle. All are parts of `buffer`.
+/// Blocks of 64 slots that changed: VERTEX_BYTES a vertex, three numbers a triangle. All are parts of `buffer`.
 export interface Changes {
   buffer: ArrayBuffer;
   vertexBlocks: Uint32Array;
@@ -62,7 +63,11 @@ export interface Opened {
 }
 
 export const BLOCK = 64;
-export const VERTEX_BYTES = 24;
+export const VERTEX_BYTES: Record<Kind, number> = {
+  raster: 24,
+  points: 24,
+  surface: 32
+};
 
 export class CoreError extends Error {}
 
@@ -85,7 +90,7 @@ interface Exports {
   open(maxPoints: number): number;
   frame(): number;
   changes(): number;
-  restore(): number;
+  restore(time: number): number;
   hash(): number;
   pick(): number;
   profile(): number;
@@ -151,8 +156,8 @@ export class Core {
       time, camera.level ?? 255
     ]);
     this.check(this.wasm.frame());
-    const n = this.numbers(10);
-    if (n[9] === 0) this.lacking = this.missing();
+    const n = this.numbers(11);
+    if (n[10] === 0) this.lacking = this.missing();
     return {
       state: {
         points: n[0],
@@ -163,7 +168,8 @@ export class Core {
         settled: n[5] === 1,
         worst: n[6],
         clusters: n[7],
-        storedBytes: n[8]
+        storedBytes: n[8],
+        waiting: n[9] === 1
       },
       missing: this.lacking
     };
@@ -173,7 +179,7 @@ export class Core {
     this.check(this.wasm.changes());
     const [vertexBlocks, vertexBlocksAt, verticesAt, triangleBlocks, triangleBlocksAt, trianglesAt] = this.numbers(6);
     const memory = new Uint8Array(this.wasm.memory.buffer);
-    const vertexBytes = vertexBlocks * BLOCK * VERTEX_BYTES, triangleBytes = triangleBlocks * BLOCK * 12;
+    const vertexBytes = vertexBlocks * BLOCK * VERTEX_BYTES[this.kind ?? 'points'], triangleBytes = triangleBlocks * BLOCK * 12;
     const buffer = this.buffer(4 * (vertexBlocks + triangleBlocks) + vertexBytes + triangleBytes);
     let end = 0;
     const copy = (from: number, bytes: number) => {
@@ -195,8 +201,8 @@ export class Core {
     if (this.buffers.length < MOST_BUFFERS) this.buffers.push(buffer);
   }
   /// Computes the surface of a scan from scratch; what that changes is among the next changes.
-  restore(): void {
-    this.check(this.wasm.restore());
+  restore(time: number): void {
+    this.check(this.wasm.restore(time));
   }
   hash(): string {
     this.check(this.wasm.hash());

@@ -25,11 +25,13 @@ precision highp float;
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in float level;
-layout(location = 3) in vec2 start;
+layout(location = 3) in vec3 start;      // of a raster: z; of a surface: from the place, in units of 2^exponent
 layout(location = 4) in vec3 rgb;        // of points and surfaces, in the bytes of the start
 layout(location = 5) in vec2 attributes; // likewise: class, intensity
+layout(location = 6) in float began;     // the slide
+layout(location = 7) in float exponent;
 uniform mat4 matrix;
-uniform bool slides;
+uniform int slides;  // 0 not, 1 up and down, 2 in space
 uniform float time, pointSize;
 out vec3 at;
 out vec3 up;
@@ -38,9 +40,9 @@ out vec3 own;
 out vec2 attributesOf;
 void main() {
   at = place;
-  if (slides) {
-    float t = clamp((time - start.y) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0);
-    at.z = mix(start.x, place.z, t * t * (3.0 - 2.0 * t));
+  if (slides > 0) {
+    float t = clamp((time - began) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0), left = 1.0 - t * t * (3.0 - 2.0 * t);
+    at += left * (slides == 1 ? vec3(0.0, 0.0, start.x - place.z) : start * exp2(exponent));
   }
   up = normal;
   own = rgb;
@@ -179,7 +181,7 @@ export class Renderer {
   /// Forgets the scene.
   clear(): void {
     const gl = this.gl;
-    this.vertices = new GrowingBuffer(gl, gl.ARRAY_BUFFER, VERTEX_BYTES);
+    this.vertices = new GrowingBuffer(gl, gl.ARRAY_BUFFER, VERTEX_BYTES[this.kind]);
     this.triangles = new GrowingBuffer(gl, gl.ELEMENT_ARRAY_BUFFER, 12);
     this.lines = gl.createBuffer()!;
     this.surface = this.array(this.triangles.buffer);
@@ -194,13 +196,14 @@ export class Renderer {
     this.box = box;
     this.top = top;
     this.kind = kind;
+    this.clear();
     this.fill(this.ramps.height, scan ? heightStops(0, 1) : heightStops(box[2], box[5]));
   }
   apply(state: State, changes: Changes, time: number): void {
     this.state = state;
     if (changes.vertexBlocks.length > 0) {
       this.vertices.put(changes.vertexBlocks, changes.vertices, state.vertexSlots);
-      if (this.kind === 'raster') this.slidingUntil = time + SLIDE_SECONDS;
+      if (this.kind !== 'points') this.slidingUntil = time + SLIDE_SECONDS;
     }
     if (changes.triangleBlocks.length > 0) {
       const bytes = new Uint8Array(changes.triangles.buffer, changes.triangles.byteOffset, changes.triangles.byteLength);
@@ -271,7 +274,7 @@ export class Renderer {
     gl.uniform1f(this.uniform('haze'), extent * (camera.body ? 100 : 2.5));
     const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
     gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
-    gl.uniform1i(this.uniform('slides'), this.kind === 'raster' ? 1 : 0);
+    gl.uniform1i(this.uniform('slides'), {points: 0, raster: 1, surface: 2}[this.kind]);
     gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
     if (this.kind === 'points') {
@@ -328,13 +331,21 @@ export class Renderer {
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices.buffer);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, elements);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, VERTEX_BYTES, 0);
-    gl.vertexAttribPointer(1, 3, gl.BYTE, true, VERTEX_BYTES, 12);
-    gl.vertexAttribPointer(2, 1, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 15);
-    gl.vertexAttribPointer(3, 2, gl.FLOAT, false, VERTEX_BYTES, 16);
-    gl.vertexAttribPointer(4, 3, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 16);
-    gl.vertexAttribPointer(5, 2, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 19);
-    for (let i = 0; i < 6; ++i) gl.enableVertexAttribArray(i);
+    // Numbers of an attribute, their type, whether they are shares of its range, their first byte.
+    const attributes: Array<[number, number, number, boolean, number]> =
+        [[0, 3, gl.FLOAT, false, 0], [1, 3, gl.BYTE, true, 12], [2, 1, gl.UNSIGNED_BYTE, true, 15]];
+    if (this.kind === 'raster') {
+      attributes.push([3, 1, gl.FLOAT, false, 16], [6, 1, gl.FLOAT, false, 20]);
+    } else {
+      attributes.push([4, 3, gl.UNSIGNED_BYTE, true, 16], [5, 2, gl.UNSIGNED_BYTE, true, 19]);
+    }
+    if (this.kind === 'surface') {
+      attributes.push([3, 3, gl.SHORT, false, 22], [6, 1, gl.FLOAT, false, 28], [7, 1, gl.BYTE, false, 21]);
+    }
+    for (const [at, size, type, share, first] of attributes) {
+      gl.vertexAttribPointer(at, size, type, share, VERTEX_BYTES[this.kind], first);
+      gl.enableVertexAttribArray(at);
+    }
     gl.bindVertexArray(null);
     return array;
   }

@@ -2,7 +2,7 @@
 /// The page: what the user does goes to the camera and the worker, what comes back to the renderer.
 
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
-import type {Hit, Kind, Opened} from './core';
+import {type Hit, type Kind, type Opened, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {CATEGORIES, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
 import {type Colour, COLOURS, type Look, Renderer} from './render';
@@ -99,7 +99,7 @@ class Viewer {
   }
   get settled(): boolean {
     if (this.moved || this.pivoting || this.status === null || this.status.serial !== this.serial) return false;
-    return this.status.state.settled && !this.renderer.sliding(this.now);
+    return this.status.state.settled && !this.status.state.waiting && !this.renderer.sliding(this.now);
   }
   get state(): object {
     return {
@@ -163,7 +163,6 @@ class Viewer {
         break;
       case 'opened': {
         const again = this.manifest !== null;  // the same scan, shown otherwise
-        if (again) this.renderer.clear();
         this.manifest = message.manifest;
         this.box = message.scene.box;
         this.kind = message.scene.kind;
@@ -197,7 +196,7 @@ class Viewer {
       case 'frame': {
         // The clock of the worker has another origin; slides count from now.
         const shift = this.now - message.time;
-        if (this.kind === 'raster' && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
+        if (this.kind !== 'points' && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
         this.renderer.apply(message.state, message.changes, this.now);
         this.status = message;
         if (this.hit && message.changes.vertexBlocks.length > 0) this.followSurface(400);
@@ -230,8 +229,8 @@ class Viewer {
   /// Start times of the vertices of a frame, from the worker's clock to the page's.
   private shift(vertices: Uint8Array, time: number, by: number): void {
     const floats = new Float32Array(vertices.buffer, vertices.byteOffset, vertices.byteLength / 4);
-    const exact = Math.fround(time), to = Math.fround(time + by);
-    for (let i = 5; i < floats.length; i += 6) {
+    const exact = Math.fround(time), to = Math.fround(time + by), words = VERTEX_BYTES[this.kind] / 4;
+    for (let i = words - 1; i < floats.length; i += words) {
       if (floats[i] === exact) {
         floats[i] = to;
       } else if (floats[i] > 0) {

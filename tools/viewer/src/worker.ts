@@ -15,6 +15,8 @@ const SURFACE_COST = 4;
 const MOST_GIVEN = 64 << 20;
 /// The surface is computed from scratch once nothing has changed for so many milliseconds.
 const REST = 700;
+/// A frame looks after so many milliseconds whether what has gone is to be drawn no longer.
+const EXCHANGE = 100;
 /// Frames that the page may be behind.
 const AHEAD = 6;
 
@@ -47,6 +49,7 @@ class Session {
   private restored = false;             ///< just now
   private followed = false;             ///< the surface has followed changes since it was computed from scratch
   private restTimer: ReturnType<typeof setTimeout>|undefined;
+  private exchange: ReturnType<typeof setTimeout>|undefined;
   private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< of a scan
   private givenBytes = 0;
   private ranges!: Ranges;
@@ -239,7 +242,7 @@ class Session {
     this.wake();
   }
   private restore(): void {
-    this.core.restore();
+    this.core.restore(performance.now() / 1000);
     this.followed = false;
     this.restored = true;
   }
@@ -266,6 +269,8 @@ class Session {
     this.restored = false;
     // What is missing wakes it again.
     this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);
+    clearTimeout(this.exchange);
+    if (this.idle && state.waiting) this.exchange = setTimeout(() => this.wake(), EXCHANGE);
     ++this.undrawn;
     post(
         {

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <terrace/tri/geomorph.hpp>
+
+#include "blocks.hpp"
+#include "scene.hpp"
+
+namespace terrace::viewer {
+
+/// Triangles that have gone and are drawn on while their vertices slide onto what replaces them,
+/// and which is hidden until then. What is exchanged at once is a group.
+///
+/// What has gone is copied to spare slots, which are before those of the model: slot s of the model
+/// is drawn at kVertices + s and kTriangles + s. What waits lies in plain lists: a step looks
+/// through all of it, some tens of nanoseconds per triangle.
+template <class Vertex>
+class Waiting {
+ public:
+  static constexpr std::uint32_t kVertices = 1u << 14, kTriangles = 1u << 15;
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  Waiting(Blocks<Vertex>& vertices, Blocks<SceneTriangle>& triangles)
+      : vertices_(vertices), triangles_(triangles) {}
+
+  [[nodiscard]] bool empty() const { return hidden_.empty() && kept_.empty(); }
+  [[nodiscard]] std::size_t vertex_room() const { return kVertices - anchors_.size(); }
+  [[nodiscard]] std::size_t triangle_room() const { return kTriangles - kept_.size(); }
+
+  // ---- Groups, by numbers that are valid until sweep()
+
+  [[nodiscard]] std::uint32_t open(double begin, double end) {
+    groups_.push_back({begin, end, static_cast<std::uint32_t>(groups_.size()), false});
+    return groups_.back().into;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    Group &one = groups_[a = root(a)], &other = groups_[b = root(b)];
+    one.begin = std::min(one.begin, other.begin);
+    one.end = std::max(one.end, other.end);
+    other.into = a;
+  }
+  [[nodiscard]] double begin(std::uint32_t group) { return groups_[root(group)].begin; }
+  /// At the next sweep().
+  void end(std::uint32_t group) { groups_[root(group)].over = true; }
+  void end_until(double time) {
+    for (std::uint32_t g = 0; g < groups_.size(); ++g) {
+      if (groups_[g].into == g && groups_[g].end <= time) groups_[g].over = true;
+    }
+  }
+  /// Draws what was hidden in the groups that have ended.
+  void sweep() {
+    std::vector<std::uint32_t> number(groups_.size(), kNone);
+    std::vector<Group> left;
+    const auto stays = [&](std::uint32_t& group) {
+      const std::uint32_t g = root(group);
+      if (groups_[g].over) return false;
+      if (number[g] == kNone) {
+        number[g] = static_cast<std::uint32_t>(left.size());
+        left.push_back(groups_[g]);
+        left.back().into = number[g];
+      }
+      group = number[g];
+      return true;
+    };
+    std::size_t count = 0;
+    for (Kept kept : kept_) {
+      if (stays(kept.group)) {
+        kept_[count++] = kept;
+      } else {
+        triangles_.change(kept.slot) = {};
+        free_triangles_.push_back(kept.slot);
+      }
+    }
+    kept_.resize(count);
+    count = 0;
+    for (std::size_t i = 0; i < anchors_.size(); ++i) {
+      Kept kept = kept_vertices_[i];
+      if (stays(kept.group)) {
+        anchors_[count] = anchors_[i];
+        kept_vertices_[count++] = kept;
+      } else {
+        free_vertices_.push_back(kept.slot);
+      }
+    }
+    anchors_.resize(count);
+    kept_vertices_.resize(count);
+    count = 0;
+    for (Hidden hidden : hidden_) {
+      if (hidden.slot == kNone) continue;
+      if (stays(hidden.group)) {
+        index_[hidden.slot] = static_cast<std::uint32_t>(count);
+        hidden_[count++] = hidden;
+      } else {
+        index_[hidden.slot] = kNone;
+        triangles_.change(hidden.slot) = hidden.corners;
+      }
+    }
+    hidden_.resize(count);
+    groups_ = std::move(left);
+  }
+
+  // ---- What waits
+
+  /// The group that hides a triangle; kNone if none does.
+  [[nodiscard]] std::uint32_t hiding(std::uint32_t triangle) const {
+    if (triangle >= index_.size() || index_[triangle] == kNone) return kNone;
+    return hidden_[index_[triangle]].group;
+  }
+  void hide(std::uint32_t group, std::uint32_t triangle, const SceneTriangle& corners) {
+    if (triangle >= index_.size()) index_.resize(triangle + triangle / 8 + 1, kNone);
+    index_[triangle] = static_cast<std::uint32_t>(hidden_.size());
+    hidden_.push_back({triangle, group, corners});
+  }
+  /// A hidden triangle has gone, too.
+  void forget(std::uint32_t triangle) {
+    hidden_[index_[triangle]].slot = kNone;
+    index_[triangle] = kNone;
+  }
+  /// Draws on a vertex; the slot that it is drawn at. Requires room.
+  std::uint32_t keep(std::uint32_t group, const Vertex& vertex, const tri::Anchor& anchor) {
+    const std::uint32_t slot = take(free_vertices_, static_cast<std::uint32_t>(anchors_.size()));
+    vertices_.change(slot) = vertex;
+    anchors_.push_back(anchor);
+    kept_vertices_.push_back({slot, group});
+    return slot;
+  }
+  /// Draws on a triangle. Requires room.
+  void keep(std::uint32_t group, const SceneTriangle& corners) {
+    const std::uint32_t slot = take(free_triangles_, static_cast<std::uint32_t>(kept_.size()));
+    triangles_.change(slot) = corners;
+    kept_.push_back({slot, group});
+  }
+  /// told(slot, group) for the triangles that are drawn on.
+  template <class Told>
+  void for_kept(const Told& told) {
+    for (const Kept& kept : kept_) told(kept.slot, kept.group);
+  }
+  /// Where the vertices that are drawn on slide to, and the slots that they are drawn at.
+  [[nodiscard]] std::vector<tri::Anchor>& anchors() { return anchors_; }
+  [[nodiscard]] std::uint32_t slot_of_anchor(std::size_t i) const { return kept_vertices_[i].slot; }
+
+ private:
+  struct Group {
+    double begin = 0.0, end = 0.0;
+    std::uint32_t into = 0;  ///< itself, or a group that it has joined
+    bool over = false;
+  };
+  struct Kept {
+    std::uint32_t slot, group;
+  };
+  struct Hidden {
+    std::uint32_t slot, group;
+    SceneTriangle corners;
+  };
+  std::uint32_t root(std::uint32_t group) {
+    while (groups_[group].into != group) {
+      group = groups_[group].into = groups_[groups_[group].into].into;
+    }
+    return group;
+  }
+  /// Slots below `used` + the number of free ones have been handed out.
+  static std::uint32_t take(std::vector<std::uint32_t>& free, std::uint32_t used) {
+    if (free.empty()) return used;
+    const std::uint32_t slot = free.back();
+    free.pop_back();
+    return slot;
+  }
+
+  Blocks<Vertex>& vertices_;
+  Blocks<SceneTriangle>& triangles_;
+  std::vector<Group> groups_;
+  std::vector<Kept> kept_, kept_vertices_;  ///< triangles; vertices, beside anchors_
+  std::vector<tri::Anchor> anchors_;
+  std::vector<Hidden> hidden_;
+  std::vector<std::uint32_t> index_;  ///< in hidden_, by drawn slot of a triangle
+  std::vector<std::uint32_t> free_vertices_, free_triangles_;
+};
+
+}  // namespace terrace::viewer
