@@ -81,7 +81,7 @@ class Geomorph {
   /// Replaces slides and parts. with_removed: false leaves `removed` empty, for renderers that do
   /// not draw what has gone. anchors: of earlier steps; those whose triangle has gone are moved to
   /// what replaces it, where their place is projected likewise. O(n log n) in the size of the
-  /// delta, 0.2 us per vertex in space. Throws std::invalid_argument for a delta over the plane
+  /// delta, 0.7 us per vertex in space. Throws std::invalid_argument for a delta over the plane
   /// without heights.
   void make(const Model& model, const typename Model::Delta& delta, bool with_removed = true,
             std::span<Anchor> anchors = {});
