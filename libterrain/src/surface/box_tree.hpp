@@ -5,14 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "surface/store_window.hpp"
 
 namespace terrace::terrain {
 
-/// Numbered boxes in a tree, halved across the longer side of what is around them.
+/// Numbered boxes in a tree, which is good where boxes that follow each other lie together.
 class BoxTree {
  public:
   struct Item {
@@ -26,7 +25,7 @@ class BoxTree {
     nodes_.clear();
     return items_;
   }
-  /// O(n log n).
+  /// O(n).
   void build() {
     if (!items_.empty()) add(0, static_cast<std::uint32_t>(items_.size()));
   }
@@ -60,30 +59,30 @@ class BoxTree {
     std::uint32_t next = 0;
   };
 
-  void add(std::uint32_t begin, std::uint32_t end) {
+  /// Returns the box around the items.
+  StoredBox add(std::uint32_t begin, std::uint32_t end) {
     constexpr double kFar = std::numeric_limits<double>::infinity();
     StoredBox box{{kFar, kFar}, {-kFar, -kFar}};
-    const std::span<Item> items(items_.data() + begin, end - begin);
-    for (const Item& item : items) {
+    const auto include = [&box](const StoredBox& other) {
       for (std::size_t k = 0; k < 2; ++k) {
-        box.min[k] = std::min(box.min[k], item.box.min[k]);
-        box.max[k] = std::max(box.max[k], item.box.max[k]);
+        box.min[k] = std::min(box.min[k], other.min[k]);
+        box.max[k] = std::max(box.max[k], other.max[k]);
       }
-    }
+    };
     const std::size_t at = nodes_.size();
-    const bool is_leaf = items.size() <= kItemsPerLeaf;
-    nodes_.push_back({box, begin, is_leaf ? end : begin, 0});
-    if (!is_leaf) {
-      const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
-      const std::uint32_t half = (end - begin) / 2;
-      std::nth_element(
-          items.begin(), items.begin() + half, items.end(), [axis](const Item& a, const Item& b) {
-            return a.box.min[axis] + a.box.max[axis] < b.box.min[axis] + b.box.max[axis];
-          });
-      add(begin, begin + half);
-      add(begin + half, end);
+    nodes_.push_back({});
+    if (end - begin <= kItemsPerLeaf) {
+      for (std::uint32_t i = begin; i < end; ++i) include(items_[i].box);
+      nodes_[at].begin = begin;
+      nodes_[at].end = end;
+    } else {
+      const std::uint32_t middle = begin + (end - begin) / 2;
+      include(add(begin, middle));
+      include(add(middle, end));
     }
+    nodes_[at].box = box;
     nodes_[at].next = static_cast<std::uint32_t>(nodes_.size());
+    return box;
   }
 
   std::vector<Item> items_;

@@ -199,7 +199,8 @@ class PointWindow {
   std::vector<std::uint32_t> chosen_;
   BoxTree outer_tree_, open_tree_;  ///< of outer_ that inner_ does not hold; of frontier_.open()
   std::size_t read_in_trees_ = 0;   ///< so many were read when the trees were made
-  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< of pending_
+  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< of pending_, or of clusters
+  std::size_t clusters_at_once_ = 1;                         ///< for a suspect
   std::vector<double> reaches_;
   Triangulation::Changes changes_;
   // A vertex near each cell of a grid over the box.

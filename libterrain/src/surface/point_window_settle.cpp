@@ -5,12 +5,13 @@
 #include <limits>
 #include <span>
 
+#include <terrace/tri/predicates.hpp>
+
 #include "surface/point_window.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-constexpr std::uint32_t kNoOpen = 0xFFFFFFFF;
 /// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
 constexpr std::size_t kPointsPerGroup = 16;
 /// Share of the circles reaching over the border that a wider border is to hold.
@@ -18,6 +19,8 @@ constexpr double kWidened = 0.95;
 /// Each widening is at most this share of the window's longer side.
 constexpr double kMostWidened = 0.03;
 constexpr unsigned kMostTimesWidened = 3;
+/// Clusters that are read at once for a suspect double after so many rounds, so many times.
+constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
 /// For these each point is looked for by itself.
 constexpr std::size_t kFewSuspects = 12;
 
@@ -61,10 +64,13 @@ void PointWindow::examine(tri::TriangleId triangle) {
 }
 
 void PointWindow::settle() {
+  clusters_at_once_ = 1;
   triangulation_.start_journal();
   examine_all();
   for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) store_.check_stop();
-  while (add_missing()) {
+  for (unsigned round = 1; add_missing(); ++round) {
+    // Where one cluster after another has nothing, more are read at once.
+    clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMostDoublings);
     store_.check_stop();
     insert_taken();
     examine_changes();
@@ -289,6 +295,19 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   const CircleCover& cover = suspect.cover;
   const std::array<Point2, 3> corner = corners(suspect.triangle);
   const StoredBox bounds = cover.bounds();
+  const Point2 &from = corner[(suspect.edge + 1) % 3], &to = corner[(suspect.edge + 2) % 3];
+  const auto meets_cover = [&](const StoredBox& box) {
+    if (!bounds.meets(box) || !cover.meets(box)) return false;
+    if (suspect.edge == Suspect::kNone) return true;
+    // On the line of an edge of the hull only what lies between its ends is missing: a straight
+    // border has many points on it.
+    const Point2 outermost{to[1] > from[1] ? box.max[0] : box.min[0],
+                           to[0] > from[0] ? box.min[1] : box.max[1]};
+    if (tri::orientation(from, to, outermost) < 0) return true;
+    return StoredBox{{std::min(from[0], to[0]), std::min(from[1], to[1])},
+                     {std::max(from[0], to[0]), std::max(from[1], to[1])}}
+        .meets(box);
+  };
   // Take the point farthest inside among those that were read: it leaves the smallest remainder.
   std::size_t point = pending_.size();
   double depth = std::numeric_limits<double>::infinity();
@@ -300,13 +319,12 @@ bool PointWindow::find_missing(const Suspect& suspect) {
     const StoredBox box{p.place, p.place};
     const double d = cover.depth(box);
     if (point < pending_.size() && !(d < depth)) return;
-    if (!bounds.meets(box) || !cover.meets(box)) return;
+    if (!meets_cover(box)) return;
     point = at;
     depth = d;
   };
   const auto may_hold = [&](const StoredBox& box) {
-    return bounds.meets(box) && cover.meets(box) &&
-           !(point < pending_.size() && cover.least_depth(box) > depth);
+    return meets_cover(box) && !(point < pending_.size() && cover.least_depth(box) > depth);
   };
   outer_tree_.visit(may_hold, [&](std::uint32_t number) {
     Outer& outer = outer_[number];
@@ -323,28 +341,26 @@ bool PointWindow::find_missing(const Suspect& suspect) {
     take(pending_[point]);
     return true;
   }
-  // Else of the clusters that may hold some one of the highest level.
+  // Else of the clusters of the highest level that may hold some those where most does.
   const auto open = frontier_.open();
-  std::uint32_t best = kNoOpen;
-  const auto look_at = [&](std::uint32_t k) {
-    if (best != kNoOpen && open[k].level < open[best].level) return;
-    const double d = cover.depth(open[k].box);
-    if (best != kNoOpen && open[k].level == open[best].level && !(d < depth)) return;
-    best = k;
-    depth = d;
-  };
-  const auto meets_cover = [&](const StoredBox& box) {
-    return bounds.meets(box) && cover.meets(box);
-  };
-  open_tree_.visit(meets_cover, look_at);
-  if (best == kNoOpen) return false;
-  chosen_.push_back(best);
-  if (cover.has_plane && !cover.has_disk && cover.plane.grazes(open[best].box)) {
-    // Hardly anything lies beyond this edge of the hull, but on its line: on a straight border,
-    // much. None of that makes the plane smaller, so all of it has to be looked into.
-    open_tree_.visit(meets_cover, [&](std::uint32_t k) {
-      if (open[k].level == open[best].level) chosen_.push_back(k);
-    });
+  unsigned level = 0;
+  by_distance_.clear();
+  open_tree_.visit(meets_cover, [&](std::uint32_t k) {
+    if (open[k].level < level) return;
+    if (open[k].level > level) by_distance_.clear();
+    level = open[k].level;
+    by_distance_.emplace_back(cover.depth(open[k].box), k);
+  });
+  if (by_distance_.empty()) return false;
+  std::size_t count = std::min(clusters_at_once_, by_distance_.size());
+  const auto behind = by_distance_.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(by_distance_.begin(), behind - 1, by_distance_.end());
+  const StoredBox& best = open[std::min_element(by_distance_.begin(), behind)->second].box;
+  // Hardly anything lies beyond an edge of the hull, but on its line: on a straight border, much.
+  // None of that makes the plane smaller, so all of it has to be looked into.
+  if (cover.has_plane && !cover.has_disk && cover.plane.grazes(best)) count = by_distance_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    chosen_.push_back(static_cast<std::uint32_t>(by_distance_[i].second));
   }
   return true;
 }
