@@ -54,7 +54,8 @@ class PointWindow {
   /// those in a border as wide as most circumcircles reach over it; then, while a triangle that
   /// meets the box has a circumcircle, or a hull edge that the box sees from outside has a
   /// half-plane, in which a point may be missing, adds one: of what was read, or else of the
-  /// clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids and
+  /// clusters whose boxes it meets, coarse levels first, and the more at once the longer nothing is
+  /// found. So no width is guessed, and voids and
   /// hulls cost a few clusters of coarse levels more. About 0.4 us per point in the box. Clusters
   /// of unordered points overlap, and all that meet the box are read, 30 ns per point: the larger
   /// the box, the less they count. A box that holds the store has nothing to settle.
