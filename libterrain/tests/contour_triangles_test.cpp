@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <random>
 #include <set>
@@ -28,6 +29,8 @@ using PlaneEdge = std::pair<Point2, Point2>;
 struct Surface {
   std::vector<Triangle> triangles;
   std::vector<Point2> points;
+  tri::Delaunay2<double> whole;  ///< of which these are the triangles, in order
+  std::vector<double> heights;   ///< by slot
 };
 
 /// Points in a square of side 100 at an offset. kind 0: anywhere; 1: whole numbers, few heights; 2:
@@ -47,9 +50,10 @@ Surface random_surface(std::uint64_t seed, int kind, std::size_t count, double i
     const double height = 20 * std::sin(p[0] / 9) + 20 * std::cos(p[1] / 13) + 3 * unit();
     heights.push_back(kind == 1 ? std::floor(height / 8) * 4 : height);
   }
-  tri::Delaunay2<double> whole;
+  tri::Delaunay2<double>& whole = surface.whole;
   const std::vector<tri::VertexId> vertices = whole.build(surface.points);
-  std::vector<double> height_of(whole.vertex_slots());
+  std::vector<double>& height_of = surface.heights;
+  height_of.resize(whole.vertex_slots());
   for (std::size_t i = count; i-- > 0;) height_of[tri::slot(vertices[i])] = heights[i];
   const ContourLevels levels(interval);
   for (const tri::TriangleId id : whole.all_triangles()) {
@@ -197,6 +201,68 @@ TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
       EXPECT_LE(2 * open, ends);
       if (kind != 1) {
         EXPECT_EQ(2 * open, ends);
+      }
+    }
+  }
+}
+
+/// As draw() does, each part by a tracer.
+std::vector<ContourLine> trace(const Surface& surface, const Parts& parts, double interval,
+                               const std::function<bool(tri::TriangleId)>& wanted) {
+  const tri::Delaunay2<double>& whole = surface.whole;
+  const ContourLevels levels(interval);
+  std::vector<std::int64_t> level_of(whole.vertex_slots());
+  std::vector<std::uint32_t> part_of(whole.vertex_slots());
+  for (const tri::VertexId v : whole.all_vertices()) {
+    level_of[tri::slot(v)] = levels.at_or_above(surface.heights[tri::slot(v)]);
+    part_of[tri::slot(v)] = parts.part_of(whole.point(v));
+  }
+  std::vector<std::vector<tri::TriangleId>> by_part(parts.count());
+  for (const tri::TriangleId id : whole.all_triangles()) {
+    std::uint32_t part = kNoContourPart;
+    std::set<std::int64_t> different;
+    for (const tri::VertexId v : whole.vertices(id)) {
+      part = std::min(part, part_of[tri::slot(v)]);
+      different.insert(level_of[tri::slot(v)]);
+    }
+    if (different.size() > 1 && wanted(id)) by_part[part].push_back(id);
+  }
+  std::vector<ContourLine> lines;
+  ContourTriangles contours(interval, [&](const ContourLine& line) { lines.push_back(line); });
+  PartTracer tracer(levels, whole, surface.heights, level_of, part_of);
+  for (const std::vector<tri::TriangleId>& part : by_part) contours.add(tracer.trace(part));
+  EXPECT_EQ(contours.open_points(), 0u);
+  contours.finish();
+  return lines;
+}
+
+TEST(PartTracer, FindsTheLinesThatSegmentsMakeInTheirOrder) {
+  for (std::uint64_t seed = 51; seed <= 74; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const int kind = static_cast<int>(seed % 4);
+    const double interval = seed % 3 == 0 ? 0.5 : kind == 1 ? 4 : 2;
+    const Surface surface = random_surface(seed, kind, 60 + 40 * (seed - 50), interval);
+    for (const std::uint64_t left_out : {1000000U, 10U, 2U}) {
+      const auto wanted = [&](tri::TriangleId id) {
+        return tri::slot(id) * 2654435761U % 1000003U % left_out != 0;
+      };
+      std::vector<Triangle> triangles;
+      std::size_t at = 0;
+      for (const tri::TriangleId id : surface.whole.all_triangles()) {
+        if (wanted(id)) triangles.push_back(surface.triangles[at]);
+        ++at;
+      }
+      for (const std::uint32_t along : {1U, 3U, 9U}) {
+        SCOPED_TRACE(std::to_string(along) + " parts along a side");
+        const Parts parts(surface.points, along);
+        const DrawnParts drawn = draw(triangles, parts, interval);
+        const std::vector<ContourLine> traced = trace(surface, parts, interval, wanted);
+        ASSERT_EQ(traced.size(), drawn.lines.size());
+        for (std::size_t i = 0; i < traced.size(); ++i) {
+          ASSERT_EQ(traced[i].level, drawn.lines[i].level);
+          ASSERT_EQ(traced[i].closed, drawn.lines[i].closed);
+          ASSERT_EQ(traced[i].points, drawn.lines[i].points);
+        }
       }
     }
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <random>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -121,6 +122,106 @@ TEST(LineJoiner, EmitsOpenLinesInTheOrderOfTheirFirstSegments) {
   add(3, 10);  // joins the last to the first, whose number stays
   joiner.emit_whole([](const Crossing&) { return false; });
   EXPECT_EQ(first, (std::vector<double>{20, 1, 30}));
+}
+
+/// Joins segments first, second, ... of `segments` to stretches, and adds these.
+template <class Joiner>
+void add_as_stretches(Joiner& joiner, std::span<const JoinerSegment> segments) {
+  std::map<std::uint64_t, std::size_t> begins, ends;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    begins[segments[i].from.edge] = i;
+    ends[segments[i].to.edge] = i;
+  }
+  struct Found {
+    std::vector<std::size_t> segments;
+    bool closed = false;
+    std::size_t first = 0, last = 0;
+    std::uint32_t number = 0;
+  };
+  std::vector<Found> all;
+  std::vector<bool> done(segments.size(), false);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (done[i]) continue;
+    Found found;
+    std::size_t at = i;
+    while (ends.contains(segments[at].from.edge) && !found.closed) {
+      at = ends[segments[at].from.edge];
+      found.closed = at == i;
+    }
+    found.first = found.last = at;
+    while (!done[at]) {
+      done[at] = true;
+      found.segments.push_back(at);
+      found.first = std::min(found.first, at);
+      found.last = std::max(found.last, at);
+      if (begins.contains(segments[at].to.edge)) at = begins[segments[at].to.edge];
+    }
+    all.push_back(found);
+  }
+  std::sort(all.begin(), all.end(),
+            [](const Found& a, const Found& b) { return a.first < b.first; });
+  std::uint32_t open = 0;
+  for (Found& found : all) {
+    if (!found.closed) found.number = open++;
+  }
+  std::sort(all.begin(), all.end(), [](const Found& a, const Found& b) { return a.last < b.last; });
+  for (Found& found : all) {
+    const auto last = std::find(found.segments.begin(), found.segments.end(), found.last);
+    const auto behind = static_cast<std::size_t>(last - found.segments.begin()) + 1;
+    if (found.closed) {
+      std::rotate(found.segments.begin(), last + 1, found.segments.end());
+    }
+    const JoinerSegment &begin = segments[found.segments.front()],
+                        &end = segments[found.segments.back()];
+    std::vector<Point2> points{place_of(begin.from.edge)};
+    for (const std::size_t k : found.segments) points.push_back(place_of(segments[k].to.edge));
+    if (found.closed) {
+      joiner.pass_closed(begin.from.level, points);
+    } else {
+      joiner.add({begin.from, end.to, points, found.number, behind});
+    }
+  }
+  joiner.end_of_stretches(open);
+}
+
+TEST(LineJoiner, StretchesMakeTheLinesOfTheirSegments) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    std::vector<ContourLine> lines;
+    const std::vector<JoinerSegment> segments = shuffled_segments(random, lines);
+    std::vector<ContourLine> one_by_one, as_stretches;
+    LineJoiner<Crossing, FewValues> singly(
+        [&](ContourLine&& line) { one_by_one.push_back(std::move(line)); });
+    LineJoiner<Crossing, FewValues> together(
+        [&](ContourLine&& line) { as_stretches.push_back(std::move(line)); });
+    for (std::size_t begin = 0, end = 0; begin < segments.size(); begin = end) {
+      end = std::min(begin + 1 + random() % 200, segments.size());
+      for (std::size_t i = begin; i < end; ++i) {
+        singly.add(segments[i].from, place_of(segments[i].from.edge), segments[i].to,
+                   place_of(segments[i].to.edge));
+      }
+      add_as_stretches(together, std::span(segments).subspan(begin, end - begin));
+      // What has no end in the segments to come is whole.
+      std::map<std::uint64_t, int> later;
+      for (std::size_t i = end; i < segments.size(); ++i) {
+        ++later[segments[i].from.edge];
+        ++later[segments[i].to.edge];
+      }
+      const auto goes_on = [&](const Crossing& c) { return later.contains(c.edge); };
+      singly.emit_whole(goes_on);
+      together.emit_whole(goes_on);
+      ASSERT_EQ(together.open_points(), singly.open_points());
+      ASSERT_EQ(together.segments(), singly.segments());
+    }
+    ASSERT_EQ(one_by_one.size(), lines.size());
+    ASSERT_EQ(as_stretches.size(), lines.size());
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      EXPECT_EQ(as_stretches[i].level, one_by_one[i].level);
+      EXPECT_EQ(as_stretches[i].closed, one_by_one[i].closed);
+      EXPECT_EQ(as_stretches[i].points, one_by_one[i].points);
+    }
+  }
 }
 
 TEST(LineJoiner, TellsOfTooManyPoints) {

@@ -130,6 +130,11 @@ void Delaunay2<Coord, Metric>::clear() {
 }
 
 template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::restart() {
+  impl_->mesh.restart();
+}
+
+template <class Coord, class Metric>
 void Delaunay2<Coord, Metric>::reserve(std::size_t vertices) {
   check_count(0, vertices);
   impl_->mesh.point.reserve(vertices + 1);

@@ -10,8 +10,8 @@
 #include <utility>
 
 /// Growing arrays of plain data for the triangulation: unlike std::vector they leave new elements
-/// uninitialised, grow by an eighth without a second copy if the system can move pages, and use
-/// huge pages once they are large (a sixth faster, as accesses are scattered).
+/// uninitialised, and once they are large they grow by an eighth without a second copy if the system
+/// can move pages, and use huge pages (a sixth faster, as accesses are scattered).
 
 namespace terrace::tri {
 
@@ -77,10 +77,11 @@ class Pool {
 
  private:
   [[nodiscard]] std::size_t grown() const {
-    if (capacity_ < 4096) return 2 * capacity_ + 16;
-    const std::size_t eighth = capacity_ + capacity_ / 8;
-    if (eighth * sizeof(T) < kHugePage) return eighth;
+    // What is smaller than a huge page is copied when it grows, and its pages are new each time.
+    const std::size_t doubled = 2 * capacity_ + 16;
+    if (doubled * sizeof(T) < kHugePage) return doubled;
     // Grows by whole huge pages: memory first used as small pages stays in them.
+    const std::size_t eighth = capacity_ + capacity_ / 8;
     const std::size_t whole = eighth * sizeof(T) / kHugePage * kHugePage / sizeof(T);
     return whole > capacity_ ? whole : whole + kHugePage / sizeof(T);
   }

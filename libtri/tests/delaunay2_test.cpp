@@ -223,6 +223,36 @@ TYPED_TEST(Delaunay2Test, JournalTellsTheNetDifference) {
   }
 }
 
+TYPED_TEST(Delaunay2Test, RestartedIsAsNew) {
+  Delaunay2<TypeParam> triangulation;
+  std::uint64_t seed = 20;
+  for (const PointSet kind : kPointSets) {
+    SCOPED_TRACE(name(kind));
+    const auto points = make_points<TypeParam>(kind, 150, ++seed);
+    triangulation.build(points);
+    Delaunay2<TypeParam> fresh;
+    fresh.build(points);
+    ASSERT_EQ(find_fault(triangulation), "");
+    ASSERT_EQ(triangulation.hash(), fresh.hash());
+    // In the midst of changes.
+    triangulation.start_journal();
+    std::vector<VertexId> some;
+    for (const VertexId v : triangulation.all_vertices()) {
+      if (some.size() < 40) some.push_back(v);
+    }
+    triangulation.remove(std::span<const VertexId>(some));
+    const std::size_t held = triangulation.memory_bytes();
+    triangulation.restart();
+    ASSERT_EQ(find_fault(triangulation), "");
+    ASSERT_EQ(triangulation.vertex_count(), 0u);
+    ASSERT_EQ(triangulation.triangle_count(), 0u);
+    ASSERT_LE(triangulation.memory_bytes(), held);
+    triangulation.insert(points.front());
+    ASSERT_EQ(triangulation.vertex_count(), 1u);
+    triangulation.restart();
+  }
+}
+
 TYPED_TEST(Delaunay2Test, LocateAndNearestAgreeWithBruteForce) {
   using Point = typename Delaunay2<TypeParam>::Point;
   for (const PointSet kind :

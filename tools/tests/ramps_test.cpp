@@ -47,6 +47,10 @@ TEST(Ramps, TheViewerHasThoseOfTheCommand) {
     EXPECT_EQ(sea_colour(share), mixed(ramps["sea"], share)) << share;
     EXPECT_EQ(slope_colour(60 * share), mixed(ramps["slope"], 60 * share)) << share;
   }
+  for (unsigned level = 0; level <= 8; ++level) {
+    EXPECT_EQ(store_level_colour(level, 8), mixed(ramps["levels"], 1 - level / 8.0)) << level;
+  }
+  EXPECT_EQ(store_level_colour(0, 0), mixed(ramps["levels"], 1));
   const Json& categories = ramps["categories"];
   for (std::size_t i = 0; i < 3 * categories.size(); ++i) {
     EXPECT_EQ(Json(category_colour(static_cast<std::int64_t>(i))),

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "terrace/terrain/region.hpp"
+
 namespace terrace::terrain {
 
 /// The multiples of an interval, and where they cross triangles: a level crosses an edge if one end
@@ -49,6 +51,16 @@ class ContourLevels {
         segment(level, *corner[alone], previous, next);
       }
     }
+  }
+
+  /// Where a level crosses the edge between p and q, which have these heights: the same bits for
+  /// both triangles at the edge.
+  [[nodiscard]] Point2 place(std::int64_t level, const Point2& p, double p_height, const Point2& q,
+                             double q_height) const {
+    if (q < p) return place(level, q, q_height, p, p_height);
+    const double t = share(level, p_height, q_height);
+    // An end at the level is met exactly, from whatever side.
+    return t == 1 ? q : Point2{p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])};
   }
 
   /// How far from `from` to `to` the level lies, 0 to 1; the edge must be crossed.

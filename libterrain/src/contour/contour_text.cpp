@@ -91,16 +91,18 @@ void ContourText::flush() {
     points += lines_[i].points.size();
     if (points * pieces >= points_ * begin.size()) begin.push_back(i + 1);
   }
-  std::vector<std::string> texts(begin.size() - 1);
-  parallel_for(texts.size(), threads_, [&](unsigned, std::size_t piece) {
+  texts_.resize(std::max(texts_.size(), begin.size() - 1));
+  parallel_for(begin.size() - 1, threads_, [&](unsigned, std::size_t piece) {
     std::vector<Point2> places;
+    std::string& text = texts_[piece];
+    text.clear();
     for (std::size_t i = begin[piece]; i < begin[piece + 1]; ++i) {
-      texts[piece] += i == 0 && first_ ? "\n" : ",\n";
-      append(texts[piece], lines_[i], places);
+      text += i == 0 && first_ ? "\n" : ",\n";
+      append(text, lines_[i], places);
     }
   });
   if (first_) write_(kContourHead);
-  for (const std::string& text : texts) write_(text);
+  for (std::size_t piece = 0; piece + 1 < begin.size(); ++piece) write_(texts_[piece]);
   first_ = false;
   lines_.clear();
   points_ = 0;

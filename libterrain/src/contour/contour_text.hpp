@@ -48,6 +48,7 @@ class ContourText {
   ContourOutcome outcome_;
   std::vector<ContourLine> lines_;  ///< not written yet
   std::size_t points_ = 0;          ///< of these
+  std::vector<std::string> texts_;  ///< of pieces; their memory is used again
   bool first_ = true;
 };
 

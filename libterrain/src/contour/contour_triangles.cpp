@@ -15,7 +15,7 @@ ContourTriangles::ContourTriangles(double interval, std::function<void(ContourLi
                                    OpenLineLimit limit)
     : levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
 
-std::size_t ContourTriangles::Hash::operator()(const Crossing& c) const {
+std::size_t ContourTriangles::Hash::operator()(const ContourCrossing& c) const {
   // Adding 0 makes 0 of -0, which is equal to it.
   const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v + 0.0); };
   std::uint64_t hash = static_cast<std::uint64_t>(c.level) * 0x9E3779B97F4A7C15U;
@@ -27,14 +27,8 @@ std::size_t ContourTriangles::Hash::operator()(const Crossing& c) const {
 
 void ContourTriangles::join(std::span<const Triangle> triangles) {
   const auto crossing = [&](std::int64_t level, const Corner& p, const Corner& q) {
-    // Always from the same end, so that both triangles at an edge find the same place.
-    const Corner &a = p.place < q.place ? p : q, &b = p.place < q.place ? q : p;
-    const double t = levels_.share(level, a.height, b.height);
-    // An end at the level is met exactly, from whatever side.
-    const Point2 place = t == 1 ? b.place
-                                : Point2{a.place[0] + t * (b.place[0] - a.place[0]),
-                                         a.place[1] + t * (b.place[1] - a.place[1])};
-    return std::pair(Crossing{level, a.place, b.place, std::min(a.part, b.part)}, place);
+    return std::pair(ContourCrossing(level, p.place, q.place, std::min(p.part, q.part)),
+                     levels_.place(level, p.place, p.height, q.place, q.height));
   };
   for (const Triangle& t : triangles) {
     ContourLevels::cross(
@@ -49,13 +43,31 @@ void ContourTriangles::join(std::span<const Triangle> triangles) {
 
 void ContourTriangles::add(std::span<const Triangle> triangles) {
   join(triangles);
-  joiner_.emit_whole([&](const Crossing& c) { return c.last > part_; });
+  end_part();
+}
+
+void ContourTriangles::add(const PartLines& part) {
+  for (const PartLines::Line& line : part.lines) {
+    const std::span<const Point2> points(part.points.data() + line.begin, line.end - line.begin);
+    if (line.open == PartLines::kClosed) {
+      joiner_.pass_closed(line.level, points);
+    } else {
+      const PartLines::Open& open = part.open[line.open];
+      joiner_.add({open.from, open.to, points, open.number, open.last});
+    }
+  }
+  joiner_.end_of_stretches(part.open.size());
+  end_part();
+}
+
+void ContourTriangles::end_part() {
+  joiner_.emit_whole([&](const ContourCrossing& c) { return c.last > part_; });
   ++part_;
 }
 
 void ContourTriangles::finish(std::span<const Triangle> triangles) {
   join(triangles);
-  joiner_.emit_whole([](const Crossing&) { return false; });
+  joiner_.emit_whole([](const ContourCrossing&) { return false; });
 }
 
 void ContourTriangles::sort(std::span<Triangle> triangles) {

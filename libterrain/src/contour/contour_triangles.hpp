@@ -9,6 +9,7 @@
 
 #include "contour/contour_levels.hpp"
 #include "contour/line_joiner.hpp"
+#include "contour/part_lines.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -22,14 +23,11 @@ namespace terrace::terrain {
 /// first part of one of its ends is. Memory: the lines that are not at their ends.
 class ContourTriangles {
  public:
-  /// The part number of vertices that lie in no part.
-  static constexpr std::uint32_t kNoPart = 0xFFFFFFFFu;
-
   struct Corner {
     Point2 place{};
     double height = 0;
     std::int64_t level = 0;  ///< ContourLevels::at_or_above
-    std::uint32_t part = kNoPart;
+    std::uint32_t part = kNoContourPart;
   };
   using Triangle = std::array<Corner, 3>;  ///< counter-clockwise
 
@@ -40,6 +38,8 @@ class ContourTriangles {
 
   /// The triangles of the next part; those that no level crosses may be left out.
   void add(std::span<const Triangle> triangles);
+  /// The same, of the triangles sorted as sort() does.
+  void add(const PartLines& part);
   /// Those of no part; nothing follows.
   void finish(std::span<const Triangle> triangles = {});
 
@@ -53,23 +53,15 @@ class ContourTriangles {
   [[nodiscard]] std::uint64_t segments() const { return joiner_.segments(); }
 
  private:
-  /// A level on the edge from a to b, a < b.
-  struct Crossing {
-    std::int64_t level = 0;
-    Point2 a{}, b{};
-    std::uint32_t last = kNoPart;  ///< part in which a triangle at the edge may come
-    friend bool operator==(const Crossing& p, const Crossing& q) {
-      return p.level == q.level && p.a == q.a && p.b == q.b;
-    }
-  };
   struct Hash {
-    std::size_t operator()(const Crossing& c) const;
+    std::size_t operator()(const ContourCrossing& c) const;
   };
 
   void join(std::span<const Triangle> triangles);
+  void end_part();
 
   ContourLevels levels_;
-  LineJoiner<Crossing, Hash> joiner_;
+  LineJoiner<ContourCrossing, Hash> joiner_;
   std::uint32_t part_ = 0;  ///< the next one
 };
 

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -26,11 +29,21 @@ struct OpenLineLimit {
   std::function<void()> exceeded{};  ///< called beyond; must throw
 };
 
+/// Segments of a line one after another. Segments have an order; a line that closes begins behind
+/// the last of its segments in that order.
+template <class Crossing>
+struct LineStretch {
+  Crossing from, to;
+  std::span<const Point2> points;  ///< one more than segments
+  std::uint32_t number = 0;        ///< stretches by the first of their segments
+  std::size_t last = 0;            ///< which of the points the last segment leads to
+};
+
 /// Joins directed segments to lines. Crossing says where a segment begins or ends: a level (its
 /// member `level`) on an edge; at most one segment begins there and at most one ends. Lines come
 /// out in an order that depends on the order of the segments alone.
 ///
-/// Two hash look-ups per segment. Memory: the lines that are not whole.
+/// Two hash look-ups per segment or stretch. Memory: the lines that are not whole.
 template <class Crossing, class Hash>
 class LineJoiner {
  public:
@@ -42,56 +55,77 @@ class LineJoiner {
   }
 
   void add(const Crossing& from, Point2 from_place, const Crossing& to, Point2 to_place) {
-    ++segments_;
+    const std::array<Point2, 2> points{from_place, to_place};
+    add({from, to, points, 0, 1});
+    end_of_stretches(1);
+  }
+
+  /// The same as one by one adding the segments of some stretches, in their order. The stretches
+  /// must come in the order of their last segments, numbered from 0 on in that of their first;
+  /// end_of_stretches(how many) must follow.
+  void add(const LineStretch<Crossing>& stretch) {
+    const std::span<const Point2> points = stretch.points;
+    segments_ += points.size() - 1;
     if (open_points_ > limit_.points) limit_.exceeded();
-    const std::uint32_t from_hash = hash_of(from), to_hash = hash_of(to);
-    const std::uint32_t first = take(from, from_hash, kEnd);
-    const std::uint32_t second = take(to, to_hash, kBegin);
+    const std::uint64_t number = next_number_ + stretch.number;
+    const std::uint32_t from_hash = hash_of(stretch.from), to_hash = hash_of(stretch.to);
+    const std::uint32_t first = take(stretch.from, from_hash, kEnd);
+    const std::uint32_t second = take(stretch.to, to_hash, kBegin);
     if (first == kNone && second == kNone) {
       const std::uint32_t fresh = new_line();
-      lines_[fresh] = {from, to, next_number_++, new_point(from_place), new_point(to_place), 2};
-      points_[lines_[fresh].first].next = lines_[fresh].last;
+      lines_[fresh] = {stretch.from, stretch.to, number, 0, 0, 0};
+      lines_[fresh].first = lines_[fresh].last = new_point(points[0]);
+      lines_[fresh].count = 1;
+      ++open_points_;
+      append(fresh, points.subspan(1));
       put(from_hash, fresh, kBegin);
       put(to_hash, fresh, kEnd);
-      open_points_ += 2;
     } else if (second == kNone) {
-      const std::uint32_t added = new_point(to_place);
-      Line& line = lines_[first];
-      points_[line.last].next = added;
-      line.last = added;
-      line.end = to;
-      ++line.count;
-      ++open_points_;
+      append(first, points.subspan(1));
+      lines_[first].end = stretch.to;
+      lines_[first].number = std::min(lines_[first].number, number);
       put(to_hash, first, kEnd);
     } else if (first == kNone) {
-      const std::uint32_t added = new_point(from_place);
+      for (std::size_t i = points.size() - 1; i-- > 0;) {
+        const std::uint32_t added = new_point(points[i]);
+        points_[added].next = lines_[second].first;
+        lines_[second].first = added;
+      }
       Line& line = lines_[second];
-      points_[added].next = line.first;
-      line.first = added;
-      line.begin = from;
-      ++line.count;
-      ++open_points_;
+      line.begin = stretch.from;
+      line.number = std::min(line.number, number);
+      line.count += points.size() - 1;
+      open_points_ += points.size() - 1;
       put(from_hash, second, kBegin);
     } else if (first == second) {
-      const std::uint32_t added = new_point(to_place);
-      Line& line = lines_[first];
-      points_[line.last].next = added;
-      line.last = added;
-      ++line.count;
-      ++open_points_;
+      append(first, points.subspan(1, stretch.last));
+      const std::uint32_t last = lines_[first].last;
+      append(first, points.subspan(stretch.last + 1));
+      turn(lines_[first], last);
       emit(first, true);
     } else {
-      // The line keeps the smaller number.
+      append(first, points.subspan(1, points.size() - 2));
+      // The line keeps the smallest number.
       Line& line = lines_[first];
       Line& rest = lines_[second];
       points_[line.last].next = rest.first;
       line.last = rest.last;
       line.end = rest.end;
       line.count += rest.count;
-      line.number = std::min(line.number, rest.number);
+      line.number = std::min({line.number, rest.number, number});
       slot_of(second, kEnd)->end = first << 1 | kEnd;
       drop_line(second);
     }
+  }
+  void end_of_stretches(std::size_t count) { next_number_ += count; }
+
+  /// A line that is whole and closed, in its place among the stretches.
+  void pass_closed(std::int64_t level, std::span<const Point2> points) {
+    segments_ += points.size() - 1;
+    ContourLine result{level, true, {}};
+    result.points.reserve(points.size());
+    std::unique_copy(points.begin(), points.end(), std::back_inserter(result.points));
+    if (result.points.size() > 1) emit_(std::move(result));
   }
 
   /// Emits the lines of which no end goes on. O(n log n) with n lines that are not whole.
@@ -211,6 +245,31 @@ class LineJoiner {
     lines_[line].count = 0;
     lines_[line].first = free_line_;
     free_line_ = line;
+  }
+
+  void append(std::uint32_t number, std::span<const Point2> points) {
+    for (const Point2& p : points) {
+      const std::uint32_t added = new_point(p);
+      points_[lines_[number].last].next = added;
+      lines_[number].last = added;
+    }
+    lines_[number].count += points.size();
+    open_points_ += points.size();
+  }
+
+  /// Makes a line that ends where it begins do so at one of its points.
+  void turn(Line& line, std::uint32_t point) {
+    if (point == line.last) return;
+    // The first point, which the last one equals, becomes the last.
+    const std::uint32_t dropped = line.first;
+    points_[line.last].next = points_[dropped].next;
+    line.first = point;
+    // point .. last, second .. before point, and a copy of point.
+    std::uint32_t before = line.last;
+    while (points_[before].next != point) before = points_[before].next;
+    points_[dropped].place = points_[point].place;
+    points_[before].next = dropped;
+    line.last = dropped;
   }
 
   /// Its ends are not in the table any more.

@@ -7,11 +7,13 @@
 #include <optional>
 #include <span>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "base/ordered_work.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_triangles.hpp"
+#include "contour/part_lines.hpp"
 #include "surface/point_window.hpp"
 #include "surface/window_tree.hpp"
 
@@ -22,17 +24,21 @@ namespace {
 constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
 /// Several parts are triangulated at once, which costs less per point; a point counts for its share
 /// of the triangulation and of the triangles that wait until lines are drawn.
-constexpr double kMostPointsAtOnce = 1U << 19;
+constexpr double kMostPointsAtOnce = 1U << 17;
 constexpr double kPartsPerThread = 4;
 constexpr double kBytesPerExpected = 3.0 * PointWindow::kBytesPerPoint + 3 * 240;
+/// Lines that wait to be drawn may have this share of a thread's memory; where levels are closer,
+/// triangles wait instead.
+constexpr std::uint64_t kShareOfLines = 8;
+constexpr std::uint64_t kBytesPerSegment = 64;
 
 using Triangle = ContourTriangles::Triangle;
-constexpr std::uint32_t kNoPart = ContourTriangles::kNoPart;
+constexpr std::uint32_t kNoPart = kNoContourPart;
 
-/// Triangles that levels cross: those of each of some parts, and such as have no vertex in any part
-/// at work.
+/// The lines of each of some parts, or its triangles that levels cross; and such triangles as have
+/// no vertex in any part at work.
 struct Crossed {
-  std::vector<std::vector<Triangle>> own;
+  std::vector<std::variant<PartLines, std::vector<Triangle>>> own;
   std::vector<Triangle> strange;
 };
 
@@ -51,7 +57,8 @@ class PointContours {
         ground_(parts.store),
         levels_(request_.interval),
         tree_(parts.store, request_.level, parts.points_per_part),
-        rank_(tree_.size(), kNoPart) {
+        rank_(tree_.size(), kNoPart),
+        is_selective_(request_.max_edge || request_.region) {
     const stream::Box3& bounds = parts.store.bounds();
     bounds_ = {{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}};
     // So that a triangle meets a box if its middle, which is rounded, lies there.
@@ -79,6 +86,7 @@ class PointContours {
     const std::uint64_t memory = parts_.memory_bytes / 2;
     const auto threads = static_cast<unsigned>(
         std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, parts_.threads));
+    most_segments_ = memory / threads / kShareOfLines / kBytesPerSegment;
     const double most_points =
         std::min({static_cast<double>(memory / threads) / kBytesPerExpected, kMostPointsAtOnce,
                   tree_.part(0).points / (kPartsPerThread * threads)});
@@ -103,8 +111,8 @@ class PointContours {
           return result;
         },
         [&](std::size_t i, const Crossed& triangles) {
-          for (const std::vector<Triangle>& part : triangles.own) {
-            lines.add(part);
+          for (const auto& part : triangles.own) {
+            std::visit([&](const auto& of_part) { lines.add(of_part); }, part);
           }
           // Several parts meet such a one.
           const auto middle =
@@ -158,29 +166,49 @@ class PointContours {
       level_of[tri::slot(vertex)] = levels_.at_or_above(window.height(vertex));
       part_of[tri::slot(vertex)] = rank_[tree_.window_of(whole.point(vertex))];
     }
+    const auto triangle_of = [&](tri::TriangleId id) {
+      Triangle triangle;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const tri::VertexId v = whole.vertices(id)[i];
+        triangle[i] = {whole.point(v), window.height(v), level_of[tri::slot(v)],
+                       part_of[tri::slot(v)]};
+      }
+      return triangle;
+    };
     // The ranks of parts in a box follow each other.
     const std::uint32_t first_rank = rank_[first_at_work(part)];
-    const std::size_t before = result.own.size();
     std::uint32_t count = 0;
     for (std::size_t i = part.first; i < part.end; ++i) count += rank_[i] != kNoPart ? 1U : 0U;
-    result.own.resize(before + count);
+    std::vector<std::vector<tri::TriangleId>> own(count);
+    std::uint64_t segments = 0;
     for (const tri::TriangleId id : whole.all_triangles()) {
       const std::array<tri::VertexId, 3> vertices = whole.vertices(id);
       const auto level = [&](std::size_t i) { return level_of[tri::slot(vertices[i])]; };
       if (level(0) == level(1) && level(0) == level(2)) continue;
-      if (!window.is_certain(id)) continue;
       const auto at = [&](std::size_t i) { return part_of[tri::slot(vertices[i])]; };
       const std::uint32_t first = std::min({at(0), at(1), at(2)});
       const bool is_own = first != kNoPart && first - first_rank < count;
-      if (!is_own && first != kNoPart) continue;
-      Triangle triangle;
-      for (std::size_t i = 0; i < 3; ++i) {
-        triangle[i] = {whole.point(vertices[i]), window.height(vertices[i]), level(i), at(i)};
+      if ((!is_own && first != kNoPart) || !window.is_certain(id)) continue;
+      if (is_selective_ && !wanted(triangle_of(id))) continue;
+      if (is_own) {
+        own[first - first_rank].push_back(id);
+        const auto [low, high] = std::minmax({level(0), level(1), level(2)});
+        segments += static_cast<std::uint64_t>(high - low);
+      } else {
+        result.strange.push_back(triangle_of(id));
       }
-      if (!wanted(triangle)) continue;
-      (is_own ? result.own[before + first - first_rank] : result.strange).push_back(triangle);
     }
-    for (std::size_t i = before; i < result.own.size(); ++i) ContourTriangles::sort(result.own[i]);
+    if (segments <= most_segments_) {
+      PartTracer tracer(levels_, whole, window.heights(), level_of, part_of);
+      for (const auto& ids : own) result.own.emplace_back(tracer.trace(ids));
+    } else {
+      for (const auto& ids : own) {
+        std::vector<Triangle> triangles;
+        for (const tri::TriangleId id : ids) triangles.push_back(triangle_of(id));
+        ContourTriangles::sort(triangles);
+        result.own.emplace_back(std::move(triangles));
+      }
+    }
   }
 
   const ContourParts& parts_;
@@ -191,6 +219,8 @@ class PointContours {
   StoredBox bounds_;
   std::vector<std::uint32_t> rank_;  ///< by part: which of those that meet the region it is
   std::uint32_t parts_at_work_ = 0;
+  bool is_selective_;                ///< not all triangles are wanted
+  std::uint64_t most_segments_ = 0;  ///< whose lines may wait, of parts triangulated at once
 };
 
 }  // namespace

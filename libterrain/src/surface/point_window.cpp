@@ -17,13 +17,14 @@ namespace {
 constexpr double kMargin = 3;
 /// The margin is at most this share of the longer side.
 constexpr double kMostMargin = 0.05;
-/// Points to begin with.
-constexpr std::size_t kFirstPoints = 48;
 /// Peak bytes per point that was read and lies around; a point that is inserted has its place,
 /// height and origin twice while it is, 20 for sorting and then 68 in the triangulation, states,
 /// a hint and a suspect's share.
 constexpr std::uint64_t kBytesRead = 2 * 32;
 constexpr std::uint64_t kBytesBefore = std::uint64_t{8} << 20;  ///< what reads the store
+/// Memory of points that were taken is kept for those of the next window within this share of what
+/// is allowed: pages are expensive.
+constexpr std::uint64_t kShareKept = 16;
 
 }  // namespace
 
@@ -52,7 +53,8 @@ void PointWindow::check_memory(std::size_t more) const {
   const std::uint64_t inserted = triangulation_.vertex_count() + places_.size() + more;
   const std::uint64_t needed = around * kBytesRead + inserted * kBytesPerPoint + kBytesBefore +
                                frontier_.memory_bytes() + outer_.capacity() * sizeof(Outer) +
-                               groups_.capacity() * sizeof(Group);
+                               groups_.capacity() * sizeof(Group) + outer_tree_.memory_bytes() +
+                               open_tree_.memory_bytes();
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
   throw NoRoom({.file = store_.path().string(),
                 .where = {},
@@ -124,6 +126,11 @@ void PointWindow::take_nearest(std::size_t count) {
   for (std::size_t k = 0; k < count; ++k) take(pending_[by_distance_[k].second]);
 }
 
+bool PointWindow::keeps_taken() const {
+  return taken_.capacity() * (sizeof(Triangulation::Point) + sizeof(Taken)) <=
+         memory_bytes_ / kShareKept;
+}
+
 void PointWindow::insert_taken() {
   check_memory(0);
   inserted_.clear();
@@ -131,7 +138,11 @@ void PointWindow::insert_taken() {
   const bool is_first = triangulation_.vertex_count() == 0;
   if (is_first) {
     built = triangulation_.build(places_);
-    std::vector<Triangulation::Point>().swap(places_);  // may be large
+    if (keeps_taken()) {
+      places_.clear();
+    } else {
+      std::vector<Triangulation::Point>().swap(places_);
+    }
   } else {
     inserted_.resize(places_.size());
     triangulation_.insert(places_, inserted_);
@@ -145,16 +156,15 @@ void PointWindow::insert_taken() {
     origins_[at] = taken_[i].origin;
     heights_[at] = taken_[i].height;
   }
-  if (is_first) {
-    std::vector<Taken>().swap(taken_);
-  } else {
+  if (!is_first || keeps_taken()) {
     taken_.clear();
+  } else {
+    std::vector<Taken>().swap(taken_);
   }
 }
 
 void PointWindow::clear() {
-  triangulation_.stop_journal();
-  triangulation_.clear();
+  triangulation_.restart();
   is_whole_ = false;
   heights_.clear();
   origins_.clear();
@@ -166,6 +176,7 @@ void PointWindow::clear() {
   left_ = 0;
   outer_.clear();
   groups_.clear();
+  read_in_trees_ = 0;
   suspects_.clear();
   suspect_triangles_ = 0;
   hull_.clear();

@@ -12,6 +12,7 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/interpolation.hpp>
 
+#include "surface/box_tree.hpp"
 #include "surface/circle_cover.hpp"
 #include "surface/cluster_frontier.hpp"
 #include "surface/lattice_surface.hpp"
@@ -53,7 +54,8 @@ class PointWindow {
   /// those in a border as wide as most circumcircles reach over it; then, while a triangle that
   /// meets the box has a circumcircle, or a hull edge that the box sees from outside has a
   /// half-plane, in which a point may be missing, adds one: of what was read, or else of the
-  /// clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids and
+  /// clusters whose boxes it meets, coarse levels first, and the more at once the longer nothing is
+  /// found. So no width is guessed, and voids and
   /// hulls cost a few clusters of coarse levels more. About 0.4 us per point in the box. Clusters
   /// of unordered points overlap, and all that meet the box are read, 30 ns per point: the larger
   /// the box, the less they count. A box that holds the store has nothing to settle.
@@ -66,7 +68,7 @@ class PointWindow {
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
   /// Whether it is a triangle of the whole. Requires a living triangle.
   [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
-    return is_whole_ || (states_[tri::slot(triangle)] & kTriangleState) == kCertain;
+    return is_whole_ || state(triangle) == kCertain;
   }
   /// In the store's vertical unit (scale and offset of the channel applied).
   [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
@@ -97,6 +99,8 @@ class PointWindow {
     std::uint32_t cluster = kNowhere, index = 0;
   };
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
+  /// Points to begin with, if need be from around inner_.
+  static constexpr std::size_t kFirstPoints = 48;
   /// What is kept of a point that is to be inserted.
   struct Taken {
     double height = 0;
@@ -115,12 +119,13 @@ class PointWindow {
     StoredBox box;
     std::size_t begin = 0, count = 0, next = 0;
   };
-  /// What lies outside inner_ of one cluster. It is parted into groups when it is first looked
-  /// into.
+  /// What lies outside inner_ of one cluster. What is not taken of it is parted into groups when
+  /// it is first looked into.
   struct Outer {
     StoredBox box;
-    std::size_t begin = 0, count = 0;            ///< in pending_
-    std::size_t first_group = 0, end_group = 0;  ///< equal: not parted yet
+    std::size_t begin = 0, count = 0;  ///< in pending_
+    std::size_t first_group = 0, end_group = 0;
+    bool is_parted = false;
   };
   /// A triangle, or its hull edge, that needs all points in its cover.
   struct Suspect {
@@ -130,7 +135,10 @@ class PointWindow {
     std::uint8_t edge = kNone;
   };
   /// State of a triangle; the bits above tell which edges are certain to be on the hull.
-  enum State : std::uint8_t { kUnknown, kSuspect, kCertain, kTriangleState = 3, kHullEdge = 4 };
+  enum State : std::uint8_t { kCertain, kSuspect, kUnknown, kTriangleState = 3, kHullEdge = 4 };
+  [[nodiscard]] std::uint8_t state(tri::TriangleId triangle) const {
+    return states_[tri::slot(triangle)] & kTriangleState;
+  }
 
   void clear();
   void take(const stream::StoreQuery::Node& node);
@@ -138,6 +146,7 @@ class PointWindow {
   void grow_inner(const StoredBox& box);
   void take_nearest(std::size_t count);
   void insert_taken();
+  [[nodiscard]] bool keeps_taken() const;
   [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
   void check_memory(std::size_t more) const;
   [[nodiscard]] StoredBox with_margin() const;
@@ -145,15 +154,16 @@ class PointWindow {
   void settle();
   void examine_all();
   void examine_changes();
+  void find_hull();
   void examine(tri::TriangleId triangle);
-  void consider(tri::TriangleId triangle, const CircleCover& cover);
   void find_suspect_hull();
   /// Lets inner_ hold most circles of suspects; false: there are few, or it would not help.
   bool widen();
   /// False: nothing is missing.
   bool add_missing();
   bool read_missing();
-  bool find_missing(const Suspect& suspect, bool is_near);
+  bool find_missing(const Suspect& suspect);
+  void make_trees();
   void part(Outer& outer);
   void add_groups(std::size_t begin, std::size_t count);
   [[nodiscard]] CircleCover circle(tri::TriangleId triangle) const;
@@ -187,8 +197,11 @@ class PointWindow {
   std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
   std::size_t suspect_triangles_ = 0;
   std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
-  std::vector<std::uint32_t> open_near_, chosen_;
-  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< of pending_
+  std::vector<std::uint32_t> chosen_;
+  BoxTree outer_tree_, open_tree_;  ///< of outer_ that inner_ does not hold; of frontier_.open()
+  std::size_t read_in_trees_ = 0;   ///< so many were read when the trees were made
+  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< of pending_, or of clusters
+  std::size_t clusters_at_once_ = 1;                         ///< for a suspect
   std::vector<double> reaches_;
   Triangulation::Changes changes_;
   // A vertex near each cell of a grid over the box.

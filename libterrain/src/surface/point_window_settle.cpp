@@ -5,12 +5,13 @@
 #include <limits>
 #include <span>
 
+#include <terrace/tri/predicates.hpp>
+
 #include "surface/point_window.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-constexpr std::uint32_t kNoOpen = 0xFFFFFFFF;
 /// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
 constexpr std::size_t kPointsPerGroup = 16;
 /// Share of the circles reaching over the border that a wider border is to hold.
@@ -18,8 +19,8 @@ constexpr double kWidened = 0.95;
 /// Each widening is at most this share of the window's longer side.
 constexpr double kMostWidened = 0.03;
 constexpr unsigned kMostTimesWidened = 3;
-/// Clusters that most suspects may meet lie within this share of the window's sides.
-constexpr double kNear = 0.05;
+/// Clusters that are read at once for a suspect double after so many rounds, so many times.
+constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
 /// For these each point is looked for by itself.
 constexpr std::size_t kFewSuspects = 12;
 
@@ -49,30 +50,27 @@ CircleCover PointWindow::circle(tri::TriangleId triangle) const {
   return CircleCover::of_triangle(corner[0], corner[1], corner[2]);
 }
 
-void PointWindow::consider(tri::TriangleId triangle, const CircleCover& cover) {
-  std::uint8_t& state = states_[tri::slot(triangle)];
-  if ((state & kTriangleState) != kUnknown) return;
-  if (holds(inner_, cover.bounds())) {
-    state |= kCertain;
-  } else {
-    state |= kSuspect;
-    suspects_.push_back({cover, triangle});
-  }
-}
-
 void PointWindow::examine(tri::TriangleId triangle) {
-  const auto next = triangulation_.neighbours(triangle);
-  if (std::find(next.begin(), next.end(), tri::kNoTriangle) != next.end()) {
-    hull_.push_back(triangle);
+  std::uint8_t& state = states_[tri::slot(triangle)];
+  const CircleCover cover = circle(triangle);
+  if (holds(inner_, cover.bounds())) {
+    state = kCertain;
+  } else if (meets(corners(triangle), box_)) {
+    state = kSuspect;
+    suspects_.push_back({cover, triangle});
+  } else {
+    state = kUnknown;
   }
-  if (meets(corners(triangle), box_)) consider(triangle, circle(triangle));
 }
 
 void PointWindow::settle() {
+  clusters_at_once_ = 1;
   triangulation_.start_journal();
   examine_all();
   for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) store_.check_stop();
-  while (add_missing()) {
+  for (unsigned round = 1; add_missing(); ++round) {
+    // Where one cluster after another has nothing, more are read at once.
+    clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMostDoublings);
     store_.check_stop();
     insert_taken();
     examine_changes();
@@ -80,9 +78,56 @@ void PointWindow::settle() {
   triangulation_.stop_journal();
 }
 
+void PointWindow::find_hull() {
+  if (triangulation_.triangle_count() == 0) return;
+  tri::VertexId least = tri::kNoVertex;
+  Point2 place{};
+  for (const tri::VertexId v : triangulation_.all_vertices()) {
+    const Point2 p = triangulation_.point(v);
+    if (least != tri::kNoVertex && !(p < place)) continue;
+    least = v;
+    place = p;
+  }
+  // Turns about a corner until there is the hull edge that begins there.
+  tri::TriangleId t = triangulation_.triangle_at(least);
+  tri::VertexId about = least;
+  do {
+    while (true) {
+      const auto corner = triangulation_.vertices(t);
+      const auto at =
+          static_cast<std::size_t>(std::find(corner.begin(), corner.end(), about) - corner.begin());
+      const tri::TriangleId next = triangulation_.neighbours(t)[(at + 2) % 3];
+      if (next == tri::kNoTriangle) {
+        about = corner[(at + 1) % 3];
+        break;
+      }
+      t = next;
+    }
+    hull_.push_back(t);
+  } while (about != least);
+}
+
 void PointWindow::examine_all() {
-  states_.assign(triangulation_.triangle_slots(), kUnknown);
-  for (const tri::TriangleId t : triangulation_.all_triangles()) examine(t);
+  // While inner_ holds all vertices, a circle that leaves it holds places outside the hull. The
+  // triangles whose circles hold one of them are joined to each other and to the hull across edges,
+  // as what an insertion there would remove. So the others are not looked at.
+  states_.assign(triangulation_.triangle_slots(), kCertain);
+  find_hull();
+  std::vector<tri::TriangleId> reached = hull_;
+  if (triangulation_.vertex_count() <= kFirstPoints) {
+    const auto all = triangulation_.all_triangles();
+    reached.assign(all.begin(), all.end());
+  }
+  while (!reached.empty()) {
+    const tri::TriangleId t = reached.back();
+    reached.pop_back();
+    if (state(t) != kCertain) continue;
+    examine(t);
+    if (state(t) == kCertain) continue;
+    for (const tri::TriangleId next : triangulation_.neighbours(t)) {
+      if (next != tri::kNoTriangle && state(next) == kCertain) reached.push_back(next);
+    }
+  }
   suspect_triangles_ = suspects_.size();
   find_suspect_hull();
 }
@@ -92,10 +137,13 @@ void PointWindow::examine_changes() {
   states_.resize(triangulation_.triangle_slots(), kUnknown);
   for (const tri::TriangleId t : changes_.removed_triangles) states_[tri::slot(t)] = kUnknown;
   suspects_.resize(suspect_triangles_);
-  std::erase_if(suspects_, [&](const Suspect& suspect) {
-    return (states_[tri::slot(suspect.triangle)] & kTriangleState) != kSuspect;
-  });
-  for (const tri::TriangleId t : changes_.added_triangles) examine(t);
+  std::erase_if(suspects_,
+                [&](const Suspect& suspect) { return state(suspect.triangle) != kSuspect; });
+  for (const tri::TriangleId t : changes_.added_triangles) {
+    const auto next = triangulation_.neighbours(t);
+    if (std::find(next.begin(), next.end(), tri::kNoTriangle) != next.end()) hull_.push_back(t);
+    examine(t);
+  }
   suspect_triangles_ = suspects_.size();
   find_suspect_hull();
 }
@@ -174,21 +222,10 @@ bool PointWindow::add_missing() {
       if (!places_.empty()) return true;
     }
   }
-  // What most suspects meet of the clusters that were not read lies near.
-  StoredBox wide = inner_;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const double more = kNear * (inner_.max[k] - inner_.min[k]);
-    wide.min[k] -= more;
-    wide.max[k] += more;
-  }
-  open_near_.clear();
-  const auto open = frontier_.open();
-  for (std::uint32_t k = 0; k < open.size(); ++k) {
-    if (open[k].box.meets(wide)) open_near_.push_back(k);
-  }
+  make_trees();
   chosen_.clear();
   for (const Suspect& suspect : suspects_) {
-    if (find_missing(suspect, holds(wide, suspect.cover.bounds()))) continue;
+    if (find_missing(suspect)) continue;
     std::uint8_t& state = states_[tri::slot(suspect.triangle)];
     if (suspect.edge == Suspect::kNone) {
       state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
@@ -228,34 +265,69 @@ void PointWindow::add_groups(std::size_t begin, std::size_t count) {
 }
 
 void PointWindow::part(Outer& outer) {
-  if (outer.first_group != outer.end_group) return;
+  if (outer.is_parted) return;
+  outer.is_parted = true;
   outer.first_group = groups_.size();
-  add_groups(outer.begin, outer.count);
+  const auto begin = pending_.begin() + static_cast<std::ptrdiff_t>(outer.begin);
+  const auto end = begin + static_cast<std::ptrdiff_t>(outer.count);
+  const auto taken =
+      std::partition(begin, end, [](const Pending& p) { return p.origin.cluster != kNowhere; });
+  if (taken != begin) add_groups(outer.begin, static_cast<std::size_t>(taken - begin));
   outer.end_group = groups_.size();
 }
 
-bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
+void PointWindow::make_trees() {
+  if (read_in_trees_ == read_.size()) return;
+  read_in_trees_ = read_.size();
+  std::vector<BoxTree::Item>& outer = outer_tree_.start();
+  for (std::uint32_t k = 0; k < outer_.size(); ++k) {
+    if (!holds(inner_, outer_[k].box)) outer.push_back({outer_[k].box, k});
+  }
+  outer_tree_.build();
+  std::vector<BoxTree::Item>& open = open_tree_.start();
+  for (std::uint32_t k = 0; k < frontier_.open().size(); ++k) {
+    open.push_back({frontier_.open()[k].box, k});
+  }
+  open_tree_.build();
+}
+
+bool PointWindow::find_missing(const Suspect& suspect) {
   const CircleCover& cover = suspect.cover;
+  const std::array<Point2, 3> corner = corners(suspect.triangle);
   const StoredBox bounds = cover.bounds();
+  const Point2 &from = corner[(suspect.edge + 1) % 3], &to = corner[(suspect.edge + 2) % 3];
+  const auto meets_cover = [&](const StoredBox& box) {
+    if (!bounds.meets(box) || !cover.meets(box)) return false;
+    if (suspect.edge == Suspect::kNone) return true;
+    // On the line of an edge of the hull only what lies between its ends is missing: a straight
+    // border has many points on it.
+    const Point2 outermost{to[1] > from[1] ? box.max[0] : box.min[0],
+                           to[0] > from[0] ? box.min[1] : box.max[1]};
+    if (tri::orientation(from, to, outermost) < 0) return true;
+    return StoredBox{{std::min(from[0], to[0]), std::min(from[1], to[1])},
+                     {std::max(from[0], to[0]), std::max(from[1], to[1])}}
+        .meets(box);
+  };
   // Take the point farthest inside among those that were read: it leaves the smallest remainder.
   std::size_t point = pending_.size();
   double depth = std::numeric_limits<double>::infinity();
   const auto look_at_point = [&](std::size_t at) {
-    const Pending& p = pending_[at];
+    Pending& p = pending_[at];
     if (p.origin.cluster == kNowhere) return;  // taken
+    // Twins of a corner may give it another height and change nothing else.
+    if (p.place == corner[0] || p.place == corner[1] || p.place == corner[2]) return take(p);
     const StoredBox box{p.place, p.place};
     const double d = cover.depth(box);
     if (point < pending_.size() && !(d < depth)) return;
-    if (!bounds.meets(box) || !cover.meets(box)) return;
+    if (!meets_cover(box)) return;
     point = at;
     depth = d;
   };
   const auto may_hold = [&](const StoredBox& box) {
-    return bounds.meets(box) && cover.meets(box) &&
-           !(point < pending_.size() && cover.least_depth(box) > depth);
+    return meets_cover(box) && !(point < pending_.size() && cover.least_depth(box) > depth);
   };
-  for (Outer& outer : outer_) {
-    if (!may_hold(outer.box)) continue;
+  outer_tree_.visit(may_hold, [&](std::uint32_t number) {
+    Outer& outer = outer_[number];
     part(outer);
     for (std::size_t g = outer.first_group; g < outer.end_group;) {
       const Group& group = groups_[g];
@@ -264,35 +336,31 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
       if (!looks) continue;
       for (std::size_t k = 0; k < group.count; ++k) look_at_point(group.begin + k);
     }
-  }
+  });
   if (point < pending_.size()) {
     take(pending_[point]);
     return true;
   }
-  // Else of the clusters that may hold some one of the highest level.
+  // Else of the clusters of the highest level that may hold some those where most does.
   const auto open = frontier_.open();
-  std::uint32_t best = kNoOpen;
-  const auto look_at = [&](std::uint32_t k) {
-    if (best != kNoOpen && open[k].level < open[best].level) return;
-    if (!bounds.meets(open[k].box) || !cover.meets(open[k].box)) return;
-    const double d = cover.depth(open[k].box);
-    if (best != kNoOpen && open[k].level == open[best].level && !(d < depth)) return;
-    best = k;
-    depth = d;
-  };
-  if (is_near) {
-    for (const std::uint32_t k : open_near_) look_at(k);
-  } else {
-    for (std::uint32_t k = 0; k < open.size(); ++k) look_at(k);
-  }
-  if (best == kNoOpen) return false;
-  chosen_.push_back(best);
-  if (cover.has_plane && !cover.has_disk && cover.plane.grazes(open[best].box)) {
-    // Hardly anything lies beyond this edge of the hull, but on its line: on a straight border,
-    // much. None of that makes the plane smaller, so all of it has to be looked into.
-    for (std::uint32_t k = 0; k < open.size(); ++k) {
-      if (open[k].level == open[best].level && cover.meets(open[k].box)) chosen_.push_back(k);
-    }
+  unsigned level = 0;
+  by_distance_.clear();
+  open_tree_.visit(meets_cover, [&](std::uint32_t k) {
+    if (open[k].level < level) return;
+    if (open[k].level > level) by_distance_.clear();
+    level = open[k].level;
+    by_distance_.emplace_back(cover.depth(open[k].box), k);
+  });
+  if (by_distance_.empty()) return false;
+  std::size_t count = std::min(clusters_at_once_, by_distance_.size());
+  const auto behind = by_distance_.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(by_distance_.begin(), behind - 1, by_distance_.end());
+  const StoredBox& best = open[std::min_element(by_distance_.begin(), behind)->second].box;
+  // Hardly anything lies beyond an edge of the hull, but on its line: on a straight border, much.
+  // None of that makes the plane smaller, so all of it has to be looked into.
+  if (cover.has_plane && !cover.has_disk && cover.plane.grazes(best)) count = by_distance_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    chosen_.push_back(static_cast<std::uint32_t>(by_distance_[i].second));
   }
   return true;
 }

@@ -188,6 +188,16 @@ struct Mesh {
     *this = std::move(empty);
   }
 
+  /// Removes everything and keeps the memory; the journal stops.
+  void restart() {
+    journal.stop();
+    line.clear();
+    flat = true;
+    vertex_count = 0;
+    last_vertex = kNone;
+    forget_slots();
+  }
+
   [[nodiscard]] bool vertex_alive(std::uint32_t v) const {
     return v != kGhost && v < incident.size() && (incident[v] & kFreeVertexBit) == 0;
   }

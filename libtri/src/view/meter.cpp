@@ -16,6 +16,10 @@ void learn(double& rate, double measured) {
   rate += (measured - rate) * (rate == 0.0 ? 1.0 : measured > rate ? 0.25 : 0.0625);
 }
 
+// What is ahead scatters around the estimate, and steps that have work for all their time are to end
+// within the budget, too.
+constexpr double kAim = 0.95;
+
 // A part of the cost of each operation, and of the end of a step, does not depend on the number of
 // points.
 double with_overhead(std::size_t points) { return static_cast<double>(points) + 16.0; }
@@ -42,7 +46,7 @@ bool StepMeter::fits(std::size_t points, std::size_t kind) const {
                        static_cast<double>(points_[0]) * budget_->after[0] +
                        static_cast<double>(points_[1]) * budget_->after[1] +
                        with_overhead(points) * budget_->after[kind] + (fixed_done_ ? 0.0 : fixed_);
-  return last_ - begin_ + ahead < budget_->seconds;
+  return last_ - begin_ + ahead < kAim * budget_->seconds;
 }
 
 void StepMeter::spend(std::size_t points, std::size_t kind) {

@@ -58,6 +58,15 @@ Rgb slope_colour(double degrees) {
   return ramp(kSlope, degrees);
 }
 
+Rgb store_level_colour(unsigned level, unsigned top) {
+  static constexpr std::array<Stop, 5> kLevels{{{0.00, {68, 34, 112}},
+                                                {0.25, {49, 104, 142}},
+                                                {0.50, {53, 183, 121}},
+                                                {0.75, {180, 221, 44}},
+                                                {1.00, {253, 231, 80}}}};
+  return ramp(kLevels, top > 0 ? 1 - static_cast<double>(level) / top : 1);
+}
+
 Rgb category_colour(std::int64_t category) {
   // P. Green-Armytage's idea of many distinct colours, in twelve of middle lightness.
   static constexpr std::array<Rgb, 12> kCategories{{{68, 119, 170},

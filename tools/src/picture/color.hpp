@@ -17,7 +17,9 @@ Rgb land_colour(double share);
 Rgb sea_colour(double share);
 /// Slope: white, yellow, red, dark red at 0, 15, 35 and 60 degrees and above.
 Rgb slope_colour(double degrees);
-/// Colours that differ well for small numbers: levels, classes, clusters.
+/// Levels of a store: dark blue for the coarsest, `top`, to yellow for level 0.
+Rgb store_level_colour(unsigned level, unsigned top);
+/// Colours that differ well for small numbers: classes, clusters.
 Rgb category_colour(std::int64_t category);
 /// The same for clusters, scattered, because consecutive numbers are not neighbours. Negative
 /// numbers, points without a cluster, are light grey.

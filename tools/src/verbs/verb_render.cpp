@@ -475,10 +475,12 @@ class RenderCommand : public Command {
     const HeightTint tint =
         by == "height" ? HeightTint::of(shown_heights(mesh, heights, terrain)) : HeightTint{};
     const auto normals = by == "slope" ? vertex_normals(mesh) : std::vector<std::array<float, 3>>();
+    const unsigned top =
+        by == "level" ? *std::max_element(mesh.levels.begin(), mesh.levels.end()) : 0;
     for (std::size_t i = 0; i < colours.size(); ++i) {
       if (by == "height") colours[i] = tint.colour(heights[i]);
       if (by == "slope") colours[i] = slope_colour(slope_degrees(normals[i]));
-      if (by == "level") colours[i] = category_colour(mesh.levels[i]);
+      if (by == "level") colours[i] = store_level_colour(mesh.levels[i], top);
       if (by == "class") colours[i] = category_colour(mesh.classes[i]);
       if (by == "cluster") colours[i] = cluster_colour(mesh.classes[i]);
     }

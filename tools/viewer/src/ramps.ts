@@ -8,8 +8,7 @@ export type Stop = number[];
 
 export const SLOPE: Stop[] = ramps.slope;
 /// From the coarsest level to level 0.
-export const LEVELS: Stop[] =
-    [[0, 68, 34, 112], [0.25, 49, 104, 142], [0.5, 53, 183, 121], [0.75, 180, 221, 44], [1, 253, 231, 80]];
+export const LEVELS: Stop[] = ramps.levels;
 export const GREYS: Stop[] = [[0, 28, 30, 34], [1, 245, 245, 240]];
 /// Surfaces without other colours, as `terrace render` draws them.
 export const PLAIN: Stop[] = [[0, 205, 205, 200], [1, 205, 205, 200]];

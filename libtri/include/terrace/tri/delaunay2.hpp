@@ -195,6 +195,8 @@ class Delaunay2 {
   void remove(std::span<const VertexId> vertices);
   /// Removes everything and releases the memory; a journal continues.
   void clear();
+  /// Removes everything, keeps the memory and stops a journal: for one triangulation after another.
+  void restart();
   /// Reserves room for this many vertices without moving memory.
   void reserve(std::size_t vertices);
 
