@@ -286,6 +286,8 @@ class SceneOf final : public Scene {
   std::vector<Part> parts_;
   /// By drawn slot, none between calls: the part in which a vertex goes; then where it is drawn on.
   std::vector<std::uint32_t> leaving_;
+  /// Triangles that are drawn on with such a vertex, and their groups.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> leaving_kept_;
 };
 
 /// Of a step's connected parts those wait in which vertices go and none come: a collapse. Where a
@@ -319,18 +321,28 @@ void SceneOf<Shown>::wait(const Delta& delta, double time) {
       const std::uint32_t group = waiting_.hiding(drawn(changes.removed_triangles[i]));
       if (group != kNone) told(parts_[numbers.removed_triangles[i]], group);
     }
-    // On the hull a vertex may have lost all its triangles without new ones.
-    if (numbers.removed.empty()) return;
-    waiting_.for_kept([&](std::uint32_t kept, std::uint32_t group) {
+    for (const auto& [kept, group] : leaving_kept_) {
       for (const std::uint32_t corner : triangles_[kept]) {
         if (leaving_[corner] != kNone) told(parts_[leaving_[corner]], group);
       }
+    }
+  };
+  // On the hull a vertex may have lost all its triangles without new ones, so that those which are
+  // drawn on are looked at, too.
+  const auto find_kept = [&] {
+    leaving_kept_.clear();
+    if (numbers.removed.empty()) return;
+    waiting_.for_kept([&](std::uint32_t kept, std::uint32_t group) {
+      const auto& [a, b, c] = triangles_[kept];
+      if ((leaving_[a] & leaving_[b] & leaving_[c]) != kNone)
+        leaving_kept_.emplace_back(kept, group);
     });
   };
+  find_kept();
   for_touched([&](const Part& part, std::uint32_t group) {
     if (!part.waits || time - waiting_.begin(group) > kLongestWait) waiting_.end(group);
   });
-  waiting_.sweep();
+  if (waiting_.sweep()) find_kept();
   for (Part& part : parts_) {
     if (part.waits) part.group = waiting_.open(time, time + kWait);
   }
@@ -359,11 +371,8 @@ void SceneOf<Shown>::wait(const Delta& delta, double time) {
     }
     return corners;
   };
-  if (!numbers.removed.empty()) {
-    waiting_.for_kept([&](std::uint32_t kept, std::uint32_t) {
-      const SceneTriangle corners = drawn_on(triangles_[kept]);
-      if (corners != triangles_[kept]) triangles_.change(kept) = corners;
-    });
+  for (const auto& [kept, group] : leaving_kept_) {
+    triangles_.change(kept) = drawn_on(triangles_[kept]);
   }
   for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
     const Part& part = parts_[numbers.removed_triangles[i]];

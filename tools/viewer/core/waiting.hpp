@@ -46,14 +46,16 @@ class Waiting {
   }
   [[nodiscard]] double begin(std::uint32_t group) { return groups_[root(group)].begin; }
   /// At the next sweep().
-  void end(std::uint32_t group) { groups_[root(group)].over = true; }
+  void end(std::uint32_t group) { groups_[root(group)].over = any_over_ = true; }
   void end_until(double time) {
     for (std::uint32_t g = 0; g < groups_.size(); ++g) {
-      if (groups_[g].into == g && groups_[g].end <= time) groups_[g].over = true;
+      if (groups_[g].into == g && groups_[g].end <= time) end(g);
     }
   }
-  /// Draws what was hidden in the groups that have ended.
-  void sweep() {
+  /// Draws what was hidden in the groups that have ended; false if none has.
+  bool sweep() {
+    if (!any_over_) return false;
+    any_over_ = false;
     std::vector<std::uint32_t> number(groups_.size(), kNone);
     std::vector<Group> left;
     const auto stays = [&](std::uint32_t& group) {
@@ -73,7 +75,7 @@ class Waiting {
         kept_[count++] = kept;
       } else {
         triangles_.change(kept.slot) = {};
-        free_triangles_.push_back(kept.slot);
+        free_triangles_.put(kept.slot);
       }
     }
     kept_.resize(count);
@@ -84,7 +86,7 @@ class Waiting {
         anchors_[count] = anchors_[i];
         kept_vertices_[count++] = kept;
       } else {
-        free_vertices_.push_back(kept.slot);
+        free_vertices_.put(kept.slot);
       }
     }
     anchors_.resize(count);
@@ -102,6 +104,7 @@ class Waiting {
     }
     hidden_.resize(count);
     groups_ = std::move(left);
+    return true;
   }
 
   // ---- What waits
@@ -123,7 +126,7 @@ class Waiting {
   }
   /// Draws on a vertex; the slot that it is drawn at. Requires room.
   std::uint32_t keep(std::uint32_t group, const Vertex& vertex, const tri::Anchor& anchor) {
-    const std::uint32_t slot = take(free_vertices_, static_cast<std::uint32_t>(anchors_.size()));
+    const std::uint32_t slot = free_vertices_.take();
     vertices_.change(slot) = vertex;
     anchors_.push_back(anchor);
     kept_vertices_.push_back({slot, group});
@@ -131,7 +134,7 @@ class Waiting {
   }
   /// Draws on a triangle. Requires room.
   void keep(std::uint32_t group, const SceneTriangle& corners) {
-    const std::uint32_t slot = take(free_triangles_, static_cast<std::uint32_t>(kept_.size()));
+    const std::uint32_t slot = free_triangles_.take();
     triangles_.change(slot) = corners;
     kept_.push_back({slot, group});
   }
@@ -163,13 +166,20 @@ class Waiting {
     }
     return group;
   }
-  /// Slots below `used` + the number of free ones have been handed out.
-  static std::uint32_t take(std::vector<std::uint32_t>& free, std::uint32_t used) {
-    if (free.empty()) return used;
-    const std::uint32_t slot = free.back();
-    free.pop_back();
-    return slot;
-  }
+  /// Slots in the order in which they became free: what waits together lies together, so that few
+  /// blocks change.
+  class FreeSlots {
+   public:
+    explicit FreeSlots(std::uint32_t count) : ring_(count) {
+      for (std::uint32_t i = 0; i < count; ++i) ring_[i] = i;
+    }
+    std::uint32_t take() { return ring_[next_++ % ring_.size()]; }
+    void put(std::uint32_t slot) { ring_[last_++ % ring_.size()] = slot; }
+
+   private:
+    std::vector<std::uint32_t> ring_;
+    std::size_t next_ = 0, last_ = 0;
+  };
 
   Blocks<Vertex>& vertices_;
   Blocks<SceneTriangle>& triangles_;
@@ -178,7 +188,8 @@ class Waiting {
   std::vector<tri::Anchor> anchors_;
   std::vector<Hidden> hidden_;
   std::vector<std::uint32_t> index_;  ///< in hidden_, by drawn slot of a triangle
-  std::vector<std::uint32_t> free_vertices_, free_triangles_;
+  FreeSlots free_vertices_{kVertices}, free_triangles_{kTriangles};
+  bool any_over_ = false;
 };
 
 }  // namespace terrace::viewer
