@@ -58,16 +58,17 @@ void radix_sort(Pool<CurveEntry>& entries) {
 /// Sorts a range of point indices. cells_of(range) lays a raster over these points: single()
 /// returns whether they all coincide, key(index) is the position of a point's cell on the curve, of
 /// kKeyBits bits. Points in one cell are distinguished by the next raster, over fewer points, so
-/// recursion is never deep. Threads compute keys.
-template <unsigned kKeyBits, class CellsOf>
-void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
-                      unsigned threads = 1) {
-  // Runs of equal keys up to this length stay as they are.
+/// recursion is never deep. Threads compute keys. sort_run(run) sorts the points of one cell, which
+/// are few or all coincide.
+template <unsigned kKeyBits, class CellsOf, class SortRun>
+void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of, unsigned threads,
+                      const SortRun& sort_run) {
+  // Runs of equal keys up to this length are not parted further.
   constexpr std::size_t kLeaf = 16;
   // Below this, counters would cost more than points.
   constexpr std::uint32_t kFew = 3000;
   const auto cells = cells_of(order);
-  if (cells.single()) return;
+  if (cells.single()) return sort_run(order);
   const auto count = static_cast<std::uint32_t>(order.size());
   Pool<CurveEntry> entries;
   entries.resize(count);
@@ -88,12 +89,25 @@ void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
   for (std::uint32_t i = 0; i < count; ++i) {
     order[i] = entries[i].number;
     if (i + 1 == count || entries[i + 1].key != entries[i].key) {
-      if (i + 1 - begin > kLeaf) long_runs.push_back(order.subspan(begin, i + 1 - begin));
+      const std::span<std::uint32_t> run = order.subspan(begin, i + 1 - begin);
+      if (run.size() > kLeaf) {
+        long_runs.push_back(run);
+      } else if (run.size() > 1) {
+        sort_run(run);
+      }
       begin = i + 1;
     }
   }
   entries.release();
-  for (const std::span<std::uint32_t> run : long_runs) sort_along_curve<kKeyBits>(run, cells_of);
+  for (const std::span<std::uint32_t> run : long_runs)
+    sort_along_curve<kKeyBits>(run, cells_of, 1, sort_run);
+}
+
+/// The same; points of one cell stay in their order.
+template <unsigned kKeyBits, class CellsOf>
+void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
+                      unsigned threads = 1) {
+  sort_along_curve<kKeyBits>(order, cells_of, threads, [](std::span<std::uint32_t>) {});
 }
 
 }  // namespace terrace::tri

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -87,7 +88,19 @@ class PointWindow {
   /// between the outermost; there are heights but no gradients. With a limit, triangles beyond it
   /// are left out; shorter edges and vertices that have no other have heights but no gradients.
   /// The same bits whatever the window.
-  [[nodiscard]] SurfacePoint at(const Point2& place) const;
+  [[nodiscard]] SurfacePoint at(const Point2& place) const {
+    tri::VertexId near = tri::kNoVertex;
+    return at(place, near);
+  }
+  /// The same, faster for places that are close to the one before: `near` is a vertex close to it,
+  /// or none, and becomes one close to this.
+  SurfacePoint at(const Point2& place, tri::VertexId& near) const;
+
+  /// Whether two places are so close that a walk from one to the other is as short as from a hint.
+  [[nodiscard]] bool are_close(const Point2& a, const Point2& b) const {
+    return std::abs(a[0] - b[0]) * hint_scale_[0] < 1.0 &&
+           std::abs(a[1] - b[1]) * hint_scale_[1] < 1.0;
+  }
 
   /// Whether a place lies inside an edge, exactly.
   [[nodiscard]] bool is_on_edge(const Point2& place) const;
@@ -204,6 +217,7 @@ class PointWindow {
   std::size_t clusters_at_once_ = 1;                         ///< for a suspect
   std::vector<double> reaches_;
   Triangulation::Changes changes_;
+  bool has_triangles_ = false;  ///< counting them goes round the hull
   // A vertex near each cell of a grid over the box.
   std::vector<tri::VertexId> hints_;
   std::uint32_t hint_columns_ = 1, hint_rows_ = 1;

@@ -19,6 +19,7 @@ SurfaceTriangle PointWindow::corners_with_heights(tri::TriangleId t) const {
 }
 
 void PointWindow::make_hints() {
+  has_triangles_ = triangulation_.triangle_count() > 0;
   constexpr std::size_t kMost = 1024;
   const auto side =
       static_cast<std::size_t>(std::sqrt(static_cast<double>(triangulation_.vertex_count()) / 2));
@@ -49,9 +50,9 @@ std::size_t PointWindow::hint_cell(const Point2& place) const {
   return cell(1, hint_rows_) * hint_columns_ + cell(0, hint_columns_);
 }
 
-SurfacePoint PointWindow::at(const Point2& place) const {
+SurfacePoint PointWindow::at(const Point2& place, tri::VertexId& near) const {
   if (triangulation_.vertex_count() == 0) return {};
-  if (triangulation_.triangle_count() == 0) {
+  if (!has_triangles_) {
     std::vector<tri::VertexWeight> weights;
     tri::weights_at(triangulation_, place, tri::Interpolation::kLinear, weights);
     SurfacePoint result;
@@ -62,7 +63,9 @@ SurfacePoint PointWindow::at(const Point2& place) const {
     }
     return result;
   }
-  const tri::Location found = triangulation_.locate(place, hints_[hint_cell(place)]);
+  const tri::VertexId hint = near == tri::kNoVertex ? hints_[hint_cell(place)] : near;
+  const tri::Location found = triangulation_.locate(place, hint);
+  near = found.vertex;
   switch (found.place) {
     case tri::Place::kVertex:
       return at_vertex(found.vertex, found.triangle);
@@ -79,7 +82,7 @@ SurfacePoint PointWindow::at(const Point2& place) const {
 }
 
 bool PointWindow::is_on_edge(const Point2& place) const {
-  if (triangulation_.triangle_count() == 0) return false;
+  if (!has_triangles_) return false;
   return triangulation_.locate(place, hints_[hint_cell(place)]).place == tri::Place::kEdge;
 }
 

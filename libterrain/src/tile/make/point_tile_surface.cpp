@@ -131,7 +131,7 @@ void PointTileSurface::drop_duplicates() {
 void PointTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
   if (cloud_.samples) {
-    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out, order_);
+    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out);
     return;
   }
   WindowPoints more;
@@ -245,7 +245,14 @@ void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span
     }
   }
   if (cloud_.whole) {
-    for (const std::uint32_t i : within) out[i] = cloud_.whole->at(stored[i]).height;
+    // Places come along sides: each is a few triangles from the one before, unless it is far away.
+    tri::VertexId near = tri::kNoVertex;
+    Point2 before{};
+    for (const std::uint32_t i : within) {
+      if (!cloud_.whole->are_close(before, stored[i])) near = tri::kNoVertex;
+      out[i] = cloud_.whole->at(stored[i], near).height;
+      before = stored[i];
+    }
     return;
   }
   part_heights(stored, within, out);

@@ -111,6 +111,13 @@ void SharedSides::keep(const Key& key, const std::vector<TileSideVertex>& vertic
   if (recent_.try_emplace(key, vertices).second) vertices_ += vertices.size();
 }
 
+void SharedSides::clear() {
+  const std::lock_guard lock(mutex_);
+  recent_.clear();
+  older_.clear();
+  vertices_ = 0;
+}
+
 TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
                      SharedSides* shared)
     : tile_(tile), plan_(plan), surface_(surface), shared_(shared), data_(surface.bounds()) {}

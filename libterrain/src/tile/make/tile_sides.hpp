@@ -72,6 +72,7 @@ class SharedSides {
 
   [[nodiscard]] std::optional<std::vector<TileSideVertex>> find(const Key& key) const;
   void keep(const Key& key, const std::vector<TileSideVertex>& vertices);
+  void clear();
 
  private:
   using Sides = std::map<Key, std::vector<TileSideVertex>>;

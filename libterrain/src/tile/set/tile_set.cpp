@@ -216,7 +216,7 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
   const std::string fingerprint = fingerprint_of(store, options);
   if (request.resume && !request.replace) refuse_another(layer_path, fingerprint);
   TileSetWriter writer(surfaces, options, context, layer_path);
-  for (unsigned zoom = options.last_zoom + 1; zoom-- > request.first_zoom;) writer.write_zoom(zoom);
+  writer.write_zooms();
   writer.finish();
 
   TileLayer layer;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <system_error>
 #include <utility>
 
@@ -98,60 +99,91 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const 
   return written;
 }
 
-void TileSetWriter::write_tiles(const ZoomPlan& plan, const std::vector<TileAddress>& tiles) {
-  std::vector<TileAddress> there;
-  std::vector<TileJournal::Record> records;
-  TileZoom summary{.zoom = plan.zoom};
-  TilesOutcome added;
-  SharedSides sides;
+void TileSetWriter::write_zooms() {
+  TileSurface& surface = *surfaces_.front();
+  std::vector<std::unique_ptr<Zoom>> zooms;
+  for (unsigned zoom = options_.last_zoom + 1; zoom-- > options_.request.first_zoom;) {
+    auto begun = std::make_unique<Zoom>();
+    begun->tiles = candidates(zoom, surface, context_);
+    // A quarter more, for what is filled beside the samples.
+    begun->range = 1.25 * widest_range(begun->tiles, surface);
+    begun->plan = plan_zoom(zoom, options_.max_error(zoom), begun->range, surface);
+    zooms.push_back(std::move(begun));
+  }
+  // Metadata of a tile needs those of the next zoom below finished. Else all zooms are one queue:
+  // the upper ones have fewer tiles than there may be threads.
+  const std::size_t together = options_.request.metadata ? 1 : zooms.size();
+  for (std::size_t first = 0; first < zooms.size(); first += together) {
+    std::vector<Zoom*> open;
+    for (std::size_t i = 0; i < together; ++i) open.push_back(zooms[first + i].get());
+    while (!open.empty()) {
+      write_tiles(open);
+      std::erase_if(open, [](const Zoom* zoom) { return !zoom->too_far; });
+      for (Zoom* zoom : open) take_larger_steps(*zoom);
+    }
+    for (std::size_t i = 0; i < together; ++i) conclude(*zooms[first + i]);
+  }
+}
+
+void TileSetWriter::write_tiles(const std::vector<Zoom*>& zooms) {
+  std::vector<std::pair<Zoom*, std::size_t>> queue;
+  for (Zoom* zoom : zooms) {
+    zoom->written.clear();
+    for (std::size_t i = 0; i < zoom->tiles.size(); ++i) queue.emplace_back(zoom, i);
+  }
   ProgressReport report(context_, "tiles");
   in_order(
-      tiles.size(), static_cast<unsigned>(surfaces_.size()),
+      queue.size(), static_cast<unsigned>(surfaces_.size()),
       [&](unsigned worker, std::size_t i) {
-        return write_tile(tiles[i], plan, *surfaces_[worker], sides);
+        const auto& [zoom, number] = queue[i];
+        if (!zoom->too_far) {
+          try {
+            return write_tile(zoom->tiles[number], zoom->plan, *surfaces_[worker], zoom->sides);
+          } catch (const HeightsTooFar&) {
+            zoom->too_far = true;
+          }
+        }
+        return Written{};
       },
       [&](std::size_t i, const Written& written) {
         report.update(result.tiles + i,
-                      static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
-        if (written.made) journal_.add(tiles[i], written.finished);
-        records.emplace_back(tiles[i], written.finished);
-        if (written.finished.bytes == 0) return;
-        there.push_back(tiles[i]);
-        added.bytes += written.finished.bytes;
-        added.made += written.made ? 1 : 0;
-        added.kept += written.kept ? 1 : 0;
-        summary.max_error = std::max(summary.max_error, written.finished.max_error);
+                      static_cast<double>(i + 1) / static_cast<double>(queue.size()));
+        const auto& [zoom, number] = queue[i];
+        if (written.made) journal_.add(zoom->tiles[number], written.finished);
+        zoom->written.push_back(written);
       });
-  summary.tiles = there.size();
-  result.tiles += there.size();
-  result.bytes += added.bytes;
-  result.made += added.made;
-  result.kept += added.kept;
-  result.zooms.insert(result.zooms.begin(), summary);
-  records_.insert(records_.end(), records.begin(), records.end());
-  deeper_ = {there.begin(), there.end()};
-  present[plan.zoom] = std::move(there);
 }
 
-void TileSetWriter::write_zoom(unsigned zoom) {
-  TileSurface& surface = *surfaces_.front();
-  const std::vector<TileAddress> tiles = candidates(zoom, surface, context_);
-  // A quarter more, for what is filled beside the samples.
-  double range = 1.25 * widest_range(tiles, surface);
-  for (;;) {
-    try {
-      write_tiles(plan_zoom(zoom, options_.max_error(zoom), range, surface), tiles);
-      return;
-    } catch (const HeightsTooFar&) {
-      if (range > 1e7) {
-        throw stream::Error({.file = options_.folder,
-                             .where = "zoom " + std::to_string(zoom),
-                             .cause = "heights beyond 10,000 km have no place on a globe",
-                             .remedy = "look at the unit and the nodata value of the source"});
-      }
-      range = std::max(1.0, 2.0 * range);
-    }
+void TileSetWriter::take_larger_steps(Zoom& zoom) {
+  if (zoom.range > 1e7) {
+    throw stream::Error({.file = options_.folder,
+                         .where = "zoom " + std::to_string(zoom.plan.zoom),
+                         .cause = "heights beyond 10,000 km have no place on a globe",
+                         .remedy = "look at the unit and the nodata value of the source"});
   }
+  zoom.range = std::max(1.0, 2.0 * zoom.range);
+  zoom.plan = plan_zoom(zoom.plan.zoom, zoom.plan.max_error, zoom.range, *surfaces_.front());
+  zoom.sides.clear();
+  zoom.too_far = false;
+}
+
+void TileSetWriter::conclude(const Zoom& zoom) {
+  std::vector<TileAddress>& there = present[zoom.plan.zoom];
+  TileZoom summary{.zoom = zoom.plan.zoom};
+  for (std::size_t i = 0; i < zoom.tiles.size(); ++i) {
+    const Written& written = zoom.written[i];
+    records_.emplace_back(zoom.tiles[i], written.finished);
+    if (written.finished.bytes == 0) continue;
+    there.push_back(zoom.tiles[i]);
+    result.bytes += written.finished.bytes;
+    result.made += written.made ? 1 : 0;
+    result.kept += written.kept ? 1 : 0;
+    summary.max_error = std::max(summary.max_error, written.finished.max_error);
+  }
+  summary.tiles = there.size();
+  result.tiles += there.size();
+  result.zooms.insert(result.zooms.begin(), summary);
+  deeper_ = {there.begin(), there.end()};
 }
 
 void TileSetWriter::remove_others() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -28,7 +29,7 @@ struct TileSetOptions {
   [[nodiscard]] double max_error(unsigned zoom) const;
 };
 
-/// Writes the tiles of one folder, zoom by zoom. Files that are whole and up to date are kept.
+/// Writes the tiles of one folder. Files that are whole and up to date are kept.
 /// Before anything changes, `layer.json` is removed: an unfinished set has none.
 class TileSetWriter {
  public:
@@ -43,8 +44,8 @@ class TileSetWriter {
     present.resize(options.last_zoom + 1);
   }
 
-  /// The deepest first: its tiles are named in the metadata of those above.
-  void write_zoom(unsigned zoom);
+  /// The deepest zoom first: its tiles are named in the metadata of those above.
+  void write_zooms();
   /// After all zooms: removes tiles of an earlier set that this one does not have, and temporary
   /// files of killed runs; completes the journal.
   void finish();
@@ -59,7 +60,18 @@ class TileSetWriter {
     bool kept = false;  ///< its file was not touched
     FinishedTile finished;
   };
-  void write_tiles(const ZoomPlan& plan, const std::vector<TileAddress>& tiles);
+  struct Zoom {
+    std::vector<TileAddress> tiles;  ///< that may have data
+    double range = 0.0;              ///< of heights that a tile's steps must have room for
+    ZoomPlan plan;
+    SharedSides sides;
+    std::atomic<bool> too_far = false;  ///< that room did not suffice
+    std::vector<Written> written;       ///< by tile
+  };
+  /// Sets too_far of zooms, whose tiles are then to be written again.
+  void write_tiles(const std::vector<Zoom*>& zooms);
+  void take_larger_steps(Zoom& zoom);
+  void conclude(const Zoom& zoom);
   Written write_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
                      SharedSides& sides);
   void remove_others();

@@ -74,17 +74,43 @@ void Greedy::run(std::size_t max_vertices, std::size_t max_triangles) {
   }
 }
 
-bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
-  const Vertex vertex = vertex_of((*mesh_.samples)[index], index, lattice_);
+void Greedy::sweep(std::uint32_t step) {
+  const Pool<Sample>& samples = *mesh_.samples;
+  std::uint32_t at = 0;
+  while (!mesh_.triangles[at].live()) ++at;
+  for (std::uint64_t i = 0; i < samples.size(); i += step) {
+    const auto index = static_cast<std::uint32_t>(i);
+    const Sample& sample = samples[index];
+    if (sample.next == kIsVertex) continue;
+    const Spot found = mesh_.locate({sample.x, sample.y}, at);
+    if (found.triangle == kNone) continue;
+    at = found.triangle;
+    const double height = height_in(mesh_, mesh_.triangles[at], sample.x, sample.y);
+    if (!(std::abs(height - sample.z) > bound_)) continue;
+    const Vertex vertex = vertex_of(sample, index, lattice_);
+    const Spot spot = spot_for(vertex, at);
+    if (spot.triangle == kNone) continue;
+    put(vertex, spot);
+    if (!lattice_) (*mesh_.samples)[index].next = kIsVertex;
+    at = cavity_.created().front();
+  }
+  while (mesh_.heads.size() < mesh_.triangles.size()) mesh_.heads.push_back(kNone);
+}
+
+Spot Greedy::spot_for(const Vertex& vertex, std::uint32_t near) const {
+  const Spot spot = mesh_.locate({vertex.x, vertex.y}, near);
+  if (spot.triangle == kNone || spot.zeros == 2) return {};
+  return fixed_border_ && is_open(spot) ? Spot{} : spot;
+}
+
+bool Greedy::is_open(const Spot& spot) const {
+  return spot.zeros == 1 && mesh_.triangles[spot.triangle].next[spot.edge] == kNone;
+}
+
+void Greedy::put(const Vertex& vertex, const Spot& spot) {
   const Place2 p{vertex.x, vertex.y};
-  const Spot spot = mesh_.locate(p, triangle);
-  if (spot.triangle == kNone || spot.zeros == 2) return false;
-  const Triangle& around = mesh_.triangles[spot.triangle];
-  const bool open = spot.zeros == 1 && around.next[spot.edge] == kNone;
-  if (open && fixed_border_) return false;
-  const std::uint32_t border = around.corner[after(spot.edge)];
-  // Rounding may have assigned it to another list.
-  if (!lattice_ && spot.triangle != triangle) move(index, triangle, spot.triangle);
+  const bool open = is_open(spot);
+  const std::uint32_t border = mesh_.triangles[spot.triangle].corner[after(spot.edge)];
   cavity_.dig(mesh_.triangles, spot.triangle, [&](const Triangle& t) {
     const Place2 a = mesh_.place(t.corner[0]);
     const Place2 b = mesh_.place(t.corner[1]);
@@ -96,6 +122,16 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
   mesh_.vertices.push_back(vertex);
   cavity_.fill(mesh_.triangles, mesh_.vertices.size() - 1,
                [&](std::uint32_t a, std::uint32_t) { return open && a == border; });
+}
+
+bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
+  const Vertex vertex = vertex_of((*mesh_.samples)[index], index, lattice_);
+  const Spot spot = spot_for(vertex, triangle);
+  if (spot.triangle == kNone) return false;
+  const bool open = is_open(spot);
+  // Rounding may have assigned it to another list.
+  if (!lattice_ && spot.triangle != triangle) move(index, triangle, spot.triangle);
+  put(vertex, spot);
   const std::vector<std::uint32_t>& created = cavity_.created();
   const std::size_t old = created.size() - (open ? 1 : 2);
   const auto old_end = created.begin() + static_cast<std::ptrdiff_t>(old);

@@ -26,6 +26,11 @@ class Greedy {
   /// From now on a new vertex only splits the triangles that contain it: for meshes that are no
   /// longer Delaunay.
   void stop_delaunay() { delaunay_ = false; }
+  /// One pass over the samples 0, step, 2 * step, ... in their order: each that is beyond the bound
+  /// when its turn comes becomes a vertex, if it can. Several times as fast as run() per vertex, as
+  /// no lists are kept, and more vertices; removal leaves about as many. Later vertices may take
+  /// the surface away from samples that were passed. The lists are to be made anew.
+  void sweep(std::uint32_t step);
   /// Begins with these triangles, which have an error, from newly made lists. Samples are handled
   /// in parts of `together` numbers, which are close to each other: part by part, they and their
   /// triangles stay in the cache, and the result is as good as if all were handled together.
@@ -37,6 +42,12 @@ class Greedy {
  private:
   /// Returns false if the sample cannot become a vertex.
   bool insert(std::uint32_t index, std::uint32_t triangle);
+  /// Where a vertex can be put; no triangle if it cannot.
+  [[nodiscard]] Spot spot_for(const Vertex& vertex, std::uint32_t near) const;
+  /// Whether it lies on the border.
+  [[nodiscard]] bool is_open(const Spot& spot) const;
+  /// Adds a vertex; the new triangles are the cavity's.
+  void put(const Vertex& vertex, const Spot& spot);
   /// Distributes the samples of the first `old` of the cavity's triangles to the new ones.
   void deal_samples(const Vertex& vertex, std::size_t old, bool open, std::uint32_t apart);
   /// Moves a sample from one triangle's list to another's.

@@ -68,9 +68,10 @@ class Maker {
     const std::size_t fixed = mesh_.vertices.size();
     // Reserves so much that growing, which briefly takes twice the memory, is rare; unused capacity
     // costs only address space.
-    mesh_.triangles.reserve(mesh_.triangles.size() + samples_.size());
+    mesh_.triangles.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
     Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
-    insert_greedily(greedy, bound, max_vertices);
+    const bool sweeps = quality != TinQuality::kGreedy;
+    insert(greedy, bound, max_vertices, sweeps);
     removed_ = 0;
     if (quality == TinQuality::kGreedy) {
       mend(greedy, bound, max_vertices);
@@ -129,8 +130,9 @@ class Maker {
 
  private:
   /// While triangles are large, a few of their samples choose the vertices as well as all would,
-  /// and need not be redistributed each time.
-  void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
+  /// and need not be redistributed each time. sweeps: what is removed later need not be chosen
+  /// well.
+  void insert(Greedy& greedy, double bound, std::size_t max_vertices, bool sweeps) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 3;
     // So few that they and their triangles stay in the cache.
@@ -138,6 +140,8 @@ class Maker {
     for (const std::uint32_t step : kSteps) {
       const std::size_t listed = samples_.size() / step;
       if (step > 1 && listed < 1024) continue;
+      if (sweeps) greedy.sweep(step);
+      if (sweeps && step > 1) continue;
       const bool last = step == 1 && max_vertices == kUnlimited;
       greedy.start(list_samples(mesh_, step, bound).waiting, last ? kTogether : samples_.size());
       greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);

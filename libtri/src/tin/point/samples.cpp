@@ -22,24 +22,21 @@ std::uint32_t spread(std::uint32_t bits) {
   return (bits | bits << 1) & 0x55555555u;
 }
 
-/// A raster of 2^16 x 2^16 cells over some places, along the Z curve.
+/// A raster of 2^16 x 2^16 cells over some samples, along the Z curve.
 class Cells {
  public:
-  template <class PlaceOf>
-  Cells(std::size_t count, const PlaceOf& place_of) : low_(place_of(0)) {
+  Cells(const double* x, const double* y, std::span<const std::uint32_t> order)
+      : x_(x), y_(y), low_{x[order[0]], y[order[0]]} {
     std::array<double, 2> high = low_;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::array<double, 2> place = place_of(i);
-      for (std::size_t k = 0; k < 2; ++k) {
-        low_[k] = std::min(low_[k], place[k]);
-        high[k] = std::max(high[k], place[k]);
-      }
+    for (const std::uint32_t i : order) {
+      low_ = {std::min(low_[0], x[i]), std::min(low_[1], y[i])};
+      high = {std::max(high[0], x[i]), std::max(high[1], y[i])};
     }
     extent_ = std::max(high[0] - low_[0], high[1] - low_[1]);
   }
   [[nodiscard]] bool single() const { return !(extent_ > 0); }
-  [[nodiscard]] std::uint32_t key(double x, double y) const {
-    return spread(cell(x, low_[0])) | spread(cell(y, low_[1])) << 1;
+  [[nodiscard]] std::uint32_t key(std::uint32_t i) const {
+    return spread(cell(x_[i], low_[0])) | spread(cell(y_[i], low_[1])) << 1;
   }
 
  private:
@@ -48,56 +45,11 @@ class Cells {
     return part < 65535 ? static_cast<std::uint32_t>(part) : 65535;
   }
 
+  const double* x_;
+  const double* y_;
   std::array<double, 2> low_;
   double extent_ = 0;
 };
-
-/// The same for sample numbers, as sort_along_curve() requires.
-struct NumberCells {
-  const double* x;
-  const double* y;
-  Cells cells;
-
-  NumberCells(const double* xs, const double* ys, std::span<const std::uint32_t> order)
-      : x(xs), y(ys), cells(order.size(), [&](std::size_t i) {
-          return std::array<double, 2>{xs[order[i]], ys[order[i]]};
-        }) {}
-  [[nodiscard]] bool single() const { return cells.single(); }
-  [[nodiscard]] std::uint32_t key(std::uint32_t i) const { return cells.key(x[i], y[i]); }
-};
-
-/// Reorders so that samples of one place are adjacent, the smaller number first. A cell has so few
-/// samples that sorting them by place does not spoil the curve.
-void group_places(std::span<Sample> samples) {
-  constexpr std::size_t kFew = 3000;
-  const auto sort_places = [](std::span<Sample> part) {
-    std::sort(part.begin(), part.end(), [](const Sample& a, const Sample& b) {
-      if (a.x != b.x) return a.x < b.x;
-      if (a.y != b.y) return a.y < b.y;
-      return a.id < b.id;
-    });
-  };
-  if (samples.size() < kFew) return sort_places(samples);
-  const Cells cells(samples.size(), [&](std::size_t i) {
-    return std::array<double, 2>{samples[i].x, samples[i].y};
-  });
-  if (cells.single()) return sort_places(samples);
-  const auto key_of = [&](std::size_t i) { return cells.key(samples[i].x, samples[i].y); };
-  std::size_t begin = 0;
-  std::uint32_t key = key_of(0);
-  for (std::size_t i = 1; i <= samples.size(); ++i) {
-    const std::uint32_t next = i < samples.size() ? key_of(i) : ~key;
-    if (next == key) continue;
-    const std::span<Sample> part = samples.subspan(begin, i - begin);
-    if (part.size() >= kFew) {
-      group_places(part);
-    } else if (part.size() > 1) {
-      sort_places(part);
-    }
-    begin = i;
-    key = next;
-  }
-}
 
 double merged_height(std::span<const Sample> group, PointDuplicates duplicates) {
   double height = group[0].z;
@@ -138,9 +90,17 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
   numbers.resize(count);
   const std::span<std::uint32_t> order = span_of(numbers);
   std::iota(order.begin(), order.end(), 0u);
-  sort_along_curve<32>(order, [&](std::span<const std::uint32_t> part) {
-    return NumberCells(x.data(), y.data(), part);
-  });
+  // Samples of one place become adjacent, the smaller number first.
+  sort_along_curve<32>(
+      order, [&](std::span<const std::uint32_t> part) { return Cells(x.data(), y.data(), part); },
+      1,
+      [&](std::span<std::uint32_t> run) {
+        std::sort(run.begin(), run.end(), [&](std::uint32_t a, std::uint32_t b) {
+          if (x[a] != x[b]) return x[a] < x[b];
+          if (y[a] != y[b]) return y[a] < y[b];
+          return a < b;
+        });
+      });
   Pool<Sample>& all = samples.all;
   all.resize(count);
   for (std::uint32_t k = 0; k < count; ++k) {
@@ -148,7 +108,6 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
     all[k] = {x[i], y[i], z[i], kUnlisted, i};
   }
   numbers.release();
-  group_places(span_of(all));
   std::uint32_t kept = 0;
   for (std::uint32_t begin = 0; begin < count;) {
     Sample first = all[begin];

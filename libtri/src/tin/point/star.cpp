@@ -56,6 +56,10 @@ double StarSamples::cross_at(std::size_t i, std::size_t j, std::size_t sample) c
 bool StarSamples::out_of_reach(std::size_t sample, double bound) const {
   if (sample == index_.size()) return false;
   const std::size_t size = ring_.size();
+  // No triangle goes beyond its corners.
+  const auto [low, high] = std::minmax_element(
+      ring_.begin(), ring_.end(), [](const Vertex& a, const Vertex& b) { return a.z < b.z; });
+  if (z_[sample] - high->z > bound || low->z - z_[sample] > bound) return true;
   // Bit j of left[i] and bit i of left_from[j]: left of the line from corner i to j, or on it.
   std::array<std::uint32_t, kMaxRing> left{}, left_from{}, right{};
   for (std::size_t i = 0; i < size; ++i) {
