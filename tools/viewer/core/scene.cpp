@@ -32,7 +32,7 @@ Point3 cross(const Point3& a, const Point3& b) {
 
 template <class Shown>
 class SceneOf final : public Scene {
-  /// Of SceneBodyPoint::start, without the sign; one is left for rounding.
+  /// The bits of SceneBodyPoint::start without the sign; one is left for rounding.
   static constexpr int kStartBits = 14;
   /// What the page takes for a slide, and for how long what has gone is drawn on: a little longer.
   /// What is drawn on and changes again and again ends in time, too.
@@ -277,7 +277,7 @@ class SceneOf final : public Scene {
       morph_;
   BodyNormals normals_;  // of surfaces in space
   Waiting<Vertex> waiting_{vertices_, triangles_};
-  /// Of the last step.
+  /// A connected part of the last step.
   struct Part {
     std::uint32_t vertices = 0, triangles = 0;  ///< that go
     bool waits = true;
@@ -290,7 +290,7 @@ class SceneOf final : public Scene {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> leaving_kept_;
 };
 
-/// Of a step's connected parts those wait in which vertices go and none come: a collapse. Where a
+/// The connected parts of a step in which vertices go and none come wait: collapses. Where a
 /// part changes what is hidden, it joins the group that does, or ends it if it does not wait.
 template <class Shown>
 template <class Delta>
