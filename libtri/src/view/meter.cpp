@@ -16,8 +16,8 @@ void learn(double& rate, double measured) {
   rate += (measured - rate) * (rate == 0.0 ? 1.0 : measured > rate ? 0.25 : 0.0625);
 }
 
-// What is ahead scatters around the estimate, and steps that have work for all their time are to end
-// within the budget, too.
+// What is ahead scatters around the estimate, and steps that have work for all their time are to
+// end within the budget, too.
 constexpr double kAim = 0.95;
 
 // A part of the cost of each operation, and of the end of a step, does not depend on the number of
