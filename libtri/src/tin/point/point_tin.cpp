@@ -196,6 +196,8 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
     if (!(bound > too_small && bound < best)) bound = (too_small + best) / 2;
   }
   if (last != best) maker.make(best, kUnlimited, options.quality);
+  // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
+  if (maker.vertices() > limit) maker.make(options.max_error, limit, TinQuality::kGreedy);
   return true;
 }
 
