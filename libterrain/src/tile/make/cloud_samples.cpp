@@ -118,8 +118,9 @@ void CloudSamples::place(const stream::Store& store, const StoredPlaces& places,
   });
 }
 
-void CloudSamples::add(const StoredBox& window, const GeographicBox& box,
-                       SurfaceSamples& out) const {
+void CloudSamples::add(const StoredBox& window, const GeographicBox& box, SurfaceSamples& out,
+                       std::vector<std::uint64_t>& order) const {
+  order.clear();
   const std::size_t x0 = column_or_row(0, window.min[0]), x1 = column_or_row(0, window.max[0]);
   const std::size_t y0 = column_or_row(1, window.min[1]), y1 = column_or_row(1, window.max[1]);
   for (std::size_t y = y0; y <= y1; ++y) {
@@ -128,11 +129,16 @@ void CloudSamples::add(const StoredBox& window, const GeographicBox& box,
       const Sample& s = samples_[i];
       if (s.longitude >= box.west && s.longitude <= box.east && s.latitude >= box.south &&
           s.latitude <= box.north) {
-        out.longitude.push_back(s.longitude);
-        out.latitude.push_back(s.latitude);
-        out.height.push_back(s.height);
+        order.push_back(std::uint64_t{s.number} << 32 | i);
       }
     }
+  }
+  std::sort(order.begin(), order.end());
+  for (const std::uint64_t one : order) {
+    const Sample& s = samples_[static_cast<std::uint32_t>(one)];
+    out.longitude.push_back(s.longitude);
+    out.latitude.push_back(s.latitude);
+    out.height.push_back(s.height);
   }
 }
 

@@ -26,8 +26,10 @@ class CloudSamples {
   CloudSamples(const stream::Store& store, const StoredPlaces& places,
                const EllipsoidalHeights& vertical, unsigned threads);
 
-  /// Adds those in `box` of the points in `window` (stored coordinates), in an order of their own.
-  void add(const StoredBox& window, const GeographicBox& box, SurfaceSamples& out) const;
+  /// Adds those in `box` of the points in `window` (stored coordinates), in the order of
+  /// StoreWindow::points(). order: scratch memory.
+  void add(const StoredBox& window, const GeographicBox& box, SurfaceSamples& out,
+           std::vector<std::uint64_t>& order) const;
 
  private:
   /// Stored x, y and z at first.

@@ -131,7 +131,7 @@ void PointTileSurface::drop_duplicates() {
 void PointTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
   if (cloud_.samples) {
-    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out);
+    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out, order_);
     return;
   }
   WindowPoints more;

@@ -82,6 +82,7 @@ class PointTileSurface final : public TileSurface {
   std::vector<StoredBox> windows_;
   WindowPoints points_;
   std::vector<std::uint32_t> slots_;
+  std::vector<std::uint64_t> order_;
   std::map<std::array<double, 4>, bool> crowded_;  ///< what is known of boxes
 };
 
