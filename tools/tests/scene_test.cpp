@@ -98,19 +98,23 @@ tri::View looking(double east, double north, double above, double pixel_error) {
   return view;
 }
 
-// After every frame the arrays are the Delaunay triangulation of the vertices in them, each at the
-// height of its cell; in the end at the level that was asked for.
+// After every frame at which nothing that has gone is drawn on, the arrays are the Delaunay
+// triangulation of the vertices in them, each at the height of its cell; in the end at the level
+// that was asked for.
 TEST_F(Scenes, TheArraysAreTheTriangulation) {
   const auto scene = Scene::open(store(), kGround, 1'000'000);
   Mirror mirror;
   bool sliding = false;
-  std::size_t most = 0;
+  std::size_t most = 0, compared = 0;
   double time = 0;
   for (const auto& view :
        {looking(0, 0, 4000, 20), looking(300, 200, 900, 1), looking(-500, -300, 1500, 3)}) {
     for (int frame = 0; frame < 2000; ++frame) {
       const SceneState state = scene->frame(view, 0.004, time += 0.01);
       mirror.apply(scene->take_changes());
+      ASSERT_LT(frame, 1999);
+      if (state.waiting) continue;
+      ++compared;
       std::set<std::uint32_t> used;
       std::set<std::array<std::array<int, 2>, 3>> triangles;
       for (const SceneTriangle& t : mirror.triangles) {
@@ -147,9 +151,9 @@ TEST_F(Scenes, TheArraysAreTheTriangulation) {
         ASSERT_TRUE(triangles.contains(corners));
       }
       if (state.settled) break;
-      ASSERT_LT(frame, 1999);
     }
   }
+  EXPECT_GE(compared, 3u);
   EXPECT_TRUE(sliding) << "nothing slides into place";
   EXPECT_GT(most, 5000u);
 }
