@@ -229,7 +229,7 @@ class PublishTest(Stores):
         self.assertEqual(terrace('verify', self.path('site', 'stores', 'alps')).returncode, 0)
         # The viewer's own files are within their bars.
         own = ['body.wasm', 'core.wasm', 'index.html', 'viewer.css', 'viewer.js', 'worker.js']
-        self.assertLess(sum(os.path.getsize(self.path('site', name)) for name in own), 1_000_000)
+        self.assertLess(sum(os.path.getsize(self.path('site', name)) for name in own), 1 << 20)
         self.assertLess(os.path.getsize(self.path('site', 'stores', 'alps.start')), 300_000)
         # Nothing else is left beside it.
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
