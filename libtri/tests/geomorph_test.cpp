@@ -558,7 +558,7 @@ TYPED_TEST(Geomorphs, PartsAreThoseThatTouch) {
           ASSERT_TRUE(first || at->second == part) << "two parts touch";
         }
       }
-      // Of each part all can be reached from one triangle.
+      // All triangles of a part can be reached from one of them.
       std::map<std::uint32_t, std::set<Point3>> reached;
       for (std::size_t change = 1; change > 0;) {
         change = 0;
