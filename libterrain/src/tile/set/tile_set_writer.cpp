@@ -151,6 +151,7 @@ void TileSetWriter::write_tiles(const std::vector<Zoom*>& zooms) {
         const auto& [zoom, number] = queue[i];
         if (written.made) journal_.add(zoom->tiles[number], written.finished);
         zoom->written.push_back(written);
+        if (number + 1 == zoom->tiles.size()) zoom->sides.clear();
       });
 }
 
