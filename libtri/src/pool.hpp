@@ -10,8 +10,8 @@
 #include <utility>
 
 /// Growing arrays of plain data for the triangulation: unlike std::vector they leave new elements
-/// uninitialised, and once they are large they grow by an eighth without a second copy if the system
-/// can move pages, and use huge pages (a sixth faster, as accesses are scattered).
+/// uninitialised, and once they are large they grow by an eighth without a second copy if the
+/// system can move pages, and use huge pages (a sixth faster, as accesses are scattered).
 
 namespace terrace::tri {
 
