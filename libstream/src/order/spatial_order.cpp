@@ -18,9 +18,9 @@ namespace {
 
 /// Points that are looked at together.
 constexpr std::size_t kWindowPoints = 1u << 18;
-/// In an ordered stream every fourth window is judged, by every fourth of its points.
-constexpr std::size_t kJudgedWindows = 4;
+/// A window is judged by every fourth of its points, and in an ordered stream every fourth is.
 constexpr std::size_t kJudgedPoints = 4;
+constexpr std::size_t kJudgedWindows = 4;
 /// Blocks so many times wider than those of a k-d tree are not compact.
 constexpr double kWidest = 2.0;
 /// Buckets are the leaves of a k-d tree of this depth.
@@ -103,14 +103,13 @@ class SpatialSource final : public OrderedSource {
   void open() {
     state_ = State::judging;
     bool more = true;
-    while (places_.size() < kWindowPoints && more) {
+    while (seen_ < kWindowPoints && more) {
       PointBlock block;
       more = source_->next(block);
-      add_places(block);
+      look_at(block);
       if (!block.empty()) window_.push_back(std::move(block));
     }
-    if (!places_.empty() &&
-        (options_.order == Order::spatial || spread(options_.block_points) > kWidest)) {
+    if (seen_ > 0 && (options_.order == Order::spatial || spread() > kWidest)) {
       report_.reordered = true;
       state_ = State::gathering;
       if (!more) load_window();
@@ -125,15 +124,21 @@ class SpatialSource final : public OrderedSource {
       unjudged_ -= std::min<std::uint64_t>(unjudged_, block.size());
       return;
     }
-    for (const Point3& p : block.positions) {
-      if (seen_++ % kJudgedPoints == 0) places_.push_back({p, places_.size()});
-    }
+    look_at(block);
     if (seen_ < kWindowPoints) return;
-    if (spread(std::max<std::size_t>(options_.block_points / kJudgedPoints, 1)) > kWidest) {
+    if (spread() > kWidest) {
       report_.reordered = true;
       state_ = State::gathering;
     } else {
       leave_window();
+    }
+  }
+
+  /// Adds points of a block to those by which its window is judged.
+  void look_at(const PointBlock& block) {
+    places_.reserve(kWindowPoints / kJudgedPoints + block.size());
+    for (const Point3& p : block.positions) {
+      if (seen_++ % kJudgedPoints == 0) places_.push_back({p, places_.size()});
     }
   }
 
@@ -143,13 +148,10 @@ class SpatialSource final : public OrderedSource {
     unjudged_ = (kJudgedWindows - 1) * kWindowPoints;
   }
 
-  void add_places(const PointBlock& block) {
-    for (const Point3& p : block.positions) places_.push_back({p, places_.size()});
-  }
-
-  /// The spread of the window in `places_`, which is reordered.
-  double spread(std::size_t block_points) {
-    const std::size_t blocks = blocks_of(places_.size(), block_points);
+  /// The spread of the window of which `places_` are a part, which is reordered.
+  double spread() {
+    const std::size_t blocks =
+        blocks_of(places_.size(), std::max<std::size_t>(options_.block_points / kJudgedPoints, 1));
     std::vector<std::size_t> begins;
     for (std::size_t b = 0; b <= blocks; ++b) begins.push_back(b * places_.size() / blocks);
     measure_units();
@@ -182,6 +184,10 @@ class SpatialSource final : public OrderedSource {
 
   /// Puts what is held back and all that follows into buckets.
   void gather() {
+    if (!window_.empty()) places_.clear();
+    for (const PointBlock& block : window_) {
+      for (const Point3& p : block.positions) places_.push_back({p, places_.size()});
+    }
     measure_units();
     planes_ = kd_planes(places_, kDepth, lengths_);
     packed_.emplace(info());

@@ -222,9 +222,9 @@ class SplitEncoder {
   void encode(Coder& coder, const std::array<std::uint64_t, 3>& size, At&& at, std::uint32_t n,
               std::uint32_t* order) {
     if (NarrowPoints::fit(size, n)) {
-      Run<Coder, NarrowPoints>{coder, narrow_}.encode(size, at, n, order);
+      Run<Coder, NarrowPoints>{coder, order}.encode(size, at, n, narrow_);
     } else {
-      Run<Coder, WidePoints>{coder, wide_}.encode(size, at, n, order);
+      Run<Coder, WidePoints>{coder, order}.encode(size, at, n, wide_);
     }
   }
 
@@ -235,36 +235,37 @@ class SplitEncoder {
     using Box = typename Points::Box;
 
     Coder& coder;
-    std::vector<Point>& all;
+    std::uint32_t* order;  ///< where the numbers of the next points go
 
     template <class At>
     void encode(const std::array<std::uint64_t, 3>& size, At&& at, std::uint32_t n,
-                std::uint32_t* order) {
-      all.resize(n);
+                std::vector<Point>& points) {
+      points.resize(2 * std::size_t{n});
       for (std::uint32_t i = 0; i < n; ++i) {
-        all[i] = Points::point(at(0, i), at(1, i), at(2, i), i);
+        points[i] = Points::point(at(0, i), at(1, i), at(2, i), i);
       }
-      split(Points::box(size), all.data(), n);
-      for (std::uint32_t i = 0; i < n; ++i) order[i] = Points::number(all[i]);
+      split(Points::box(size), points.data(), points.data() + n, n);
     }
 
-    void split(Box box, Point* points, std::uint32_t n) {
+    /// `room` is for as many points.
+    void split(Box box, Point* points, Point* room, std::uint32_t n) {
       // The lower half recursively, the upper one by going round: at most 192 deep.
       while (n > 3) {
         const BoxSide side = Points::longest(box);
-        if (side.extent == 0) return std::sort(points, points + n);
-        std::uint32_t below = partition(points, n, Points::limit(box, side));
+        if (side.extent == 0) return finish(points, n);
+        std::uint32_t below = partition(points, room, n, Points::limit(box, side));
         code_split(coder, n, below);
-        if (below > 0) split(Points::half(box, side, false), points, below);
+        n -= below;
+        if (below > 0) split(Points::half(box, side, false), points, room + n, below);
         box = Points::half(box, side, true);
         points += below;
-        n -= below;
+        std::swap(points, room);
       }
       switch (n) {
         case 1:
-          return Points::place(coder, box, points[0]);
+          return place(box, points[0]);
         case 2:
-          return split_two(box, points);
+          return split_two(box, points[0], points[1]);
         case 3:
           return split_three(box, points);
         default:
@@ -274,57 +275,70 @@ class SplitEncoder {
 
     // Most boxes have two or three points: what is known of them spares branches, which are guessed
     // wrong half of the time.
-    void split_two(Box box, Point* points) {
+    void split_two(Box box, Point a, Point b) {
       for (;;) {
         const BoxSide side = Points::longest(box);
-        if (side.extent == 0) return std::sort(points, points + 2);
+        if (side.extent == 0) return finish(std::array<Point, 2>{a, b}.data(), 2);
         const typename Points::Limit limit = Points::limit(box, side);
-        const bool first = Points::is_below(points[0], limit),
-                   second = Points::is_below(points[1], limit);
+        const bool first = Points::is_below(a, limit), second = Points::is_below(b, limit);
         coder.symbol(context::kSplit, 0u + first + second);
         if (first != second) {
-          Points::exchange(points[0], points[1], second);
-          Points::place(coder, Points::half(box, side, false), points[0]);
-          Points::place(coder, Points::half(box, side, true), points[1]);
-          return;
+          Points::exchange(a, b, second);
+          place(Points::half(box, side, false), a);
+          return place(Points::half(box, side, true), b);
         }
         box = Points::half(box, side, !first);
       }
     }
 
     void split_three(Box box, Point* points) {
+      std::array<Point, 3> room;
       for (;;) {
         const BoxSide side = Points::longest(box);
-        if (side.extent == 0) return std::sort(points, points + 3);
-        const std::uint32_t below = partition(points, 3, Points::limit(box, side));
+        if (side.extent == 0) return finish(points, 3);
+        const std::uint32_t below = partition(points, room.data(), 3, Points::limit(box, side));
         coder.symbol(context::kSplit + 1, below);
         if (below == 1) {
-          Points::place(coder, Points::half(box, side, false), points[0]);
-          return split_two(Points::half(box, side, true), points + 1);
+          place(Points::half(box, side, false), points[0]);
+          return split_two(Points::half(box, side, true), room[0], room[1]);
         }
         if (below == 2) {
-          split_two(Points::half(box, side, false), points);
-          return Points::place(coder, Points::half(box, side, true), points[2]);
+          split_two(Points::half(box, side, false), points[0], points[1]);
+          return place(Points::half(box, side, true), room[0]);
         }
+        if (below == 0) std::copy(room.begin(), room.end(), points);
         box = Points::half(box, side, below == 0);
       }
     }
 
-    /// Brings the points below the limit to the front and returns their number. Always swaps: a
-    /// branch here is a coin toss.
-    static std::uint32_t partition(Point* points, std::uint32_t n,
+    void place(const Box& box, const Point& point) {
+      Points::place(coder, box, point);
+      *order++ = Points::number(point);
+    }
+
+    /// Of points at one place.
+    void finish(Point* points, std::uint32_t n) {
+      std::sort(points, points + n);
+      for (std::uint32_t i = 0; i < n; ++i) *order++ = Points::number(points[i]);
+    }
+
+    /// Leaves the points below the limit, moves the others to `above` and returns how many are
+    /// below. Writes all to both: a branch here is a coin toss. Nothing written is read again,
+    /// which would be waited for.
+    static std::uint32_t partition(Point* points, Point* above, std::uint32_t n,
                                    const typename Points::Limit& limit) {
       std::uint32_t below = 0;
       for (std::uint32_t i = 0; i < n; ++i) {
         const Point point = points[i];
-        points[i] = points[below];
         points[below] = point;
+        above[i - below] = point;
         below += Points::is_below(point, limit) ? 1 : 0;
       }
       return below;
     }
   };
 
+  // Points, and as much room.
   std::vector<NarrowPoints::Point> narrow_;
   std::vector<WidePoints::Point> wide_;
 };
