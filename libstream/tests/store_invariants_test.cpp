@@ -206,8 +206,9 @@ TEST(StoreInvariants, ManifestsWhosePlacesCannotBeAreRefused) {
       {"scale or offset", [](auto& m) { m["coordinates"][0]["offset"] = "-inf"; }},
       {"the world transform", [](auto& m) { m["world"][0] = 0; }},
       {"the world transform", [](auto& m) { m["world"][5] = "nan"; }},
-      {"an EPSG code", [](auto& m) { m["crs"]["epsg"] = 1e300; }},
-      {"an EPSG code", [](auto& m) { m["crs"]["vertical_epsg"] = -5; }},
+      {"an EPSG code", [](auto& m) { m["crs"]["epsg"] = std::uint64_t{1} << 31; }},
+      {"a count", [](auto& m) { m["crs"]["epsg"] = 1e300; }},
+      {"a count", [](auto& m) { m["crs"]["vertical_epsg"] = -5; }},
       {"an unknown type", [](auto& m) { m["coordinates"][0]["type"] = "int3"; }},
   };
   for (const ManifestCase& c : cases) {

@@ -5,6 +5,7 @@
 TERRACE=path/to/terrace view_cli_test.py [CLASS...]
 """
 
+import gzip
 import hashlib
 import json
 import os
@@ -229,7 +230,13 @@ class PublishTest(Stores):
         self.assertEqual(terrace('verify', self.path('site', 'stores', 'alps')).returncode, 0)
         # The viewer's own files are within their bars.
         own = ['body.wasm', 'core.wasm', 'index.html', 'viewer.css', 'viewer.js', 'worker.js']
-        self.assertLess(sum(os.path.getsize(self.path('site', name)) for name in own), 1 << 20)
+        packed = {}
+        for name in own:
+            with open(self.path('site', name), 'rb') as file:
+                packed[name] = len(gzip.compress(file.read(), 9))
+        self.assertLessEqual(sum(os.path.getsize(self.path('site', name)) for name in own), 1_000_000)
+        self.assertLessEqual(sum(packed.values()), 400_000)
+        self.assertLessEqual(max(packed.values()), 200_000)
         self.assertLess(os.path.getsize(self.path('site', 'stores', 'alps.start')), 300_000)
         # Nothing else is left beside it.
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])

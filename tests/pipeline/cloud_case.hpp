@@ -69,6 +69,12 @@ inline Points points_of(const std::string& kind) {
       const double t = random.unit() * 1000, s = random.unit() * 60;
       add(0.8 * t - 0.6 * s, 0.6 * t + 0.8 * s);
     }
+  } else if (kind == "winding") {  // a swath whose bends leave voids within the hull
+    for (int i = 0; i < 12000; ++i) {
+      const double t = i * 0.5 + random.unit() * 2;
+      const double s = random.unit() * 30 + 250 * std::sin(t / 400);
+      add(0.8 * t - 0.6 * s, 0.6 * t + 0.8 * s);
+    }
   } else if (kind == "straight borders") {  // a tile that was cut out of a scan
     for (int i = 0; i < 3000; ++i) add(std::round(random.unit() * 1e3), random.unit() * 1000);
     for (int i = 0; i < 600; ++i) add(i % 2 * 1000, random.unit() * 1000);

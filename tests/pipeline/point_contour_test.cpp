@@ -25,6 +25,7 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
+#include "cloud_case.hpp"
 #include "contour/contour_parts.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
@@ -196,6 +197,12 @@ TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
       expect_contours(store, {.interval = seed % 2 == 0 ? 2.0 : 3.3, .level = level}, triangles);
     }
   }
+}
+
+TEST(PointContours, AlongAWindingSwathAreThoseOfTheWholeTriangulation) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = cloud(folder.path(), tests::points_of("winding"));
+  expect_contours(store, {.interval = 2}, triangles_of(store, 0));
 }
 
 TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,13 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
+#include "surface/window_tree.hpp"
 
 namespace terrace {
 namespace {
 
 using terrain::Point2;
+using terrain::PointVoids;
 using terrain::PointWindow;
 using terrain::StoredBox;
 using terrain::SurfacePoint;
@@ -70,9 +73,14 @@ StoredBox random_box(const stream::Box3& bounds, Random& random, std::uint64_t i
   return box;
 }
 
-void check_windows(const stream::Store& store, unsigned level, int boxes) {
+void check_windows(const stream::Store& store, unsigned level, int boxes,
+                   bool knows_border = false) {
   const Whole whole(store, level);
-  PointWindow window(store, level, 0), other(store, level, 0);
+  const auto voids = std::make_shared<PointVoids>(store, level);
+  PointWindow window(store, level, 0, voids), other(store, level, 0);
+  if (knows_border) {
+    ASSERT_EQ(voids->find(other), whole.triangulation.triangle_count() > 0);
+  }
   Random random(level + 3);
   for (int i = 0; i < boxes; ++i) {
     SCOPED_TRACE("level " + std::to_string(level) + ", box " + std::to_string(i));
@@ -139,11 +147,18 @@ TEST_P(Clouds, WindowsHaveTheTrianglesOfTheWhole) {
   for (unsigned level = 1; level <= store.top(); ++level) check_windows(store, level, 12);
 }
 
+TEST_P(Clouds, SoTheyDoWithTheBorderOfTheVoids) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store =
+      stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
+  for (unsigned level = 0; level <= store.top(); ++level) check_windows(store, level, 20, true);
+}
+
 INSTANTIATE_TEST_SUITE_P(PointWindow, Clouds,
                          testing::Values("random", "lattice", "duplicates", "voids", "clusters",
-                                         "turned", "straight borders", "circle", "parabola", "far",
-                                         "huge", "tiny", "line", "nearly a line", "one", "two",
-                                         "one place"),
+                                         "turned", "winding", "straight borders", "circle",
+                                         "parabola", "far", "huge", "tiny", "line", "nearly a line",
+                                         "one", "two", "one place"),
                          [](const auto& one) {
                            std::string name = one.param;
                            std::replace(name.begin(), name.end(), ' ', '_');
@@ -180,6 +195,27 @@ TEST(PointWindow, ReadsLittleMoreThanItNeeds) {
     // where it sees the hull what lies along that.
     EXPECT_LT(static_cast<double>(read) / 200, 0.1 * static_cast<double>(store.points()));
   }
+}
+
+// Bends leave voids whose circles hold most of the swath's border: each window looked for what was
+// missing from them by itself, for minutes.
+TEST(PointWindow, BoxesLookedAtAlongAWindingSwathAreFewTimesItsPoints) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = stream::Store::open(cloud_store(folder.path(), points_of("winding")));
+  const terrain::WindowTree tree(store, 0, 200);
+  ASSERT_GT(tree.size(), 50U);
+  const auto voids = std::make_shared<PointVoids>(store, 0);
+  PointWindow window(store, 0, 0, voids);
+  std::size_t triangulated = 0;
+  for (std::size_t i = 0; i < tree.size(); ++i) {
+    window.load(tree.box(i));
+    triangulated += window.triangulation().vertex_count();
+  }
+  RecordProperty("looks", std::to_string(voids->looks()));
+  RecordProperty("triangulated", std::to_string(triangulated));
+  EXPECT_TRUE(voids->known());
+  EXPECT_LT(voids->looks(), 17 * store.points());
+  EXPECT_LT(triangulated, 4 * store.points());
 }
 
 TEST(PointWindow, SaysWhatMemoryItNeeds) {

@@ -12,7 +12,6 @@ for program in em++ make node npm; do
   command -v "$program" > /dev/null || skip "$program is not installed, of Emscripten, make, node and npm"
 done
 em++ --version | grep -q ' 3\.1\.6' || skip 'another Emscripten than 3.1.6 makes other bytes'
-[ -d /usr/include/nlohmann ] || skip 'nlohmann-json is not installed'
 
 make -s -j"$(nproc)" -f "$source/tools/viewer/core/Makefile" ROOT="$source" OUT="$build/viewer-core" all
 mkdir -p "$build/viewer-sources"

@@ -4,23 +4,13 @@
 #include <charconv>
 #include <cmath>
 
-#include <nlohmann/json.hpp>
-
 #include "store/codec/bytes.hpp"
 #include "store/codec/layout.hpp"
+#include "store/json.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-constexpr const char* kFormatName = "terrace-store";
-/// The text ends with this, eight hexadecimal digits, and the closing below. The checksum is the
-/// CRC-32 of the whole text with zeros for its digits.
-constexpr std::string_view kChecksumKey = "\"checksum\": \"";
-constexpr std::string_view kClosing = "\"\n}\n";
-constexpr std::string_view kZeros = "00000000";
 
 std::uint32_t from_hexadecimal(const std::string& text) {
   std::uint32_t value = 0;
@@ -31,68 +21,48 @@ std::uint32_t from_hexadecimal(const std::string& text) {
   return value;
 }
 
-/// JSON has no infinities and no NaN; they are rare enough to be words.
-Json number(double value) {
-  if (std::isfinite(value)) return value;
-  return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
-}
-
-double number(const Json& json) {
-  if (!json.is_string()) return json.get<double>();
-  const auto word = json.get<std::string>();
+/// JSON has no infinities and no NaN; they are words.
+double number(const JsonValue& json) {
+  if (json.kind() != JsonValue::Kind::string) return json.number();
+  const std::string& word = json.string();
   if (word == "inf") return std::numeric_limits<double>::infinity();
   if (word == "-inf") return -std::numeric_limits<double>::infinity();
   if (word == "nan") return std::numeric_limits<double>::quiet_NaN();
   throw Damage("\"" + word + "\" is not a number");
 }
 
-/// The library's own conversions would round, wrap or cut what is no such integer.
-std::uint64_t count_of(const Json& json) {
-  if (!json.is_number_unsigned()) throw Damage("a count is not an integer from 0 up");
-  return json.get<std::uint64_t>();
-}
-
-int code_of(const Json& json) {
-  if (!json.is_number_integer()) throw Damage("an EPSG code is not an integer");
-  const auto value = json.get<std::int64_t>();
-  if (value < 0 || value > INT32_MAX) throw Damage("an EPSG code is out of range");
+int code_of(const JsonValue& json) {
+  const std::uint64_t value = json.count();
+  if (value > INT32_MAX) throw Damage("an EPSG code is out of range");
   return static_cast<int>(value);
 }
 
-Json channel_json(const Channel& channel) {
-  return {{"name", channel.name},
-          {"type", std::string(name_of(channel.type))},
-          {"scale", number(channel.scale)},
-          {"offset", number(channel.offset)},
-          {"unit", channel.unit}};
+const std::vector<JsonValue>& items(const JsonValue& json, std::size_t count,
+                                    const char* otherwise) {
+  if (json.items().size() != count) throw Damage(otherwise);
+  return json.items();
 }
 
-Channel channel_of(const Json& json) {
+Channel channel_of(const JsonValue& json) {
   Channel channel;
-  channel.name = json.at("name").get<std::string>();
-  const auto type = scalar_type_of(json.at("type").get<std::string>());
+  channel.name = json.at("name").string();
+  const auto type = scalar_type_of(json.at("type").string());
   if (!type) throw Damage("a channel has an unknown type");
   channel.type = *type;
   channel.scale = number(json.at("scale"));
   channel.offset = number(json.at("offset"));
-  channel.unit = json.at("unit").get<std::string>();
+  channel.unit = json.at("unit").string();
   return channel;
 }
 
-Json point_json(const Point3& p) { return Json::array({number(p[0]), number(p[1]), number(p[2])}); }
-
-Point3 point_of(const Json& json) {
-  if (!json.is_array() || json.size() != 3) throw Damage("a point does not have three coordinates");
-  return {number(json[0]), number(json[1]), number(json[2])};
+Point3 point_of(const JsonValue& json) {
+  const std::vector<JsonValue>& xyz = items(json, 3, "a point does not have three coordinates");
+  return {number(xyz[0]), number(xyz[1]), number(xyz[2])};
 }
 
-Json file_json(const FileEntry& file) {
-  return {{"file", file.name}, {"bytes", file.bytes}, {"crc32", hexadecimal(file.checksum)}};
-}
-
-FileEntry file_of(const Json& json) {
-  FileEntry file{json.at("file").get<std::string>(), count_of(json.at("bytes")),
-                 from_hexadecimal(json.at("crc32").get<std::string>())};
+FileEntry file_of(const JsonValue& json) {
+  FileEntry file{json.at("file").string(), json.at("bytes").count(),
+                 from_hexadecimal(json.at("crc32").string())};
   // A name, not a way out of the folder.
   if (file.name.empty() || file.name.find('/') != std::string::npos || file.name[0] == '.') {
     throw Damage("a file name is not allowed");
@@ -100,126 +70,62 @@ FileEntry file_of(const Json& json) {
   return file;
 }
 
-Json crs_json(const Crs& crs) {
-  return {{"epsg", crs.epsg},
-          {"vertical_epsg", crs.vertical_epsg},
-          {"name", crs.name},
-          {"geographic", crs.geographic},
-          {"horizontal_unit", crs.horizontal_unit},
-          {"vertical_unit", crs.vertical_unit},
-          {"wkt", crs.wkt}};
-}
-
-Crs crs_of(const Json& json) {
+Crs crs_of(const JsonValue& json) {
   Crs crs;
   crs.epsg = code_of(json.at("epsg"));
   crs.vertical_epsg = code_of(json.at("vertical_epsg"));
-  crs.name = json.at("name").get<std::string>();
-  crs.geographic = json.at("geographic").get<bool>();
-  crs.horizontal_unit = json.at("horizontal_unit").get<std::string>();
-  crs.vertical_unit = json.at("vertical_unit").get<std::string>();
-  crs.wkt = json.at("wkt").get<std::string>();
+  crs.name = json.at("name").string();
+  crs.geographic = json.at("geographic").boolean();
+  crs.horizontal_unit = json.at("horizontal_unit").string();
+  crs.vertical_unit = json.at("vertical_unit").string();
+  crs.wkt = json.at("wkt").string();
   return crs;
 }
 
-Json to_json(const Manifest& m) {
-  Json json;
-  json["format"] = kFormatName;
-  json["version"] = m.version;
-  json["kind"] = m.schema.grid ? "grid" : "cloud";
-  json["source"] = m.schema.format;
-  json["points"] = m.points;
-  json["nodata"] = m.schema.nodata;
-  json["columns"] = m.schema.columns;
-  json["rows"] = m.schema.rows;
-  json["bounds"] = m.bounds.empty()
-                       ? Json(nullptr)
-                       : Json{{"min", point_json(m.bounds.min)}, {"max", point_json(m.bounds.max)}};
-  json["mean_height"] = number(m.mean_height);
-  json["coordinates"] = Json::array();
-  for (const Channel& channel : m.schema.coordinates) {
-    json["coordinates"].push_back(channel_json(channel));
-  }
-  json["attributes"] = Json::array();
-  for (const Channel& channel : m.schema.attributes) {
-    json["attributes"].push_back(channel_json(channel));
-  }
-  json["world"] = Json::array();
-  for (const double c : m.schema.world.xy) json["world"].push_back(number(c));
-  json["crs"] = crs_json(m.schema.crs);
-  json["vertical"] = m.schema.vertical;
-  json["parameters"] = Json::array();
-  for (const auto& [name, value] : m.schema.parameters) {
-    json["parameters"].push_back({{"name", name}, {"value", value}});
-  }
-  json["levels"] = Json::array();
-  for (std::size_t l = 0; l < m.levels.size(); ++l) {
-    const LevelEntry& level = m.levels[l];
-    const Json segment = {{"clusters", level.clusters},
-                          {"data", file_json(level.data)},
-                          {"index", file_json(level.index)},
-                          {"directory_bytes", level.directory_bytes}};
-    json["levels"].push_back({{"level", l},
-                              {"points", level.points},
-                              {"members", level.members},
-                              {"clusters", level.clusters},
-                              {"segments", Json::array({segment})}});
-  }
-  return json;
-}
-
-Manifest from_json(const Json& json) {
+Manifest from_json(const JsonValue& json) {
   Manifest m;
-  m.version = json.at("version").get<int>();
-  const auto kind = json.at("kind").get<std::string>();
+  m.version = static_cast<int>(json.at("version").count());
+  const auto kind = json.at("kind").string();
   if (kind != "grid" && kind != "cloud") throw Damage("the kind is unknown");
   m.schema.grid = kind == "grid";
-  m.schema.format = json.at("source").get<std::string>();
-  m.points = count_of(json.at("points"));
-  m.schema.nodata = count_of(json.at("nodata"));
-  m.schema.columns = count_of(json.at("columns"));
-  m.schema.rows = count_of(json.at("rows"));
-  if (const Json& bounds = json.at("bounds"); !bounds.is_null()) {
+  m.schema.format = json.at("source").string();
+  m.points = json.at("points").count();
+  m.schema.nodata = json.at("nodata").count();
+  m.schema.columns = json.at("columns").count();
+  m.schema.rows = json.at("rows").count();
+  if (const JsonValue& bounds = json.at("bounds"); bounds.kind() != JsonValue::Kind::null) {
     m.bounds = {point_of(bounds.at("min")), point_of(bounds.at("max"))};
   }
   m.mean_height = number(json.at("mean_height"));
-  const Json& coordinates = json.at("coordinates");
-  if (!coordinates.is_array() || coordinates.size() != 3) {
-    throw Damage("there are not three coordinates");
-  }
+  const auto& coordinates = items(json.at("coordinates"), 3, "there are not three coordinates");
   for (std::size_t i = 0; i < 3; ++i) m.schema.coordinates[i] = channel_of(coordinates[i]);
-  for (const Json& channel : json.at("attributes")) {
+  for (const JsonValue& channel : json.at("attributes").items()) {
     m.schema.attributes.push_back(channel_of(channel));
   }
   if (m.schema.attributes.size() > kMostAttributes) throw Damage("there are too many attributes");
-  const Json& world = json.at("world");
-  if (!world.is_array() || world.size() != 6)
-    throw Damage("the world transform is not six numbers");
+  const auto& world = items(json.at("world"), 6, "the world transform is not six numbers");
   for (std::size_t i = 0; i < 6; ++i) m.schema.world.xy[i] = number(world[i]);
   m.schema.crs = crs_of(json.at("crs"));
-  m.schema.vertical = json.at("vertical").get<std::string>();
-  for (const Json& parameter : json.at("parameters")) {
-    m.schema.parameters.emplace_back(parameter.at("name").get<std::string>(),
-                                     parameter.at("value").get<std::string>());
+  m.schema.vertical = json.at("vertical").string();
+  for (const JsonValue& parameter : json.at("parameters").items()) {
+    m.schema.parameters.emplace_back(parameter.at("name").string(), parameter.at("value").string());
   }
-  for (const Json& level : json.at("levels")) {
-    const Json& segments = level.at("segments");
-    if (!segments.is_array() || segments.size() != 1) {
-      throw Damage("a level does not have one segment");
-    }
-    if (count_of(level.at("level")) != m.levels.size()) {
+  for (const JsonValue& level : json.at("levels").items()) {
+    const JsonValue& segment =
+        items(level.at("segments"), 1, "a level does not have one segment").front();
+    if (level.at("level").count() != m.levels.size()) {
       throw Damage("the levels do not follow one another from 0 up");
     }
     LevelEntry entry;
-    entry.points = count_of(level.at("points"));
-    entry.members = count_of(level.at("members"));
-    entry.clusters = count_of(level.at("clusters"));
-    if (count_of(segments[0].at("clusters")) != entry.clusters) {
+    entry.points = level.at("points").count();
+    entry.members = level.at("members").count();
+    entry.clusters = level.at("clusters").count();
+    if (segment.at("clusters").count() != entry.clusters) {
       throw Damage("a level's segment does not have the level's clusters");
     }
-    entry.data = file_of(segments[0].at("data"));
-    entry.index = file_of(segments[0].at("index"));
-    entry.directory_bytes = count_of(segments[0].at("directory_bytes"));
+    entry.data = file_of(segment.at("data"));
+    entry.index = file_of(segment.at("index"));
+    entry.directory_bytes = segment.at("directory_bytes").count();
     m.levels.push_back(std::move(entry));
   }
   return m;
@@ -306,16 +212,6 @@ std::string hexadecimal(std::uint32_t value) {
   return text;
 }
 
-std::string to_text(const Manifest& manifest) {
-  Json json = to_json(manifest);
-  json["checksum"] = kZeros;
-  std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-  const std::uint32_t checksum = crc32(0, text.data(), text.size());
-  const std::size_t at = text.size() - kClosing.size() - kZeros.size();
-  text.replace(at, kZeros.size(), hexadecimal(checksum));
-  return text;
-}
-
 std::string read_manifest(const ByteSource& file) {
   if (file.size() > kMostManifestBytes) {
     throw Error({.file = file.name(), .where = {}, .cause = "the file is too large", .remedy = {}});
@@ -326,14 +222,13 @@ std::string read_manifest(const ByteSource& file) {
 }
 
 Manifest parse_manifest(const std::string& text, const std::string& file) {
-  Json json;
   try {
-    json = Json::parse(text);
-    if (!json.is_object() || json.at("format") != kFormatName) {
+    const JsonValue json = JsonValue::parse(text);
+    if (json.at("format").string() != kFormatName) {
       damaged(file, "it does not say that this is a store");
     }
     // Before anything that a newer version may do otherwise.
-    const auto version = json.at("version").get<std::int64_t>();
+    const auto version = json.at("version").count();
     if (version > kVersion) {
       throw Error({.file = file,
                    .where = {},
@@ -365,18 +260,9 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     check_places(manifest);
     manifest.checksum = checksum;
     return manifest;
-  } catch (const Json::exception& error) {
-    damaged(file, error.what());
   } catch (const Damage& error) {
     damaged(file, error.what());
   }
-}
-
-bool is_as_written(const std::string& text, const Manifest& manifest) {
-  Json json = to_json(manifest);
-  json["checksum"] = hexadecimal(manifest.checksum);
-  // Objects of this kind of JSON are equal only if their keys have the same order.
-  return Json::parse(text, nullptr, /*allow_exceptions=*/false) == json;
 }
 
 bool looks_like_store(const std::filesystem::path& folder) {
@@ -384,10 +270,8 @@ bool looks_like_store(const std::filesystem::path& folder) {
   const auto path = folder / kManifestName;
   if (!std::filesystem::is_regular_file(path, error)) return false;
   try {
-    const Json json = Json::parse(read_manifest(*open_file(path)), nullptr, false);
-    const auto format = json.is_object() ? json.find("format") : json.end();
-    return format != json.end() && *format == kFormatName;
-  } catch (const Error&) {
+    return JsonValue::parse(read_manifest(*open_file(path))).at("format").string() == kFormatName;
+  } catch (const std::runtime_error&) {
     return false;
   }
 }

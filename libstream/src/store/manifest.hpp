@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/temporary.hpp"
@@ -19,6 +20,13 @@ inline constexpr std::size_t kMostAttributes = 4096;
 /// and the bytes of a point, fit into 64 bits.
 inline constexpr std::uint64_t kMostStorePoints = std::uint64_t{1} << 48;
 inline constexpr std::uint64_t kMostColumns = std::uint64_t{1} << 31;
+
+inline constexpr std::string_view kFormatName = "terrace-store";
+/// The text ends with this, eight hexadecimal digits, and the closing below. The checksum is the
+/// CRC-32 of the whole text with zeros for its digits.
+inline constexpr std::string_view kChecksumKey = "\"checksum\": \"";
+inline constexpr std::string_view kClosing = "\"\n}\n";
+inline constexpr std::string_view kZeros = "00000000";
 
 struct FileEntry {
   std::string name;

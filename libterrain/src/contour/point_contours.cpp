@@ -96,6 +96,7 @@ class PointContours {
                           if (first_at_work(part) < part.end) loads.push_back(&part);
                         });
     std::vector<std::unique_ptr<PointWindow>> windows(threads);
+    const auto voids = std::make_shared<PointVoids>(parts_.store, request_.level);
     ContourTriangles lines(request_.interval, parts_.emit, parts_.limit);
     std::vector<Triangle> strange;
     in_order(
@@ -103,7 +104,8 @@ class PointContours {
         [&](unsigned thread, std::size_t i) {
           std::unique_ptr<PointWindow>& window = windows[thread];
           if (window == nullptr) {
-            window = std::make_unique<PointWindow>(parts_.store, request_.level, memory / threads);
+            window = std::make_unique<PointWindow>(parts_.store, request_.level, memory / threads,
+                                                   voids);
           }
           Crossed result;
           add_crossed(*window, *loads[i], result);

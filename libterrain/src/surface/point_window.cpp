@@ -17,6 +17,8 @@ namespace {
 constexpr double kMargin = 3;
 /// The margin is at most this share of the longer side.
 constexpr double kMostMargin = 0.05;
+/// Wider circles than so many medians, or than this share of the longer side, border voids.
+constexpr double kWidest = 4, kMostWide = 1.0 / 16;
 /// Peak bytes per point that was read and lies around; a point that is inserted has its place,
 /// height and origin twice while it is, 20 for sorting and then 68 in the triangulation, states,
 /// a hint and a suspect's share.
@@ -28,11 +30,13 @@ constexpr std::uint64_t kShareKept = 16;
 
 }  // namespace
 
-PointWindow::PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes)
+PointWindow::PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes,
+                         std::shared_ptr<PointVoids> voids)
     : store_(store),
       memory_bytes_(memory_bytes),
       scale_(store.schema().coordinates[2].scale),
       offset_(store.schema().coordinates[2].offset),
+      voids_(voids != nullptr ? std::move(voids) : std::make_shared<PointVoids>(store, level)),
       frontier_(store, level) {}
 
 std::array<Point2, 3> PointWindow::corners(tri::TriangleId triangle) const {
@@ -165,7 +169,7 @@ void PointWindow::insert_taken() {
 
 void PointWindow::clear() {
   triangulation_.restart();
-  is_whole_ = false;
+  is_whole_ = takes_too_long_ = false;
   heights_.clear();
   origins_.clear();
   states_.clear();
@@ -182,32 +186,101 @@ void PointWindow::clear() {
   hull_.clear();
 }
 
-StoredBox PointWindow::with_margin() const {
+double PointWindow::margin() const {
   const double width = box_.max[0] - box_.min[0], height = box_.max[1] - box_.min[1];
   const auto inside = static_cast<double>(std::max<std::size_t>(places_.size(), 1));
-  const double margin =
-      std::min(kMargin * std::sqrt(width * height / inside), kMostMargin * std::max(width, height));
-  return {{box_.min[0] - margin, box_.min[1] - margin},
-          {box_.max[0] + margin, box_.max[1] + margin}};
+  return std::min(kMargin * std::sqrt(width * height / inside),
+                  kMostMargin * std::max(width, height));
+}
+
+void PointWindow::begin(const StoredBox& box) {
+  clear();
+  box_ = inner_ = box;
+  const auto take = [this](const stream::StoreQuery::Node& node) { this->take(node); };
+  frontier_.begin(take);
+  frontier_.read_meeting(box, take);
 }
 
 void PointWindow::load(const StoredBox& box) {
-  clear();
-  box_ = inner_ = box;
-  const StoredBox bounds{{store_.bounds().min[0], store_.bounds().min[1]},
-                         {store_.bounds().max[0], store_.bounds().max[1]}};
-  if (box.meets(bounds)) {
-    const auto take = [this](const stream::StoreQuery::Node& node) { this->take(node); };
-    frontier_.begin(take);
-    frontier_.read_meeting(box, take);
+  if (!box.meets(flat(store_.bounds()))) {
+    clear();
+    box_ = inner_ = box;
+    return make_hints();
+  }
+  const auto load = [&] {
+    begin(box);
+    if (voids_->known()) return load_with_border();
     // Triangles across the border need a few points more, which are cheaper in bulk.
-    grow_inner(with_margin());
+    grow_inner(box.widened(margin()));
     if (places_.size() < kFirstPoints) take_nearest(kFirstPoints - places_.size());
     insert_taken();
     is_whole_ = left_ == 0 && frontier_.open().empty();
     if (!is_whole_) settle();
+  };
+  load();
+  if (takes_too_long_) {
+    voids_->find(*this);
+    load();
   }
   make_hints();
+}
+
+void PointWindow::load_with_border() {
+  grow_inner(box_.widened(voids_->reach(box_)));
+  insert_taken();
+  voids_->for_each(box_, [this](const SurfaceCorner& corner) {
+    if (inner_.contains({corner.place[0], corner.place[1], 0})) return;
+    places_.push_back(corner.place);
+    taken_.push_back({corner.height, {}});
+  });
+  insert_taken();
+  states_.assign(triangulation_.triangle_slots(), kUnknown);
+  for (const tri::TriangleId t : triangulation_.all_triangles()) {
+    if (inner_.holds(circle(t).bounds()) || triangle_meets(corners(t), box_)) {
+      states_[tri::slot(t)] = kCertain;
+    }
+  }
+}
+
+double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>& border) {
+  begin(box);
+  const double margin = this->margin();
+  grow_inner(box.widened(margin));
+  if (places_.empty()) return 0;
+  insert_taken();
+  const auto is_inside = [&](tri::VertexId v) {
+    const Point2 p = triangulation_.point(v);
+    return box.contains({p[0], p[1], 0});
+  };
+  // Of points spread evenly, one circle in a thousand million is so wide.
+  std::vector<double> radii;
+  for (const tri::TriangleId t : triangulation_.all_triangles()) {
+    const CircleCover cover = circle(t);
+    if (!cover.has_plane && is_inside(triangulation_.vertices(t)[0])) radii.push_back(cover.radius);
+  }
+  double radius = 0;
+  if (!radii.empty()) {
+    const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+    std::nth_element(radii.begin(), middle, radii.end());
+    const double side = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
+    radius = std::min(kWidest * *middle, kMostWide * side);
+  }
+  // A little more, for rounding.
+  const double reach = 2 * radius * (1 + 1e-6);
+  grow_inner(box.widened(std::max(margin, reach)));
+  insert_taken();
+  std::vector<bool> is_border(triangulation_.vertex_slots(), triangulation_.triangle_count() == 0);
+  for (const tri::TriangleId t : triangulation_.all_triangles()) {
+    const CircleCover cover = circle(t);
+    const auto next = triangulation_.neighbours(t);
+    const bool is_narrow = !cover.has_plane && cover.radius <= radius;
+    if (is_narrow && std::find(next.begin(), next.end(), tri::kNoTriangle) == next.end()) continue;
+    for (const tri::VertexId v : triangulation_.vertices(t)) is_border[tri::slot(v)] = true;
+  }
+  for (const tri::VertexId v : triangulation_.all_vertices()) {
+    if (is_border[tri::slot(v)] && is_inside(v)) border.push_back(corner(v));
+  }
+  return reach;
 }
 
 }  // namespace terrace::terrain

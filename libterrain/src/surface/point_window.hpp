@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -17,11 +18,15 @@
 #include "surface/circle_cover.hpp"
 #include "surface/cluster_frontier.hpp"
 #include "surface/lattice_surface.hpp"
+#include "surface/point_voids.hpp"
 #include "surface/store_window.hpp"
 #include "surface/surface_corner.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
+
+/// Whether a triangle, its corners counter-clockwise, meets a box: exact.
+bool triangle_meets(const std::array<Point2, 3>& corner, const StoredBox& box);
 
 /// The Delaunay triangulation in x,y of all points of a level and above, part by part: exactly the
 /// triangles that the whole has. tri::Delaunay2 breaks ties by the points alone, so a triangle
@@ -43,8 +48,10 @@ class PointWindow {
   /// Peak bytes per point of a window that is large beside its border.
   static constexpr std::uint64_t kBytesPerPoint = 120;
 
-  /// memory_bytes: what one window may take; 0: as much as there is. The store must outlive this.
-  PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes);
+  /// memory_bytes: what one window may take; 0: as much as there is. voids: shared by windows of
+  /// this store and level; none: its own. The store must outlive this.
+  PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes,
+              std::shared_ptr<PointVoids> voids = nullptr);
   PointWindow(const PointWindow&) = delete;
   PointWindow& operator=(const PointWindow&) = delete;
 
@@ -56,14 +63,20 @@ class PointWindow {
   /// meets the box has a circumcircle, or a hull edge that the box sees from outside has a
   /// half-plane, in which a point may be missing, adds one: of what was read, or else of the
   /// clusters whose boxes it meets, coarse levels first, and the more at once the longer nothing is
-  /// found. So no width is guessed, and voids and
-  /// hulls cost a few clusters of coarse levels more. About 0.4 us per point in the box. Clusters
-  /// of unordered points overlap, and all that meet the box are read, 30 ns per point: the larger
-  /// the box, the less they count. A box that holds the store has nothing to settle.
+  /// found. So no width is guessed, and voids and hulls cost a few clusters of coarse levels more.
+  /// Where they cost too much, as along a swath that winds, their border is found once for all
+  /// windows, see PointVoids. About 0.4 us per point in the box. Clusters of unordered points
+  /// overlap, and all that meet the box are read, 30 ns per point: the larger the box, the less
+  /// they count. A box that holds the store has nothing to settle.
   ///
   /// Throws: NoRoom where memory_bytes do not suffice; stream::Error on a damaged store;
   /// stream::Stopped. After that it can only be loaded again or destroyed.
   void load(const StoredBox& box);
+  /// For PointVoids: appends the points of the box of which not all triangles have circumcircles
+  /// that lie within the distance that it returns, each place once. Afterwards the window can only
+  /// be loaded or destroyed. Throws as load() does.
+  double find_border(const StoredBox& box, std::vector<SurfaceCorner>& border);
+  [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
 
   /// As it was loaded last. Vertices have no other order or number than this one gives them.
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
@@ -154,6 +167,9 @@ class PointWindow {
   }
 
   void clear();
+  /// Clears and reads what meets the box, of which inner_ holds all points.
+  void begin(const StoredBox& box);
+  void load_with_border();
   void take(const stream::StoreQuery::Node& node);
   void take(Pending& point);
   void grow_inner(const StoredBox& box);
@@ -162,7 +178,7 @@ class PointWindow {
   [[nodiscard]] bool keeps_taken() const;
   [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
   void check_memory(std::size_t more) const;
-  [[nodiscard]] StoredBox with_margin() const;
+  [[nodiscard]] double margin() const;
 
   void settle();
   void examine_all();
@@ -172,7 +188,7 @@ class PointWindow {
   void find_suspect_hull();
   /// Lets inner_ hold most circles of suspects; false: there are few, or it would not help.
   bool widen();
-  /// False: nothing is missing.
+  /// False: nothing is missing, or looking for it is taking too long.
   bool add_missing();
   bool read_missing();
   bool find_missing(const Suspect& suspect);
@@ -192,6 +208,9 @@ class PointWindow {
   std::uint64_t memory_bytes_;
   double scale_, offset_;  ///< of heights
   TooLong too_long_;
+  std::shared_ptr<PointVoids> voids_;
+  std::uint64_t looks_ = 0;  ///< not counted in voids_ yet
+  bool takes_too_long_ = false;
   ClusterFrontier frontier_;
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
   bool is_whole_ = false;      ///< all points of the store are inserted

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include <terrace/tri/predicates.hpp>
 
@@ -23,27 +24,24 @@ constexpr unsigned kMostTimesWidened = 3;
 constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
 /// For these each point is looked for by itself.
 constexpr std::size_t kFewSuspects = 12;
+/// Looks are counted for all windows together when there are so many.
+constexpr std::uint64_t kLooksAtOnce = 1024;
 
-/// Whether a triangle, its corners counter-clockwise, meets a box; sometimes true where it does not
-/// by a rounding.
-bool meets(const std::array<Point2, 3>& corner, const StoredBox& box) {
+}  // namespace
+
+bool triangle_meets(const std::array<Point2, 3>& corner, const StoredBox& box) {
   for (std::size_t k = 0; k < 2; ++k) {
     const auto [low, high] = std::minmax({corner[0][k], corner[1][k], corner[2][k]});
     if (low > box.max[k] || high < box.min[k]) return false;
   }
   for (std::size_t i = 0; i < 3; ++i) {
-    // Seen from outside, the inside is to the right of a side.
-    if (!HalfPlane{corner[(i + 1) % 3], corner[i]}.meets(box)) return false;
+    const Point2 &a = corner[i], &b = corner[(i + 1) % 3];
+    const Point2 leftmost{b[1] > a[1] ? box.min[0] : box.max[0],
+                          b[0] > a[0] ? box.max[1] : box.min[1]};
+    if (tri::orientation(a, b, leftmost) < 0) return false;
   }
   return true;
 }
-
-bool holds(const StoredBox& outer, const StoredBox& inner) {
-  return inner.min[0] >= outer.min[0] && inner.min[1] >= outer.min[1] &&
-         inner.max[0] <= outer.max[0] && inner.max[1] <= outer.max[1];
-}
-
-}  // namespace
 
 CircleCover PointWindow::circle(tri::TriangleId triangle) const {
   const std::array<Point2, 3> corner = corners(triangle);
@@ -53,9 +51,9 @@ CircleCover PointWindow::circle(tri::TriangleId triangle) const {
 void PointWindow::examine(tri::TriangleId triangle) {
   std::uint8_t& state = states_[tri::slot(triangle)];
   const CircleCover cover = circle(triangle);
-  if (holds(inner_, cover.bounds())) {
+  if (inner_.holds(cover.bounds())) {
     state = kCertain;
-  } else if (meets(corners(triangle), box_)) {
+  } else if (triangle_meets(corners(triangle), box_)) {
     state = kSuspect;
     suspects_.push_back({cover, triangle});
   } else {
@@ -188,14 +186,13 @@ bool PointWindow::widen() {
   // A little more, for rounding.
   const double more = std::min(*at * (1 + 1e-6), most);
   if (!(more > 0)) return false;
-  grow_inner(
-      {{inner_.min[0] - more, inner_.min[1] - more}, {inner_.max[0] + more, inner_.max[1] + more}});
+  grow_inner(inner_.widened(more));
   insert_taken();
   examine_changes();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < suspects_.size(); ++i) {
     const Suspect& suspect = suspects_[i];
-    if (i < suspect_triangles_ && holds(inner_, suspect.cover.bounds())) {
+    if (i < suspect_triangles_ && inner_.holds(suspect.cover.bounds())) {
       std::uint8_t& state = states_[tri::slot(suspect.triangle)];
       state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
     } else {
@@ -225,7 +222,10 @@ bool PointWindow::add_missing() {
   make_trees();
   chosen_.clear();
   for (const Suspect& suspect : suspects_) {
-    if (find_missing(suspect)) continue;
+    const bool is_missing = find_missing(suspect);
+    if (looks_ >= kLooksAtOnce) takes_too_long_ = voids_->count_looks(std::exchange(looks_, 0));
+    if (takes_too_long_) return false;
+    if (is_missing) continue;
     std::uint8_t& state = states_[tri::slot(suspect.triangle)];
     if (suspect.edge == Suspect::kNone) {
       state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
@@ -281,7 +281,7 @@ void PointWindow::make_trees() {
   read_in_trees_ = read_.size();
   std::vector<BoxTree::Item>& outer = outer_tree_.start();
   for (std::uint32_t k = 0; k < outer_.size(); ++k) {
-    if (!holds(inner_, outer_[k].box)) outer.push_back({outer_[k].box, k});
+    if (!inner_.holds(outer_[k].box)) outer.push_back({outer_[k].box, k});
   }
   outer_tree_.build();
   std::vector<BoxTree::Item>& open = open_tree_.start();
@@ -297,6 +297,7 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   const StoredBox bounds = cover.bounds();
   const Point2 &from = corner[(suspect.edge + 1) % 3], &to = corner[(suspect.edge + 2) % 3];
   const auto meets_cover = [&](const StoredBox& box) {
+    ++looks_;
     if (!bounds.meets(box) || !cover.meets(box)) return false;
     if (suspect.edge == Suspect::kNone) return true;
     // On the line of an edge of the hull only what lies between its ends is missing: a straight

@@ -41,6 +41,13 @@ struct StoredBox {
   [[nodiscard]] bool contains(const stream::Point3& p) const {
     return p[0] >= min[0] && p[0] <= max[0] && p[1] >= min[1] && p[1] <= max[1];
   }
+  [[nodiscard]] bool holds(const StoredBox& other) const {
+    return min[0] <= other.min[0] && max[0] >= other.max[0] && min[1] <= other.min[1] &&
+           max[1] >= other.max[1];
+  }
+  [[nodiscard]] StoredBox widened(double by) const {
+    return {{min[0] - by, min[1] - by}, {max[0] + by, max[1] + by}};
+  }
 };
 
 /// The x,y of a box of stored coordinates.

@@ -40,7 +40,9 @@ StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32
 TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
                        EllipsoidalHeights heights, std::uint64_t bytes, std::uint64_t whole_bytes,
                        unsigned threads)
-    : TiledStore(tiled, std::move(system), std::move(heights)), window_bytes(bytes) {
+    : TiledStore(tiled, std::move(system), std::move(heights)),
+      window_bytes(bytes),
+      voids(std::make_shared<PointVoids>(store, 0)) {
   spacing = cloud_spacing(tiled, places);
   constexpr std::uint64_t kMostTriangulated = std::uint64_t{1} << 29;
   const std::uint64_t most =
@@ -68,7 +70,7 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
 PointTileSurface::PointTileSurface(const TiledCloud& cloud)
     : cloud_(cloud),
       reader_(cloud.store, std::uint64_t{8} << 20),
-      window_(cloud.store, 0, cloud.window_bytes) {}
+      window_(cloud.store, 0, cloud.window_bytes, cloud.voids) {}
 
 const std::vector<StoredBox>& PointTileSurface::windows(const GeographicBox& box) {
   if (!asked_ || *asked_ != box) {
