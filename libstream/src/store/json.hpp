@@ -9,7 +9,7 @@
 namespace terrace::stream::store {
 
 /// A value of JSON (RFC 8259), read only. Manifests are read by this, not by nlohmann-json, because
-/// the viewer's WebAssembly modules would grow by an eighth.
+/// the viewer's WebAssembly modules would grow by a fifteenth.
 class JsonValue {
  public:
   enum class Kind : std::uint8_t { null, boolean, number, string, array, object };
