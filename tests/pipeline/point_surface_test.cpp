@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -79,11 +80,16 @@ TEST_P(SurfaceOfClouds, IsThatOfTheTriangulationWhateverIsLoaded) {
     PointSurface loaded(store, level, hull), some(store, level, hull), none(store, level, hull);
     ASSERT_TRUE(loaded.load(all, 1U << 20, true));
     ASSERT_TRUE(some.load(part, 1U << 20, true));
+    // With the border of the voids known.
+    const auto voids = std::make_shared<terrain::PointVoids>(store, level);
+    PointWindow scratch(store, level, 0);
+    ASSERT_TRUE(voids->find(scratch));
+    PointSurface bordered(store, level, hull, {}, voids);
     for (std::size_t i = 0; i < places.size(); ++i) {
       SCOPED_TRACE("place " + std::to_string(i));
       const SurfacePoint expected = whole.at(places[i]);
       const Point2 nearest = triangulation.point(triangulation.nearest(places[i]));
-      for (PointSurface* surface : {&loaded, &some, &none}) {
+      for (PointSurface* surface : {&loaded, &some, &none, &bordered}) {
         const SurfacePoint found = surface->linear(places[i]);
         ASSERT_TRUE(same_bits(found.height, expected.height));
         ASSERT_TRUE(same_bits(found.per_column, expected.per_column));
@@ -100,19 +106,47 @@ TEST_P(SurfaceOfClouds, IsThatOfTheTriangulationWhateverIsLoaded) {
       ASSERT_TRUE(same_bits(natural.per_column, again.per_column));
       ASSERT_TRUE(same_bits(natural.height, alone.height));
       ASSERT_TRUE(same_bits(natural.per_row, alone.per_row));
+      ASSERT_TRUE(same_bits(natural.height, bordered.natural(places[i]).height));
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(PointSurface, SurfaceOfClouds,
                          testing::Values("random", "lattice", "duplicates", "voids", "clusters",
-                                         "turned", "straight borders", "circle", "parabola", "far",
-                                         "huge", "tiny", "nearly a line"),
+                                         "turned", "winding", "straight borders", "circle",
+                                         "parabola", "far", "huge", "tiny", "nearly a line"),
                          [](const auto& one) {
                            std::string name = one.param;
                            std::replace(name.begin(), name.end(), ' ', '_');
                            return name;
                          });
+
+// The circle above a place in a bend holds most of the swath's border: each place looked through it
+// by itself, for minutes.
+TEST(PointSurface, LooksOfPlacesInTheBendsOfASwathAreFewTimesItsPoints) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = stream::Store::open(cloud_store(folder.path(), points_of("winding")));
+  const PointHull hull(store, 0);
+  const auto voids = std::make_shared<terrain::PointVoids>(store, 0);
+  PointSurface surface(store, 0, hull, {}, voids);
+  PointWindow whole(store, 0, 0);
+  whole.load(terrain::flat(store.bounds()));
+  const stream::Box3& box = store.bounds();
+  constexpr int kSide = 100;
+  std::uint64_t places = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const Point2 p{box.min[0] + (box.max[0] - box.min[0]) * (i % kSide + 0.5) / kSide,
+                   box.min[1] + (box.max[1] - box.min[1]) * (i / kSide + 0.5) / kSide};
+    const double height = surface.linear(p).height;
+    ASSERT_TRUE(same_bits(height, whole.at(p).height));
+    if (!std::isnan(height)) ++places;
+  }
+  RecordProperty("places", std::to_string(places));
+  RecordProperty("looks", std::to_string(voids->looks()));
+  EXPECT_TRUE(voids->known());
+  // Up to 16 for each point, and afterwards what lies near each place.
+  EXPECT_LT(voids->looks(), 17 * store.points() + 400 * places);
+}
 
 TEST(PointSurface, RefusesMoreThanThereIsRoomForAndCrowds) {
   const tests::TemporaryFolder folder;

@@ -36,6 +36,9 @@ constexpr double kReadShare = 0.5;
 constexpr double kParts = 8;
 /// So many mean distances of points around a box are loaded too: hardly a circle reaches farther.
 constexpr double kSampleMargin = 8;
+/// It is at most this share of the longer side, or a window in a void would be loaded with all that
+/// lies for many windows around.
+constexpr double kMostSampleMargin = 0.125;
 /// What a thread may need: a window of usual size where points crowd.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
 /// For reading, beside the points.
@@ -109,8 +112,9 @@ struct CloudWorker {
   std::optional<StoredBox> loaded{};
 
   CloudWorker(const stream::Store& store, unsigned level, const PointHull& hull,
-              const TooLong& too_long)
-      : surface(store, level, hull, too_long) {}
+              const TooLong& too_long, const std::shared_ptr<PointVoids>& voids,
+              std::uint64_t memory_bytes)
+      : surface(store, level, hull, too_long, voids, memory_bytes) {}
 
   /// Loads what lies in a box and `margin` around it, unless it is there. False: does not fit.
   bool load(StoredBox box, double margin, std::size_t most_points, bool may_crowd) {
@@ -133,6 +137,7 @@ class PointSampler final : public HeightSampler {
         options_(options),
         memory_(context.memory_or(0) / 2),
         hull_(store, options.level),
+        voids_(std::make_shared<PointVoids>(store_, options.level)),
         tree_(store, options.level, kWindowPoints) {
     const auto threads =
         std::clamp<std::uint64_t>(memory_ / kThreadBytes, 1, std::max(1U, context.threads));
@@ -168,7 +173,8 @@ class PointSampler final : public HeightSampler {
         parts.size(), static_cast<unsigned>(workers_.size()), [&](unsigned thread, std::size_t i) {
           std::unique_ptr<CloudWorker>& worker = workers_[thread];
           if (worker == nullptr) {
-            worker = std::make_unique<CloudWorker>(store_, options_.level, hull_, too_long_);
+            worker = std::make_unique<CloudWorker>(store_, options_.level, hull_, too_long_, voids_,
+                                                   memory_ / workers_.size());
           }
           if (whole_) {
             worker->surface.share(*whole_);
@@ -236,8 +242,10 @@ class PointSampler final : public HeightSampler {
     const Numbers numbers = numbers_in(part);
     if (numbers.empty()) return;
     const StoredBox& box = part.box;
-    const double area = (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]);
-    const double margin = kSampleMargin * std::sqrt(area / std::max(part.points, 1.0));
+    const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
+    const double margin =
+        std::min(kSampleMargin * std::sqrt(width * height / std::max(part.points, 1.0)),
+                 kMostSampleMargin * std::max(width, height));
     if (is_dense(part, numbers.size())) {
       if (worker.load(box, margin, room_, part.is_window())) {
         return answer_along(worker, box, numbers, places, out);
@@ -326,6 +334,7 @@ class PointSampler final : public HeightSampler {
   SamplerOptions options_;
   std::uint64_t memory_;
   PointHull hull_;
+  std::shared_ptr<PointVoids> voids_;
   WindowTree tree_;
   TooLong too_long_;
   std::vector<std::unique_ptr<CloudWorker>> workers_;

@@ -9,6 +9,8 @@
 #include <terrace/tri/interpolation.hpp>
 #include <terrace/tri/predicates.hpp>
 
+#include "surface/point_window.hpp"
+
 namespace terrace::terrain {
 namespace {
 
@@ -70,11 +72,14 @@ StoredBox bounds_of(std::span<const CircleCover> covers) {
 }  // namespace
 
 PointSurface::PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
-                           TooLong too_long)
+                           TooLong too_long, std::shared_ptr<PointVoids> voids,
+                           std::uint64_t memory_bytes)
     : store_(store),
       level_(level),
       hull_(hull),
       too_long_(std::move(too_long)),
+      voids_(std::move(voids)),
+      memory_bytes_(memory_bytes),
       query_(store, kSurfaceCacheBytes) {
   own_.clear();
 }
@@ -115,9 +120,11 @@ std::optional<PointSurface::Target> PointSurface::target_of(const Point2& place,
 template <class Visit>
 void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& from,
                            const Visit& visit) {
+  std::uint64_t looks = 0;
   query_.best_first(
       level_,
       [&](const stream::Box3& whole) {
+        ++looks;
         const StoredBox box = flat(whole);
         // A box that is a single place adds nothing: its head is known.
         if (box.min == box.max || cells_->knows(box)) return kFarAway;
@@ -126,12 +133,24 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
                                                                 : kFarAway;
       },
       [&](const stream::StoreQuery::Node& node) {
+        looks += node.positions.size();
         for (const stream::Point3& p : node.positions) {
           const Point2 place{p[0], p[1]};
           if (!cells_->knows(place)) visit(place);
         }
         return greatest_square(bounds_of(covers), from);
       });
+  if (voids_ != nullptr) wants_border_ = voids_->count_looks(looks);
+}
+
+bool PointSurface::knows_border() {
+  if (voids_ == nullptr) return false;
+  if (wants_border_ && !voids_->known()) {
+    PointWindow window(store_, level_, memory_bytes_, voids_);
+    voids_->find(window);
+    wants_border_ = false;
+  }
+  return voids_->known();
 }
 
 void PointSurface::find_triangle(const Target& target) {
@@ -169,6 +188,18 @@ void PointSurface::find_triangle(const Target& target) {
       cells_->visit_cells(cells_->near(target.place, reach), offer);
     } while (changed);
     if (reach >= kFarthest || cells_->is_near(cover.bounds(), reach)) break;
+  }
+  if (!cells_->knows(cover.bounds()) && knows_border()) {
+    const double reach = voids_->reach({target.place, target.place});
+    const CircleCover near = disk(target.place, reach * reach);
+    do {
+      changed = false;
+      voids_->for_each_around(target.place, offer);
+      cells_->in(near, target.place, offer);
+      if (!cells_->knows(near.bounds())) read_in({&near, 1}, target.place, offer);
+    } while (changed);
+    triangle_ = t;
+    return;
   }
   do {
     changed = false;
@@ -263,6 +294,15 @@ void PointSurface::find_star(const Point2& centre) {
       if (!cells_->knows(cover.bounds())) covers_.push_back(cover);
     }
     if (covers_.empty()) return;
+    if (knows_border()) {
+      const double reach = voids_->reach({centre, centre});
+      const CircleCover near = disk(centre, reach * reach);
+      limit = kFarAway;
+      voids_->for_each_around(centre, offer);
+      cells_->in(near, centre, offer);
+      if (!cells_->knows(near.bounds())) read_in({&near, 1}, centre, offer);
+      return;
+    }
     limit = greatest_square(bounds_of(covers_), centre);
     read_in(covers_, centre, offer);
   }

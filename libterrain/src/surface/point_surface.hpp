@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "surface/point_cells.hpp"
 #include "surface/point_hull.hpp"
 #include "surface/point_star.hpp"
+#include "surface/point_voids.hpp"
 #include "surface/surface_corner.hpp"
 #include "terrace/terrain/heights.hpp"
 
@@ -32,17 +34,21 @@ namespace terrace::terrain {
 /// breaks them, so the triangles are those of the whole whatever is loaded.
 ///
 /// Points come from the cells of a grid over what load() has read, and where a circle reaches
-/// beyond that from the store, by its clusters' boxes. Places should come near each other: as a
-/// rule one lies in the triangle of the one before or close to it. About 1 us a place in a loaded
-/// box, half a millisecond elsewhere.
+/// beyond that from the store, by its clusters' boxes; where voids make that long, from the voids'
+/// border, see PointVoids. Places should come near each other: as a rule one lies in the triangle
+/// of the one before or close to it. About 1 us a place in a loaded box, half a millisecond
+/// elsewhere.
 ///
 /// One object per thread; any number of them share a Store and a hull, which must outlive them. All
 /// functions throw stream::Error on a damaged store and stream::Stopped.
 class PointSurface {
  public:
-  /// Requires a hull that is not flat, of the same level.
+  /// Requires a hull that is not flat, of the same level. voids: shared by the surfaces of this
+  /// store and level, or none; memory_bytes: what finding their border may take, 0: as much as
+  /// there is.
   PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
-               TooLong too_long = {});
+               TooLong too_long = {}, std::shared_ptr<PointVoids> voids = nullptr,
+               std::uint64_t memory_bytes = 0);
   PointSurface(const PointSurface&) = delete;
   PointSurface& operator=(const PointSurface&) = delete;
 
@@ -85,6 +91,8 @@ class PointSurface {
   /// not outside the hull.
   void find_star(const Point2& centre);
   void narrow_first(const Point2& centre);
+  /// Whether the border of the voids is known; finds it where that pays.
+  bool knows_border();
   /// Calls visit(point) at least for all points in the covers that are not held in memory.
   template <class Visit>
   void read_in(std::span<const CircleCover> covers, const Point2& from, const Visit& visit);
@@ -97,6 +105,9 @@ class PointSurface {
   unsigned level_;
   const PointHull& hull_;
   TooLong too_long_;
+  std::shared_ptr<PointVoids> voids_;
+  std::uint64_t memory_bytes_;
+  bool wants_border_ = false;
   stream::StoreQuery query_;
   /// Which points were offered to star_ in the circle of one of its triangles.
   enum Mark : std::uint8_t { kNone, kMemory, kAll };

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <exception>
+#include <unordered_set>
 #include <utility>
 
+#include "surface/circle_cover.hpp"
 #include "surface/point_window.hpp"
 
 namespace terrace::terrain {
@@ -121,6 +123,27 @@ void PointVoids::for_each(const StoredBox& box,
   std::sort(corners.begin(), corners.end());
   corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
   for (const tri::VertexId v : corners) visit({border_.point(v), heights_[tri::slot(v)]});
+}
+
+void PointVoids::for_each_around(const Point2& place,
+                                 const std::function<void(const Point2&)>& visit) const {
+  const StoredBox box{place, place};
+  std::vector<tri::TriangleId> open{border_.locate(place).triangle};
+  std::unordered_set<std::uint32_t> reached{tri::slot(open[0])};
+  while (!open.empty()) {
+    const std::array<tri::VertexId, 3> v = border_.vertices(open.back());
+    const std::array<tri::TriangleId, 3> next = border_.neighbours(open.back());
+    open.pop_back();
+    const std::array<Point2, 3> corner{border_.point(v[0]), border_.point(v[1]),
+                                       border_.point(v[2])};
+    if (!CircleCover::of_triangle(corner[0], corner[1], corner[2]).meets(box)) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      visit(corner[i]);
+      if (next[i] != tri::kNoTriangle && reached.insert(tri::slot(next[i])).second) {
+        open.push_back(next[i]);
+      }
+    }
+  }
 }
 
 }  // namespace terrace::terrain

@@ -26,13 +26,14 @@ class PointWindow;
 /// within a reach, which is some spacings of the points around. All points with a long or open
 /// triangle are among them, so with them a window is complete at once: a triangle that meets a box
 /// either has a corner that is no border point, and lies within reach of the box, or it is one of
-/// the triangulation of the border points alone.
+/// the triangulation of the border points alone. The same holds for circles that hold a place.
 ///
 /// They are found in one pass over the store, as much work as triangulating it once, when windows
 /// have looked for missing points so long that it pays: at most once, and as a rule never. What
 /// windows contain does not depend on it.
 ///
-/// Windows of several threads share one; the threads that need the border find it together.
+/// Windows and places (PointSurface) of several threads share one; the threads that need the border
+/// find it together.
 class PointVoids {
  public:
   /// The store must outlive this.
@@ -57,6 +58,9 @@ class PointVoids {
   /// The corners, with heights in the store's vertical unit, of all triangles between border points
   /// that meet the box, each once.
   void for_each(const StoredBox& box, const std::function<void(const SurfaceCorner&)>& visit) const;
+  /// At least the corners of all triangles between border points whose circumcircles hold a place,
+  /// some of them more than once. The place must not be outside the hull.
+  void for_each_around(const Point2& place, const std::function<void(const Point2&)>& visit) const;
 
  private:
   enum class State : std::uint8_t { kUnknown, kKnown, kNone };
