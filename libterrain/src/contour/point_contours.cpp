@@ -24,7 +24,7 @@ namespace {
 constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
 /// Several parts are triangulated at once, which costs less per point; a point counts for its share
 /// of the triangulation and of the triangles that wait until lines are drawn.
-constexpr double kMostPointsAtOnce = 1U << 17;
+constexpr double kMostPointsAtOnce = 1U << 16;
 constexpr double kPartsPerThread = 4;
 constexpr double kBytesPerExpected = 3.0 * PointWindow::kBytesPerPoint + 3 * 240;
 /// Lines that wait to be drawn may have this share of a thread's memory; where levels are closer,
