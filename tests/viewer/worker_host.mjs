@@ -69,6 +69,11 @@ export class Worker {
       DecompressionStream,
       Response,
       performance,
+      // One of node's would keep the process alive.
+      MessageChannel: class {
+        port1 = {};
+        port2 = {postMessage: () => setImmediate(() => this.port1.onmessage())};
+      },
       setTimeout: (work, time) => setTimeout(work, time ?? 0),
       clearTimeout,
       ArrayBuffer,

@@ -63,9 +63,15 @@ class Session {
   private undrawn = 0;
   private scheduled = false;
   private idle = false;  ///< nothing to do before something new comes
+  /// What has come in the meantime is heard between two frames; browsers put 4 ms between timers.
+  private readonly turns = new MessageChannel();
 
   constructor(private readonly request: ToWorker&{type: 'open'}) {
     this.asPoints = request.asPoints;
+    this.turns.port1.onmessage = () => {
+      this.scheduled = false;
+      this.step();
+    };
   }
 
   async open(): Promise<void> {
@@ -160,10 +166,7 @@ class Session {
   private schedule(): void {
     if (this.scheduled || this.failed || !this.ranges) return;
     this.scheduled = true;
-    setTimeout(() => {
-      this.scheduled = false;
-      this.step();
-    });
+    this.turns.port2.postMessage(null);
   }
   private step(): void {
     if (this.failed || this.undrawn >= AHEAD) return;
