@@ -17,16 +17,6 @@ stream::Entities entities_of(const stream::StoreSchema& schema) {
   return stream::Entities::points;
 }
 
-void need_points(const stream::Store& store, const std::string& what) {
-  const stream::Entities entities = entities_of(store.schema());
-  if (entities == stream::Entities::points) return;
-  throw stream::Error({.file = store.path().string(),
-                       .where = {},
-                       .cause = "holds " + std::string(stream::name_of(entities)) + ", and " +
-                                what + " needs points",
-                       .remedy = "build a store of the vertices: leave `entities` out"});
-}
-
 stream::Point3 exact_world_point(const stream::Placement& placement, const stream::Point3& stored) {
   const stream::Channel& z = placement.coordinates[2];
   const bool as_stored =

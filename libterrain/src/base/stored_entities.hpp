@@ -21,9 +21,6 @@ inline constexpr std::string_view kEntitiesParameter = "entities";
 
 [[nodiscard]] stream::Entities entities_of(const stream::StoreSchema& schema);
 
-/// Throws: stream::Error if the store holds anything but points; `what` needs them.
-void need_points(const stream::Store& store, const std::string& what);
-
 /// The place in the CRS, bit for bit as it was read: an identity transform is skipped, because sums
 /// would lose the sign of zeros.
 [[nodiscard]] stream::Point3 exact_world_point(const stream::Placement& placement,

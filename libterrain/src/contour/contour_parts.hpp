@@ -34,7 +34,6 @@ void draw_lattice_contours(const ContourParts& parts);
 /// Draws the lines of points, or of a raster at a level above 0.
 void draw_point_contours(const ContourParts& parts);
 
-[[noreturn]] void throw_region_outside(const stream::Store& store);
 /// The box in stored coordinates around a region's box.
 StoredBox box_around(const Region& region, const GroundSlope& ground);
 /// Whether places in a box of stored coordinates lie in the region, at any height.

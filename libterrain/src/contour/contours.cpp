@@ -10,7 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/progress_report.hpp"
-#include "base/stored_entities.hpp"
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_text.hpp"
@@ -30,11 +30,6 @@ stream::Error failure(const stream::Store& store, const std::string& cause,
 }
 
 }  // namespace
-
-void throw_region_outside(const stream::Store& store) {
-  throw failure(store, "the region does not meet the store",
-                "look at its bounds, and at the CRS in which the `region` is given");
-}
 
 StoredBox box_around(const Region& region, const GroundSlope& ground) {
   const stream::Box3& world = region.box();
@@ -67,10 +62,7 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
   need_points(given, "a contour");
   const stream::Store store = given.with_stop(context.stop);
   const std::uint64_t memory = context.memory_or(0);
-  if (request.level > store.top()) {
-    throw UsageError("the store has no level " + std::to_string(request.level) +
-                     ": its top is level " + std::to_string(store.top()));
-  }
+  need_level(store, request.level);
   const stream::Channel& z = store.schema().coordinates[2];
   for (const double raw : {store.bounds().min[2], store.bounds().max[2]}) {
     if (store.points() > 0 &&

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/parallel.hpp"
+#include "base/store_checks.hpp"
 #include "contour/contour_lines.hpp"
 #include "contour/contour_parts.hpp"
 #include "terrace/terrain/error.hpp"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/ordered_work.hpp"
+#include "base/store_checks.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_triangles.hpp"
 #include "contour/part_lines.hpp"

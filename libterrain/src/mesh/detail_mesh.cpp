@@ -13,6 +13,7 @@
 #include <terrace/tri/metric.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
+#include "base/store_checks.hpp"
 #include "base/stored_entities.hpp"
 #include "earth/ground.hpp"
 #include "mesh/detail_triangles.hpp"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/parallel.hpp"
-#include "base/stored_entities.hpp"
+#include "base/store_checks.hpp"
 #include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/error.hpp"
@@ -15,10 +15,7 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& given,
                                             const SamplerOptions& options, const Context& context) {
   need_points(given, "the height of a place");
   const stream::Store store = given.with_stop(context.stop);
-  if (options.level > store.top()) {
-    throw UsageError("the store has no level " + std::to_string(options.level) +
-                     ": its top is level " + std::to_string(store.top()));
-  }
+  need_level(store, options.level);
   if (!store.schema().grid || options.level > 0) return make_point_sampler(store, options, context);
   if (options.max_edge) {
     throw UsageError(

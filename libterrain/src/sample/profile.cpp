@@ -12,7 +12,7 @@
 
 #include "base/file_marks.hpp"
 #include "base/fixed_text.hpp"
-#include "base/stored_entities.hpp"
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "earth/line_distance.hpp"

@@ -14,7 +14,7 @@
 
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
-#include "base/stored_entities.hpp"
+#include "base/store_checks.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"

@@ -13,6 +13,7 @@
 #include <terrace/stream/store_query.hpp>
 
 #include "base/portable_math.hpp"
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -21,14 +22,6 @@ namespace terrace::terrain {
 namespace {
 
 constexpr double kMostGridCells = 2147483647.0;
-
-[[noreturn]] void outside(const stream::Store& store) {
-  throw stream::Error({.file = store.path().string(),
-                       .where = {},
-                       .cause = "the region does not meet the store",
-                       .remedy = "look at its bounds, and at the CRS in which the `region` is "
-                                 "given"});
-}
 
 /// The store's area in its CRS: of a raster with half a cell around the samples.
 stream::Box3 area_of(const stream::Store& store) {
@@ -107,10 +100,7 @@ std::uint32_t count_of(double cells) {
 
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request) {
   const unsigned level = request.sampler.level;
-  if (level > store.top()) {
-    throw UsageError("the store has no level " + std::to_string(level) + ": its top is level " +
-                     std::to_string(store.top()));
-  }
+  need_level(store, level);
   const stream::Box3 area = area_of(store);
   stream::Box3 box = area;
   if (request.region) {
@@ -121,7 +111,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     }
   }
   if (store.points() == 0 || !(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) {
-    outside(store);
+    throw_region_outside(store);
   }
   const std::array<double, 6>& m = store.schema().world.xy;
   const bool straight = m[1] == 0 && m[3] == 0;
@@ -137,7 +127,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
       if (a > b) std::swap(a, b);
       first[axis] = std::max(0.0, std::ceil(a - 1e-6));
       last[axis] = std::min(size - 1, std::floor(b + 1e-6));
-      if (first[axis] > last[axis]) outside(store);
+      if (first[axis] > last[axis]) throw_region_outside(store);
     }
     grid.step_x = m[0];
     grid.step_y = m[4];

@@ -7,6 +7,7 @@
 #include <terrace/stream/schema.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "base/store_checks.hpp"
 #include "earth/ground.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -20,10 +21,7 @@ struct Local {
 };
 
 Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
-  if (level > store.top()) {
-    throw UsageError("the store has no level " + std::to_string(level) + ", its top is " +
-                     std::to_string(store.top()));
-  }
+  need_level(store, level);
   if (!std::isfinite(near.xy[0]) || !std::isfinite(near.xy[1]) ||
       !std::isfinite(near.z.value_or(0))) {
     throw UsageError("`near` needs finite coordinates");

@@ -7,7 +7,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/stored_entities.hpp"
+#include "base/store_checks.hpp"
 #include "mesh/bounded/least_error.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesher.hpp"

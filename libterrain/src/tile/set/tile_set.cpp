@@ -13,7 +13,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/file_lock.hpp>
 
-#include "base/stored_entities.hpp"
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tiles.hpp"

@@ -96,9 +96,10 @@ struct PointTin {
 /// surface: the result has no vertices and all samples are uncovered.
 ///
 /// The result depends only on the arguments: the same bytes on every machine. The order of samples
-/// at different positions hardly matters. One thread. Time about n log n for n samples: on a
-/// processor of 2024, 0.2 us per sample and 1.3 us per vertex inserted, and as much again for
-/// removal. Memory: 36 bytes per sample and about 100 per vertex inserted, including the result.
+/// at different positions does not matter. One thread. Time about n log n for n samples: on a
+/// processor of 2024, 0.3 us per sample and 1.3 us per vertex inserted; if vertices are to be
+/// removed again 0.7 us per vertex inserted and 1 us more to try to remove it. Memory: 36 bytes per
+/// sample and about 100 per vertex inserted, including the result.
 ///
 /// With max_points greedy insertion stops there; the other qualities search for the error bound
 /// that leaves nearly that many vertices, which takes up to 8 times as long.
