@@ -63,7 +63,7 @@ bool PointVoids::find(PointWindow& window) {
   changed_.wait(lock, [&] { return at_work_ == 0 || state_ != State::kUnknown; });
   if (state_ == State::kUnknown) {
     triangulate();
-    // Of points on one line not even neighbours are known from the border.
+    // If all points are on one line, the border does not even tell who are neighbours.
     state_ = border_.triangle_count() > 0 ? State::kKnown : State::kNone;
   }
   return known();

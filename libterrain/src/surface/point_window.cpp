@@ -252,7 +252,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
     const Point2 p = triangulation_.point(v);
     return box.contains({p[0], p[1], 0});
   };
-  // Of points spread evenly, one circle in a thousand million is so wide.
+  // Where points are spread evenly, one circle in a thousand million is so wide.
   std::vector<double> radii;
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
     const CircleCover cover = circle(t);

@@ -316,7 +316,7 @@ class SplitEncoder {
       *order++ = Points::number(point);
     }
 
-    /// Of points at one place.
+    /// Ends with points that are all at one place.
     void finish(Point* points, std::uint32_t n) {
       std::sort(points, points + n);
       for (std::uint32_t i = 0; i < n; ++i) *order++ = Points::number(points[i]);

@@ -29,7 +29,7 @@ struct TiledCloud : TiledStore {
   /// a part at a time.
   std::unique_ptr<const PointWindow> whole{};
   std::unique_ptr<const CloudSamples> samples{};
-  /// Of the windows of all threads.
+  /// Shared by the windows of all threads.
   std::shared_ptr<PointVoids> voids{};
 
   /// Reads a level of the store, and a few clusters; all of it where it fits into whole_bytes.
