@@ -11,6 +11,7 @@ import json
 import math
 import os
 import random
+import re
 import subprocess
 import tempfile
 import unittest
@@ -266,8 +267,13 @@ class BoundedMeshTest(unittest.TestCase):
                 self.assertEqual(summary['covered'], sum(raster.covered))
                 self.assertEqual(summary['covered'] + summary['uncovered'], summary['samples'])
         # The shores need many points at any error.
-        self.refuse(1, 'too few', 'mesh', store, '-o', self.path('none.obj'), '--max-points', 9)
+        refused = terrace('mesh', store, '-o', self.path('none.obj'), '--max-points', 9)
+        self.assertEqual(refused.returncode, 1)
+        said = re.search(r'--max-points 9 is too few: .* takes (\d+); .*--fill', refused.stderr)
+        self.assertIsNotNone(said, refused.stderr)
         self.assertFalse(os.path.exists(self.path('none.obj')))
+        summary, _ = self.mesh(store, 'least.obj', '--max-points', said[1])
+        self.assertLessEqual(summary['vertices'], int(said[1]))
         for fill in ('flat', 'interpolate'):
             with self.subTest(fill):
                 summary, out = self.mesh(store, 'filled.obj', '--max-error', 4, '--fill', fill)
@@ -483,6 +489,38 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertGreater(summary['vertices'], 1900)
         left = [name for name in os.listdir(self.folder.name) if 'tmp' in name or 'samples' in name]
         self.assertEqual(left, [])
+
+    def test_more_points_than_samples_in_a_format_that_rounds(self):
+        # No bound was asked for, so rounding breaks none: what readers see is measured.
+        write_tiff(self.path('raster.tif'), 40, 30, hills(40, 30, 2))
+        scattered = random.Random(3)
+        with open(self.path('cloud.xyz'), 'w', encoding='utf-8') as file:
+            file.writelines(f'{scattered.uniform(5e5, 5.1e5)} {scattered.uniform(5e6, 5.1e6)} {scattered.uniform(0, 9)}\n'
+                            for _ in range(500))
+        for name in ('raster.tif', 'cloud.xyz'):
+            with self.subTest(name):
+                store = self.build(name)
+                samples = self.mesh(store, 'all.ply', '--max-error', 0)[0]['samples']
+                exact, _ = self.mesh(store, 'exact.ply', '--max-points', 2 * samples)
+                rounded, _ = self.mesh(store, 'rounded.glb', '--max-points', 2 * samples)
+                self.assertEqual(exact['max_error'], 0)
+                self.assertEqual(rounded['vertices'], exact['vertices'])
+                self.assertLess(rounded['max_error'], 1e-3)
+
+    def test_no_error_of_heights_in_doubles(self):
+        # Errors that are 0, computed in doubles, need not be.
+        slopes = random.Random(4)
+        for steep in (1, 1e6):
+            heights = [steep * (c * 100 / 3 + r * 700 / 9) if slopes.random() < 0.9 else steep * slopes.uniform(0, 900)
+                       for r in range(37) for c in range(53)]
+            name = f'slopes{int(steep)}'
+            with open(self.path(f'{name}.asc'), 'w', encoding='utf-8') as file:
+                file.write('ncols 53\nnrows 37\nxllcorner 0\nyllcorner 0\ncellsize 1\n')
+                file.write(' '.join(map(repr, heights)))
+            with self.subTest(steep):
+                summary, _ = self.mesh(self.build(f'{name}.asc'), f'{name}.ply', '--max-error', 0)
+                self.assertLess(summary['max_error'], 1e-10 * steep)
+                self.assertLess(summary['vertices'], 53 * 37)
 
     def test_wrong_usage(self):
         mesh = ('mesh', self.store, '-o', self.path('none.obj'))

@@ -154,7 +154,8 @@ class CloudContourTest(CloudTestCase):
     @unittest.skipIf(SCIPY is None, 'no SciPy')
     def test_lines_in_the_stores_own_places_need_no_crs(self):
         store = self.build('local', self.points)
-        self.expect_error(1, 'contour', store, '--interval', 10, '-o', self.path('none.geojson'))
+        refused = self.expect_error(1, 'contour', store, '--interval', 10, '-o', self.path('none.geojson'))
+        self.assertIn('--own-crs', refused)
 
         def named(level, a, b):
             return (level, *sorted(tuple(f'{c:.6f}' for c in p) for p in (a, b)))

@@ -33,7 +33,8 @@ ContourText::ContourText(const stream::Store& store, const ContourRequest& reque
       write_(std::move(write)),
       number_(request.own_crs ? kOwnDecimals : kDecimals) {
   if (!request.own_crs) {
-    geography_.emplace(system_of(store), world_box(store.schema(), store.bounds()));
+    geography_.emplace(system_of(store, ", or ask for `own_crs`"),
+                       world_box(store.schema(), store.bounds()));
   }
   const std::array<double, 6>& m = store.schema().world.xy;
   reverse_ = m[0] * m[4] - m[1] * m[3] > 0;

@@ -14,14 +14,14 @@
 
 namespace terrace::terrain {
 
-CoordinateSystem system_of(const stream::Store& store) {
+CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise) {
   const std::string file = store.path().string();
   std::optional<CoordinateSystem> system = CoordinateSystem::of(store.schema().crs, file);
   if (!system) {
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "has no CRS",
-                         .remedy = "build it anew with `crs` EPSG:n"});
+                         .remedy = "build it anew with `crs` EPSG:n" + otherwise});
   }
   return system->over(world_box(store.schema(), store.bounds()));
 }

@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 36> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 37> kOptions{{
     {"band", "--band"},
     {"block_points", "--block"},
     {"cell", "--cell"},
@@ -35,6 +35,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 36> kOptions
     {"metric", "--metric"},
     {"near", "--near"},
     {"outlier_price", "--outlier-price"},
+    {"own_crs", "--own-crs"},
     {"region", "--region"},
     {"replace", "--force"},
     {"resolution", "--resolution"},

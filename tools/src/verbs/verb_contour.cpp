@@ -46,13 +46,13 @@ class ContourCommand final : public Command {
     request.level = sampler.level;
     request.max_edge = sampler.max_edge;
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
-    if (!request.own_crs) {
-      if (const std::string note = system_of(store).wgs84_note(); !note.empty()) common.say(note);
-    }
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     const ContourOutcome outcome = write_contours(
         store, request, [&](std::string_view text) { output.write(text); }, common.context());
     output.commit();
+    if (!request.own_crs) {
+      if (const std::string note = system_of(store).wgs84_note(); !note.empty()) common.say(note);
+    }
 
     Summary summary;
     summary.json = {

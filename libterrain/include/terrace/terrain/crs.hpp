@@ -145,8 +145,9 @@ class Transformation {
   std::shared_ptr<const DatumChange> change_;
 };
 
-/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known.
-CoordinateSystem system_of(const stream::Store& store);
+/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known. otherwise:
+/// what helps those without, beside naming it when the store is built.
+CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise = {});
 
 /// From a store's CRS to another, named as for CoordinateSystem::parse, by the operation that is
 /// best where the store lies. shift: of the one whose datum does not count as WGS 84; of the named

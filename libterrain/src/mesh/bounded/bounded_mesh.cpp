@@ -17,8 +17,9 @@
 namespace terrace::terrain {
 namespace {
 
+/// remedy: for a mesh that is to have fewer points than its border.
 BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& options,
-                          const std::stop_token& stop) {
+                          const char* remedy, const std::stop_token& stop) {
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;
   std::optional<MeshSpool> spool;
@@ -39,11 +40,14 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& opti
     }
     search.run = [&](double bound) { return run(bound, options.max_points); };
     if (!least_error(search)) {
-      throw stream::Error({.file = options.path,
-                           .where = {},
-                           .cause = "`max_points` " + std::to_string(options.max_points) +
-                                    " is too few even for a flat mesh of this region",
-                           .remedy = "allow more points"});
+      run(search.range, ~std::uint64_t{0});
+      throw stream::Error(
+          {.file = options.path,
+           .where = {},
+           .cause = "`max_points` " + std::to_string(options.max_points) +
+                    " is too few: even a flat mesh of this region, with its border, takes " +
+                    std::to_string(result.vertices),
+           .remedy = remedy});
     }
   }
   stream::WriterOptions writer = options.writer;
@@ -61,12 +65,15 @@ BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMe
   need_points(store, "a bounded mesh");
   const stream::Store source = store.with_stop(context.stop);
   if (store.schema().grid) {
-    return mesh_by(RasterMesher(source, options, context), options, context.stop);
+    const char* const remedy = options.fill == Fill::none
+                                   ? "allow more points, or `fill` cells without data"
+                                   : "allow more points";
+    return mesh_by(RasterMesher(source, options, context), options, remedy, context.stop);
   }
   if (options.fill != Fill::none) {
     throw UsageError("`fill` is for rasters: irregular points have no cells without data");
   }
-  return mesh_by(PointMesher(source, options, context), options, context.stop);
+  return mesh_by(PointMesher(source, options, context), options, "allow more points", context.stop);
 }
 
 }  // namespace terrace::terrain

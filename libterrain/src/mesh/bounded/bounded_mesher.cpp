@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mesh/bounded/bounded_mesher.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
@@ -23,8 +26,10 @@ double BoundedMesher::metres_vertical() const {
 
 Aim BoundedMesher::aim_within(double bound) const {
   const stream::Point3& moved = rounding_.largest();
-  if (moved == stream::Point3{}) return {bound, bound};
+  if (moved == stream::Point3{}) return {bound, bound, bound};
+  const double first = bound * (255.0 / 256.0) - moved[2];
   const double sure = bound * (15.0 / 16.0) - moved[2];
+  if (options_.max_points > 0) return {std::max(first, 0.0), std::max(sure, 0.0), HUGE_VAL};
   if (!(sure >= 0.0)) {
     throw stream::Error({.file = options_.path,
                          .where = {},
@@ -32,7 +37,7 @@ Aim BoundedMesher::aim_within(double bound) const {
                                   readable_number(moved[2]) + ", too much for this `max_error`",
                          .remedy = "write PLY, which is exact"});
   }
-  return {bound * (255.0 / 256.0) - moved[2], sure};
+  return {first, sure, bound};
 }
 
 unsigned BoundedMesher::threads_within_memory(std::uint64_t each, std::uint64_t beside,

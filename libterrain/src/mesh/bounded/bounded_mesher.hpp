@@ -23,6 +23,8 @@ namespace terrace::terrain {
 struct Aim {
   double first = 0.0;  ///< ignores rounded places: to be tried, and checked
   double sure = 0.0;   ///< where the first misses the bound, or cannot be checked
+  double bound = 0.0;  ///< what readers may see: infinite if a number of points was asked for, not
+                       ///< a bound, and the format rounds; what they do see is measured then
 };
 
 /// What was measured on the mesh of one window, as a reader of the file gets it back.

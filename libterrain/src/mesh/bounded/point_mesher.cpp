@@ -185,8 +185,8 @@ unsigned PointMesher::threads_for(std::uint64_t each, std::uint64_t points) cons
 
 PointMeshOptions PointMesher::mesh_options(double max_error) const {
   PointMeshOptions out;
-  out.bound = max_error;
   const Aim aim = aim_within(max_error);
+  out.bound = aim.bound;
   out.first_aim = aim.first;
   out.tin.max_error = aim.sure;
   out.tin.duplicates = options_.duplicates;

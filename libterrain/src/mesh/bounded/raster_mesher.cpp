@@ -265,8 +265,8 @@ std::vector<std::unique_ptr<WindowMesher>> RasterMesher::meshers(double max_erro
 
 WindowTinOptions RasterMesher::window_options(double max_error) const {
   WindowTinOptions out;
-  out.bound = max_error;
   const Aim aim = aim_within(max_error);
+  out.bound = aim.bound;
   out.first_aim = aim.first;
   out.aim = aim.sure;
   out.whole = whole_;
