@@ -315,7 +315,7 @@ TEST(GeoTiffWriter, OverviewsAreTheMeansOfWhatHasData) {
   constexpr std::uint64_t kSeed = 5;
   std::cout << "seed " << kSeed << '\n';
   std::mt19937_64 random(kSeed);
-  for (int round = 0; round < 6; ++round) {
+  for (int round = 0; round < 6; round += TERRACE_TEST_SHARE) {
     SCOPED_TRACE(round);
     expect_overviews<float>(random, GeoTiffOverviews::average, -9999);
     expect_overviews<std::int16_t>(random, GeoTiffOverviews::average, -32768);

@@ -133,8 +133,10 @@ TEST(LasReal, CompressedRecordsAreThoseLaszipDecodes) {
       bytes.replace(377, 4, "none");
       file = write_text(temp.path() / "plain.laz", bytes);
     }
-    EXPECT_EQ(fnv1a(records_through(file, temp, 1)), hash);
     EXPECT_EQ(fnv1a(records_through(file, temp, 3)), hash);
+    // That they come back in all the other ways is seen with the small files where reading is slow.
+    if (points > 200'000 / TERRACE_TEST_SHARE && TERRACE_TEST_SHARE > 1) continue;
+    EXPECT_EQ(fnv1a(records_through(file, temp, 1)), hash);
     // Compressed here, and from a pipe.
     const std::string laz = temp.path() / "copy.laz";
     copy_points(temp.path() / "copy.las", laz);

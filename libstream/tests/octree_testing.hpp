@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <random>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -23,8 +25,8 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity},
                                   {kInfinity, kInfinity, kInfinity}};
 
-/// A place in the CRS and the packed attributes.
-using Record = std::pair<Point3, std::string>;
+/// A place in the CRS and a hash of the packed attributes.
+using Record = std::pair<Point3, std::size_t>;
 
 /// Those inside a region, sorted: equal for the same points in any order.
 inline std::vector<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
@@ -34,7 +36,8 @@ inline std::vector<Record> records(const AllPoints& all, const Box3& region = kE
     const Point3 at = world_point(all.info, all.points.positions[i]);
     if (!region.contains(at)) continue;
     const auto* const payload = reinterpret_cast<const char*>(all.points.payload.data());
-    found.emplace_back(at, std::string(payload + i * bytes, bytes));
+    const std::string_view packed(payload + i * bytes, bytes);
+    found.emplace_back(at, std::hash<std::string_view>()(packed));
   }
   std::sort(found.begin(), found.end());
   return found;

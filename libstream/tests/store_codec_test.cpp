@@ -141,7 +141,7 @@ TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
 
 TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
   Random random(3);
-  for (int round = 0; round < 2000; ++round) {
+  for (int round = 0; round < 2000 / TERRACE_TEST_SHARE; ++round) {
     SCOPED_TRACE(round);
     // Sizes of up to 2^16 are kept in another way than larger ones.
     std::array<std::uint64_t, 3> size{};
@@ -227,7 +227,7 @@ TEST(StoreCodec, FewSymbolsAreFewBytes) {
 TEST(StoreCodec, IndexPagesComeBack) {
   Random random(10);
   int accepted = 0;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 300 / TERRACE_TEST_SHARE; ++round) {
     SCOPED_TRACE(round);
     Schema schema;
     for (const ScalarType type : {ScalarType::u8, ScalarType::f32, ScalarType::i64}) {

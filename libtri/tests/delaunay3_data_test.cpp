@@ -32,7 +32,8 @@ class Delaunay3DataTest : public ::testing::Test {
     if (!file) return {};
     DoublePoints all = name.ends_with(".obj") ? read_obj(file).points : read_ply(file).points;
     DoublePoints some;
-    for (std::size_t i = 0; i < all.size(); i += TERRACE_TEST_SHARE) some.push_back(all[i]);
+    constexpr std::size_t kStep = TERRACE_TEST_SHARE * TERRACE_TEST_SHARE;
+    for (std::size_t i = 0; i < all.size(); i += kStep) some.push_back(all[i]);
     return some;
   }
 

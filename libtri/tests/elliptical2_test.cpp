@@ -26,7 +26,7 @@ TEST(EllipticalMetric2, NoVertexIsInsideAnEllipse) {
   for (const PointSet kind : kPointSets) {
     SCOPED_TRACE(name(kind));
     Elliptical2 triangulation(map);
-    triangulation.build(make_points<double>(kind, 60, 2));
+    triangulation.build(make_points<double>(kind, 40, 2));
     ASSERT_EQ(find_fault(triangulation), "");
     for (const TriangleId id : triangulation.all_triangles()) {
       const Corners t = corners_of(triangulation, triangulation.vertices(id));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <random>
 #include <set>
 
@@ -89,12 +90,13 @@ struct Model {
 };
 
 TEST_F(ShapeDataTest, ClosedModelsComeBackFromTheirPoints) {
-  for (const Model& model : {Model{"lucy_100k.ply", 49, 1, 5, 0.002},
-                             {"horse.ply", 0, 1, 0, 0.001},
-                             {"igea.ply", 0, 1, 0, 0.0},
-                             {"armadillo_libigl.obj", 0, 1, 0, 0.001},
-                             {"fandisk.obj", 0, 1, 0, 0.001},
-                             {"spot.obj", 0, 1, 0, 0.001}}) {
+  // The first and the fifth, which are small, are those under sanitizers.
+  const Model models[] = {
+      {"spot.obj", 0, 1, 0, 0.001},    {"lucy_100k.ply", 49, 1, 5, 0.002},
+      {"horse.ply", 0, 1, 0, 0.001},   {"igea.ply", 0, 1, 0, 0.0},
+      {"fandisk.obj", 0, 1, 0, 0.001}, {"armadillo_libigl.obj", 0, 1, 0, 0.001}};
+  for (std::size_t m = 0; m < std::size(models); m += TERRACE_TEST_SHARE) {
+    const Model& model = models[m];
     SCOPED_TRACE(model.file);
     const Surface original = scan(model.file);
     const RestoredSurface found = restore_surface(original.points);
@@ -128,10 +130,12 @@ TEST_F(ShapeDataTest, TheDragonIsWholeButForCrumbs) {
 }
 
 TEST_F(ShapeDataTest, OpenScansAreFoundAndLeftOpen) {
-  for (const char* file :
-       {"armadillo_tm.ply", "bunny_range/bun000.ply.gz", "bunny_range/bun045.ply.gz",
-        "bunny_range/bun090.ply.gz", "bunny_range/bun180.ply.gz", "bunny_range/bun270.ply.gz",
-        "bunny_range/bun315.ply.gz"}) {
+  const char* const files[] = {"bunny_range/bun000.ply.gz", "bunny_range/bun045.ply.gz",
+                               "bunny_range/bun090.ply.gz", "bunny_range/bun180.ply.gz",
+                               "armadillo_tm.ply",          "bunny_range/bun270.ply.gz",
+                               "bunny_range/bun315.ply.gz"};
+  for (std::size_t i = 0; i < std::size(files); i += TERRACE_TEST_SHARE) {
+    const char* const file = files[i];
     SCOPED_TRACE(file);
     const Surface original = scan(file);
     const RestoredSurface found = restore_surface(original.points);
@@ -158,7 +162,7 @@ TEST_F(ShapeDataTest, NearbyUpdatesOfClustersOfAHundredPoints) {
     std::size_t wrong = 0;
     std::vector<VertexId> all;
     for (const VertexId v : triangulation.all_vertices()) all.push_back(v);
-    for (int cluster = 0; cluster < 8; ++cluster) {
+    for (int cluster = 0; cluster < 8 / TERRACE_TEST_SHARE; ++cluster) {
       std::vector<VertexId> near{all[random() % all.size()]}, around;
       while (!triangulation.alive(near[0])) near[0] = all[random() % all.size()];
       for (std::size_t i = 0; near.size() < 100; ++i) {

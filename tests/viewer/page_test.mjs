@@ -258,7 +258,9 @@ describe('pages side by side', {concurrency: 3}, () => {
   for (const name of ['bunny', 'autzen']) {
     test(`real data: ${name}`, {skip: name in sites.real ? false : 'TERRACE_DATA has no such file'}, async () => {
       const {page, errors, outside, close} = await open(`#s=${name}&q=32`);
-      const flight = sites.flight(name, {maxPoints: MAX_POINTS, kind: name === 'bunny' ? 'surface' : 'points'}).slice(0, 3);
+      // Over the bunny the worker's test flies further.
+      const stops = name === 'bunny' && !process.env.TERRACE_NIGHTLY ? 1 : 3;
+      const flight = sites.flight(name, {maxPoints: MAX_POINTS, kind: name === 'bunny' ? 'surface' : 'points'}).slice(0, stops);
       // The native flight begins with nothing expanded.
       for (const stop of [{...flight[0], error: 1e6, points: null}, ...flight]) {
         await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);

@@ -12,6 +12,7 @@ export const MAX_POINTS = 300_000;
 
 export class Sites {
   constructor() {
+    this.flights = new Map();
     this.folder = mkdtempSync(join(tmpdir(), 'terrace-viewer-'));
     this.site = join(this.folder, 'site');
   }
@@ -62,11 +63,15 @@ export class Sites {
   }
   /// kind: 'surface' for that of a scan, for which the worker allows a quarter of the points.
   flight(name, {maxPoints = MAX_POINTS, kind = 'points'} = {}) {
+    const key = `${name} ${maxPoints} ${kind}`, known = this.flights.get(key);
+    if (known) return known;
     const surface = kind === 'surface';
     const out = execFileSync(process.env.FLIGHT_HASHES,
                              [join(this.folder, `${name}.store`), String(surface ? maxPoints / 4 : maxPoints), ...(surface ? [kind] : [])],
                              {encoding: 'utf8', maxBuffer: 1 << 24});
-    return out.trim().split('\n').map(line => JSON.parse(line));
+    const stops = out.trim().split('\n').map(line => JSON.parse(line));
+    this.flights.set(key, stops);
+    return stops;
   }
   remove() {
     rmSync(this.folder, {recursive: true, force: true});

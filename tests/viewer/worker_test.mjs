@@ -61,8 +61,10 @@ class Tested extends Flyer {
 const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
 for (const [name, kind] of Object.entries(FLIGHTS)) {
   test(`a flight over ${name} gives the hashes of the native run`, {skip: name === 'bunny' && !sites.real.bunny}, async () => {
-    const flight = sites.flight(name, {kind});
-    assert.ok(new Set(flight.map(stop => stop.hash)).size >= 4, 'the flight does not change what is shown');
+    // Close to the bunny it takes a minute, and goes on by night alone.
+    const stops = name === 'bunny' && !process.env.TERRACE_NIGHTLY ? 2 : 8;
+    const flight = sites.flight(name, {kind}).slice(0, stops);
+    assert.ok(new Set(flight.map(stop => stop.hash)).size >= Math.min(4, stops), 'the flight does not change what is shown');
     const flyer = new Tested(name);
     const {scene} = await flyer.opened();
     assert.equal(scene.kind, kind);
@@ -197,6 +199,13 @@ function distanceTo(p, [a, b, c]) {
   }));
 }
 
+/// Whether p is less than `reach` from a triangle.
+function isNear(p, triangle, reach) {
+  const [a, b, c] = triangle;
+  const beside = k => p[k] < Math.min(a[k], b[k], c[k]) - reach || p[k] > Math.max(a[k], b[k], c[k]) + reach;
+  return !beside(0) && !beside(1) && !beside(2) && distanceTo(p, triangle) < reach;
+}
+
 test('a surface: what comes begins where the surface was', async () => {
   const arrays = new Arrays(32);
   let came = 0, waited = false;
@@ -213,8 +222,7 @@ test('a surface: what comes begins where the surface was', async () => {
       for (const slot of slots) {
         if (arrays.began(slot) !== Math.fround(message.time) || ++came % 60 !== 0) continue;
         const start = arrays.place(slot, message.time);
-        const away = Math.min(...before.map(triangle => distanceTo(start, triangle)));
-        assert.ok(away < 2e-4, `${start} is ${away} from the surface before`);
+        assert.ok(before.some(triangle => isNear(start, triangle, 2e-4)), `${start} is not on the surface before`);
       }
     }
   });
