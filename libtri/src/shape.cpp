@@ -132,7 +132,7 @@ ShapeSurface BasicShape3<Triangulation>::surface_without_lids(
   ShapeSurface result = surface(triangulation);
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
-  shape::leave_out_lids(mesh, shape::places_of(mesh), result);
+  shape::leave_out_lids(mesh, result);
   return result;
 }
 

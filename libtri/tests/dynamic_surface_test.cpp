@@ -74,11 +74,11 @@ class Drawn {
   std::map<TriangleId, Points> drawn_;
 };
 
-/// The surface of a shape as points, from the smallest corner on.
+/// The surface of a shape as points, from the smallest corner on; of open scans without lids.
 template <class Coord>
 auto faces_of(const Shape3<Coord>& shape, const Delaunay3<Coord>& triangulation) {
   std::multiset<typename Drawn<Coord>::Points> all;
-  const ShapeSurface surface = shape.surface(triangulation);
+  const ShapeSurface surface = shape.surface_without_lids(triangulation);
   for (const auto& face : surface.surface.faces) {
     typename Drawn<Coord>::Points p;
     for (std::size_t i = 0; i < 3; ++i) p[i] = triangulation.point(surface.vertices[face[i]]);

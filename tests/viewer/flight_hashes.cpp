@@ -17,6 +17,12 @@ namespace {
 
 using namespace terrace;
 
+template <class Triangulation>
+bool is_open(const Triangulation& triangulation) {
+  if constexpr (requires { triangulation.open(); }) return triangulation.open();
+  return false;
+}
+
 template <class Shown>
 int fly(const stream::Store& store, std::size_t max_points) {
   using View = terrain::StoreView<Shown>;
@@ -54,9 +60,9 @@ int fly(const stream::Store& store, std::size_t max_points) {
     view.restore();
     std::printf(
         "{\"eye\":[%.17g,%.17g,%.17g],\"direction\":[%.17g,%.17g,%.17g],\"error\":%.17g,"
-        "\"points\":%zu,\"expanded\":%zu,\"hash\":\"%016llx\"}\n",
+        "\"points\":%zu,\"expanded\":%zu,\"open\":%s,\"hash\":\"%016llx\"}\n",
         eye[0], eye[1], eye[2], way[0], way[1], way[2], stop.error, view.model().point_count(),
-        view.model().expanded_count(),
+        view.model().expanded_count(), is_open(view.model().triangulation()) ? "true" : "false",
         static_cast<unsigned long long>(view.model().triangulation().hash()));
   }
   return 0;

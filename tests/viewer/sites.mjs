@@ -45,16 +45,20 @@ export class Sites {
     }
     writeFileSync(join(this.folder, 'cloud.csv'), cloud);
     this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
-    // A scan: a ball with bumps.
-    let ball = 'x,y,z\n';
+    // A scan: a ball with bumps; and one that lacks a cap in the east.
+    let ball = 'x,y,z\n', bowl = ball;
     for (let i = 0; i < 12_000; ++i) {
       const z = 1 - (2 * i + 1) / 12_000, turn = i * 2.399963229728653, r = Math.sqrt(1 - z * z);
       const size = 10 + 0.5 * Math.sin(5 * z) + 0.4 * Math.sin(6 * r * Math.cos(turn));
-      ball += `${size * r * Math.cos(turn)},${size * r * Math.sin(turn)},${size * z}\n`;
+      const point = `${size * r * Math.cos(turn)},${size * r * Math.sin(turn)},${size * z}\n`;
+      ball += point;
+      if (r * Math.cos(turn) < 0.4) bowl += point;
     }
-    writeFileSync(join(this.folder, 'ball.csv'), ball);
-    this.terrace('build', 'ball.csv', '-o', 'ball.store', '--block', '1000', '-q');
-    const stores = ['alps.store', 'flat.store', 'cloud.store', 'ball.store'];
+    for (const [name, points] of Object.entries({ball, bowl})) {
+      writeFileSync(join(this.folder, `${name}.csv`), points);
+      this.terrace('build', `${name}.csv`, '-o', `${name}.store`, '--block', '1000', '-q');
+    }
+    const stores = ['alps.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store'];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);

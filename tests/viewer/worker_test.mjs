@@ -58,13 +58,14 @@ class Tested extends Flyer {
   }
 }
 
-const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
+const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', bowl: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
 for (const [name, kind] of Object.entries(FLIGHTS)) {
   test(`a flight over ${name} gives the hashes of the native run`, {skip: name === 'bunny' && !sites.real.bunny}, async () => {
     // Close to the bunny it takes a minute, and goes on by night alone.
     const stops = name === 'bunny' && !process.env.TERRACE_NIGHTLY ? 2 : 8;
     const flight = sites.flight(name, {kind}).slice(0, stops);
     assert.ok(new Set(flight.map(stop => stop.hash)).size >= Math.min(4, stops), 'the flight does not change what is shown');
+    if (name === 'bowl') assert.deepEqual(new Set(flight.map(stop => stop.open)), new Set([false, true]));
     const flyer = new Tested(name);
     const {scene} = await flyer.opened();
     assert.equal(scene.kind, kind);
@@ -385,6 +386,17 @@ test('by hand: a cluster of a surface expands, collapses and is released; a poin
   assert.equal((await answer({type: 'profile', id: 2, from: [0, 0, 0], to: [5, 5, 5]}, 'profiled')).line.length, 0);
   flyer.worker.tell({type: 'pin', how: -1});
   assert.equal((await flyer.settle(camera)).points, before);
+});
+
+test('an open scan: a ray through its opening meets the far side', async () => {
+  const flyer = new Tested('bowl');
+  await flyer.opened();
+  await flyer.settle({eye: [40, 0, 0], direction: [-1, 0, 0], error: 0.5});
+  await flyer.hash();  // the surface from scratch
+  const picked = flyer.until(message => message.type === 'picked');
+  flyer.worker.tell({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01});
+  const {hit} = await picked;
+  assert.ok(hit.place[0] < -6, JSON.stringify(hit));
 });
 
 test('a module for bodies that cannot be fetched: a message, and a retry that helps', async () => {

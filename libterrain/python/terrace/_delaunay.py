@@ -365,9 +365,9 @@ class DynamicSurface(_PointMesh):
     """The surface from which a changing set of points in space was scanned, by the poles rule of Delaunay3.shape():
     ``simplices`` are its triangles, counter-clockwise seen from outside.
 
-    It follows insertions and removals, about 12 us per point, where tetrahedra are new; restore() computes it afresh.
-    Closed: open scans have lids. Threads may share one. Raises: ValueError. Source: J. Skala, section 8.3; N. Amenta,
-    M. Bern, 1999.
+    It follows insertions and removals, about 16 us per point, where tetrahedra are new; restore() computes it afresh.
+    Open scans are left open, as by Delaunay3.shape(lids=False). Threads may share one. Raises: ValueError. Source: J. Skala,
+    section 8.3; N. Amenta, M. Bern, 1999.
 
     >>> angles, heights = np.random.default_rng(1).random((2, 500))
     >>> radii = np.sqrt(1 - (2 * heights - 1) ** 2)

@@ -13,7 +13,15 @@ namespace terrace::tri::spatial {
 template <class Kernel>
 class Star {
  public:
-  Star(const Mesh<Kernel>& mesh, std::uint32_t vertex) : mesh_(mesh), vertex_(vertex) {
+  Star() = default;
+  Star(const Mesh<Kernel>& mesh, std::uint32_t vertex) { start(mesh, vertex); }
+
+  /// Begins again, in the memory that there is.
+  void start(const Mesh<Kernel>& mesh, std::uint32_t vertex) {
+    mesh_ = &mesh;
+    vertex_ = vertex;
+    at_ = 0;
+    found_.clear();
     table_.assign(64, kNone);
     add(mesh.vertex[vertex].incident);
   }
@@ -22,7 +30,7 @@ class Star {
   std::uint32_t next() {
     if (at_ == found_.size()) return kNone;
     const std::uint32_t t = found_[at_++];
-    const Tetrahedron& tetrahedron = mesh_.tetrahedron[t];
+    const Tetrahedron& tetrahedron = mesh_->tetrahedron[t];
     for (std::size_t i = 0; i < 4; ++i)
       if (tetrahedron.corner[i] != vertex_) add(tetrahedron_of(tetrahedron.mate[i]));
     return t;
@@ -45,8 +53,8 @@ class Star {
     return true;
   }
 
-  const Mesh<Kernel>& mesh_;
-  std::uint32_t vertex_;
+  const Mesh<Kernel>* mesh_ = nullptr;
+  std::uint32_t vertex_ = kNone;
   std::vector<std::uint32_t> found_;
   std::vector<std::uint32_t> table_;
   std::size_t at_ = 0;

@@ -10,6 +10,7 @@
 #include "delaunay3/access.hpp"
 #include "free_slots.hpp"
 #include "journal.hpp"
+#include "lids.hpp"
 #include "nearby.hpp"
 #include "poles.hpp"
 #include "pool.hpp"
@@ -51,12 +52,18 @@ template <class Coord>
 struct DynamicSurface<Coord>::Impl {
   Delaunay3<Coord> tetrahedra;
   shape::State state;
-  // Triangles by slot; behind: their slots by tetrahedron and corner opposite, kNone elsewhere.
+  // The facets of the closed surface by slot; behind: their slots by tetrahedron and corner
+  // opposite, kNone elsewhere.
   Pool<Corners3> corners;  ///< kFreeCorner first: the slot is free
   Pool<spatial::Side> side;
+  Pool<shape::LidFace> lid_face;
   Pool<std::array<std::uint32_t, 4>> behind;
   FreeSlots free;
-  Pool<std::uint32_t> at_vertex;  ///< how many triangles have it as a corner, by vertex slot
+  shape::LidShare share;
+  bool open = false;                     ///< lids are no triangles
+  std::vector<shape::Spacing> spacings;  ///< by vertex slot
+  // Triangles: all facets but the lids of an open scan.
+  Pool<std::uint32_t> at_vertex;  ///< how many have it as a corner, by vertex slot
   std::size_t count = 0;
   Journal<Point, 3> journal;
   // Scratch memory.
@@ -68,6 +75,7 @@ struct DynamicSurface<Coord>::Impl {
   typename Delaunay3<Coord>::Changes changes;
   std::vector<std::uint32_t> examined, exposed;
   std::vector<Facet> vanished, appeared;
+  std::vector<std::uint32_t> unsure;  ///< facets that may have become lids, or no longer are
   std::vector<bool> fresh;  ///< by vertex slot: new since the last changes; false between calls
 
   [[nodiscard]] std::uint32_t& at(spatial::Side s) {
@@ -104,9 +112,9 @@ struct DynamicSurface<Coord>::Impl {
       if (!spatial::is_finite(tetrahedron.corner)) continue;
       for (std::uint32_t i = 0; i < 4; ++i) {
         const spatial::Side s = spatial::make_side(t, i);
-        const bool open = state.of[t] == shape::kKept &&
-                          state.of[spatial::tetrahedron_of(tetrahedron.mate[i])] != shape::kKept;
-        if (!open) {
+        const bool facet = state.of[t] == shape::kKept &&
+                           state.of[spatial::tetrahedron_of(tetrahedron.mate[i])] != shape::kKept;
+        if (!facet) {
           vanish(s);
         } else if (at(s) == spatial::kNone) {
           appeared.push_back({turned(spatial::facet_of(tetrahedron, i)), s});
@@ -143,27 +151,78 @@ struct DynamicSurface<Coord>::Impl {
     for (; old != vanished.end(); ++old) drop(old->what);
     appeared.resize(left);
     for (const Facet& facet : appeared) add(facet);
-    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
   }
-  void drop(std::uint32_t triangle) {
-    if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
-    for (const std::uint32_t v : corners[triangle]) --at_vertex[v];
-    corners[triangle].fill(spatial::kFreeCorner);
-    free.put(triangle);
+  void drop(std::uint32_t facet) {
+    if (is_triangle(facet)) hide(facet);
+    share.remove(lid_face[facet]);
+    corners[facet].fill(spatial::kFreeCorner);
+    free.put(facet);
+  }
+  /// As a triangle, until find_lids().
+  void add(const Facet& facet) {
+    const std::uint32_t slot = free.empty() ? side.size() : free.take();
+    if (slot == side.size()) {
+      side.push_back({});
+      corners.push_back({});
+      lid_face.push_back({});
+    }
+    side[slot] = facet.what;
+    corners[slot] = facet.corners;
+    lid_face[slot] = {};
+    at(facet.what) = slot;
+    unsure.push_back(slot);
+    show(slot);
+  }
+  void show(std::uint32_t facet) {
+    if (journal.on()) journal.touch_cell(facet, {spatial::kFreeCorner, 0, 0});
+    for (const std::uint32_t v : corners[facet]) ++at_vertex[v];
+    ++count;
+  }
+  void hide(std::uint32_t facet) {
+    if (journal.on()) journal.touch_cell(facet, corners[facet]);
+    for (const std::uint32_t v : corners[facet]) --at_vertex[v];
     --count;
   }
-  void add(const Facet& facet) {
-    const std::uint32_t triangle = free.empty() ? side.size() : free.take();
-    if (triangle == side.size()) {
-      side.push_back({});
-      corners.push_back({spatial::kFreeCorner, 0, 0});
+
+  /// Looks at the facets that are new and at those where spacings have changed.
+  void find_lids() {
+    shape::LidFinder<std::decay_t<decltype(mesh())>> finder(mesh(), spacings);
+    for (const std::uint32_t facet : unsure) {
+      lid_face[facet] = finder.measure(corners[facet]);
+      share.add(lid_face[facet]);
     }
-    if (journal.on()) journal.touch_cell(triangle, corners[triangle]);
-    side[triangle] = facet.what;
-    corners[triangle] = facet.corners;
-    for (const std::uint32_t v : facet.corners) ++at_vertex[v];
-    at(facet.what) = triangle;
-    ++count;
+    for (const VertexId v : changes.removed_vertices) finder.forget(slot(v));
+    for (const VertexId v : changes.added_vertices) finder.forget(slot(v));
+    for (const auto& v : changes.removed_corners)
+      finder.gone({slot(v[0]), slot(v[1]), slot(v[2]), slot(v[3])});
+    for (const TetrahedronId t : changes.added_tetrahedra)
+      finder.came(mesh().tetrahedron[slot(t)].corner, fresh);
+    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
+    finder.renew([&](std::uint32_t v) {
+      if (state.degree[v] == 0) return;  // it is a corner of no facet
+      finder.find_spacing(v, [&](std::uint32_t t) {
+        for (std::uint32_t i = 0; i < 4; ++i) {
+          const std::uint32_t facet = behind[t][i];
+          if (facet != spatial::kNone && mesh().tetrahedron[t].corner[i] != v)
+            unsure.push_back(facet);
+        }
+      });
+    });
+    for (const std::uint32_t facet : unsure) {
+      const bool lid = finder.lid(corners[facet]);
+      shape::LidFace& face = lid_face[facet];
+      if (lid == (face.lid != 0)) continue;
+      share.remove(face);
+      face.lid = lid;
+      share.add(face);
+      if (open) lid ? hide(facet) : show(facet);
+    }
+    unsure.clear();
+    if (std::exchange(open, share.open()) == open) return;
+    for (std::uint32_t facet = 0; facet < corners.size(); ++facet) {
+      if (!in_use(corners[facet]) || lid_face[facet].lid == 0) continue;
+      open ? hide(facet) : show(facet);
+    }
   }
 
   void reserve(std::size_t vertices) {
@@ -176,6 +235,8 @@ struct DynamicSurface<Coord>::Impl {
     behind.reserve(of_tetrahedra);
     corners.reserve(of_triangles);
     side.reserve(of_triangles);
+    lid_face.reserve(of_triangles);
+    spacings.reserve(vertices + 1);
     at_vertex.reserve(vertices + 1);
     state.degree.reserve(vertices + 1);
     state.labels_gone.reserve(vertices + 1);
@@ -207,6 +268,7 @@ struct DynamicSurface<Coord>::Impl {
     relabel(from_scratch, threads);
     compare();
     exchange();
+    find_lids();
   }
   void take(Changes& out) {
     assert(journal.on());
@@ -214,11 +276,14 @@ struct DynamicSurface<Coord>::Impl {
     const auto& all = mesh();
     journal.take(
         [&](std::uint32_t v) { return all.vertex_alive(v) ? &all.vertex[v].point : nullptr; },
-        [&](std::uint32_t t) { return in_use(corners[t]) ? &corners[t] : nullptr; },
+        [&](std::uint32_t t) { return is_triangle(t) ? &corners[t] : nullptr; },
         [](const Corners3& c) { return in_use(c); }, out, out.removed_triangles,
         out.added_triangles);
   }
   static bool in_use(const Corners3& c) { return c[0] != spatial::kFreeCorner; }
+  [[nodiscard]] bool is_triangle(std::uint32_t facet) const {
+    return in_use(corners[facet]) && !(open && lid_face[facet].lid != 0);
+  }
 };
 
 template <class Coord>
@@ -290,6 +355,10 @@ std::size_t DynamicSurface<Coord>::triangle_count() const {
   return impl_->count;
 }
 template <class Coord>
+bool DynamicSurface<Coord>::open() const {
+  return impl_->open;
+}
+template <class Coord>
 auto DynamicSurface<Coord>::point(VertexId vertex) const -> Point {
   return impl_->tetrahedra.point(vertex);
 }
@@ -319,7 +388,7 @@ bool DynamicSurface<Coord>::alive(VertexId vertex) const {
 }
 template <class Coord>
 bool DynamicSurface<Coord>::alive(TriangleId triangle) const {
-  return slot(triangle) < impl_->side.size() && Impl::in_use(impl_->corners[slot(triangle)]);
+  return slot(triangle) < impl_->side.size() && impl_->is_triangle(slot(triangle));
 }
 
 template <class Coord>
@@ -346,8 +415,10 @@ template <class Coord>
 std::size_t DynamicSurface<Coord>::memory_bytes() const {
   const Impl& i = *impl_;
   return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.bytes() + i.side.bytes() +
-         i.behind.bytes() + i.at_vertex.bytes() + i.examined.capacity() * sizeof(std::uint32_t) +
-         i.free.bytes() + i.journal.bytes() +
+         i.lid_face.bytes() + i.behind.bytes() + i.at_vertex.bytes() +
+         i.spacings.capacity() * sizeof(shape::Spacing) +
+         (i.examined.capacity() + i.unsure.capacity()) * sizeof(std::uint32_t) + i.free.bytes() +
+         i.journal.bytes() +
          (i.vanished.capacity() + i.appeared.capacity()) * sizeof(typename Impl::Facet) +
          i.fresh.capacity() / 8;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -19,97 +20,212 @@ namespace terrace::tri::shape {
 inline constexpr double kLidSpacings = 10.0;
 /// Samples at the border of an open scan have few neighbours beside those across its gaps.
 inline constexpr std::size_t kSpacingRank = 3;
-inline constexpr double kLidShare = 0.1;
+/// Of so many parts of an open scan's area, more than one is in lids.
+inline constexpr std::int64_t kLidParts = 10;
 
-template <class Mesh>
-class LidFinder {
+/// Twice the area of a face, mantissa * 2^(bin - kOffset), cut to 18 bits so that sums of areas are
+/// exact: they do not depend on the order in which faces come and go.
+struct LidFace {
+  static constexpr int kOffset = 2700, kBins = 4800;
+
+  std::uint32_t mantissa : 18, bin : 13, lid : 1;
+};
+static_assert(sizeof(LidFace) == 4);
+
+/// The share of lids in an area, by exponent.
+class LidShare {
  public:
-  LidFinder(const Mesh& mesh, const std::vector<Place>& places) : mesh_(mesh), places_(places) {
-    nearest2_.assign(places.size(), std::numeric_limits<double>::infinity());
-    for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
-      const auto& corner = mesh.tetrahedron[t].corner;
-      if (!spatial::is_finite(corner)) continue;
-      for (std::size_t i = 0; i < 4; ++i) {
-        for (std::size_t j = i + 1; j < 4; ++j) {
-          const double d2 = distance2(corner[i], corner[j]);
-          nearest2_[corner[i]] = std::min(nearest2_[corner[i]], d2);
-          nearest2_[corner[j]] = std::min(nearest2_[corner[j]], d2);
-        }
-      }
+  void add(const LidFace& face) { change(face, 1); }
+  void remove(const LidFace& face) { change(face, -1); }
+  /// Whether more than a tenth of the area is in lids: 9 times theirs is above that of the others.
+  [[nodiscard]] bool open() const {
+    std::int64_t sum = 0;
+    bool rest = false;  // of what is below the current exponent, a fraction
+    for (const std::int64_t bin : bins_) {
+      rest = rest || (sum & 1) != 0;
+      sum = bin + (sum >> 1);
     }
-    spacing2_.assign(places.size(), -1.0);
-  }
-
-  /// Whether an edge of the face is longer than ten times the spacing at each of its corners.
-  bool lid(const std::array<std::uint32_t, 3>& face) {
-    const double longest2 = std::max(
-        {distance2(face[0], face[1]), distance2(face[1], face[2]), distance2(face[2], face[0])});
-    const double limit2 = longest2 / (kLidSpacings * kLidSpacings);
-    // No spacing is below the distance of the nearest vertex.
-    return std::all_of(face.begin(), face.end(),
-                       [&](std::uint32_t v) { return nearest2_[v] < limit2; }) &&
-           std::all_of(face.begin(), face.end(),
-                       [&](std::uint32_t v) { return spacing2(v) < limit2; });
-  }
-
-  [[nodiscard]] double area2(const std::array<std::uint32_t, 3>& face) const {
-    const Vector3 normal = cross(minus(places_[face[1]].at, places_[face[0]].at),
-                                 minus(places_[face[2]].at, places_[face[0]].at));
-    return std::sqrt(dot(normal, normal));
+    return sum > 0 || (sum == 0 && rest);
   }
 
  private:
-  [[nodiscard]] double distance2(std::uint32_t a, std::uint32_t b) const {
-    const Vector3 d = minus(places_[a].at, places_[b].at);
-    return dot(d, d);
+  void change(const LidFace& face, std::int64_t sign) {
+    bins_[face.bin] += sign * face.mantissa * (face.lid != 0 ? kLidParts - 1 : -1);
   }
-  /// The square of the third shortest Delaunay edge at the vertex, or of the longest of fewer.
-  double spacing2(std::uint32_t v) {
-    if (spacing2_[v] >= 0.0) return spacing2_[v];
-    std::vector<std::uint32_t> others;
-    spatial::Star star(mesh_, v);
-    for (std::uint32_t t = star.next(); t != spatial::kNone; t = star.next())
-      for (const std::uint32_t other : mesh_.tetrahedron[t].corner)
-        if (other != v && other != spatial::kGhost) others.push_back(other);
-    std::sort(others.begin(), others.end());
-    others.erase(std::unique(others.begin(), others.end()), others.end());
-    std::vector<double> lengths2;
-    lengths2.reserve(others.size());
-    for (const std::uint32_t other : others) lengths2.push_back(distance2(v, other));
-    const std::size_t rank = std::min(kSpacingRank, lengths2.size()) - 1;
-    std::nth_element(lengths2.begin(), lengths2.begin() + static_cast<std::ptrdiff_t>(rank),
-                     lengths2.end());
-    return spacing2_[v] = lengths2[rank];
+  std::vector<std::int64_t> bins_ = std::vector<std::int64_t>(LidFace::kBins);
+};
+
+/// The spacing at a vertex, as far as it is known, and the edges that tell it.
+struct Spacing {
+  static constexpr double kUnknown = -1.0;
+
+  double length = kUnknown;                        ///< the third shortest edge
+  std::array<std::uint32_t, kSpacingRank> ends{};  ///< of the three shortest
+  /// Bits, for LidFinder: which of them tetrahedra that are gone had, and new ones have.
+  std::uint8_t gone = 0, there = 0;
+};
+
+/// Requires a scope of the metric.
+template <class Mesh>
+class LidFinder {
+ public:
+  using Face = std::array<std::uint32_t, 3>;
+
+  /// spacings: by vertex slot; found where lid() needs them.
+  LidFinder(const Mesh& mesh, std::vector<Spacing>& spacings) : mesh_(mesh), spacings_(spacings) {
+    spacings_.resize(std::max<std::size_t>(spacings_.size(), mesh.vertex.size()));
+  }
+
+  /// Whether an edge of the face is longer than ten times the spacing at each of its corners.
+  bool lid(const Face& face) {
+    const double limit =
+        std::max({length(face[0], face[1]), length(face[1], face[2]), length(face[2], face[0])}) /
+        kLidSpacings;
+    // What is not known yet is mostly not needed.
+    return std::all_of(face.begin(), face.end(),
+                       [&](std::uint32_t v) { return spacings_[v].length < limit; }) &&
+           std::all_of(face.begin(), face.end(), [&](std::uint32_t v) {
+             if (spacings_[v].length < 0.0) find_spacing(v, [](std::uint32_t) {});
+             return spacings_[v].length < limit;
+           });
+  }
+
+  // ---- After changes: first forget() the vertices that came or went, then all tetrahedra
+
+  void forget(std::uint32_t vertex) { spacings_[vertex] = {}; }
+  void gone(const std::array<std::uint32_t, 4>& corners) {
+    for_edges(corners,
+              [&](Spacing& at, std::uint32_t, std::uint32_t end) { at.gone |= bit(at, end); });
+  }
+  /// fresh: of vertices that came, by slot.
+  void came(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& fresh) {
+    for_edges(corners, [&](Spacing& at, std::uint32_t v, std::uint32_t end) {
+      const std::uint8_t known = fresh[end] ? 0 : bit(at, end);
+      at.there |= known;
+      if (known == 0 && length(v, end) < at.length) at.gone |= kShorter;
+    });
+  }
+  /// changed(v) where the spacing was known and no longer is.
+  template <class Changed>
+  void renew(const Changed& changed) {
+    for (const std::uint32_t v : touched_) {
+      Spacing& at = spacings_[v];
+      const bool same = (at.gone & ~at.there) == 0;
+      at.gone = at.there = 0;
+      if (same) continue;
+      at = {};
+      changed(v);
+    }
+    touched_.clear();
+  }
+
+  /// Finds a spacing; visit(t) for all tetrahedra at the vertex, ghosts too.
+  template <class Visit>
+  void find_spacing(std::uint32_t v, const Visit& visit) {
+    std::array<double, kSpacingRank> least;
+    least.fill(std::numeric_limits<double>::infinity());
+    Spacing& at = spacings_[v];
+    at.ends.fill(spatial::kNone);
+    star_.start(mesh_, v);
+    for (std::uint32_t t = star_.next(); t != spatial::kNone; t = star_.next()) {
+      visit(t);
+      for (const std::uint32_t other : mesh_.tetrahedron[t].corner) {
+        if (other == v || other == spatial::kGhost) continue;
+        const double found = length(v, other);
+        if (found >= least.back() || bit(at, other) != 0) continue;
+        std::size_t i = kSpacingRank - 1;
+        for (; i > 0 && found < least[i - 1]; --i) {
+          least[i] = least[i - 1];
+          at.ends[i] = at.ends[i - 1];
+        }
+        least[i] = found;
+        at.ends[i] = other;
+      }
+    }
+    at.length = least.back();
+  }
+  /// The face as one that is no lid.
+  [[nodiscard]] LidFace measure(Face face) const {
+    // In lexicographic order, so that the last bit does not depend on slots.
+    const auto order = [&](std::size_t i, std::size_t j) {
+      if (spatial::lexicographically_less(mesh_.vertex[face[j]].point, mesh_.vertex[face[i]].point))
+        std::swap(face[i], face[j]);
+    };
+    order(0, 1), order(1, 2), order(0, 1);
+    std::array<Vector3, 3> p;
+    for (std::size_t i = 0; i < 3; ++i) {
+      p[i] = place(face[i]);
+      for (double& c : p[i]) c /= 2;  // so that differences cannot overflow
+    }
+    Vector3 u = edge(mesh_, p[0], p[1]), v = edge(mesh_, p[0], p[2]);
+    const double scale = scale_to_one(std::max(largest(u), largest(v)));
+    for (std::size_t k = 0; k < 3; ++k) {
+      u[k] *= scale;
+      v[k] *= scale;
+    }
+    const Vector3 normal = cross(u, v);
+    const double area = std::sqrt(dot(normal, normal));
+    if (!(area > 0.0 && area < 0x1p10)) return {};  // flat, or beyond all numbers
+    int exponent = 0, of_scale = 0;
+    const double mantissa = std::frexp(area, &exponent);
+    std::frexp(scale, &of_scale);
+    LidFace result{};
+    result.mantissa = static_cast<std::uint32_t>(mantissa * 0x1p18) & 0x3FFFFU;
+    result.bin =
+        static_cast<std::uint32_t>(exponent - 2 * (of_scale - 2) + LidFace::kOffset) & 0x1FFFU;
+    return result;
+  }
+
+ private:
+  [[nodiscard]] Vector3 place(std::uint32_t v) const { return to_doubles(mesh_.vertex[v].point); }
+  [[nodiscard]] double length(std::uint32_t a, std::uint32_t b) const {
+    return edge_length(mesh_, place(a), place(b));
+  }
+  static constexpr std::uint8_t kShorter = 1U << kSpacingRank;
+
+  /// Which of the shortest edges this is; 0 for none.
+  static std::uint8_t bit(const Spacing& at, std::uint32_t end) {
+    std::uint8_t result = 0;
+    for (std::size_t i = 0; i < kSpacingRank; ++i)
+      if (at.ends[i] == end) result = static_cast<std::uint8_t>(1U << i);
+    return result;
+  }
+  /// told(spacing, vertex, end) for edges at vertices whose spacing is known.
+  template <class Told>
+  void for_edges(const std::array<std::uint32_t, 4>& corners, const Told& told) {
+    for (const std::uint32_t v : corners) {
+      Spacing& at = spacings_[v];
+      if (at.length < 0.0) continue;
+      const bool first = (at.gone | at.there) == 0;
+      for (const std::uint32_t end : corners)
+        if (end != v) told(at, v, end);
+      if (first && (at.gone | at.there) != 0) touched_.push_back(v);
+    }
   }
 
   const Mesh& mesh_;
-  const std::vector<Place>& places_;
-  std::vector<double> nearest2_, spacing2_;  ///< by vertex slot
+  std::vector<Spacing>& spacings_;
+  std::vector<std::uint32_t> touched_;
+  spatial::Star<typename Mesh::Kernel> star_;
 };
 
 /// Removes the lids of an open scan, and the vertices that only they have; sets `open`.
 template <class Mesh>
-void leave_out_lids(const Mesh& mesh, const std::vector<Place>& places, ShapeSurface& result) {
+void leave_out_lids(const Mesh& mesh, ShapeSurface& result) {
   using Face = std::array<std::uint32_t, 3>;
   std::vector<Face>& faces = result.surface.faces;
-  LidFinder finder(mesh, places);
-  std::vector<double> lids, others;  // areas, sorted before they are added
+  std::vector<Spacing> spacings;
+  LidFinder<Mesh> finder(mesh, spacings);
+  LidShare share;
   std::vector<bool> is_lid(faces.size());
   for (std::size_t f = 0; f < faces.size(); ++f) {
     Face face;
     for (std::size_t i = 0; i < 3; ++i) face[i] = slot(result.vertices[faces[f][i]]);
-    is_lid[f] = finder.lid(face);
-    (is_lid[f] ? lids : others).push_back(finder.area2(face));
+    LidFace measured = finder.measure(face);
+    measured.lid = is_lid[f] = finder.lid(face);
+    share.add(measured);
   }
-  if (lids.empty()) return;
-  const auto sum = [](std::vector<double>& areas) {
-    std::sort(areas.begin(), areas.end());
-    double total = 0.0;
-    for (const double area : areas) total += area;
-    return total;
-  };
-  const double of_lids = sum(lids), of_others = sum(others);
-  if (!(of_lids > kLidShare * (of_lids + of_others))) return;
+  if (!share.open()) return;
 
   result.open = true;
   std::vector<bool> used(result.vertices.size());

@@ -53,9 +53,10 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
 ///
 /// Shown: std::int32_t for rasters, whose triangulation is exact on integers; double for any store;
 /// tri::PointCloud for the points alone; tri::DynamicSurface<std::int32_t> for scans: the surface
-/// in space that the points lie on, which is part of what a frame may spend. Its vertices are not
-/// in stored coordinates but on a lattice in the view frame, of a power of two metres, 2^-29 to
-/// 2^-28 of the longest side of the store's box, to which points are rounded.
+/// in space that the points lie on, of open scans without lids (tri::DynamicSurface), which is part
+/// of what a frame may spend. Its vertices are not in stored coordinates but on a lattice in the
+/// view frame, of a power of two metres, 2^-29 to 2^-28 of the longest side of the store's box, to
+/// which points are rounded.
 ///
 /// All points of a store are shown, whatever condition it was given (stream::Store::where()).
 ///

@@ -23,11 +23,13 @@ namespace terrace::tri {
 /// in a few pockets on how they came; restore() computes it from scratch.
 ///
 /// It is closed, turned outward, and touches itself where kept tetrahedra meet in an edge or a
-/// vertex, see BasicShape3::surface(). Open scans have lids. Handles of vertices are those of
-/// Delaunay3; a triangle has a handle as long as it is on the surface, even if the tetrahedron
-/// behind it is replaced.
+/// vertex, see BasicShape3::surface(). Of an open scan the lids are left out, by the rule of
+/// BasicShape3::surface_without_lids(), and no triangles: open() tells. Whether a facet is a lid is
+/// looked at again where tetrahedra have been exchanged, and sums of areas are exact; so both are
+/// functions of the facets and the points. Handles of vertices are those of Delaunay3; a triangle
+/// has a handle as long as it is on the surface, even if the tetrahedron behind it is replaced.
 ///
-/// Coord: as in Delaunay3. Memory: 350 bytes per vertex, most of it for the tetrahedra.
+/// Coord: as in Delaunay3. Memory: 390 bytes per vertex, most of it for the tetrahedra.
 template <class Coord>
 class DynamicSurface {
  public:
@@ -65,7 +67,7 @@ class DynamicSurface {
   [[nodiscard]] std::size_t removal_work(std::span<const VertexId> vertices) const;
   void reserve(std::size_t vertices);
 
-  /// Brings the surface up to date. About 12 us per point that came or went; from scratch if most
+  /// Brings the surface up to date. About 16 us per point that came or went; from scratch if most
   /// tetrahedra are new.
   void follow();
   /// Computes the surface from scratch, 3 us per vertex. The result is that of a new object of the
@@ -80,6 +82,8 @@ class DynamicSurface {
 
   [[nodiscard]] std::size_t vertex_count() const;
   [[nodiscard]] std::size_t triangle_count() const;
+  /// Whether the scan is open, and lids are left out. O(1).
+  [[nodiscard]] bool open() const;
   [[nodiscard]] Point point(VertexId vertex) const;
   /// Counter-clockwise seen from outside, the smallest handle first.
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;
