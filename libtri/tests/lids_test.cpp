@@ -312,7 +312,7 @@ TYPED_TEST(Lids, AScanIsClosedAndOpenedAgain) {
     ASSERT_NO_FATAL_FAILURE(live.check(true));
     const std::uint64_t of_bowl = live.surface.hash();
     ASSERT_TRUE(live.surface.open());
-    for (const std::size_t pieces : {1, 13}) {
+    for (const std::size_t pieces : {std::size_t{1}, std::size_t{13}}) {
       for (std::size_t begin = 0; begin < cap.size(); begin += (cap.size() - 1) / pieces + 1) {
         live.insert(std::span(cap).subspan(
             begin, std::min((cap.size() - 1) / pieces + 1, cap.size() - begin)));
