@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -91,45 +92,49 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
 /// Averages depths over a square somewhat larger than the disc, only over neighbours whose depth is
 /// not a jump away: else the normals would be those of the discs. Rows, then columns.
 void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, unsigned threads) {
-  const auto width = static_cast<int>(canvas.width()), height = static_cast<int>(canvas.height());
-  std::vector<float> other(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  const auto at = [width](int x, int y) {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(x);
+  using Floats __attribute__((vector_size(16))) = float;
+  constexpr int kLanes = 4;
+  const std::uint32_t width = canvas.width(), height = canvas.height();
+  // Rows and columns as lines, each with some samples without depth behind it, so that all lanes
+  // can be read.
+  const std::size_t row_size = width + kLanes, column_size = height + kLanes;
+  std::vector<float> rows(row_size * height, -HUGE_VALF), columns(column_size * width, -HUGE_VALF);
+  const auto smooth = [&](const float* line, std::uint32_t size, std::uint32_t index, float disc) {
+    const float centre = line[index];
+    if (!std::isfinite(centre)) return centre;
+    const float per_jump = 1 / jump(disc, camera);
+    const int radius = std::max(1, static_cast<int>(std::lround(1.2F * disc)));
+    const int at = static_cast<int>(index), first = std::max(at - radius, 0);
+    const int last = std::min(at + radius, static_cast<int>(size) - 1);
+    Floats sum{}, weight{}, off = static_cast<float>(first - at) + Floats{0, 1, 2, 3};
+    for (int i = first; i <= last; i += kLanes, off += static_cast<float>(kLanes)) {
+      Floats away;
+      std::memcpy(&away, line + i, sizeof away);
+      away -= centre;
+      const Floats jumps = away * per_jump, left = 1 - jumps * jumps;
+      const Floats reach = static_cast<float>(radius + 1) - (off < 0 ? -off : off);
+      const auto near = (left > 0) & (reach > 0);
+      const Floats w = near ? reach * left * left : Floats{};
+      sum += near ? w * away : Floats{};
+      weight += w;
+    }
+    return centre +
+           (sum[0] + sum[1] + sum[2] + sum[3]) / (weight[0] + weight[1] + weight[2] + weight[3]);
   };
-  const auto pass = [&](bool along_rows, auto&& get, auto&& set) {
-    for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
-      for (int y = static_cast<int>(first); y < static_cast<int>(last); ++y) {
-        for (int x = 0; x < width; ++x) {
-          const float centre = get(x, y);
-          float sum = 0, weight = 0;
-          if (std::isfinite(centre)) {
-            const float disc = radii[at(x, y)], step = jump(disc, camera);
-            const int radius = std::max(1, static_cast<int>(std::lround(1.2F * disc)));
-            for (int k = -radius; k <= radius; ++k) {
-              const int nx = along_rows ? x + k : x, ny = along_rows ? y : y + k;
-              if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
-              const float d = get(nx, ny);
-              const float jump_share = (d - centre) / step;
-              if (!(std::abs(jump_share) < 1)) continue;
-              const float near = 1 - jump_share * jump_share;
-              const float w = static_cast<float>(radius + 1 - std::abs(k)) * near * near;
-              sum += w * d;
-              weight += w;
-            }
-          }
-          set(x, y, weight > 0 ? sum / weight : centre);
-        }
-      }
-    });
-  };
-  const auto canvas_depth = [&](int x, int y) -> float& {
-    return canvas.depth(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
-  };
-  pass(true, canvas_depth, [&](int x, int y, float d) { other[at(x, y)] = d; });
-  pass(
-      false, [&](int x, int y) { return other[at(x, y)]; },
-      [&](int x, int y, float d) { canvas_depth(x, y) = d; });
+  for_bands(height, threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t y = first; y < last; ++y) {
+      float* const row = rows.data() + y * row_size;
+      for (std::uint32_t x = 0; x < width; ++x) row[x] = canvas.depth(x, y);
+      for (std::uint32_t x = 0; x < width; ++x)
+        columns[x * column_size + y] = smooth(row, width, x, radii[std::size_t{y} * width + x]);
+    }
+  });
+  for_bands(width, threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t x = first; x < last; ++x)
+      for (std::uint32_t y = 0; y < height; ++y)
+        canvas.depth(x, y) =
+            smooth(columns.data() + x * column_size, height, y, radii[std::size_t{y} * width + x]);
+  });
 }
 
 /// The slope of the depths at a sample along one axis, from the side without a jump.
