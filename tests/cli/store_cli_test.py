@@ -197,6 +197,10 @@ class StoreTest(unittest.TestCase):
             delta=1e-6)
         self.assertEqual(
             numbers('points', self.store, '-o', '-', '--near', f'{x},{y}', '-k', 0), [])
+        for place, said in ((f'{x},{y}', False), ('11,46.5', True)):
+            result = terrace('points', self.store, '-o', '-', '--near', place, '-k', 1)
+            self.assertEqual(result.returncode, 0)
+            self.assertEqual('outside the store' in result.stderr, said, result.stderr)
         for wrong in (['--near', f'{x},{y}'], ['--near', f'{x}', '-k', 2],
                       ['--near', f'{x},{y}', '-k', 2, '--within', 3],
                       ['--near', f'{x},{y}', '--within', -1], ['-k', 2], ['--within', 2],

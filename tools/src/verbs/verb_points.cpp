@@ -222,6 +222,12 @@ class PointsCommand final : public Command {
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
     NearPlace place{.xy = {v[0], v[1]}};
     if (v.size() == 3) place.z = v[2];
+    const stream::Box3 box = world_box(store.schema(), store.bounds());
+    if (!(v[0] >= box.min[0] && v[0] <= box.max[0] && v[1] >= box.min[1] && v[1] <= box.max[1])) {
+      common.say(near_ + " lies outside the store: in its CRS X is from " +
+                 number_text(box.min[0]) + " to " + number_text(box.max[0]) + ", Y from " +
+                 number_text(box.min[1]) + " to " + number_text(box.max[1]));
+    }
     stream::StoreQuery query(store);
     const std::vector<stream::FoundPoint> found =
         count_ ? nearest_points(query, place, *count_, detail.level)
