@@ -20,7 +20,7 @@ namespace terrace::tri::shape {
 inline constexpr double kLidSpacings = 10.0;
 /// Samples at the border of an open scan have few neighbours beside those across its gaps.
 inline constexpr std::size_t kSpacingRank = 3;
-/// Of so many parts of an open scan's area, more than one is in lids.
+/// A scan is open if more than one part in so many of its area is in lids.
 inline constexpr std::int64_t kLidParts = 10;
 
 /// Twice the area of a face, mantissa * 2^(bin - kOffset), cut to 18 bits so that sums of areas are
