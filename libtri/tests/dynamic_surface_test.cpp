@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <random>
 #include <set>
 #include <vector>
@@ -13,6 +12,7 @@
 
 #include "ball_world.hpp"
 #include "delaunay3/access.hpp"
+#include "drawn_surface.hpp"
 #include "points3.hpp"
 #include "shape/nearby.hpp"
 #include "terrace/tri/shape.hpp"
@@ -24,68 +24,6 @@ template <class T>
 class DynamicSurfaceOf : public testing::Test {};
 using SurfaceCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(DynamicSurfaceOf, SurfaceCoords);
-
-/// What a renderer keeps: the corners of triangles as they were when it was told of them.
-template <class Coord>
-class Drawn {
- public:
-  using Points = std::array<std::array<Coord, 3>, 3>;
-
-  explicit Drawn(const DynamicSurface<Coord>& surface) : surface_(&surface), drawn_(now()) {}
-  void apply(const typename DynamicSurface<Coord>::Changes& changes) {
-    ASSERT_EQ(changes.removed_triangles.size(), changes.removed_corners.size());
-    for (const TriangleId t : changes.removed_triangles) ASSERT_EQ(drawn_.erase(t), 1u);
-    for (const TriangleId t : changes.added_triangles) {
-      ASSERT_TRUE(surface_->alive(t));
-      ASSERT_TRUE(drawn_.emplace(t, points(t)).second);
-    }
-  }
-  void check() const {
-    ASSERT_EQ(drawn_.size(), surface_->triangle_count());
-    ASSERT_EQ(drawn_, now());
-    std::map<VertexId, std::size_t> count;
-    for (const auto& [triangle, corners] : drawn_) {
-      for (const VertexId corner : surface_->vertices(triangle)) ++count[corner];
-    }
-    for (const VertexId v : surface_->all_vertices())
-      ASSERT_EQ(surface_->triangles_at(v), count[v]);
-  }
-  [[nodiscard]] std::multiset<Points> triangles() const {
-    std::multiset<Points> all;
-    for (const auto& [triangle, corners] : drawn_) all.insert(from_least(corners));
-    return all;
-  }
-  static Points from_least(Points p) {
-    std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
-    return p;
-  }
-
- private:
-  [[nodiscard]] Points points(TriangleId t) const {
-    const auto [a, b, c] = surface_->vertices(t);
-    return {surface_->point(a), surface_->point(b), surface_->point(c)};
-  }
-  [[nodiscard]] std::map<TriangleId, Points> now() const {
-    std::map<TriangleId, Points> all;
-    for (const TriangleId t : surface_->all_triangles()) all.emplace(t, points(t));
-    return all;
-  }
-  const DynamicSurface<Coord>* surface_;
-  std::map<TriangleId, Points> drawn_;
-};
-
-/// The surface of a shape as points, from the smallest corner on; of open scans without lids.
-template <class Coord>
-auto faces_of(const Shape3<Coord>& shape, const Delaunay3<Coord>& triangulation) {
-  std::multiset<typename Drawn<Coord>::Points> all;
-  const ShapeSurface surface = shape.surface_without_lids(triangulation);
-  for (const auto& face : surface.surface.faces) {
-    typename Drawn<Coord>::Points p;
-    for (std::size_t i = 0; i < 3; ++i) p[i] = triangulation.point(surface.vertices[face[i]]);
-    all.insert(Drawn<Coord>::from_least(p));
-  }
-  return all;
-}
 
 // Any points come and go: the deltas tell all, and the surface is that of the shape that follows
 // the same changes; from scratch it is that of a new object.
@@ -139,7 +77,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
       ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
       ASSERT_EQ(surface.tetrahedra().hash(), triangulation.hash());
-      ASSERT_EQ(drawn.triangles(), faces_of(shape, triangulation));
+      ASSERT_EQ(drawn.triangles(),
+                faces_of(shape.surface_without_lids(triangulation), triangulation));
       // A triangle that is told to go and to come has a new corner.
       std::set<std::array<VertexId, 3>> gone(changes.removed_corners.begin(),
                                              changes.removed_corners.end());
@@ -220,7 +159,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
                2 * tetrahedra.added_tetrahedra.size() < triangulation.tetrahedron_count();
       ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
-      ASSERT_EQ(drawn.triangles(), faces_of(shape, triangulation));
+      ASSERT_EQ(drawn.triangles(),
+                faces_of(shape.surface_without_lids(triangulation), triangulation));
       const ShapeSurface found = shape.surface(triangulation);
       ASSERT_TRUE(measure(found.surface).closed);
       ASSERT_EQ(found.vertices.size() + shape.lost_vertices().size(), triangulation.vertex_count());

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "ball_world.hpp"
+#include "drawn_surface.hpp"
 #include "points3.hpp"
 #include "scan_file.hpp"
 #include "terrace/tri/dynamic_surface.hpp"
@@ -29,61 +30,18 @@ class Lids : public testing::Test {};
 using LidCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(Lids, LidCoords);
 
-template <class Coord>
-using Triangle3 = std::array<std::array<Coord, 3>, 3>;
-
-/// A surface as triangles, each from its least corner on, and whether the scan is open.
+/// A surface, and whether the scan is open.
 template <class Coord>
 struct Seen {
-  std::multiset<Triangle3<Coord>> triangles;
+  std::multiset<typename Drawn<Coord>::Points> triangles;
   bool open = false;
   bool operator==(const Seen&) const = default;
-  void add(Triangle3<Coord> p) {
-    std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
-    triangles.insert(p);
-  }
 };
 
 template <class Coord>
 Seen<Coord> seen(const ShapeSurface& surface, const Delaunay3<Coord>& triangulation) {
-  Seen<Coord> result;
-  result.open = surface.open;
-  for (const auto& face : surface.surface.faces) {
-    Triangle3<Coord> p;
-    for (std::size_t i = 0; i < 3; ++i) p[i] = triangulation.point(surface.vertices[face[i]]);
-    result.add(p);
-  }
-  return result;
+  return {faces_of(surface, triangulation), surface.open};
 }
-
-/// As a renderer has it that was told of all changes.
-template <class Coord>
-class Renderer {
- public:
-  explicit Renderer(const DynamicSurface<Coord>& surface) : surface_(&surface) {
-    for (const TriangleId t : surface.all_triangles()) drawn_.emplace(t, corners(t));
-  }
-  void apply(const typename DynamicSurface<Coord>::Changes& changes) {
-    for (const TriangleId t : changes.removed_triangles) ASSERT_EQ(drawn_.erase(t), 1u);
-    for (const TriangleId t : changes.added_triangles)
-      ASSERT_TRUE(drawn_.emplace(t, corners(t)).second);
-    ASSERT_EQ(drawn_.size(), surface_->triangle_count());
-  }
-  [[nodiscard]] Seen<Coord> seen() const {
-    Seen<Coord> result;
-    result.open = surface_->open();
-    for (const auto& [triangle, points] : drawn_) result.add(points);
-    return result;
-  }
-
- private:
-  [[nodiscard]] Triangle3<Coord> corners(TriangleId t) const {
-    const auto [a, b, c] = surface_->vertices(t);
-    return {surface_->point(a), surface_->point(b), surface_->point(c)};
-  }
-  const DynamicSurface<Coord>* surface_;
-  std::map<TriangleId, Triangle3<Coord>> drawn_;
-};
 
 /// What is seen of the closed surface by the definition; `share` is that of the lids.
 template <class Coord>
@@ -109,7 +67,7 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
   Wide of_lids = 0, of_all = 0;
   for (const auto& face : closed.surface.faces) {
     std::array<VertexId, 3> v;
-    Triangle3<Coord> p;
+    typename Drawn<Coord>::Points p;
     for (std::size_t i = 0; i < 3; ++i) {
       v[i] = closed.vertices[face[i]];
       p[i] = triangulation.point(v[i]);
@@ -129,8 +87,8 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
     }
     of_all += std::sqrt(square);
     of_lids += lid ? std::sqrt(square) : 0;
-    all.add(p);
-    if (!lid) others.add(p);
+    all.triangles.insert(Drawn<Coord>::from_least(p));
+    if (!lid) others.triangles.insert(Drawn<Coord>::from_least(p));
   }
   share = of_all > 0 ? static_cast<double>(of_lids / of_all) : 0.0;
   others.open = share > 0.1;
@@ -217,7 +175,7 @@ struct Followed {
   Shape3<Coord> shape;
   typename DynamicSurface<Coord>::Changes changes;
   typename Delaunay3<Coord>::Changes tetrahedra;
-  Renderer<Coord> renderer{surface};
+  Drawn<Coord> drawn{surface};
   std::array<std::size_t, 2> answers{};  ///< closed, open
   std::size_t turns = 0;
 
@@ -245,15 +203,12 @@ struct Followed {
       shape.update_nearby(triangulation, tetrahedra);
     }
     surface.take_changes(changes);
-    ASSERT_NO_FATAL_FAILURE(renderer.apply(changes));
+    ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
+    ASSERT_NO_FATAL_FAILURE(drawn.check());
     const auto expected = seen(shape.surface_without_lids(triangulation), triangulation);
-    ASSERT_EQ(renderer.seen(), expected);
+    ASSERT_EQ((Seen<Coord>{drawn.triangles(), surface.open()}), expected);
     ++answers[expected.open];
     turns += before != expected.open;
-    std::map<VertexId, std::size_t> count;
-    for (const TriangleId t : surface.all_triangles())
-      for (const VertexId corner : surface.vertices(t)) ++count[corner];
-    for (const VertexId v : surface.all_vertices()) ASSERT_EQ(surface.triangles_at(v), count[v]);
     if (!scratch) return;
     std::vector<std::array<Coord, 3>> there;
     for (const VertexId v : surface.all_vertices()) there.push_back(surface.point(v));
@@ -344,7 +299,7 @@ void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& ran
   using Surface3 = DynamicSurface<std::int32_t>;
   MultiresolutionModel<Surface3> model(source);
   const Surface3& surface = model.triangulation();
-  Renderer<std::int32_t> renderer(surface);
+  Drawn<std::int32_t> drawn(surface);
   for (int step = 0; step < steps; ++step) {
     std::vector<ClusterId> open = model.expanded(), parents = open, closed, children;
     parents.push_back(cluster_id(source.top(), 0));
@@ -361,16 +316,18 @@ void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& ran
       const ClusterId id = from[below(random, from.size())];
       delta = model.is_expanded(id) ? &model.collapse(id) : &model.expand(id);
     }
-    ASSERT_NO_FATAL_FAILURE(renderer.apply(delta->changes));
+    ASSERT_NO_FATAL_FAILURE(drawn.apply(delta->changes));
     if (step % 4 != 3) continue;
-    ASSERT_NO_FATAL_FAILURE(renderer.apply(model.restore(2).changes));
+    ASSERT_NO_FATAL_FAILURE(drawn.apply(model.restore(2).changes));
+    ASSERT_NO_FATAL_FAILURE(drawn.check());
     std::vector<Surface3::Point> there;
     for (const VertexId v : surface.all_vertices()) there.push_back(surface.point(v));
     Delaunay3<std::int32_t> fresh;
     fresh.build(there);
     Shape3<std::int32_t> shape;
     shape.restore(fresh);
-    ASSERT_EQ(renderer.seen(), seen(shape.surface_without_lids(fresh), fresh));
+    ASSERT_EQ((Seen<std::int32_t>{drawn.triangles(), surface.open()}),
+              seen(shape.surface_without_lids(fresh), fresh));
     ++answers[surface.open()];
   }
 }
