@@ -20,7 +20,7 @@ void* checked(void* memory) {
 #ifdef __linux__
 
 // Smaller arrays are on the heap: mappings are too coarse and too expensive for them.
-constexpr std::size_t kMapFrom = std::size_t{1} << 20;
+constexpr std::size_t kMapFrom = std::size_t{8} << 20;
 
 std::size_t round_up(std::size_t bytes, std::size_t unit) {
   return (bytes + unit - 1) / unit * unit;
@@ -79,8 +79,7 @@ void* allocate_pages(std::size_t bytes) {
 
 void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes) {
 #ifdef __linux__
-  // Smaller arrays are in small pages and are copied.
-  if (old_bytes >= kHugePage && new_bytes >= kHugePage) return remap(memory, old_bytes, new_bytes);
+  if (old_bytes >= kMapFrom && new_bytes >= kMapFrom) return remap(memory, old_bytes, new_bytes);
   if (old_bytes >= kMapFrom || new_bytes >= kMapFrom) {
     void* moved = allocate_pages(new_bytes);
     std::memcpy(moved, memory, std::min(old_bytes, new_bytes));

@@ -54,7 +54,7 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
         }
         too_many = places.size() > most_points;
       });
-  return !too_many && sort(store, box, places, heights, may_crowd, 1);
+  return !too_many && (sort(store, box, places, heights, may_crowd, 1) || may_crowd);
 }
 
 bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned threads) {
@@ -93,8 +93,8 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
                                   " that the manifest tells",
                          .remedy = "restore the files or build the store anew"});
   }
-  const auto places = std::make_unique_for_overwrite<Point2[]>(count);
-  const auto heights = std::make_unique_for_overwrite<double[]>(count);
+  const auto places = large_array<Point2>(count);
+  const auto heights = large_array<double>(count);
   parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {
     Piece& piece = pieces[i];
     std::size_t at = piece.begin;
@@ -121,7 +121,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
     }
     count += piece.points;
   }
-  return sort(store, flat(store.bounds()), {places.get(), count}, {heights.get(), count}, false,
+  return sort(store, flat(store.bounds()), {places.get(), count}, {heights.get(), count}, true,
               threads);
 }
 
@@ -164,13 +164,14 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
   in_bands([&](std::size_t at, std::size_t) { ++begin_[at + 1]; });
   double shared = 0;
   for (const std::uint32_t count : begin_) shared += static_cast<double>(count) * count;
-  if (!may_crowd && shared > kCrowd * static_cast<double>(places.size())) {
+  const bool crowds = shared > kCrowd * static_cast<double>(places.size());
+  if (crowds && !may_crowd) {
     clear();
     return false;
   }
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-  places_ = std::make_unique_for_overwrite<Point2[]>(places.size());
-  heights_ = std::make_unique_for_overwrite<double[]>(places.size());
+  places_ = large_array<Point2>(places.size());
+  heights_ = large_array<double>(places.size());
   // begin_[c] goes from the cell's begin to its end, which is where the next one begins.
   in_bands([&](std::size_t at, std::size_t i) {
     places_[begin_[at]] = places[i];
@@ -193,7 +194,7 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
     known_.min[k] = box.min[k] <= store.bounds().min[k] ? -kFar : box.min[k];
     known_.max[k] = box.max[k] >= store.bounds().max[k] ? kFar : box.max[k];
   }
-  return true;
+  return !crowds;
 }
 
 void PointCells::drop_duplicates() {

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
+#include "base/large_array.hpp"
 #include "surface/circle_cover.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/region.hpp"
@@ -33,7 +33,8 @@ class PointCells {
   bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
             std::size_t most_points, bool may_crowd);
   /// The same for all points of a store, by several threads: each decodes clusters that follow each
-  /// other, and then sorts a band of rows. False if they crowd. Throws as above.
+  /// other, and then sorts a band of rows. False if they crowd; they are held all the same. Throws
+  /// as above.
   bool load_all(const stream::Store& store, unsigned level, unsigned threads);
   void clear();
 
@@ -49,6 +50,9 @@ class PointCells {
   }
   /// The height of a point that is held, in the store's vertical unit.
   [[nodiscard]] double height(const Point2& point) const;
+  /// All that are held, by cells, and their heights.
+  [[nodiscard]] std::span<const Point2> places() const { return {places_.get(), begin_.back()}; }
+  [[nodiscard]] std::span<const double> heights() const { return {heights_.get(), begin_.back()}; }
 
   /// Cells in a rectangle of the grid.
   struct Range {
@@ -77,13 +81,18 @@ class PointCells {
     const std::size_t side = 2 * std::size_t{reach} + 1;
     return cells_of(box).count() <= 2 * side * side || (reach >= columns_ && reach >= rows_);
   }
+  /// Calls visit(i) for places()[i] in these cells.
   template <class Visit>
-  void visit_cells(const Range& range, const Visit& visit) const {
+  void visit_indices(const Range& range, const Visit& visit) const {
     for (std::uint32_t row = range.row; row < range.end_row; ++row) {
       const std::size_t first = std::size_t{row} * columns_;
       const std::uint32_t end = begin_[first + range.end_column];
-      for (std::uint32_t i = begin_[first + range.column]; i < end; ++i) visit(places_[i]);
+      for (std::uint32_t i = begin_[first + range.column]; i < end; ++i) visit(i);
     }
+  }
+  template <class Visit>
+  void visit_cells(const Range& range, const Visit& visit) const {
+    visit_indices(range, [&](std::uint32_t i) { visit(places_[i]); });
   }
   /// The same without those of other cells.
   template <class Visit>
@@ -128,7 +137,8 @@ class PointCells {
   }
   /// A box that holds the points in a range of cells.
   [[nodiscard]] StoredBox box_of(const Range& range) const;
-  /// Takes points of the box in the order of StoreWindow::points(). False: they crowd.
+  /// Takes points of the box in the order of StoreWindow::points(). False: they crowd; then they
+  /// are held only if they may.
   bool sort(const stream::Store& store, const StoredBox& box, std::span<const Point2> places,
             std::span<const double> heights, bool may_crowd, unsigned threads);
   void drop_duplicates();
@@ -166,10 +176,9 @@ class PointCells {
   StoredBox box_{}, known_{};
   std::array<double, 2> per_unit_{}, cell_size_{};
   std::uint32_t columns_ = 1, rows_ = 1;
-  // Not cleared first: each page of them is touched once, by the thread that fills it.
-  std::unique_ptr<Point2[]> places_;   ///< by cells, row by row
-  std::unique_ptr<double[]> heights_;  ///< of places_
-  std::vector<std::uint32_t> begin_;   ///< in places_, by cell; at last their number
+  LargeArray<Point2> places_;         ///< by cells, row by row
+  LargeArray<double> heights_;        ///< of places_
+  std::vector<std::uint32_t> begin_;  ///< in places_, by cell; at last their number
   /// Points in the cells left of and above each corner of the grid, row by row.
   std::vector<std::uint32_t> sums_;
 };

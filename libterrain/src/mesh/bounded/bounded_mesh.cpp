@@ -29,7 +29,7 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& opti
     result = mesher.run(bound, *spool, most);
     return static_cast<double>(result.vertices);
   };
-  if (options.max_points == 0 || mesher.limits_points()) {
+  if (options.max_points == 0) {
     run(options.max_error / metres, ~std::uint64_t{0});
   } else {
     LeastErrorSearch search;

@@ -50,8 +50,6 @@ class BoundedMesher {
   /// estimate of how many there would be. Throws: as write_bounded_mesh().
   virtual BoundedMeshResult run(double max_error, MeshSpool& spool,
                                 std::uint64_t most_vertices) = 0;
-  /// Whether run() keeps to options.max_points by itself.
-  [[nodiscard]] virtual bool limits_points() const { return false; }
   /// A quick estimate of the vertices that a bound takes, from some windows. Requires
   /// can_estimate().
   [[nodiscard]] virtual double estimate(double max_error) const = 0;

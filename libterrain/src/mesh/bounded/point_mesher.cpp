@@ -294,19 +294,8 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
                                    std::uint64_t most_vertices) {
   BoundedMeshResult result;
   try {
-    if (!single()) {
-      result = run_plan(mesh_options(max_error), spool, most_vertices);
-    } else {
-      PointMeshOptions options;
-      if (options_.max_points > 0) {
-        options = mesh_options(bounds_.max[2] - bounds_.min[2]);
-        options.first_aim = options.tin.max_error = 0.0;
-        options.tin.max_points = options_.max_points;
-      } else {
-        options = mesh_options(max_error);
-      }
-      result = run_whole(options, spool);
-    }
+    const PointMeshOptions options = mesh_options(max_error);
+    result = single() ? run_whole(options, spool) : run_plan(options, spool, most_vertices);
   } catch (const SamplesShareAPlace&) {
     throw shared_places_error();
   }

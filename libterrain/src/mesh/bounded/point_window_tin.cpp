@@ -249,7 +249,7 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
   }
   out.uncovered = out.triangles.empty() ? samples.size() : out.errors.uncovered;
   const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
-  const bool beyond = options.tin.max_points == 0 && out.errors.largest > options.bound;
+  const bool beyond = out.errors.largest > options.bound;
   if (missed || (beyond && !may_miss)) {
     fail(missed ? "the mesh leaves out samples"
                 : "the mesh misses its bound: " + number_text(out.errors.largest) + " of " +

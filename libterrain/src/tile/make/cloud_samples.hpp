@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include <terrace/stream/store.hpp>
 
+#include "base/large_array.hpp"
 #include "earth/geoid_heights.hpp"
-#include "surface/store_window.hpp"
+#include "surface/point_cells.hpp"
 #include "tile/make/stored_places.hpp"
 #include "tile/make/tile_surface.hpp"
 
@@ -20,36 +18,28 @@ namespace terrace::terrain {
 /// Const members may be called by several threads at once.
 class CloudSamples {
  public:
-  static constexpr std::uint64_t kBytesPerPoint = 36;
+  static constexpr std::uint64_t kBytesPerPoint = PointCells::kBytesPerPoint;
 
-  /// Reads the store twice. Throws: stream::Error on a damaged store, stream::Stopped.
+  /// Throws: stream::Error on a damaged store, stream::Stopped.
   CloudSamples(const stream::Store& store, const StoredPlaces& places,
                const EllipsoidalHeights& vertical, unsigned threads);
 
-  /// Adds those in `box` of the points in `window` (stored coordinates), in the order of
-  /// StoreWindow::points(). order: scratch memory.
-  void add(const StoredBox& window, const GeographicBox& box, SurfaceSamples& out,
-           std::vector<std::uint64_t>& order) const;
+  /// As they are stored.
+  [[nodiscard]] const PointCells& cells() const { return cells_; }
+  /// Whether they crowd in few of the cells.
+  [[nodiscard]] bool crowd() const { return crowd_; }
+
+  /// Adds those in `box` of the points in `window` (stored coordinates).
+  void add(const StoredBox& window, const GeographicBox& box, SurfaceSamples& out) const;
 
  private:
-  /// Stored x, y and z at first.
   struct Sample {
     double longitude, latitude, height;
-    std::uint32_t number;  ///< in the order of StoreWindow::points()
   };
-  [[nodiscard]] std::size_t column_or_row(std::size_t axis, double stored) const;
-  [[nodiscard]] std::size_t cell(double x, double y) const {
-    return column_or_row(1, y) * cells_[0] + column_or_row(0, x);
-  }
-  void sort_into_cells(const stream::Store& store);
-  void drop_duplicates();
-  void place(const stream::Store& store, const StoredPlaces& places,
-             const EllipsoidalHeights& vertical, unsigned threads);
 
-  std::array<double, 2> from_{}, cells_per_unit_{};
-  std::array<std::size_t, 2> cells_{1, 1};
-  std::vector<Sample> samples_;       ///< by cells, row by row
-  std::vector<std::uint32_t> begin_;  ///< in samples_, by cell; at last their number
+  PointCells cells_;
+  bool crowd_;
+  LargeArray<Sample> samples_;  ///< of cells_.places()
 };
 
 }  // namespace terrace::terrain

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -51,9 +52,12 @@ class Extremes {
       const Sample sample{places.u[i], places.v[i], places.height[i]};
       Sample& low = lowest_[row * columns_ + column];
       Sample& high = highest_[row * columns_ + column];
-      // Written so that any comes before none.
-      if (!(low.height <= sample.height)) low = sample;
-      if (!(high.height >= sample.height)) high = sample;
+      // Of equally high ones the same whatever their order. Any comes before none.
+      const auto less = [](const Sample& a, const Sample& b) {
+        return std::tie(a.height, a.u, a.v) < std::tie(b.height, b.u, b.v);
+      };
+      if (std::isnan(low.height) || less(sample, low)) low = sample;
+      if (std::isnan(high.height) || less(high, sample)) high = sample;
     }
   }
 

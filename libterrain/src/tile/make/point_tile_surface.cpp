@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "base/digest.hpp"
-#include "base/parallel.hpp"
 #include "tile/make/cloud_spacing.hpp"
 
 namespace terrace::terrain {
@@ -42,35 +41,30 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
                        unsigned threads)
     : TiledStore(tiled, std::move(system), std::move(heights)),
       window_bytes(bytes),
+      hull(store, 0),
       voids(std::make_shared<PointVoids>(store, 0)) {
   spacing = cloud_spacing(tiled, places);
-  constexpr std::uint64_t kMostTriangulated = std::uint64_t{1} << 29;
-  const std::uint64_t most =
-      whole_bytes / (PointWindow::kBytesPerPoint + CloudSamples::kBytesPerPoint);
-  if (tiled.points() >= std::min(most, kMostTriangulated)) return;
-  auto all = std::make_unique<PointWindow>(store, 0, whole_bytes);
-  std::unique_ptr<const CloudSamples> placed;
-  const bool side_by_side = threads > 1;
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 31;
+  if (tiled.points() >= std::min(whole_bytes / CloudSamples::kBytesPerPoint, kMost)) return;
+  samples = std::make_unique<CloudSamples>(store, places, vertical, threads);
+  if (!samples->crowd()) return;
+  auto all = std::make_unique<PointWindow>(store, 0, whole_bytes, voids);
   try {
-    parallel_for(2, threads, [&](unsigned, std::size_t item) {
-      if (item == 0) {
-        all->load(places.stored_bounds());
-      } else {
-        placed =
-            std::make_unique<CloudSamples>(store, places, vertical, side_by_side ? threads - 1 : 1);
-      }
-    });
+    all->load(places.stored_bounds());
   } catch (const PointWindow::NoRoom&) {
     return;
   }
-  samples = std::move(placed);
   whole = std::move(all);
 }
 
 PointTileSurface::PointTileSurface(const TiledCloud& cloud)
     : cloud_(cloud),
       reader_(cloud.store, std::uint64_t{8} << 20),
-      window_(cloud.store, 0, cloud.window_bytes, cloud.voids) {}
+      window_(cloud.store, 0, cloud.window_bytes, cloud.voids) {
+  if (!cloud.samples || cloud.samples->crowd() || cloud.hull.is_flat()) return;
+  surface_.emplace(cloud.store, 0, cloud.hull, TooLong{}, cloud.voids, cloud.window_bytes);
+  surface_->share(cloud.samples->cells());
+}
 
 const std::vector<StoredBox>& PointTileSurface::windows(const GeographicBox& box) {
   if (!asked_ || *asked_ != box) {
@@ -133,7 +127,7 @@ void PointTileSurface::drop_duplicates() {
 void PointTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
   if (cloud_.samples) {
-    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out, order_);
+    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out);
     return;
   }
   WindowPoints more;
@@ -245,6 +239,10 @@ void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span
     if (cloud_.places.stored_bounds().contains({stored[i][0], stored[i][1], 0.0})) {
       within.push_back(i);
     }
+  }
+  if (surface_) {
+    for (const std::uint32_t i : within) out[i] = surface_->linear(stored[i]).height;
+    return;
   }
   if (cloud_.whole) {
     // Places come along sides: each is a few triangles from the one before, unless it is far away.

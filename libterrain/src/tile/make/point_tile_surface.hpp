@@ -12,6 +12,8 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/geoid_heights.hpp"
+#include "surface/point_hull.hpp"
+#include "surface/point_surface.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
@@ -25,10 +27,11 @@ namespace terrace::terrain {
 struct TiledCloud : TiledStore {
   /// Memory that a thread may use for the triangles of a part.
   std::uint64_t window_bytes = 0;
-  /// All triangles and samples, if they fit into memory; else each thread makes and reads those of
-  /// a part at a time.
-  std::unique_ptr<const PointWindow> whole{};
+  PointHull hull;
+  /// All, if they fit into memory; else each thread reads those of a part at a time.
   std::unique_ptr<const CloudSamples> samples{};
+  /// All triangles, for samples that crowd, if they fit as well.
+  std::unique_ptr<const PointWindow> whole{};
   /// Shared by the windows of all threads.
   std::shared_ptr<PointVoids> voids{};
 
@@ -78,13 +81,14 @@ class PointTileSurface final : public TileSurface {
 
   const TiledCloud& cloud_;
   StoreWindow reader_;
-  PointWindow window_;
+  /// Between all samples, if they are in memory and do not crowd, nor lie on one line.
+  std::optional<PointSurface> surface_;
+  PointWindow window_;                        ///< of a part
   std::optional<StoredBox> held_, expected_;  ///< what the window holds, and is to hold
   std::optional<GeographicBox> asked_;
   std::vector<StoredBox> windows_;
   WindowPoints points_;
   std::vector<std::uint32_t> slots_;
-  std::vector<std::uint64_t> order_;
   std::map<std::array<double, 4>, bool> crowded_;  ///< what is known of boxes
 };
 

@@ -98,7 +98,10 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   auto& samples = std::get<SurfaceSamples>(part);
   across.convert(samples.longitude);
   down.convert(samples.latitude);
-  return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, options);
+  // Places that are one on the globe, as at 180 degrees: the same whatever their order.
+  tri::PointTinOptions highest = options;
+  highest.duplicates = tri::PointDuplicates::kMax;
+  return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, highest);
 }
 
 void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,

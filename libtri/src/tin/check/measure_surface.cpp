@@ -162,6 +162,10 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
   if (triangles.empty()) return result;
   const Raster raster(vertices, triangles);
   double squares = 0;
+  // So that the order of samples does not matter.
+  const auto stands_before = [&](std::size_t a, std::size_t b) {
+    return std::array{x[a], y[a], z[a]} < std::array{x[b], y[b], z[b]};
+  };
   for (std::size_t i = 0; i < x.size(); ++i) {
     const Corners* corners = raster.find(x[i], y[i]);
     if (corners == nullptr) continue;
@@ -170,7 +174,8 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
     const double error = std::abs(height - z[i]);
     ++result.covered;
     squares += error * error;
-    if (error > result.largest) {
+    if (error > result.largest ||
+        (error == result.largest && error > 0 && stands_before(i, result.largest_at))) {
       result.largest = error;
       result.largest_at = static_cast<std::uint32_t>(i);
     }

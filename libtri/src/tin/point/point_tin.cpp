@@ -68,7 +68,9 @@ class Maker {
     const std::size_t fixed = mesh_.vertices.size();
     // Reserves so much that growing, which briefly takes twice the memory, is rare; unused capacity
     // costs only address space.
+    mesh_.vertices.reserve(fixed + samples_.size());
     mesh_.triangles.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
+    mesh_.heads.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
     Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
     const bool sweeps = quality != TinQuality::kGreedy;
     insert(greedy, bound, max_vertices, sweeps);
@@ -167,37 +169,59 @@ class Maker {
   std::size_t removed_ = 0;
 };
 
-/// The smallest bound that leaves nearly max_points after removal: the bound at which greedy
-/// insertion stops at max_points is too large, as removal then leaves about 0.6 of them; the number
-/// of vertices is approximately a power of the bound.
+/// The least bound that leaves at most max_points after removal, or one at which they are nearly
+/// all used, searched from the bound at which greedy insertion stops, of whose vertices removal
+/// leaves about 0.6.
 bool make_of_points(Maker& maker, const PointTinOptions& options) {
-  constexpr int kTries = 6;
-  constexpr double kFull = 0.98;
+  constexpr int kMostTries = 24;
+  constexpr double kFull = 0.98, kLeastStep = 1.002;
+  struct Tried {
+    double bound = 0, vertices = 0;
+  };
   const std::size_t limit = options.max_points;
   if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
-  if (options.quality == TinQuality::kGreedy) return true;
-  double best = std::max(maker.measured().errors.largest, options.max_error);
-  double bound = best;
-  double too_small = options.max_error;
-  double last = bound;
-  for (int i = 0; i < kTries && bound > 0; ++i) {
+  // More vertices than this are fixed.
+  if (options.quality == TinQuality::kGreedy || maker.vertices() > limit) return true;
+  const double wanted = (1 + kFull) / 2 * static_cast<double>(limit);
+  Tried few, many;
+  double bound = std::max(maker.measured().errors.largest, options.max_error);
+  int in_a_row = 0;
+  for (int i = 0; i < kMostTries; ++i) {
     maker.make(bound, kUnlimited, options.quality);
-    last = bound;
-    const double part = static_cast<double>(maker.vertices()) / static_cast<double>(limit);
-    if (part <= 1) {
-      best = bound;
-      if (part >= kFull || bound <= options.max_error) break;
+    const Tried tried{bound, static_cast<double>(maker.vertices())};
+    const bool is_few = maker.vertices() <= limit;
+    in_a_row = is_few ? std::max(in_a_row, 0) + 1 : std::min(in_a_row, 0) - 1;
+    (is_few ? few : many) = tried;
+    if (is_few &&
+        (bound <= options.max_error || tried.vertices >= kFull * static_cast<double>(limit)))
+      return true;
+    if (few.vertices == 0) {
+      // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
+      if (i >= kMostTries / 2) break;
+      bound *= 2;
+    } else if (many.vertices == 0) {
+      bound = in_a_row > 3
+                  ? options.max_error
+                  : std::max(bound / std::max(1.05, wanted / tried.vertices), options.max_error);
+    } else if (many.bound == 0) {
+      bound = few.bound / 4;
+    } else if (few.bound <= kLeastStep * many.bound) {
+      break;
+    } else if (std::abs(in_a_row) > 2) {
+      bound = std::sqrt(few.bound * many.bound);
     } else {
-      too_small = bound;
+      // Their number is about linear in the bound's inverse.
+      const double part = (wanted - few.vertices) / (many.vertices - few.vertices);
+      const double inverse = (1 - part) / few.bound + part / many.bound;
+      bound = std::clamp(1 / inverse, many.bound * std::sqrt(kLeastStep),
+                         few.bound / std::sqrt(kLeastStep));
     }
-    // The number of vertices is roughly inversely proportional to the bound; slightly on the safe
-    // side.
-    bound = std::max(last * part * 1.01, options.max_error);
-    if (!(bound > too_small && bound < best)) bound = (too_small + best) / 2;
   }
-  if (last != best) maker.make(best, kUnlimited, options.quality);
-  // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
-  if (maker.vertices() > limit) maker.make(options.max_error, limit, TinQuality::kGreedy);
+  if (few.vertices > 0) {
+    maker.make(few.bound, kUnlimited, options.quality);
+  } else {
+    maker.make(options.max_error, limit, TinQuality::kGreedy);
+  }
   return true;
 }
 
