@@ -61,8 +61,8 @@ DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
                 ", and no operation leads from it to " + to +
                 (change.better().empty() ? "" : ": " + change.better()),
        .remedy = std::string(change.better().empty() ? "" : "install that grid, or ") +
-                 "give `shift` dx,dy,dz[,rx,ry,rz,ds], or convert the data to a system on WGS 84, "
-                 "ETRS89 or NAD83 first"});
+                 "give `shift` dx,dy,dz[,rx,ry,rz,ds] here or when the store is built, or convert "
+                 "the data to a system on WGS 84, ETRS89 or NAD83 first"});
 }
 
 }  // namespace

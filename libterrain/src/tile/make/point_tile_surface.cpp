@@ -48,7 +48,8 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
   if (tiled.points() >= std::min(whole_bytes / CloudSamples::kBytesPerPoint, kMost)) return;
   samples = std::make_unique<CloudSamples>(store, places, vertical, threads);
   if (!samples->crowd()) return;
-  auto all = std::make_unique<PointWindow>(store, 0, whole_bytes, voids);
+  const std::uint64_t left = whole_bytes - tiled.points() * CloudSamples::kBytesPerPoint;
+  auto all = std::make_unique<PointWindow>(store, 0, left, voids);
   try {
     all->load(places.stored_bounds());
   } catch (const PointWindow::NoRoom&) {

@@ -197,7 +197,7 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
       return true;
     if (few.vertices == 0) {
       // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
-      if (i >= kMostTries / 2) break;
+      if (bound == 0 || i >= kMostTries / 2) break;
       bound *= 2;
     } else if (many.vertices == 0) {
       bound = in_a_row > 3
