@@ -52,7 +52,7 @@ class Extremes {
       const Sample sample{places.u[i], places.v[i], places.height[i]};
       Sample& low = lowest_[row * columns_ + column];
       Sample& high = highest_[row * columns_ + column];
-      // Of equally high ones the same whatever their order. Any comes before none.
+      // Among equal heights the place decides, so that the order of samples does not matter.
       const auto less = [](const Sample& a, const Sample& b) {
         return std::tie(a.height, a.u, a.v) < std::tie(b.height, b.u, b.v);
       };
