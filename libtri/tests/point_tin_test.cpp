@@ -136,6 +136,35 @@ TEST(PointTin, MaxPoints) {
   EXPECT_GE(make(cloud, {}, options).vertices.size(), 3u);
 }
 
+// Numbers of vertices that fall steeply with the bound, as of trees over flat ground.
+TEST(PointTin, MaxPointsOfSpikesAreUsed) {
+  Cloud cloud = make_cloud(PointSet::kUniform, 6000, 14);
+  std::mt19937_64 random(14);
+  for (double& z : cloud.z)
+    z = random() % 4 == 0 ? 20 + static_cast<double>(random() % 500) / 100 : 0.0;
+  for (const std::size_t points : {100u, 300u, 1000u}) {
+    SCOPED_TRACE(points);
+    PointTinOptions options;
+    options.max_points = points;
+    const PointTin tin = make(cloud, {}, options);
+    EXPECT_LE(tin.vertices.size(), points);
+    if (tin.vertices.size() >= points * 98 / 100) continue;
+    // Then a bound that is a little less takes more.
+    options.max_points = 0;
+    options.max_error = tin.errors.largest * 0.99;
+    EXPECT_GT(make(cloud, {}, options).vertices.size(), points);
+  }
+}
+
+TEST(MeasureSurface, OfEqualErrorsTheLeastPlaceIsNamed) {
+  const std::vector<Point3> vertices{{0, 0, 0}, {8, 0, 0}, {0, 8, 0}};
+  const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}};
+  const std::vector<double> x{3, 1, 2, 1}, y{1, 2, 1, 1}, z{5, -5, 5, 4};
+  EXPECT_EQ(measure_surface(x, y, z, vertices, triangles).largest_at, 1u);
+  const std::vector<double> back_x{1, 2, 1, 3}, back_y{1, 1, 2, 1}, back_z{4, 5, -5, 5};
+  EXPECT_EQ(measure_surface(back_x, back_y, back_z, vertices, triangles).largest_at, 2u);
+}
+
 TEST(PointTin, OrderOfSamplesDoesNotMatterForTheResult) {
   // All places differ, so the order along the curve is the same, and with it everything else.
   const Cloud cloud = make_cloud(PointSet::kUniform, 4000, 13);

@@ -22,7 +22,6 @@ class PointMesher final : public BoundedMesher {
               const Context& context);
 
   BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices) override;
-  /// True if the samples fit into one window.
   [[nodiscard]] double estimate(double max_error) const override;
   [[nodiscard]] bool can_estimate() const override { return samples_.has_value(); }
 

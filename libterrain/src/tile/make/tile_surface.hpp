@@ -69,7 +69,7 @@ class TileSurface {
   /// Whether the sides of tiles go through the samples on them rather than along the surface, which
   /// need not go through samples at its border.
   [[nodiscard]] virtual bool sides_take_samples() const { return false; }
-  /// Replaces `out` by the samples in the box, borders included.
+  /// Replaces `out` by the samples in the box, borders included, in any order.
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
   /// The same samples in the form that is read and meshed fastest.
   virtual SurfacePart part(const GeographicBox& box) {

@@ -63,7 +63,8 @@ struct TinErrors {
   std::size_t uncovered = 0;  ///< all other samples; they are not measured
   double largest = 0;
   double rms = 0;
-  std::uint32_t largest_at = kNoSample;  ///< a sample with the largest error
+  /// A sample with the largest error; by measure_surface() the least of them in x, y, z.
+  std::uint32_t largest_at = kNoSample;
 };
 
 struct PointTin {
