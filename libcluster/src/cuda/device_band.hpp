@@ -124,22 +124,35 @@ struct NearestOfStale {
   }
 };
 
-/// each over kRows rows times slots: the nearest neighbour of a slot among some rows. Adjacent
-/// indices read adjacent columns of one row.
+/// each over parts of the rows times slots: the nearest neighbour of a slot among the rows of a
+/// part. Adjacent indices read adjacent columns of one row.
 template <class Entry>
 struct NearestOfRows {
-  static constexpr std::uint32_t kRows = 512;
+  /// A thread reads the rows of its part one after another, so parts are short: but not more than
+  /// kMostParts, for memory, and not below kLeastRows rows, for the pass over the results.
+  static constexpr std::uint32_t kMostParts = 128;
+  static constexpr std::uint32_t kLeastRows = 16;
+  static std::uint32_t rows_of(std::uint32_t slots) {
+    const std::uint32_t rows = (slots + kMostParts - 1) / kMostParts;
+    return rows < kLeastRows ? kLeastRows : rows;
+  }
+  /// An upper bound of the parts of `slots` or fewer slots.
+  static std::uint32_t most_parts(std::uint32_t slots) {
+    const std::uint32_t parts = (slots + kLeastRows - 1) / kLeastRows;
+    return parts < kMostParts ? parts : kMostParts;
+  }
+
   Slots<Entry> s;
   Entry* value;  // by part
   std::uint32_t* index;
-
-  static std::uint32_t parts(std::uint32_t slots) { return (slots + kRows - 1) / kRows; }
+  std::uint32_t rows;  ///< of a part
 
   TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t number) const {
     const auto part = static_cast<std::uint32_t>(number / s.slots);
     const auto j = static_cast<std::uint32_t>(number % s.slots);
-    const std::uint32_t first = part * kRows;
-    const std::uint32_t end = first + kRows < s.slots ? first + kRows : s.slots;
+    if (s.alive[j] == 0) return;  // nobody reads its result
+    const std::uint32_t first = part * rows;
+    const std::uint32_t end = first + rows < s.slots ? first + rows : s.slots;
     Best<Entry> best;
     for (std::uint32_t row = first; row < end; ++row) {
       const std::uint32_t steps = j > row ? j - row : j + s.slots - row;
@@ -254,10 +267,13 @@ struct MarkStale {
 // Compaction: kernels that move the remaining clusters of a round to the first slots, in order, so
 // that the band shrinks with their number, and merge their distances on the way.
 
-/// The slots are divided into this many parts, whose clusters are counted concurrently.
+/// The slots are divided into this many parts, whose clusters are counted concurrently, and the
+/// parts into groups: then no thread adds up more than 32 of either.
 inline constexpr std::uint32_t kScanParts = 1024;
+inline constexpr std::uint32_t kScanGroup = 32;  // parts
+inline constexpr std::uint32_t kScanCounts = kScanParts + kScanParts / kScanGroup;
 
-/// each over kScanParts.
+/// each over kScanParts. count: of the parts, then those of the groups, which start with zero.
 template <class Entry>
 struct CountAlive {
   Slots<Entry> s;
@@ -270,6 +286,7 @@ struct CountAlive {
       sum += s.alive[i];
     }
     count[part] = sum;
+    add(&count[kScanParts + part / kScanGroup], sum);
   }
 };
 
@@ -284,7 +301,9 @@ struct NumberAlive {
   TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t part) const {
     const std::size_t length = (s.slots + kScanParts - 1) / kScanParts;
     std::uint32_t next = 0;
-    for (std::size_t p = 0; p < part; ++p) next += count[p];
+    const std::size_t group = part / kScanGroup;
+    for (std::size_t g = 0; g < group; ++g) next += count[kScanParts + g];
+    for (std::size_t p = group * kScanGroup; p < part; ++p) next += count[p];
     for (std::size_t i = part * length; i < (part + 1) * length && i < s.slots; ++i) {
       new_of_old[i] = kNone;
       if (s.alive[i] == 0) continue;

@@ -28,7 +28,7 @@ template <class Entry>
 [[nodiscard]] std::uint64_t complete_rounds_bytes(std::uint64_t points) {
   const std::uint64_t slots = points | 1;
   const std::uint64_t band = slots * (slots / 2) * sizeof(Entry);
-  const std::uint64_t parts = NearestOfRows<Entry>::parts(static_cast<std::uint32_t>(slots));
+  const std::uint64_t parts = NearestOfRows<Entry>::most_parts(static_cast<std::uint32_t>(slots));
   const std::uint64_t per_slot = parts * (4 + sizeof(Entry)) + 80 + 4 * sizeof(Entry);
   return band + band / 25 * 16 + slots * per_slot + kSmallMemory;
 }
@@ -43,14 +43,14 @@ class CompleteRounds {
         now_(device, points_ | 1),
         next_(device, points_ | 1),
         counts_(device.template allocate<RoundCounts>(1)),
-        scan_(device.template allocate<std::uint32_t>(kScanParts)),
+        scan_(device.template allocate<std::uint32_t>(kScanCounts)),
         new_of_old_(device.template allocate<std::uint32_t>(points_ | 1)),
         old_of_new_(device.template allocate<std::uint32_t>(points_ | 1)),
         link_other_(device.template allocate<std::uint32_t>(points_)),
         link_round_(device.template allocate<std::uint32_t>(points_)),
         link_square_(device.template allocate<Entry>(points_)) {
     const std::uint32_t slots = points_ | 1;
-    const std::size_t parts = std::size_t{NearestOfRows<Entry>::parts(slots)} * slots;
+    const std::size_t parts = std::size_t{NearestOfRows<Entry>::most_parts(slots)} * slots;
     part_value_ = device.template allocate<Entry>(parts);
     part_index_ = device.template allocate<std::uint32_t>(parts);
     band_ = device.template allocate<Entry>(band_size(slots));
@@ -137,10 +137,11 @@ class CompleteRounds {
   }
 
   void nearest_of_all() {
-    const std::uint32_t parts = NearestOfRows<Entry>::parts(s_.slots);
+    const std::uint32_t rows = NearestOfRows<Entry>::rows_of(s_.slots);
+    const std::uint32_t parts = (s_.slots + rows - 1) / rows;
     device_.reduce(s_.slots, NearestOfRow<Entry>{s_});
     device_.each(std::size_t{parts} * s_.slots,
-                 NearestOfRows<Entry>{s_, part_value_.data(), part_index_.data()});
+                 NearestOfRows<Entry>{s_, part_value_.data(), part_index_.data(), rows});
     device_.each(s_.slots,
                  NearestOfParts<Entry>{s_, part_value_.data(), part_index_.data(), parts});
   }
@@ -151,6 +152,7 @@ class CompleteRounds {
       spare_ = device_.template allocate<Entry>(band_size(slots));
     }
     const Slots<Entry> to = view(slots, next_, spare_);
+    device_.clear(scan_.data(), kScanCounts);
     device_.each(kScanParts, CountAlive<Entry>{s_, scan_.data()});
     device_.each(kScanParts,
                  NumberAlive<Entry>{s_, scan_.data(), new_of_old_.data(), old_of_new_.data()});
