@@ -6,6 +6,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <random>
 #include <stop_token>
 #include <string>
@@ -34,6 +35,10 @@ class MadePoints final : public PointSource {
     for (Channel& channel : info_.coordinates) channel.type = type;
     info_.attributes = {{.name = "mark", .type = ScalarType::u8},
                         {.name = "number", .type = ScalarType::u64}};
+  }
+  void state(std::uint64_t points, std::optional<Box3> bounds) {
+    info_.points = points;
+    info_.stated_bounds = bounds;
   }
   const SourceInfo& info() const override { return info_; }
   Progress progress() const override { return {.points = next_}; }
@@ -248,6 +253,59 @@ TEST(SpatialOrderTest, HeightsInMetresDoNotHideDegrees) {
   for (PointBlock block; source->next(block);) ordered.blocks.push_back(block);
   expect_all(ordered, kCount, place);
   EXPECT_LT(ordered.width(), 0.01 * 20);
+}
+
+TEST(SpatialOrderTest, ThreadsDoNotChangeTheOrder) {
+  constexpr std::uint64_t kCount = 1'300'000;
+  for (const auto& place : {shuffled(1024), rows(1 << 16), squares(100)}) {
+    const Read expected = read(kCount, place, Order::spatial);
+    for (const unsigned threads : {2u, 5u}) {
+      for (const unsigned ahead : {0u, 1u, 3u}) {
+        const auto source =
+            in_spatial_order(std::make_unique<MadePoints>(kCount, place), {.order = Order::spatial,
+                                                                           .block_points = kBlock,
+                                                                           .threads = threads,
+                                                                           .parts_ahead = ahead});
+        Read found;
+        for (PointBlock block; source->next(block);) found.blocks.push_back(block);
+        EXPECT_TRUE(same(found, expected)) << threads << " threads, " << ahead << " ahead";
+        // Chunks of buckets are written in another order, and the last one may be a shorter one.
+        EXPECT_NEAR(static_cast<double>(source->report().temporary_bytes),
+                    static_cast<double>(expected.report.temporary_bytes), 32 << 10);
+      }
+    }
+  }
+}
+
+TEST(SpatialOrderTest, AStatedBoxSparesDividingTheOutermostBuckets) {
+  // The first window is one corner of the square: without a box nearly all points are beyond.
+  constexpr std::uint64_t kCount = 3'000'000;
+  const auto place = squares(512);
+  Box3 box;
+  for (std::uint64_t i = 0; i < kCount; i += 511) box.include(place(i));
+  const auto ordered = [&](std::optional<Box3> stated) {
+    auto made = std::make_unique<MadePoints>(kCount, place);
+    made->state(kCount, stated);
+    const auto source =
+        in_spatial_order(std::move(made), {.order = Order::spatial, .block_points = kBlock});
+    Read read;
+    for (PointBlock block; source->next(block);) read.blocks.push_back(block);
+    expect_all(read, kCount, place);
+    read.report = source->report();
+    return read;
+  };
+  const Read blind = ordered(std::nullopt), told = ordered(box);
+  EXPECT_LT(told.width(), 1.05 * blind.width());
+  // One that is wrong, or not a box, does no harm.
+  Box3 far;
+  far.include(Point3{1e9, 1e9, 1e9});
+  far.include(Point3{2e9, 2e9, 2e9});
+  EXPECT_LT(ordered(far).width(), 1.05 * blind.width());
+  Box3 endless;
+  endless.include(Point3{-HUGE_VAL, 0, 0});
+  endless.include(Point3{HUGE_VAL, 1, 1});
+  EXPECT_TRUE(same(ordered(endless), blind));
+  EXPECT_TRUE(same(ordered(Box3{}), blind));
 }
 
 TEST(SpatialOrderTest, AStopEndsTheReading) {

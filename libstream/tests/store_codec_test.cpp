@@ -23,7 +23,6 @@
 #include "store/codec/tables.hpp"
 #include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
-#include "store/write/side_by_side.hpp"
 #include "store_inputs.hpp"
 #include "temp_folder.hpp"
 #include "terrace/stream/store.hpp"
@@ -372,24 +371,6 @@ TEST(StoreCodec, ColumnsAlongLinesComeBackInEveryKind) {
     ASSERT_EQ(guide_out, guide);
     ASSERT_EQ(values_out, values);
     for (std::uint32_t i = 1; i < n; ++i) ASSERT_EQ(found[i], lines[i]);
-  }
-}
-
-TEST(StoreCodec, WorkSideBySideIsDoneOnceAndFailuresComeOut) {
-  for (const unsigned threads : {1u, 2u, 5u}) {
-    std::vector<std::atomic<int>> done(100);
-    std::atomic<bool> known = true;
-    side_by_side(threads, done.size(), [&](std::size_t i, std::size_t worker) {
-      ++done[i];
-      if (worker >= threads) known = false;
-    });
-    EXPECT_TRUE(known);
-    for (const std::atomic<int>& times : done) EXPECT_EQ(times, 1);
-    EXPECT_THROW(side_by_side(threads, 100,
-                              [&](std::size_t i, std::size_t) {
-                                if (i == 50) throw std::runtime_error("as asked");
-                              }),
-                 std::runtime_error);
   }
 }
 

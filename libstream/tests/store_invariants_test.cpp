@@ -71,9 +71,12 @@ std::string opening(const std::filesystem::path& path) {
   return {};
 }
 
+/// The same, in the same order, whatever the threads.
 std::string problems_of(const Store& store) {
-  std::string problems;
+  std::string problems, by_threads;
   store.verify([&](const Problem& problem) { problems += problem.what + "\n"; });
+  store.verify([&](const Problem& problem) { by_threads += problem.what + "\n"; }, 3);
+  EXPECT_EQ(by_threads, problems);
   return problems;
 }
 

@@ -55,12 +55,16 @@ class Chain final : public PointSource {
       const SourceInfo& info = source->info();
       if (i == 0) {
         info_ = info;
-        info_.bounds.reset();
         info_.octree.reset();
       } else {
         check_agreement(info_, info);
         info_.files.push_back(part.file);
         info_.comments.insert(info_.comments.end(), info.comments.begin(), info.comments.end());
+        if (info_.stated_bounds && info.stated_bounds) {
+          info_.stated_bounds->include(*info.stated_bounds);
+        } else {
+          info_.stated_bounds.reset();
+        }
         if (info_.points && info.points) {
           *info_.points += *info.points;
         } else {

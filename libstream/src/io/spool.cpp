@@ -53,7 +53,10 @@ void Spool::write(std::uint64_t offset, std::span<const std::byte> bytes) {
     if (put < 0) throw system_error(name_, "cannot write a temporary file", errno, remedy_);
     done += static_cast<std::size_t>(put);
   }
-  size_ = std::max(size_, offset + bytes.size());
+  const std::uint64_t end = offset + bytes.size();
+  std::uint64_t size = size_;
+  while (size < end && !size_.compare_exchange_weak(size, end)) {
+  }
 }
 
 void Spool::read(std::uint64_t offset, std::span<std::byte> out) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -25,7 +26,7 @@ class Spool final : public ByteSource {
 
   /// Throws: Error, usually because the disk is full.
   void append(std::span<const std::byte> bytes) { write(size_, bytes); }
-  /// Writes at any position; gaps read as zero.
+  /// Writes at any position; gaps read as zero. Different parts may be written at the same time.
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
@@ -37,7 +38,7 @@ class Spool final : public ByteSource {
  private:
   std::string name_, remedy_;
   int descriptor_;
-  std::uint64_t size_ = 0;
+  std::atomic<std::uint64_t> size_ = 0;
 };
 
 }  // namespace terrace::stream

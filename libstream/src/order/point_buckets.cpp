@@ -112,15 +112,27 @@ BucketFile::BucketFile(const std::string& name, const std::filesystem::path& fol
       file_(name, folder),
       packer_(record_bytes) {}
 
-void BucketFile::append(Bucket& bucket, std::span<const std::byte> record) {
+void BucketFile::append(Bucket& bucket, std::span<const std::byte> records,
+                        std::span<const std::uint32_t> numbers, RecordPacker& packer) {
   if (bucket.tail.capacity() < chunk_bytes_) bucket.tail.reserve(chunk_bytes_);
-  bucket.tail.insert(bucket.tail.end(), record.begin(), record.end());
-  if (bucket.tail.size() >= chunk_bytes_) write(bucket);
+  while (!numbers.empty()) {
+    const std::size_t before = bucket.tail.size();
+    assert(before < chunk_bytes_);
+    const std::size_t count = std::min((chunk_bytes_ - before) / record_bytes_, numbers.size());
+    bucket.tail.resize(before + count * record_bytes_);
+    std::byte* to = bucket.tail.data() + before;
+    for (const std::uint32_t number : numbers.first(count)) {
+      copy_short(records.data() + number * record_bytes_, to, record_bytes_);
+      to += record_bytes_;
+    }
+    if (bucket.tail.size() >= chunk_bytes_) write(bucket, packer);
+    numbers = numbers.subspan(count);
+  }
 }
 
 /// Moves the records in memory to the file.
-void BucketFile::write(Bucket& bucket) {
-  std::span<const std::byte> bytes = packer_.pack(bucket.tail);
+void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
+  std::span<const std::byte> bytes = packer.pack(bucket.tail);
   if (bytes.size() >= chunk_bytes_) bytes = bucket.tail;
   const Bucket::Chunk chunk = room_for(bytes.size());
   file_.write(chunk.page * kPageBytes, bytes);
@@ -130,6 +142,7 @@ void BucketFile::write(Bucket& bucket) {
 
 /// The smallest place that is free and large enough, or one at the end of the file.
 Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
+  const std::lock_guard lock(mutex_);
   const auto pages = static_cast<std::uint32_t>((bytes + kPageBytes - 1) / kPageBytes);
   Bucket::Chunk chunk{.page = pages_, .pages = pages, .bytes = static_cast<std::uint32_t>(bytes)};
   const auto place = free_.lower_bound(pages);
@@ -164,8 +177,8 @@ std::uint64_t BucketFile::records(const Bucket& bucket) const {
 void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
   const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
   const std::size_t chunks = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
-  out.clear();
-  out.reserve(chunks * chunk_bytes_ + bucket.tail.size());
+  // All that might ever come: `out` is used again.
+  out.reserve(at_once * chunk_bytes_ + bucket.tail.size());
   out.resize(chunks * chunk_bytes_);
   for (std::size_t i = 0; i < chunks; ++i) {
     const Bucket::Chunk& chunk = bucket.chunks[i];

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -67,10 +68,19 @@ class BucketFile {
   BucketFile(const std::string& name, const std::filesystem::path& folder,
              std::size_t record_bytes);
 
-  /// Throws: Error, if the disk is full above all.
-  void append(Bucket& bucket, std::span<const std::byte> record);
+  /// Appends some of the records, which `numbers` counts from 0. Threads may do so at the same
+  /// time, each with a packer and with buckets of its own. Throws: Error, if the disk is full above
+  /// all.
+  void append(Bucket& bucket, std::span<const std::byte> records,
+              std::span<const std::uint32_t> numbers, RecordPacker& packer);
+  /// Appends one record, when no other thread appends any.
+  void append(Bucket& bucket, std::span<const std::byte> record) {
+    constexpr std::array<std::uint32_t, 1> kFirst{0};
+    append(bucket, record, kFirst, packer_);
+  }
   [[nodiscard]] std::uint64_t records(const Bucket& bucket) const;
-  /// Moves the first records of the bucket, whole chunks and at most about so many, to `out`.
+  /// Moves the first records of the bucket, whole chunks and at most about so many, to `out`, whose
+  /// former content is lost.
   void take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
   /// Copies records of chunks throughout the bucket, at most so many, to `out`.
   void sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
@@ -82,13 +92,14 @@ class BucketFile {
   static constexpr std::uint64_t kPageBytes = 1024;
 
   Bucket::Chunk room_for(std::size_t bytes);
-  void write(Bucket& bucket);
+  void write(Bucket& bucket, RecordPacker& packer);
   void read(const Bucket::Chunk& chunk, std::span<std::byte> records);
 
   std::size_t record_bytes_, chunk_bytes_;  ///< of records that are not packed
   Spool file_;
   RecordPacker packer_;
   std::vector<std::byte> packed_;
+  std::mutex mutex_;                                          ///< of what follows
   std::uint32_t pages_ = 0;                                   ///< in the file
   std::map<std::uint32_t, std::vector<std::uint32_t>> free_;  ///< places, by their size
 };

@@ -2,16 +2,22 @@
 #include "terrace/stream/spatial_order.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <future>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "order/kd_cut.hpp"
 #include "order/point_buckets.hpp"
+#include "order/record_packer.hpp"
 #include "terrace/stream/error.hpp"
+#include "thread_team.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -46,11 +52,20 @@ double widths_of(std::span<const NumberedPoint> points, std::span<const std::siz
   return widths;
 }
 
+/// A window whose box has a greater share of the source's shows what all of it is like.
+constexpr double kWindowShowsAll = 0.25;
+/// Points that go to the buckets together, in about so many shares where they come from one.
+constexpr std::size_t kSharedPoints = 1u << 16;
+constexpr std::size_t kSharesOfBucket = 16;
+/// Buckets that a thread fills before it looks for others.
+constexpr std::size_t kBucketsATime = 4;
+
 /// What points take that are held back to be judged or come next, and the ends of all buckets.
-std::uint64_t bytes_to_order(const SourceInfo& info) {
+std::uint64_t bytes_to_order(const SourceInfo& info, unsigned parts_ahead) {
   static_assert(kWindowPoints <= kMostAtOnce);
   const std::uint64_t point = sizeof(Point3) + info.payload_size() + sizeof(NumberedPoint);
-  return kMostAtOnce * point + (std::uint64_t{kBucketBytes} << kDepth);
+  return std::max(kMostAtOnce + 2 * kSharedPoints, (1 + parts_ahead) * kMostAtOnce) * point +
+         (std::uint64_t{kBucketBytes} << kDepth);
 }
 
 class SpatialSource final : public OrderedSource {
@@ -60,7 +75,9 @@ class SpatialSource final : public OrderedSource {
         options_(std::move(options)),
         state_(options_.order == Order::stream || source_->info().grid ? State::passing
                                                                        : State::opening),
-        ordering_bytes_(state_ == State::passing ? 0 : bytes_to_order(source_->info())) {}
+        ordering_bytes_(
+            state_ == State::passing ? 0 : bytes_to_order(source_->info(), options_.parts_ahead)),
+        team_(options_.threads) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
   [[nodiscard]] std::uint64_t reading_bytes() const override {
@@ -171,14 +188,15 @@ class SpatialSource final : public OrderedSource {
 
   void load_window() {
     packed_.emplace(info());
+    Region region;
     std::vector<std::byte> records;
     for (const PointBlock& block : window_) {
       packed_->pack(block, records);
-      records_.insert(records_.end(), records.begin(), records.end());
+      region.records.insert(region.records.end(), records.begin(), records.end());
     }
     window_.clear();
-    cut_records();
-    total_ = delivered_ + places_.size();
+    region_ = cut_region(std::move(region));
+    total_ = delivered_ + region_.in_order.size();
     state_ = State::delivering;
   }
 
@@ -189,36 +207,126 @@ class SpatialSource final : public OrderedSource {
       for (const Point3& p : block.positions) places_.push_back({p, places_.size()});
     }
     measure_units();
+    expect_elsewhere();
     planes_ = kd_planes(places_, kDepth, lengths_);
     packed_.emplace(info());
     file_.emplace(info().files.empty() ? std::string("points") : info().files.front(),
                   options_.folder, packed_->record_bytes());
     std::vector<Bucket> buckets(planes_.size() + 1);
-    std::vector<std::byte> records;
-    const auto put = [&](const PointBlock& block) {
-      packed_->pack(block, records);
-      distribute(records, block.positions, buckets);
-      total_ += block.size();
+    const auto next_block = [&](PointBlock& block) {
+      if (window_.empty()) return source_->next(block);
+      block = std::move(window_.front());
+      window_.pop_front();
+      return true;
+    };
+    // Some are read while those before go to the buckets.
+    std::vector<Share> read, on_their_way;
+    std::size_t read_count = 0, count = 0;
+    const auto read_some = [&] {
+      read_count = 0;
+      for (std::size_t points = 0; points < kSharedPoints; ++read_count) {
+        if (read_count == read.size()) read.emplace_back();
+        if (!next_block(read[read_count].block)) break;
+        points += read[read_count].block.size();
+      }
     };
     total_ = delivered_;
-    for (; !window_.empty(); window_.pop_front()) put(window_.front());
-    PointBlock block;
-    while (source_->next(block)) {
+    for (read_some(); read_count > 0;) {
       if (options_.stop.stop_requested()) throw Stopped();
-      put(block);
       if (options_.reading) options_.reading(source_->progress());
+      std::swap(read, on_their_way);
+      count = std::exchange(read_count, 0);
+      team_.run(count + 1, [&](std::size_t i, std::size_t) {
+        if (i == 0) return read_some();
+        Share& share = on_their_way[i - 1];
+        packed_->pack(share.block, share.records);
+        const auto& places = share.block.positions;
+        sort_by_leaf(share, places.size(), [&](std::size_t p) { return places[p]; });
+      });
+      for (const Share& share : std::span(on_their_way).first(count)) {
+        total_ += share.block.size();
+      }
+      distribute(std::span(on_their_way).first(count), buckets);
     }
     push(std::move(buckets), total_);
     report_.temporary_bytes = file_->bytes();
     state_ = State::delivering;
   }
 
-  void distribute(std::span<const std::byte> records, std::span<const Point3> places,
-                  std::vector<Bucket>& buckets) {
-    const std::size_t bytes = packed_->record_bytes();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      file_->append(buckets[kd_leaf(planes_, places[i])], records.subspan(i * bytes, bytes));
+  /// A window often shows one corner of the whole, of a survey its first swath. Where the source
+  /// knows more, most of the window's points give way to places spread evenly over its box, in
+  /// proportion to the points that are to come: else nearly all of them would end in the outermost
+  /// buckets, to be divided later.
+  void expect_elsewhere() {
+    const std::optional<Box3>& bounds = info().stated_bounds;
+    const std::uint64_t points = info().points.value_or(0);
+    if (!bounds || points <= places_.size()) return;
+    Box3 window;
+    for (const NumberedPoint& point : places_) window.include(point.place);
+    double seen = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double length = bounds->max[axis] - bounds->min[axis];
+      if (!(length >= 0) || !std::isfinite(length)) return;
+      if (length > 0) seen *= std::min(1.0, (window.max[axis] - window.min[axis]) / length);
     }
+    if (seen > kWindowShowsAll) return;
+    const std::size_t count = places_.size();
+    const double share = std::max(static_cast<double>(count) / static_cast<double>(points), 0.125);
+    const auto kept = static_cast<std::size_t>(static_cast<double>(count) * share);
+    for (std::size_t i = 0; i < kept; ++i) places_[i] = places_[i * count / kept];
+    for (std::size_t i = kept; i < count; ++i) {
+      // The additive sequence of least discrepancy in space: powers of 1 / 1.2207...
+      constexpr std::array<double, 3> kSteps{0.8191725133961645, 0.6710436067037893,
+                                             0.5497004779019703};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double at = kSteps[axis] * static_cast<double>(i);
+        places_[i].place[axis] =
+            bounds->min[axis] + (at - std::floor(at)) * (bounds->max[axis] - bounds->min[axis]);
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) places_[i].number = i;
+  }
+
+  /// Points on their way to the buckets.
+  struct Share {
+    PointBlock block;
+    std::vector<NumberedPoint> places;
+    std::vector<std::byte> records;
+    std::vector<std::uint16_t> leaves;   ///< by record
+    std::vector<std::uint32_t> by_leaf;  ///< records, in their order within a leaf
+    std::vector<std::size_t> begins;     ///< of each leaf in `by_leaf`, and the end
+  };
+
+  template <class PlaceOf>
+  void sort_by_leaf(Share& share, std::size_t count, const PlaceOf& place_of) const {
+    share.leaves.resize(count);
+    share.begins.assign(planes_.size() + 2, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t leaf = kd_leaf(planes_, place_of(i));
+      share.leaves[i] = static_cast<std::uint16_t>(leaf);
+      ++share.begins[leaf + 1];
+    }
+    std::partial_sum(share.begins.begin(), share.begins.end(), share.begins.begin());
+    std::vector<std::size_t> next(share.begins.begin(), share.begins.end() - 1);
+    share.by_leaf.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      share.by_leaf[next[share.leaves[i]]++] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  /// Adds the shares' records to the buckets, in order.
+  void distribute(std::span<const Share> shares, std::vector<Bucket>& buckets) {
+    while (packers_.size() < team_.threads()) packers_.emplace_back(packed_->record_bytes());
+    team_.run(buckets.size() / kBucketsATime, [&](std::size_t i, std::size_t worker) {
+      for (std::size_t b = i * kBucketsATime; b < (i + 1) * kBucketsATime; ++b) {
+        for (const Share& share : shares) {
+          file_->append(buckets[b], share.records,
+                        std::span(share.by_leaf)
+                            .subspan(share.begins[b], share.begins[b + 1] - share.begins[b]),
+                        packers_[worker]);
+        }
+      }
+    });
   }
 
   /// Makes the buckets the next ones, such as are small together as one. Planes do not divide those
@@ -249,38 +357,70 @@ class SpatialSource final : public OrderedSource {
   }
 
   void deliver(PointBlock& block) {
-    while (next_piece_ + 1 >= pieces_.size()) {
-      if (pending_.empty()) return;
+    while (next_piece_ + 1 >= region_.pieces.size()) {
+      prepare_ahead();
+      if (coming_.empty()) return;
+      spare_.push_back(std::exchange(region_, coming_.front().get()));
+      coming_.pop_front();
+      next_piece_ = 0;
+      if (options_.parts_ahead > 0) prepare_ahead();
+    }
+    const std::size_t begin = region_.pieces[next_piece_], end = region_.pieces[next_piece_ + 1];
+    ++next_piece_;
+    packed_->unpack(region_.records, std::span(region_.in_order).subspan(begin, end - begin),
+                    block);
+  }
+
+  /// Points that are delivered together, piece by piece.
+  struct Region {
+    std::vector<std::byte> records;
+    std::vector<std::size_t> pieces;      ///< where each begins, and the end
+    std::vector<std::uint32_t> in_order;  ///< records of the pieces
+    // Of use while it is prepared:
+    std::vector<NumberedPoint> places;
+    std::vector<std::uint32_t> piece_of;  ///< by record
+  };
+
+  void prepare_ahead() {
+    while (coming_.size() < std::max(options_.parts_ahead, 1U) && !pending_.empty()) {
       Pending& next = pending_.back();
       if (next.divisible && file_->records(next.bucket) > kMostAtOnce) {
         divide();
         continue;
       }
-      file_->take(next.bucket, kMostAtOnce, records_);
+      Region region;
+      if (!spare_.empty()) {
+        region = std::move(spare_.back());
+        spare_.pop_back();
+      }
+      file_->take(next.bucket, kMostAtOnce, region.records);
       if (file_->records(next.bucket) == 0) pending_.pop_back();
-      cut_records();
+      // Where the system grants no more threads, it is cut once it is needed.
+      const std::launch when = options_.parts_ahead > 0 ? std::launch::async | std::launch::deferred
+                                                        : std::launch::deferred;
+      coming_.push_back(std::async(
+          when, [this](Region cut) { return cut_region(std::move(cut)); }, std::move(region)));
     }
-    const std::size_t begin = pieces_[next_piece_], end = pieces_[next_piece_ + 1];
-    ++next_piece_;
-    packed_->unpack(records_, std::span(in_order_).subspan(begin, end - begin), block);
   }
 
-  void cut_records() {
-    packed_->unpack(records_, places_);
-    pieces_ = cut_in_pieces(places_, blocks_of(places_.size(), options_.block_points), lengths_);
-    next_piece_ = 0;
+  [[nodiscard]] Region cut_region(Region region) const {
+    std::vector<NumberedPoint>& places = region.places;
+    packed_->unpack(region.records, places);
+    region.pieces =
+        cut_in_pieces(places, blocks_of(places.size(), options_.block_points), lengths_);
     // Within a piece in the order of the source: neighbours in it are often alike.
-    piece_of_.resize(places_.size());
-    for (std::uint32_t piece = 0; piece + 1 < pieces_.size(); ++piece) {
-      for (std::size_t i = pieces_[piece]; i < pieces_[piece + 1]; ++i) {
-        piece_of_[places_[i].number] = piece;
+    region.piece_of.resize(places.size());
+    for (std::uint32_t piece = 0; piece + 1 < region.pieces.size(); ++piece) {
+      for (std::size_t i = region.pieces[piece]; i < region.pieces[piece + 1]; ++i) {
+        region.piece_of[places[i].number] = piece;
       }
     }
-    std::vector<std::size_t> next(pieces_);
-    in_order_.resize(places_.size());
-    for (std::uint32_t number = 0; number < places_.size(); ++number) {
-      in_order_[next[piece_of_[number]]++] = number;
+    std::vector<std::size_t> next(region.pieces);
+    region.in_order.resize(places.size());
+    for (std::uint32_t number = 0; number < places.size(); ++number) {
+      region.in_order[next[region.piece_of[number]]++] = number;
     }
+    return region;
   }
 
   /// Puts smaller buckets in place of the next one.
@@ -293,14 +433,21 @@ class SpatialSource final : public OrderedSource {
     file_->sample(bucket, kWindowPoints, records);
     packed_->unpack(records, places);
     planes_ = kd_planes(places, kDepth, lengths_);
+    places = {};
     std::vector<Bucket> buckets(planes_.size() + 1);
-    std::vector<Point3> positions;
+    std::vector<Share> shares(kSharesOfBucket);
     while (file_->records(bucket) > 0) {
-      file_->take(bucket, kMostAtOnce / 8, records);
-      packed_->unpack(records, places);
-      positions.clear();
-      for (const NumberedPoint& point : places) positions.push_back(point.place);
-      distribute(records, positions, buckets);
+      std::size_t taken = 0;
+      for (; taken < shares.size() && file_->records(bucket) > 0; ++taken) {
+        file_->take(bucket, kSharedPoints / kSharesOfBucket, shares[taken].records);
+      }
+      team_.run(taken, [&](std::size_t i, std::size_t) {
+        Share& share = shares[i];
+        packed_->unpack(share.records, share.places);
+        sort_by_leaf(share, share.places.size(),
+                     [&](std::size_t p) { return share.places[p].place; });
+      });
+      distribute(std::span(shares).first(taken), buckets);
     }
     push(std::move(buckets), count / 2);
     report_.temporary_bytes = file_->bytes();
@@ -315,9 +462,10 @@ class SpatialSource final : public OrderedSource {
   SpatialOrderOptions options_;
   State state_;
   std::uint64_t ordering_bytes_;
-  std::deque<PointBlock> window_;  ///< what was held back to be judged
-  std::uint64_t unjudged_ = 0;     ///< points that pass before the next window
-  std::uint64_t seen_ = 0;         ///< points of the window that is judged
+  std::deque<PointBlock> window_;      ///< what was held back to be judged
+  std::vector<NumberedPoint> places_;  ///< of a window
+  std::uint64_t unjudged_ = 0;         ///< points that pass before the next window
+  std::uint64_t seen_ = 0;             ///< points of the window that is judged
   std::array<double, 3> lengths_{1, 1, 1};
 
   std::optional<PackedPoints> packed_;
@@ -325,15 +473,15 @@ class SpatialSource final : public OrderedSource {
   std::optional<BucketFile> file_;
   std::vector<Pending> pending_;  ///< the next one is the last
 
-  std::vector<std::byte> records_;       ///< that come next
-  std::vector<NumberedPoint> places_;    ///< of the records, in pieces; before, of a window
-  std::vector<std::size_t> pieces_;      ///< where each begins
-  std::vector<std::uint32_t> piece_of_;  ///< by number of the record
-  std::vector<std::uint32_t> in_order_;  ///< records of the pieces
+  ThreadTeam team_;
+  std::vector<RecordPacker> packers_;  ///< by thread of the team
+  Region region_;                      ///< that is delivered
   std::size_t next_piece_ = 0;
+  std::vector<Region> spare_;
 
   std::uint64_t delivered_ = 0, total_ = 0;
   Report report_;
+  std::deque<std::future<Region>> coming_;  ///< goes first: it needs the others
 };
 
 }  // namespace

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "store/verify.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -8,6 +6,8 @@
 #include <type_traits>
 
 #include "store/codec/bytes.hpp"
+#include "store/read/store_impl.hpp"
+#include "thread_team.hpp"
 #include "with_type.hpp"
 
 namespace terrace::stream::store {
@@ -29,6 +29,9 @@ std::uint64_t hash_of(std::uint64_t ordinal, const Point3& p, std::span<const st
   for (const std::uint64_t child : children) h = mixed(h ^ (child + 0x9e3779b97f4a7c15u));
   return mixed(h ^ crc32(0, payload.data(), payload.size()));
 }
+
+/// Pages that a thread checks before what was found is put together.
+constexpr unsigned kPagesPerThread = 4;
 
 /// What is summed up over one level while it is read.
 struct LevelSums {
@@ -62,13 +65,14 @@ class Verification {
  public:
   Verification(const Store& store, const ByteSource& manifest_file, const Manifest& manifest,
                const std::vector<std::unique_ptr<LevelReader>>& levels, const std::stop_token& stop,
-               const std::function<void(const Problem&)>& report)
+               unsigned threads, const std::function<void(const Problem&)>& report)
       : store_(store),
         manifest_file_(manifest_file),
         manifest_(manifest),
         levels_(levels),
         stop_(stop),
-        report_(report) {}
+        report_(report),
+        team_(threads) {}
 
   bool run() {
     check_manifest();
@@ -76,9 +80,8 @@ class Verification {
     for (std::size_t l = 0; l < levels_.size(); ++l) {
       sums_[l].headed.resize(memory_size(levels_[l]->clusters()));
       most_looked_into_ += levels_.size() * levels_[l]->clusters();
-      check_file(levels_[l]->data(), manifest_.levels[l].data.checksum);
-      check_file(levels_[l]->index(), manifest_.levels[l].index.checksum);
     }
+    check_files();
     for (unsigned l = 0; l < levels_.size(); ++l) check_level(l);
     for (std::size_t l = 0; l + 1 < levels_.size(); ++l) check_heads(l);
     check_totals();
@@ -86,14 +89,41 @@ class Verification {
   }
 
  private:
+  /// What a page of the index leads to.
+  struct Page {
+    std::shared_ptr<const IndexPage> index;  ///< null: it could not be read
+    std::vector<Problem> problems;
+    std::uint64_t members = 0, representatives = 0;  ///< see LevelSums
+    Box3 bounds;
+    double height_sum = 0.0;
+
+    void problem(const std::string& file, std::uint64_t offset, std::string what) {
+      problems.push_back({.file = file, .offset = offset, .what = std::move(what)});
+    }
+    void enter_height(const Point3& p) {
+      bounds.include(p);
+      height_sum += p[2];
+    }
+  };
+  /// What a thread reads clusters with.
+  struct Reading {
+    explicit Reading(const LevelReader& level) : ahead(level.data()) {}
+
+    SequentialBytes ahead;
+    ClusterDecoder decoder;
+    ClusterPoints points;
+    std::vector<KeyRange> ranges;
+  };
+
   void problem(const std::string& file, std::uint64_t offset, std::string what) {
-    good_ = false;
-    if (report_) report_({.file = file, .offset = offset, .what = std::move(what)});
+    report({.file = file, .offset = offset, .what = std::move(what)});
   }
-  void cluster_problem(unsigned level, std::uint64_t ordinal, std::uint64_t offset,
-                       const std::string& what) {
-    problem(levels_[level]->data().name(), offset,
-            "cluster " + std::to_string(level) + "/" + std::to_string(ordinal) + ": " + what);
+  void report(const Problem& problem) {
+    good_ = false;
+    if (report_) report_(problem);
+  }
+  std::string about_cluster(unsigned level, std::uint64_t ordinal, const std::string& what) const {
+    return "cluster " + std::to_string(level) + "/" + std::to_string(ordinal) + ": " + what;
   }
 
   void check_stop() const {
@@ -111,7 +141,27 @@ class Verification {
     }
   }
 
-  void check_file(const ByteSource& file, std::uint32_t expected) {
+  void check_files() {
+    std::vector<std::vector<Problem>> problems(2 * levels_.size());
+    team_.run(problems.size(), [&](std::size_t i, std::size_t) {
+      const LevelReader& level = *levels_[i / 2];
+      const auto& expected = manifest_.levels[i / 2];
+      if (i % 2 == 0) {
+        check_file(level.data(), expected.data.checksum, problems[i]);
+      } else {
+        check_file(level.index(), expected.index.checksum, problems[i]);
+      }
+    });
+    for (const std::vector<Problem>& found : problems) {
+      for (const Problem& problem : found) report(problem);
+    }
+  }
+
+  void check_file(const ByteSource& file, std::uint32_t expected,
+                  std::vector<Problem>& problems) const {
+    const auto problem = [&](std::string what) {
+      problems.push_back({.file = file.name(), .offset = 0, .what = std::move(what)});
+    };
     try {
       Bytes bytes(1u << 20);
       std::uint32_t checksum = 0;
@@ -122,26 +172,27 @@ class Verification {
         file.read(offset, std::as_writable_bytes(std::span(bytes)));
         checksum = crc32(checksum, bytes.data(), bytes.size());
       }
-      if (checksum != expected) problem(file.name(), 0, "the checksum of the file is wrong");
+      if (checksum != expected) problem("the checksum of the file is wrong");
     } catch (const Error& error) {
-      problem(file.name(), 0, error.what());
+      problem(error.what());
     }
   }
 
+  /// Level 0 has nearly all there is and nothing below it: its pages are checked side by side,
+  /// those of other levels, which tell whom they head, one after another.
   void check_level(unsigned l) {
     const LevelReader& level = *levels_[l];
-    SequentialBytes ahead(level.data());
+    std::vector<Reading> readings;
+    for (unsigned worker = 0; worker < team_.threads(); ++worker) readings.emplace_back(level);
+    std::vector<Page> pages(l == 0 ? std::size_t{kPagesPerThread} * team_.threads() : 1);
     std::uint64_t data_end = 0;
-    for (std::uint64_t p = 0; p < level.pages(); ++p) {
-      std::uint64_t offset = 0;
-      try {
-        offset = level.page_offset(p);
-        check_page(l, p, ahead, data_end);
-      } catch (const Error& error) {
-        problem(level.index().name(), offset, error.what());
-      } catch (const Damage& damage) {
-        problem(level.index().name(), offset, damage.what());
-      }
+    for (std::uint64_t first = 0; first < level.pages(); first += pages.size()) {
+      const std::uint64_t count = std::min<std::uint64_t>(pages.size(), level.pages() - first);
+      team_.run(static_cast<std::size_t>(count), [&](std::size_t i, std::size_t worker) {
+        pages[i] = {};
+        check_page(l, first + i, readings[worker], pages[i]);
+      });
+      for (std::uint64_t i = 0; i < count; ++i) add_page(l, first + i, pages[i], data_end);
     }
     if (data_end != level.data().size()) {
       problem(level.data().name(), data_end, "the clusters do not end where the file does");
@@ -153,83 +204,110 @@ class Verification {
     }
   }
 
-  void check_page(unsigned l, std::uint64_t number, SequentialBytes& ahead,
-                  std::uint64_t& data_end) {
+  void add_page(unsigned l, std::uint64_t number, const Page& page, std::uint64_t& data_end) {
+    const LevelReader& level = *levels_[l];
+    if (page.index) {
+      for (std::uint32_t i = 0; i < page.index->clusters(); ++i) {
+        // Bytes that clusters before have are read again, the others follow one another.
+        const std::uint64_t offset = page.index->offset(i), end = page.index->end(i);
+        if (offset != data_end && !(level.layout().small() && end <= data_end)) {
+          problem(level.data().name(), offset,
+                  about_cluster(l, number * level.layout().page_clusters() + i,
+                                "its bytes do not follow those before"));
+        }
+        data_end = std::max(data_end, end);
+      }
+    }
+    for (const Problem& problem : page.problems) report(problem);
+    sums_[l].members += page.members;
+    sums_[l].representatives += page.representatives;
+    bounds_.include(page.bounds);
+    height_sum_ += page.height_sum;
+  }
+
+  void check_page(unsigned l, std::uint64_t number, Reading& reading, Page& page) {
     check_stop();
     const LevelReader& level = *levels_[l];
-    const auto page = level.page(number);
-    for (std::uint32_t i = 0; i < page->clusters(); ++i) {
+    std::uint64_t page_offset = 0;
+    try {
+      page_offset = level.page_offset(number);
+      page.index = level.page(number);
+    } catch (const Error& error) {
+      return page.problem(level.index().name(), page_offset, error.what());
+    } catch (const Damage& damage) {
+      return page.problem(level.index().name(), page_offset, damage.what());
+    }
+    for (std::uint32_t i = 0; i < page.index->clusters(); ++i) {
       const std::uint64_t ordinal = number * level.layout().page_clusters() + i;
-      // Bytes that clusters before have are read again, the others follow one another.
-      const std::uint64_t offset = page->offset(i);
-      const bool follows =
-          offset == data_end || (level.layout().small() && page->end(i) <= data_end);
-      if (!follows) {
-        cluster_problem(l, ordinal, offset, "its bytes do not follow those before");
-      }
-      data_end = std::max(data_end, page->end(i));
+      const std::uint64_t offset = page.index->offset(i);
       try {
-        const Entry entry = level.entry(*page, ordinal);
-        level.read(ordinal, entry, offset, ahead, decoder_, points_);
-        check_cluster(l, ordinal, record_of(entry, l, offset, level.top()));
-        check_ranges(l, ordinal, offset);
+        const Entry entry = level.entry(*page.index, ordinal);
+        level.read(ordinal, entry, offset, reading.ahead, reading.decoder, reading.points);
+        check_cluster(l, ordinal, record_of(entry, l, offset, level.top()), reading.points, page);
+        check_ranges(l, ordinal, offset, reading, page);
       } catch (const Error& error) {
-        problem(level.data().name(), offset, error.what());
+        page.problem(level.data().name(), offset, error.what());
       }
     }
   }
 
-  void check_ranges(unsigned l, std::uint64_t ordinal, std::uint64_t offset) {
+  void check_ranges(unsigned l, std::uint64_t ordinal, std::uint64_t offset, Reading& reading,
+                    Page& page) const {
     const LevelReader& level = *levels_[l];
-    level.ranges(ordinal, ranges_);
+    const ClusterPoints& points = reading.points;
+    level.ranges(ordinal, reading.ranges);
     const std::size_t stride = level.layout().payload_size;
     std::size_t at = 0;
-    for (std::size_t a = 0; a < ranges_.size(); ++a) {
+    for (std::size_t a = 0; a < reading.ranges.size(); ++a) {
       const ScalarType type = level.layout().attributes[a];
       const auto inside = [&](const std::byte* record) {
         const std::uint64_t key = key_of(type, record + at);
-        return ranges_[a].low <= key && key <= ranges_[a].high;
+        return reading.ranges[a].low <= key && key <= reading.ranges[a].high;
       };
-      bool all = !points_.has_representative || inside(points_.representative_payload.data());
-      for (std::size_t i = 0; i < points_.size(); ++i) {
-        all &= inside(points_.payload.data() + i * stride);
+      bool all = !points.has_representative || inside(points.representative_payload.data());
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        all &= inside(points.payload.data() + i * stride);
       }
       if (!all) {
-        cluster_problem(l, ordinal, offset,
-                        "values of attribute " + std::to_string(a) + " lie outside of their range");
+        page.problem(level.data().name(), offset,
+                     about_cluster(l, ordinal,
+                                   "values of attribute " + std::to_string(a) +
+                                       " lie outside of their range"));
       }
       at += size_of(type);
     }
   }
 
-  void check_cluster(unsigned l, std::uint64_t ordinal, const ClusterRecord& record) {
-    LevelSums& sums = sums_[l];
-    sums.members += points_.size();
+  void check_cluster(unsigned l, std::uint64_t ordinal, const ClusterRecord& record,
+                     const ClusterPoints& points, Page& page) {
+    const auto problem = [&](const std::string& what) {
+      page.problem(levels_[l]->data().name(), record.offset, about_cluster(l, ordinal, what));
+    };
+    page.members += points.size();
     const ClusterSummary& summary = record.summary;
     bool inside = true;
-    for (const Point3& p : points_.positions) inside &= summary.box.contains(p);
-    if (points_.has_representative) inside &= summary.box.contains(points_.representative);
-    if (!inside) cluster_problem(l, ordinal, record.offset, "a point lies outside of its box");
+    for (const Point3& p : points.positions) inside &= summary.box.contains(p);
+    if (points.has_representative) inside &= summary.box.contains(points.representative);
+    if (!inside) problem("a point lies outside of its box");
     Box3 within = summary.box;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       within.min[axis] = std::max(within.min[axis], manifest_.bounds.min[axis]);
       within.max[axis] = std::min(within.max[axis], manifest_.bounds.max[axis]);
     }
-    if (points_.size() + points_.has_representative > 0 &&
+    if (points.size() + points.has_representative > 0 &&
         !holds(levels_[l]->page_box(ordinal), within)) {
-      cluster_problem(l, ordinal, record.offset, "the box reaches out of its page's");
+      problem("the box reaches out of its page's");
     }
     if (!(summary.error >= 0)) {
-      cluster_problem(l, ordinal, record.offset, "the error is not a number from 0 up");
+      problem("the error is not a number from 0 up");
     }
-    if (points_.has_representative) {
-      sums.representatives +=
-          hash_of(ordinal, points_.representative, points_.representative_payload,
-                  points_.representative_children);
+    if (points.has_representative) {
+      page.representatives += hash_of(ordinal, points.representative, points.representative_payload,
+                                      points.representative_children);
     }
     if (l == 0) {
-      for (const Point3& p : points_.positions) enter_height(p);
-      if (points_.has_representative) enter_height(points_.representative);
+      for (const Point3& p : points.positions) page.enter_height(p);
+      if (points.has_representative) page.enter_height(points.representative);
       return;
     }
     const std::size_t stride = levels_[l]->layout().payload_size;
@@ -240,30 +318,29 @@ class Verification {
       descendants += below.descendants;
       if (!holds(summary.box, below.box)) uncertain.push_back(child);
     };
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      const std::span<const std::byte> payload(points_.payload.data() + i * stride, stride);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::span<const std::byte> payload(points.payload.data() + i * stride, stride);
       for (unsigned j = 0; j < l; ++j) {
-        const std::uint64_t child = points_.children[i * l + j];
+        const std::uint64_t child = points.children[i * l + j];
         std::vector<bool>::reference headed = sums_[j].headed[static_cast<std::size_t>(child)];
         if (headed) {
-          cluster_problem(l, ordinal, record.offset,
-                          "cluster " + std::to_string(j) + "/" + std::to_string(child) +
-                              " is headed a second time");
+          problem("cluster " + std::to_string(j) + "/" + std::to_string(child) +
+                  " is headed a second time");
         }
         headed = true;
-        sums_[j].heads += hash_of(child, points_.positions[i], payload,
-                                  std::span(points_.children).subspan(i * l, j));
+        sums_[j].heads += hash_of(child, points.positions[i], payload,
+                                  std::span(points.children).subspan(i * l, j));
       }
-      check_child(points_.children[i * l + l - 1]);
+      check_child(points.children[i * l + l - 1]);
     }
-    if (points_.has_representative) check_child(points_.representative_children[l - 1]);
+    if (points.has_representative) check_child(points.representative_children[l - 1]);
     if (descendants != summary.descendants) {
-      cluster_problem(l, ordinal, record.offset, "the descendants do not add up");
+      problem("the descendants do not add up");
     }
     if (!std::all_of(uncertain.begin(), uncertain.end(), [&](std::uint64_t child) {
           return descendants_lie_in(summary.box, l - 1, child);
         })) {
-      cluster_problem(l, ordinal, record.offset, "a cluster below reaches out of its box");
+      problem("a cluster below reaches out of its box");
     }
   }
 
@@ -286,18 +363,14 @@ class Verification {
     return true;
   }
 
-  void enter_height(const Point3& p) {
-    bounds_.include(p);
-    height_sum_ += p[2];
-  }
-
   void check_heads(std::size_t l) {
     const LevelSums& sums = sums_[l];
     const auto orphan = std::find(sums.headed.begin(), sums.headed.end(), false);
     if (orphan != sums.headed.end()) {
-      cluster_problem(static_cast<unsigned>(l),
-                      static_cast<std::uint64_t>(orphan - sums.headed.begin()), 0,
-                      "no point above heads it");
+      problem(levels_[l]->data().name(), 0,
+              about_cluster(static_cast<unsigned>(l),
+                            static_cast<std::uint64_t>(orphan - sums.headed.begin()),
+                            "no point above heads it"));
     } else if (sums.heads != sums.representatives) {
       problem(levels_[l]->data().name(), 0,
               "the representatives of level " + std::to_string(l) +
@@ -324,9 +397,7 @@ class Verification {
   const std::stop_token& stop_;
   const std::function<void(const Problem&)>& report_;
   std::vector<LevelSums> sums_;
-  ClusterDecoder decoder_;
-  ClusterPoints points_;
-  std::vector<KeyRange> ranges_;
+  ThreadTeam team_;
   Box3 bounds_;
   double height_sum_ = 0.0;
   std::uint64_t looked_into_ = 0, most_looked_into_ = 0;
@@ -335,10 +406,15 @@ class Verification {
 
 }  // namespace
 
-bool verify_store(const Store& store, const ByteSource& manifest_file, const Manifest& manifest,
-                  const std::vector<std::unique_ptr<LevelReader>>& levels,
-                  const std::stop_token& stop, const std::function<void(const Problem&)>& report) {
-  return Verification(store, manifest_file, manifest, levels, stop, report).run();
+}  // namespace terrace::stream::store
+
+namespace terrace::stream {
+
+/// Memory: two bits per cluster and some buffers per thread.
+bool Store::verify(const std::function<void(const Problem&)>& report, unsigned threads) const {
+  return store::Verification(*this, *impl_->manifest_file, impl_->manifest, impl_->levels, stop_,
+                             threads, report)
+      .run();
 }
 
-}  // namespace terrace::stream::store
+}  // namespace terrace::stream

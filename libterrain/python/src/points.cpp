@@ -110,7 +110,6 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
                                      return system ? system->crs_with_wkt1() : info.crs;
                                    },
                                .lattice = lattice_of(info)};
-    if (info.bounds) header.bounds = world_box(info, *info.bounds);
     const auto writer = stream::open_point_writer(
         path, header,
         {.format = format, .replace = replace, .stop = context.stop, .threads = context.threads});

@@ -269,9 +269,9 @@ void bind_store(py::module_& module) {
         const stream::Store store = open.get();
         return Job(how).run([&](const terrain::Context& context) {
           std::vector<std::string> faults;
-          store.with_stop(context.stop).verify([&](const stream::Problem& problem) {
-            faults.push_back(text_of(problem));
-          });
+          store.with_stop(context.stop)
+              .verify([&](const stream::Problem& problem) { faults.push_back(text_of(problem)); },
+                      context.threads);
           return faults;
         });
       });

@@ -82,6 +82,8 @@ constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
 constexpr std::size_t kBlocksAhead = 4;
 /// Memory bound of a build, unless its context gives another.
 constexpr std::uint64_t kMemory = std::uint64_t{256} << 20;
+/// Parts of points that are put in order ahead, of which each takes about 20 MiB.
+constexpr unsigned kMostPartsAhead = 4;
 
 /// Bytes at the peak with so many threads, beside the source's: a generous estimate; a benchmark
 /// prints the true peak.
@@ -246,6 +248,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
          .unit_lengths =
              [&ground](const stream::Box3& box) { return unit_lengths(ground.map(box)); },
          .folder = folder,
+         .threads = std::max(1U, context.threads),
+         .parts_ahead = memory_bytes < kMemory ? 0 : std::min(context.threads / 2, kMostPartsAhead),
          .stop = reading.get_token(),
          .reading = set_aside});
     in_order = ordered.get();

@@ -70,8 +70,7 @@ class ConvertCommand : public Command {
                                                   {.attributes = info.attributes,
                                                    .comments = {kWriterMark},
                                                    .crs = crs_of(info),
-                                                   .lattice = lattice_of(info),
-                                                   .bounds = bounds_of(info)},
+                                                   .lattice = lattice_of(info)},
                                                   writing);
     writing_within_memory(*writer, output_, memory, held);
     {
@@ -113,10 +112,6 @@ class ConvertCommand : public Command {
         return info.crs;
       }
     };
-  }
-  static std::optional<stream::Box3> bounds_of(const stream::SourceInfo& info) {
-    if (!info.bounds) return std::nullopt;
-    return world_box(info, *info.bounds);
   }
 
   std::vector<std::string> inputs_;

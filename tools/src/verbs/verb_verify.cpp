@@ -53,27 +53,28 @@ class VerifyCommand final : public Command {
           "--store, --where, --max-error, --vertical and --geoid are for tile sets, and " + path_ +
           " is not one");
     }
-    return store();
+    return store(common);
   }
 
  private:
   [[nodiscard]] bool has_store_options() const {
     return !where_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty();
   }
-  [[nodiscard]] Summary store() const;
+  [[nodiscard]] Summary store(const CommonOptions& common) const;
   [[nodiscard]] Summary tiles(const CommonOptions& common) const;
 
   std::string path_, store_, where_, vertical_, geoid_;
   std::optional<double> max_error_;
 };
 
-Summary VerifyCommand::store() const {
+Summary VerifyCommand::store(const CommonOptions& common) const {
   const Stopwatch watch;
   const stream::Store store = open_store(path_);
   Summary summary;
   nlohmann::ordered_json problems = nlohmann::ordered_json::array();
   const bool ok = store.verify(
-      [&](const stream::Problem& problem) { add_problem(problem, problems, summary.text); });
+      [&](const stream::Problem& problem) { add_problem(problem, problems, summary.text); },
+      common.threads);
   std::uint64_t clusters = 0;
   for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
   summary.json = {

@@ -27,9 +27,10 @@ struct OctreeInfo {
 
 /// The properties of a source, known before its first point.
 struct SourceInfo : Schema {
-  std::string format;                   ///< "geotiff", "xyz", "ply", ...
-  std::vector<std::string> files;       ///< as the caller named them
-  std::optional<Box3> bounds;           ///< in stored coordinates, if known beforehand
+  std::string format;              ///< "geotiff", "xyz", "ply", ...
+  std::vector<std::string> files;  ///< as the caller named them
+  /// Where the points will lie, in stored coordinates, as the files say: they may be wrong.
+  std::optional<Box3> stated_bounds;
   std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
   std::optional<double> nodata;         ///< of the (first) raster, in raw units
   std::optional<OctreeInfo> octree;     ///< of a single input organised as an octree

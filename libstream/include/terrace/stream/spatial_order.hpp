@@ -25,7 +25,11 @@ struct SpatialOrderOptions {
   /// Empty: all are equal.
   std::function<std::array<double, 3>(const Box3&)> unit_lengths{};
   std::filesystem::path folder{};  ///< folder of the temporary file; empty: $TMPDIR or /tmp
-  std::stop_token stop{};          ///< ends next() with Stopped
+  unsigned threads = 1;            ///< that sort points; they do not change the order
+  /// Parts of 262,144 points that are prepared while the one before is delivered, if there are
+  /// several threads. They do not change the order either.
+  unsigned parts_ahead = 0;
+  std::stop_token stop{};  ///< ends next() with Stopped
   /// Called while points are set aside, with the number read so far.
   std::function<void(const Progress&)> reading{};
 };
@@ -38,7 +42,8 @@ class OrderedSource : public PointSource {
     /// How much wider blocks in the order of the source are than those of a k-d tree over the same
     /// points, averaged over the axes; for the points that decided, 0 if there were none.
     double spread = 0;
-    std::uint64_t temporary_bytes = 0;  ///< maximum disk space used at one time
+    /// Maximum disk space used at one time; with several threads it may vary by some chunks.
+    std::uint64_t temporary_bytes = 0;
   };
   [[nodiscard]] virtual Report report() const = 0;
 };
@@ -56,9 +61,10 @@ class OrderedSource : public PointSource {
 ///
 /// The order depends on nothing but the points, their order and the options. Memory, which
 /// reading_bytes() states with the source's: 262,144 points, of the window or of what comes next,
-/// with 40 bytes more each, and 8 MiB for the buckets. Cost: O(n log n); points are written and
-/// read once, twice beyond some 60 million. Throws in next(): Error (of the source, or of the
-/// temporary file: a full disk); Stopped.
+/// with 32 bytes more each, half as many on their way to the buckets or as many for each part
+/// ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and read once, twice
+/// beyond some 60 million. Throws in next(): Error (of the source, or of the temporary file: a full
+/// disk); Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,
                                                               SpatialOrderOptions options);
 

@@ -243,8 +243,9 @@ class Store {
   void for_each(unsigned level,
                 const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>&
                     visit) const;
-  /// Checks every byte and invariant and reports each fault; returns true if there is none.
-  bool verify(const std::function<void(const Problem&)>& report) const;
+  /// Checks every byte and invariant and reports each fault, from the calling thread and in the
+  /// same order whatever the threads; returns true if there is none.
+  bool verify(const std::function<void(const Problem&)>& report, unsigned threads = 1) const;
 
  private:
   struct Impl;

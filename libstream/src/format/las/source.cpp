@@ -42,11 +42,31 @@ class LasOpener {
     info.crs =
         options_.crs ? *options_.crs : las_crs(header_, stream_.input->name(), info.comments);
     if (first != nullptr) move_onto(*first, stream_);
+    state_bounds();
     open_records();
     return std::move(stream_);
   }
 
  private:
+  /// Points may have been moved onto the lattice of the first of several files.
+  void state_bounds() {
+    const std::optional<Lattice> lattice = lattice_of(stream_.info);
+    if (!lattice || !has_bounds()) return;
+    Box3& box = stream_.info.stated_bounds.emplace();
+    for (const Point3& corner : {header_.bounds.min, header_.bounds.max}) {
+      Point3 stored;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        stored[axis] = (corner[axis] - lattice->offset[axis]) / lattice->scale[axis];
+      }
+      box.include(stored);
+    }
+  }
+
+  /// Writers leave the header's box at 0 if they do not fill it in.
+  [[nodiscard]] bool has_bounds() const {
+    return !header_.bounds.empty() && header_.bounds.min != header_.bounds.max;
+  }
+
   /// Those that the selection needs, as far as the file can tell.
   void open_records() {
     const Selection& wanted = options_.selection;
@@ -90,11 +110,11 @@ class LasOpener {
     }
   }
 
-  /// Whether the header says that no point is in the region. Its box is not relied on where it is
-  /// empty, as writers leave it at 0; steps of the lattice make up for its rounding.
+  /// Whether the header says that no point is in the region. Steps of the lattice make up for the
+  /// rounding of its box.
   [[nodiscard]] bool lies_outside(const Box3& region) const {
     const Box3& box = header_.bounds;
-    if (box.empty() || box.min == box.max) return false;
+    if (!has_bounds()) return false;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (box.min[axis] - header_.scale[axis] > region.max[axis] ||
           box.max[axis] + header_.scale[axis] < region.min[axis]) {

@@ -2,53 +2,16 @@
 #include "terrace/stream/store.hpp"
 
 #include <cassert>
-#include <mutex>
 #include <utility>
 
-#include "store/read/level_reader.hpp"
+#include "store/read/store_impl.hpp"
 #include "store/read/view.hpp"
-#include "store/verify.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 
 using namespace store;
-
-struct Store::Impl {
-  std::filesystem::path path;
-  std::unique_ptr<ByteSource> manifest_file;
-  Manifest manifest;
-  std::uint64_t bytes = 0;
-  std::vector<LevelInfo> infos;
-  std::vector<std::unique_ptr<LevelReader>> levels;
-
-  std::mutex mutex;
-  std::vector<std::unique_ptr<ReadSpace>> spaces;
-
-  const LevelReader& level(unsigned number) const {
-    if (number >= levels.size()) {
-      throw Error({.file = path.string(),
-                   .where = {},
-                   .cause = "there is no level " + std::to_string(number) + ", the top is " +
-                            std::to_string(levels.size() - 1),
-                   .remedy = {}});
-    }
-    return *levels[number];
-  }
-  /// Memory for one thread's reading, kept for the next.
-  std::unique_ptr<ReadSpace> borrow() {
-    const std::lock_guard lock(mutex);
-    if (spaces.empty()) return std::make_unique<ReadSpace>();
-    auto space = std::move(spaces.back());
-    spaces.pop_back();
-    return space;
-  }
-  void give_back(std::unique_ptr<ReadSpace> space) {
-    const std::lock_guard lock(mutex);
-    spaces.push_back(std::move(space));
-  }
-};
 
 Store::Store(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
@@ -181,10 +144,6 @@ void Store::for_each(
     }
   });
   if (counted != members) throw miscounted();
-}
-
-bool Store::verify(const std::function<void(const Problem&)>& report) const {
-  return verify_store(*this, *impl_->manifest_file, impl_->manifest, impl_->levels, stop_, report);
 }
 
 }  // namespace terrace::stream

@@ -8,7 +8,6 @@
 
 #include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
-#include "store/write/side_by_side.hpp"
 
 namespace terrace::stream::store {
 namespace {
@@ -18,6 +17,9 @@ constexpr std::size_t kMostSharedBytes = 1024;
 /// At most so many of the blocks held back are used to choose how columns are coded. Rasters have
 /// them above level 0 alone, where little depends on it.
 constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
+/// All blocks of a level are written in the order that suits the first ones. They seldom tell more
+/// than this share of the bits: what is nearly as good is then to be the simpler one.
+constexpr std::uint64_t kOrderShare = 64;
 /// The first attributes of 64 bits are tried as guides.
 constexpr std::size_t kMostGuides = 2;
 /// At least one in so many differences of a guide begins a line, and as many do not.
@@ -37,11 +39,11 @@ std::string file_name(unsigned level, const char* what) {
 
 }  // namespace
 
-LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout, unsigned threads)
+LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout, ThreadTeam& team)
     : layout_(std::move(layout)),
       data_(folder / file_name(layout_.level, "clusters")),
       index_(folder / file_name(layout_.level, "index")),
-      threads_(std::max(1u, threads)),
+      team_(team),
       encoders_(1) {}
 
 std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
@@ -96,7 +98,7 @@ std::uint64_t LevelWriter::Trial::bits_of_column(const Layout& layout, unsigned 
 LevelWriter::Trial LevelWriter::count(const Predictor& predictor, const Columns& columns,
                                       std::size_t step) {
   std::vector<Trial> parts(encoders_.size());
-  side_by_side(threads_, (held_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
+  team_.run((held_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
     const ClusteredBlock view = held_[i * step].view();
     encoders_[worker].load(layout_, view);
     parts[worker].raw_bits += encoders_[worker].count(predictor, columns, parts[worker].counts);
@@ -182,8 +184,9 @@ void LevelWriter::choose_columns(Tables& tables) {
   for (const bool order : orders) {
     for (const Guide& guide : guides) {
       Trial plain = trial(tables.predictor, order, guide, ColumnKind::plain);
-      if (plain.bits() >= least_bits) continue;
-      least_bits = plain.bits();
+      const std::uint64_t bits = plain.bits() + (order ? plain.bits() / kOrderShare : 0);
+      if (bits >= least_bits) continue;
+      least_bits = bits;
       sequence_ = order;
       tables.guide = guide;
       trials[0] = std::move(plain);
@@ -206,7 +209,7 @@ void LevelWriter::choose_columns(Tables& tables) {
 }
 
 void LevelWriter::train() {
-  encoders_.resize(threads_);
+  encoders_.resize(team_.threads());
   // Where there are many blocks, a part of them tells as much: others wait for this.
   const bool many = held_.size() == kTrainingBlocks;
   Tables tables;
@@ -229,7 +232,7 @@ void LevelWriter::train() {
 
   std::vector<PreparedBlock> prepared(held_.size());
   const EncodingTables encoding(tables);
-  side_by_side(threads_, held_.size(), [&](std::size_t b, std::size_t worker) {
+  team_.run(held_.size(), [&](std::size_t b, std::size_t worker) {
     const ClusteredBlock view = held_[b].view();
     PreparedBlock& block = prepared[b];
     encoders_[worker].load(layout_, view);

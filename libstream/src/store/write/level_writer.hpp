@@ -13,6 +13,7 @@
 #include "store/write/block_encoder.hpp"
 #include "store/write/output_file.hpp"
 #include "store/write/raw_block.hpp"
+#include "thread_team.hpp"
 
 namespace terrace::stream::store {
 
@@ -43,12 +44,12 @@ struct PreparedBlock {
   std::vector<ClusterSummary> summaries;
 };
 
-/// The two files of a level. One thread at a time, which has `threads` at work while it trains: all
+/// The two files of a level. One thread at a time, which has the team at work while it trains: all
 /// blocks to come wait for that. The bytes depend on the blocks and their order alone, not on which
 /// of them came encoded.
 class LevelWriter {
  public:
-  LevelWriter(const std::filesystem::path& folder, Layout layout, unsigned threads);
+  LevelWriter(const std::filesystem::path& folder, Layout layout, ThreadTeam& team);
 
   /// What blocks are to be encoded with just now; null while there are no tables.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
@@ -95,7 +96,7 @@ class LevelWriter {
   /// block that was encoded with the tables of the segment before has no other order any more.
   std::optional<bool> sequence_;
   SharedTablesPtr tables_;
-  unsigned threads_;
+  ThreadTeam& team_;
   std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster

@@ -9,8 +9,8 @@
 
 #include "store/write/hilbert.hpp"
 #include "store/write/raw_block.hpp"
-#include "store/write/side_by_side.hpp"
 #include "terrace/stream/store.hpp"
+#include "thread_team.hpp"
 
 namespace terrace::stream {
 
@@ -95,6 +95,7 @@ void add(const Store& store, ClusterId id, const Ordinals& moved, RawBlock& bloc
 std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool replace,
                      unsigned threads) {
   StoreWriter writer(path, store.schema(), replace, threads);
+  ThreadTeam team(threads);
   const std::uint64_t block_points = store.schema().grid ? kRasterBlock : kCloudBlock;
   Ordinals moved;
   for (unsigned level = 0; level < store.top(); ++level) {
@@ -109,7 +110,7 @@ std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool
         begins.push_back(next);
       }
       std::vector<StoreWriter::EncodedPtr> blocks(begins.size() - 1);
-      side_by_side(threads, blocks.size(), [&](std::size_t b, std::size_t) {
+      team.run(blocks.size(), [&](std::size_t b, std::size_t) {
         RawBlock block;
         block.level = level;
         for (std::uint64_t i = begins[b]; i < begins[b + 1]; ++i) {

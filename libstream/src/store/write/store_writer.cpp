@@ -40,9 +40,8 @@ class StoreWriter::Encoded {
 void StoreWriter::EncodedDeleter::operator()(Encoded* block) const { delete block; }
 
 struct StoreWriter::Impl {
-  Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old,
-       unsigned for_training)
-      : schema(std::move(given)), replace(replace_old), threads(for_training), staging(path) {}
+  Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old, unsigned threads)
+      : schema(std::move(given)), replace(replace_old), team(threads), staging(path) {}
 
   /// An encoder nobody uses; memory for as many as there are threads.
   std::unique_ptr<BlockEncoder> borrow() {
@@ -65,7 +64,7 @@ struct StoreWriter::Impl {
 
   StoreSchema schema;
   bool replace;
-  unsigned threads;
+  ThreadTeam team;  ///< for training
   Staging staging;
   std::vector<std::unique_ptr<LevelWriter>> levels;
   std::uint64_t points = 0;
@@ -115,7 +114,7 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   const unsigned level = encoded->level;
   while (levels.size() <= level) {
     levels.push_back(std::make_unique<LevelWriter>(
-        staging.folder(), Layout(schema, static_cast<unsigned>(levels.size()), kVersion), threads));
+        staging.folder(), Layout(schema, static_cast<unsigned>(levels.size()), kVersion), team));
   }
   if (level == 0) {
     points += encoded->points;

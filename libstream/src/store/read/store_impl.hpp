@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "store/manifest.hpp"
+#include "store/read/level_reader.hpp"
+#include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+
+/// What the copies of an open store share.
+struct Store::Impl {
+  std::filesystem::path path;
+  std::unique_ptr<ByteSource> manifest_file;
+  store::Manifest manifest;
+  std::uint64_t bytes = 0;
+  std::vector<LevelInfo> infos;
+  std::vector<std::unique_ptr<store::LevelReader>> levels;
+
+  std::mutex mutex;
+  std::vector<std::unique_ptr<store::ReadSpace>> spaces;
+
+  const store::LevelReader& level(unsigned number) const {
+    if (number >= levels.size()) {
+      throw Error({.file = path.string(),
+                   .where = {},
+                   .cause = "there is no level " + std::to_string(number) + ", the top is " +
+                            std::to_string(levels.size() - 1),
+                   .remedy = {}});
+    }
+    return *levels[number];
+  }
+  /// Memory for one thread's reading, kept for the next.
+  std::unique_ptr<store::ReadSpace> borrow() {
+    const std::lock_guard lock(mutex);
+    if (spaces.empty()) return std::make_unique<store::ReadSpace>();
+    auto space = std::move(spaces.back());
+    spaces.pop_back();
+    return space;
+  }
+  void give_back(std::unique_ptr<store::ReadSpace> space) {
+    const std::lock_guard lock(mutex);
+    spaces.push_back(std::move(space));
+  }
+};
+
+}  // namespace terrace::stream
