@@ -53,18 +53,19 @@ class OrderedSource : public PointSource {
 /// The stream is judged by windows of 262,144 points, the first and, by every fourth of its points,
 /// every fourth after it: blocks that are not compact are more than twice as wide as those of a k-d
 /// tree over the window. If they are in the first window, all points are put in order; later, those
-/// that follow. They go into 256 buckets, the leaves of a k-d tree over the window, in a temporary
+/// that follow. They go into 256 buckets, the leaves of a k-d tree over the window (and over the
+/// box that the source states, of which the first window is often but a corner), in a temporary
 /// file; once all are there the buckets come back one after another, each cut by a k-d tree into
 /// blocks. A bucket of more than 262,144 points is first divided in turn, which takes no more disk
 /// as what has been read is written over. The file holds chunks of 32 KiB of packed records, less
 /// the bytes that are the same in a whole chunk. Cells of a raster stay as they are.
 ///
-/// The order depends on nothing but the points, their order and the options. Memory, which
-/// reading_bytes() states with the source's: 262,144 points, of the window or of what comes next,
-/// with 32 bytes more each, half as many on their way to the buckets or as many for each part
-/// ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and read once, twice
-/// beyond some 60 million. Throws in next(): Error (of the source, or of the temporary file: a full
-/// disk); Stopped.
+/// The order depends on nothing but the points, their order, the stated box and the options.
+/// Memory, which reading_bytes() states with the source's: 262,144 points, of the window or of what
+/// comes next, with 32 bytes more each, half as many on their way to the buckets or as many for
+/// each part ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and read once,
+/// twice beyond some 60 million. Throws in next(): Error (of the source, or of the temporary file:
+/// a full disk); Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,
                                                               SpatialOrderOptions options);
 

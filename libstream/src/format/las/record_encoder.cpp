@@ -30,6 +30,16 @@ void append_text_field(std::string& out, std::string_view text, std::size_t byte
   out.append(bytes - std::min(bytes, text.size()), '\0');
 }
 
+/// Whether the bits of the field hold a value of its type.
+template <class Value>
+bool fits(Value value, const LasField& field) {
+  if constexpr (std::is_floating_point_v<Value>) {
+    return true;
+  } else {
+    return field.bits == 0 || (value >= 0 && static_cast<std::uint64_t>(value) >> field.bits == 0);
+  }
+}
+
 }  // namespace
 
 LasRecords::LasRecords(const std::string& path, const PointHeader& header, LasFormats formats)
@@ -113,8 +123,13 @@ void LasRecords::put_attribute(const std::byte* from, std::size_t count, const C
   }
   with_type(field.channel.type, [&](auto value) {
     using Value = decltype(value);
+    // A rank stands for all angles that round to it.
+    const double exact = channel.name == "scan_angle_rank" ? 0.5 : 1e-6;
     for (std::size_t i = 0; i < count; ++i) {
-      value = converted<Value>(from + i * payload_bytes_, channel, field, points_ + i);
+      if (same) std::memcpy(&value, from + i * payload_bytes_, sizeof value);
+      if (!same || !fits(value, field)) {
+        value = converted<Value>(from + i * payload_bytes_, channel, field, exact, points_ + i);
+      }
       char* const at = to + i * layout_.record_bytes;
       if (field.bits == 0) {
         std::memcpy(at, &value, sizeof value);
@@ -126,18 +141,16 @@ void LasRecords::put_attribute(const std::byte* from, std::size_t count, const C
   });
 }
 
-/// A value of another type as the field has it.
+/// A value of another type as the field has it. exact: how far it may lie from what is stored.
 template <class Value>
 Value LasRecords::converted(const std::byte* from, const Channel& channel, const LasField& field,
-                            std::uint64_t point) const {
+                            double exact, std::uint64_t point) const {
   const double real = to_double(channel.type, from) * channel.scale + channel.offset;
   if constexpr (std::is_floating_point_v<Value>) {
     return static_cast<Value>(real);
   } else {
     const double step = (real - field.channel.offset) / field.channel.scale;
     const double whole = std::nearbyint(step);
-    // A rank stands for all angles that round to it.
-    const double exact = channel.name == "scan_angle_rank" ? 0.5 : 1e-6;
     const double most = field.bits == 0 ? static_cast<double>(std::numeric_limits<Value>::max())
                                         : static_cast<double>((1U << field.bits) - 1);
     if (!(whole >= static_cast<double>(std::numeric_limits<Value>::min()) && whole <= most &&

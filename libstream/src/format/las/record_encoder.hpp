@@ -46,7 +46,7 @@ class LasRecords {
                      const LasField& field);
   template <class Value>
   Value converted(const std::byte* from, const Channel& channel, const LasField& field,
-                  std::uint64_t point) const;
+                  double exact, std::uint64_t point) const;
   void set_single_returns();
   void count_returns();
 
