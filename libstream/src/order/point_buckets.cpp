@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cstring>
+#include <numeric>
 
 #include "terrace/stream/error.hpp"
 #include "with_type.hpp"
@@ -99,6 +100,21 @@ void PackedPoints::unpack(std::span<const std::byte> records,
   }
 }
 
+void PackedPoints::sort(std::span<const std::byte> records, std::span<const std::uint16_t> keys,
+                        std::size_t keys_end, std::vector<std::byte>& sorted,
+                        std::vector<std::size_t>& begins) const {
+  begins.assign(keys_end + 1, 0);
+  for (const std::uint16_t key : keys) ++begins[key + 1U];
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  std::vector<std::size_t> next(begins.begin(), begins.end() - 1);
+  sorted.resize(records.size());
+  const std::byte* from = records.data();
+  for (const std::uint16_t key : keys) {
+    copy_short(from, sorted.data() + next[key]++ * record_bytes_, record_bytes_);
+    from += record_bytes_;
+  }
+}
+
 void Bucket::append(Bucket&& next) {
   chunks.insert(chunks.end(), next.chunks.begin(), next.chunks.end());
   tail.insert(tail.end(), next.tail.begin(), next.tail.end());
@@ -112,21 +128,15 @@ BucketFile::BucketFile(const std::string& name, const std::filesystem::path& fol
       file_(name, folder),
       packer_(record_bytes) {}
 
-void BucketFile::append(Bucket& bucket, std::span<const std::byte> records,
-                        std::span<const std::uint32_t> numbers, RecordPacker& packer) {
+void BucketFile::append(Bucket& bucket, std::span<const std::byte> records, RecordPacker& packer) {
   if (bucket.tail.capacity() < chunk_bytes_) bucket.tail.reserve(chunk_bytes_);
-  while (!numbers.empty()) {
-    const std::size_t before = bucket.tail.size();
-    assert(before < chunk_bytes_);
-    const std::size_t count = std::min((chunk_bytes_ - before) / record_bytes_, numbers.size());
-    bucket.tail.resize(before + count * record_bytes_);
-    std::byte* to = bucket.tail.data() + before;
-    for (const std::uint32_t number : numbers.first(count)) {
-      copy_short(records.data() + number * record_bytes_, to, record_bytes_);
-      to += record_bytes_;
-    }
+  while (!records.empty()) {
+    assert(bucket.tail.size() < chunk_bytes_);
+    const std::size_t bytes = std::min(chunk_bytes_ - bucket.tail.size(), records.size());
+    const auto part = records.first(bytes);
+    bucket.tail.insert(bucket.tail.end(), part.begin(), part.end());
+    records = records.subspan(bytes);
     if (bucket.tail.size() >= chunk_bytes_) write(bucket, packer);
-    numbers = numbers.subspan(count);
   }
 }
 

@@ -33,6 +33,12 @@ class PackedPoints {
   void pack(const PointBlock& block, std::vector<std::byte>& records) const;
   /// Replaces what is in `points` by the places in the records, numbered from 0.
   void unpack(std::span<const std::byte> records, std::vector<NumberedPoint>& points) const;
+  /// Replaces what is in `sorted` by the records in the order of their keys, those of a key in the
+  /// order in which they come, and what is in `begins` by where those of each key below `keys_end`
+  /// begin, and the end.
+  void sort(std::span<const std::byte> records, std::span<const std::uint16_t> keys,
+            std::size_t keys_end, std::vector<std::byte>& sorted,
+            std::vector<std::size_t>& begins) const;
   /// Replaces what is in `block` by some of the records, which `numbers` counts from 0.
   void unpack(std::span<const std::byte> records, std::span<const std::uint32_t> numbers,
               PointBlock& block) const;
@@ -68,15 +74,12 @@ class BucketFile {
   BucketFile(const std::string& name, const std::filesystem::path& folder,
              std::size_t record_bytes);
 
-  /// Appends some of the records, which `numbers` counts from 0. Threads may do so at the same
-  /// time, each with a packer and with buckets of its own. Throws: Error, if the disk is full above
-  /// all.
-  void append(Bucket& bucket, std::span<const std::byte> records,
-              std::span<const std::uint32_t> numbers, RecordPacker& packer);
-  /// Appends one record, when no other thread appends any.
-  void append(Bucket& bucket, std::span<const std::byte> record) {
-    constexpr std::array<std::uint32_t, 1> kFirst{0};
-    append(bucket, record, kFirst, packer_);
+  /// Appends records. Threads may do so at the same time, each with a packer and with buckets of
+  /// its own. Throws: Error, if the disk is full above all.
+  void append(Bucket& bucket, std::span<const std::byte> records, RecordPacker& packer);
+  /// The same, when no other thread appends any.
+  void append(Bucket& bucket, std::span<const std::byte> records) {
+    append(bucket, records, packer_);
   }
   [[nodiscard]] std::uint64_t records(const Bucket& bucket) const;
   /// Moves the first records of the bucket, whole chunks and at most about so many, to `out`, whose

@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <deque>
 #include <future>
-#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -64,7 +63,7 @@ constexpr std::size_t kBucketsATime = 4;
 std::uint64_t bytes_to_order(const SourceInfo& info, unsigned parts_ahead) {
   static_assert(kWindowPoints <= kMostAtOnce);
   const std::uint64_t point = sizeof(Point3) + info.payload_size() + sizeof(NumberedPoint);
-  return std::max(kMostAtOnce + 2 * kSharedPoints, (1 + parts_ahead) * kMostAtOnce) * point +
+  return std::max(kMostAtOnce + kSharedPoints, (1 + parts_ahead) * kMostAtOnce) * point +
          (std::uint64_t{kBucketBytes} << kDepth);
 }
 
@@ -219,34 +218,27 @@ class SpatialSource final : public OrderedSource {
       window_.pop_front();
       return true;
     };
-    // Some are read while those before go to the buckets.
-    std::vector<Share> read, on_their_way;
-    std::size_t read_count = 0, count = 0;
-    const auto read_some = [&] {
-      read_count = 0;
-      for (std::size_t points = 0; points < kSharedPoints; ++read_count) {
-        if (read_count == read.size()) read.emplace_back();
-        if (!next_block(read[read_count].block)) break;
-        points += read[read_count].block.size();
-      }
-    };
+    std::vector<Share> shares;
     total_ = delivered_;
-    for (read_some(); read_count > 0;) {
+    for (bool more = true; more;) {
       if (options_.stop.stop_requested()) throw Stopped();
-      if (options_.reading) options_.reading(source_->progress());
-      std::swap(read, on_their_way);
-      count = std::exchange(read_count, 0);
-      team_.run(count + 1, [&](std::size_t i, std::size_t) {
-        if (i == 0) return read_some();
-        Share& share = on_their_way[i - 1];
+      std::size_t count = 0, points = 0;
+      while (more && points < kSharedPoints) {
+        if (count == shares.size()) shares.emplace_back();
+        more = next_block(shares[count].block);
+        points += shares[count].block.size();
+        if (more) ++count;
+      }
+      total_ += points;
+      // Done before more is read: a full disk is told even if the input's producer idles.
+      team_.run(count, [&](std::size_t i, std::size_t) {
+        Share& share = shares[i];
         packed_->pack(share.block, share.records);
         const auto& places = share.block.positions;
         sort_by_leaf(share, places.size(), [&](std::size_t p) { return places[p]; });
       });
-      for (const Share& share : std::span(on_their_way).first(count)) {
-        total_ += share.block.size();
-      }
-      distribute(std::span(on_their_way).first(count), buckets);
+      distribute(std::span(shares).first(count), buckets);
+      if (options_.reading) options_.reading(source_->progress());
     }
     push(std::move(buckets), total_);
     report_.temporary_bytes = file_->bytes();
@@ -263,12 +255,16 @@ class SpatialSource final : public OrderedSource {
     if (!bounds || points <= places_.size()) return;
     Box3 window;
     for (const NumberedPoint& point : places_) window.include(point.place);
-    double seen = 1;
+    std::array<double, 3> lengths{}, parts{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double length = bounds->max[axis] - bounds->min[axis];
       if (!(length >= 0) || !std::isfinite(length)) return;
-      if (length > 0) seen *= std::min(1.0, (window.max[axis] - window.min[axis]) / length);
+      lengths[axis] = length * lengths_[axis];
+      parts[axis] = length > 0 ? (window.max[axis] - window.min[axis]) / length : 1;
     }
+    // The shortest does not count: on land that of the heights, which one point may stretch.
+    parts[static_cast<std::size_t>(std::ranges::min_element(lengths) - lengths.begin())] = 1;
+    const double seen = std::min(parts[0], 1.0) * std::min(parts[1], 1.0) * std::min(parts[2], 1.0);
     if (seen > kWindowShowsAll) return;
     const std::size_t count = places_.size();
     const double share = std::max(static_cast<double>(count) / static_cast<double>(points), 0.125);
@@ -292,26 +288,18 @@ class SpatialSource final : public OrderedSource {
     PointBlock block;
     std::vector<NumberedPoint> places;
     std::vector<std::byte> records;
-    std::vector<std::uint16_t> leaves;   ///< by record
-    std::vector<std::uint32_t> by_leaf;  ///< records, in their order within a leaf
-    std::vector<std::size_t> begins;     ///< of each leaf in `by_leaf`, and the end
+    std::vector<std::uint16_t> leaves;  ///< by record
+    std::vector<std::byte> by_leaf;     ///< the records
+    std::vector<std::size_t> begins;    ///< of each leaf's, and the end
   };
 
   template <class PlaceOf>
   void sort_by_leaf(Share& share, std::size_t count, const PlaceOf& place_of) const {
     share.leaves.resize(count);
-    share.begins.assign(planes_.size() + 2, 0);
     for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t leaf = kd_leaf(planes_, place_of(i));
-      share.leaves[i] = static_cast<std::uint16_t>(leaf);
-      ++share.begins[leaf + 1];
+      share.leaves[i] = static_cast<std::uint16_t>(kd_leaf(planes_, place_of(i)));
     }
-    std::partial_sum(share.begins.begin(), share.begins.end(), share.begins.begin());
-    std::vector<std::size_t> next(share.begins.begin(), share.begins.end() - 1);
-    share.by_leaf.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      share.by_leaf[next[share.leaves[i]]++] = static_cast<std::uint32_t>(i);
-    }
+    packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
   }
 
   /// Adds the shares' records to the buckets, in order.
@@ -320,10 +308,11 @@ class SpatialSource final : public OrderedSource {
     team_.run(buckets.size() / kBucketsATime, [&](std::size_t i, std::size_t worker) {
       for (std::size_t b = i * kBucketsATime; b < (i + 1) * kBucketsATime; ++b) {
         for (const Share& share : shares) {
-          file_->append(buckets[b], share.records,
-                        std::span(share.by_leaf)
-                            .subspan(share.begins[b], share.begins[b + 1] - share.begins[b]),
-                        packers_[worker]);
+          const std::size_t bytes = packed_->record_bytes(), first = share.begins[b] * bytes;
+          file_->append(
+              buckets[b],
+              std::span(share.by_leaf).subspan(first, share.begins[b + 1] * bytes - first),
+              packers_[worker]);
         }
       }
     });

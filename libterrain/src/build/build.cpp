@@ -249,7 +249,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
              [&ground](const stream::Box3& box) { return unit_lengths(ground.map(box)); },
          .folder = folder,
          .threads = std::max(1U, context.threads),
-         .parts_ahead = memory_bytes < kMemory ? 0 : std::min(context.threads / 2, kMostPartsAhead),
+         .parts_ahead = memory_bytes < kMemory ? 0 : std::min(context.threads / 4, kMostPartsAhead),
          .stop = reading.get_token(),
          .reading = set_aside});
     in_order = ordered.get();

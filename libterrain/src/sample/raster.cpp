@@ -105,6 +105,7 @@ class RasterRun {
     options.overviews = request_.value == RasterValue::aspect ? stream::GeoTiffOverviews::nearest
                                                               : stream::GeoTiffOverviews::average;
     options.level = 6;  // overviews included as fast as the raster alone at 7, and hardly larger
+    options.threads = context_.threads;
     options.replace = request_.replace;
     options.stop = context_.stop;
     stream::GeoTiffWriter writer(request_.output, options);

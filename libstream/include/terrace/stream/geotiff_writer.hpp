@@ -35,13 +35,15 @@ struct GeoTiffOptions {
   bool predictor = true;     ///< code differences of neighbours: smaller for terrain
   std::uint32_t tile = 256;  ///< columns and rows of a tile, a multiple of 16
   GeoTiffOverviews overviews = GeoTiffOverviews::none;
+  unsigned threads = 1;    ///< that compress tiles; they do not change the file
   bool replace = false;    ///< an existing file
   std::stop_token stop{};  ///< ends commit() of a file with overviews, with Stopped
 };
 
 /// Writes a tiled GeoTIFF of one band, in rows from the top or in tiles in any order; BigTIFF where
 /// 4 GiB might not do. The file appears whole and synced with `commit()`, or not at all (see
-/// AtomicFile). Holds one row of tiles when it is given rows, and where each tile is.
+/// AtomicFile). Holds one row of tiles when it is given rows, where each tile is, and for each of
+/// several threads two tiles that are to be compressed.
 ///
 /// With overviews it is a Cloud Optimized GeoTIFF (OGC 21-026): overviews of half the columns and
 /// rows each, down to 512 x 512 cells, all directories before the tiles and the smallest overview

@@ -32,7 +32,7 @@ class Overviews {
  public:
   /// Takes a tile of a level of 1 or above.
   using Write = std::function<void(std::size_t level, std::uint32_t across, std::uint32_t down,
-                                   std::span<std::byte> samples)>;
+                                   std::span<const std::byte> samples)>;
 
   Overviews(const GeoTiffOptions& options, std::vector<GeoTiffLevel> levels, Write write);
 

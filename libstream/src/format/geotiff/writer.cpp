@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cstring>
+#include <deque>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +21,7 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
+#include "thread_team.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -33,7 +35,8 @@ constexpr std::string_view kLayout =
     "BLOCK_LEADER=SIZE_AS_UINT4\n"
     "BLOCK_TRAILER=LAST_4_BYTES_REPEATED\n"
     "KNOWN_INCOMPATIBLE_EDITION=NO\n ";
-constexpr std::size_t kAround = 4;  ///< bytes of a leader, and of a trailer
+constexpr std::size_t kAround = 4;          ///< bytes of a leader, and of a trailer
+constexpr std::size_t kTilesPerThread = 2;  ///< that wait to be compressed
 
 /// Where the tiles of a level are; 0 for those that are left out.
 struct TileIndex {
@@ -65,7 +68,15 @@ struct GeoTiffWriter::Impl {
   bool big;
   AtomicFile file;
   std::optional<Spool> spool;  ///< tiles of a file with overviews, in the order in which they come
-  TileEncoder encoder;
+  /// A tile on its way to the file.
+  struct Waiting {
+    std::size_t level, number;
+    std::vector<std::byte> samples, coded;
+  };
+  ThreadTeam team;
+  std::deque<TileEncoder> encoders;  ///< by thread
+  std::vector<Waiting> waiting;
+  std::size_t waiting_count = 0;
   Overviews overviews;
   std::vector<std::byte> band;  ///< a row of tiles, by rows
   std::vector<std::byte> tile;  ///< one of them
@@ -78,11 +89,14 @@ struct GeoTiffWriter::Impl {
         tiles(levels.begin(), levels.end()),
         big(needs_big(options, levels)),
         file(path, options.replace),
-        encoder(options),
-        overviews(options, levels,
-                  [this](std::size_t level, std::uint32_t across, std::uint32_t down,
-                         std::span<std::byte> samples) { put(level, across, down, samples); }),
+        team(options.threads),
+        waiting(team.threads() == 1 ? 1 : kTilesPerThread * team.threads()),
+        overviews(
+            options, levels,
+            [this](std::size_t level, std::uint32_t across, std::uint32_t down,
+                   std::span<const std::byte> samples) { put(level, across, down, samples); }),
         tile(std::size_t{options.tile} * options.tile * sample_bytes()) {
+    for (unsigned i = 0; i < team.threads(); ++i) encoders.emplace_back(options);
     if (options.overviews == GeoTiffOverviews::none) {
       file.write(tiff_head(big, 0));
     } else {
@@ -92,19 +106,31 @@ struct GeoTiffWriter::Impl {
 
   [[nodiscard]] std::size_t sample_bytes() const { return size_of(options.sample.type); }
 
-  /// The samples are used up.
   void put(std::size_t level, std::uint32_t across, std::uint32_t down,
-           std::span<std::byte> samples) {
-    const std::span<const std::byte> coded = encoder.encode(samples);
-    const std::size_t number = std::size_t{down} * levels[level].across + across;
-    tiles[level].bytes[number] = static_cast<std::uint32_t>(coded.size());
-    if (spool) {
-      tiles[level].offsets[number] = spool->size();
-      spool->append(coded);
-    } else {
-      tiles[level].offsets[number] = file.size();
-      file.write(coded);
+           std::span<const std::byte> samples) {
+    Waiting& tile_there = waiting[waiting_count++];
+    tile_there.level = level;
+    tile_there.number = std::size_t{down} * levels[level].across + across;
+    tile_there.samples.assign(samples.begin(), samples.end());
+    if (waiting_count == waiting.size()) write_waiting();
+  }
+  /// In the order in which they came.
+  void write_waiting() {
+    team.run(waiting_count, [this](std::size_t i, std::size_t worker) {
+      const std::span<const std::byte> coded = encoders[worker].encode(waiting[i].samples);
+      waiting[i].coded.assign(coded.begin(), coded.end());
+    });
+    for (const Waiting& done : std::span(waiting).first(waiting_count)) {
+      TileIndex& index = tiles[done.level];
+      index.bytes[done.number] = static_cast<std::uint32_t>(done.coded.size());
+      index.offsets[done.number] = spool ? spool->size() : file.size();
+      if (spool) {
+        spool->append(done.coded);
+      } else {
+        file.write(done.coded);
+      }
     }
+    waiting_count = 0;
   }
 
   /// What `tile` holds.
@@ -155,6 +181,7 @@ TiffDirectory GeoTiffWriter::Impl::directory(std::size_t level) const {
 
 /// The directory goes behind the tiles.
 void GeoTiffWriter::Impl::finish_plain() {
+  write_waiting();
   if (file.size() % 2 != 0) file.write(std::string_view("\0", 1));
   const std::uint64_t at = file.size();
   file.write(directory(0).bytes(big, at, 0));
@@ -165,6 +192,7 @@ void GeoTiffWriter::Impl::finish_plain() {
 /// The directories, then the tiles, those of the smallest overview first.
 void GeoTiffWriter::Impl::finish_with_overviews() {
   overviews.finish();
+  write_waiting();
   std::vector<std::uint64_t> directory_at{even(tiff_head(big, 0).size() + kLayout.size())};
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const std::uint64_t at = directory_at.back();
