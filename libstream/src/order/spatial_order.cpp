@@ -365,7 +365,7 @@ class SpatialSource final : public OrderedSource {
     std::vector<std::byte> records;
     std::vector<std::size_t> pieces;      ///< where each begins, and the end
     std::vector<std::uint32_t> in_order;  ///< records of the pieces
-    // Of use while it is prepared:
+    // Needed only while it is being prepared:
     std::vector<NumberedPoint> places;
     std::vector<std::uint32_t> piece_of;  ///< by record
   };
