@@ -296,6 +296,8 @@ TEST(SpatialOrderTest, AStatedBoxSparesDividingTheOutermostBuckets) {
   };
   const Read blind = ordered(std::nullopt), told = ordered(box);
   EXPECT_LT(told.width(), 1.05 * blind.width());
+  EXPECT_GT(blind.report.written_twice, kCount / 2);
+  EXPECT_LT(told.report.written_twice, kCount / 10);
   // One that is wrong, or not a box, does no harm.
   Box3 far;
   far.include(Point3{1e9, 1e9, 1e9});

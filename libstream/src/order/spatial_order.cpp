@@ -417,6 +417,7 @@ class SpatialSource final : public OrderedSource {
     Bucket bucket = std::move(pending_.back().bucket);
     pending_.pop_back();
     const std::uint64_t count = file_->records(bucket);
+    report_.written_twice += count;
     std::vector<std::byte> records;
     std::vector<NumberedPoint> places;
     file_->sample(bucket, kWindowPoints, records);

@@ -26,8 +26,8 @@ struct SpatialOrderOptions {
   std::function<std::array<double, 3>(const Box3&)> unit_lengths{};
   std::filesystem::path folder{};  ///< folder of the temporary file; empty: $TMPDIR or /tmp
   unsigned threads = 1;            ///< that sort points; they do not change the order
-  /// Parts of 262,144 points that are prepared while the one before is delivered, if there are
-  /// several threads. They do not change the order either.
+  /// Parts of 262,144 points that are prepared while the one before is delivered, each by a thread
+  /// of its own. They do not change the order either.
   unsigned parts_ahead = 0;
   std::stop_token stop{};  ///< ends next() with Stopped
   /// Called while points are set aside, with the number read so far.
@@ -42,6 +42,7 @@ class OrderedSource : public PointSource {
     /// How much wider blocks in the order of the source are than those of a k-d tree over the same
     /// points, averaged over the axes; for the points that decided, 0 if there were none.
     double spread = 0;
+    std::uint64_t written_twice = 0;  ///< points of buckets that had to be divided
     /// Maximum disk space used at one time; with several threads it may vary by some chunks.
     std::uint64_t temporary_bytes = 0;
   };
@@ -62,10 +63,10 @@ class OrderedSource : public PointSource {
 ///
 /// The order depends on nothing but the points, their order, the stated box and the options.
 /// Memory, which reading_bytes() states with the source's: 262,144 points, of the window or of what
-/// comes next, with 32 bytes more each, half as many on their way to the buckets or as many for
-/// each part ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and read once,
-/// twice beyond some 60 million. Throws in next(): Error (of the source, or of the temporary file:
-/// a full disk); Stopped.
+/// comes next, with 32 bytes more each, a quarter as many on their way to the buckets or as many
+/// for each part ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and read
+/// once, twice beyond some 60 million. Throws in next(): Error (of the source, or of the temporary
+/// file: a full disk); Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,
                                                               SpatialOrderOptions options);
 

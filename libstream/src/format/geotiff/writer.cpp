@@ -79,7 +79,7 @@ struct GeoTiffWriter::Impl {
   std::size_t waiting_count = 0;
   Overviews overviews;
   std::vector<std::byte> band;  ///< a row of tiles, by rows
-  std::vector<std::byte> tile;  ///< one of them
+  std::vector<std::byte> tile;  ///< one of the row's
   std::uint32_t next_row = 0;   ///< of write_rows
   bool by_rows = false;
 
@@ -133,10 +133,9 @@ struct GeoTiffWriter::Impl {
     waiting_count = 0;
   }
 
-  /// What `tile` holds.
-  void put_tile(std::uint32_t across, std::uint32_t down) {
-    overviews.add(across, down, tile);
-    put(0, across, down, tile);
+  void put_tile(std::uint32_t across, std::uint32_t down, std::span<const std::byte> samples) {
+    overviews.add(across, down, samples);
+    put(0, across, down, samples);
   }
 
   void flush_band(std::uint32_t rows_there);
@@ -161,7 +160,7 @@ void GeoTiffWriter::Impl::flush_band(std::uint32_t rows_there) {
         std::memcpy(out + i * size, out + (width - 1) * size, size);
       }
     }
-    put_tile(across, down);
+    put_tile(across, down, tile);
   }
 }
 
@@ -271,8 +270,7 @@ void GeoTiffWriter::write_tile(std::uint32_t across, std::uint32_t down,
     return;
   }
   assert(samples.size() == impl.tile.size());
-  std::memcpy(impl.tile.data(), samples.data(), samples.size());
-  impl.put_tile(across, down);
+  impl.put_tile(across, down, samples);
 }
 
 void GeoTiffWriter::commit() {
