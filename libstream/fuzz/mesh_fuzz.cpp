@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <string_view>
 #include <vector>
 
 #include "fuzz_points.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 
-/// Mesh files, PLY, OBJ, OFF and STL: refused, or triangles of existing vertices, with a complete
-/// record for each vertex, and no more of them than the file can hold. As a stream there are as
-/// many.
+/// Mesh files, PLY, GLB, OBJ, OFF and STL: refused, or triangles of existing vertices, with a
+/// complete record for each vertex, and no more of them than the file can hold. As a stream there
+/// are as many.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
-  for (const char* format : {"ply", "obj", "off", "stl"}) {
+  for (const char* format : {"ply", "glb", "obj", "off", "stl"}) {
     try {
       const auto source = open_source(std::vector{file.name()},
                                       {.format = format, .entities = Entities::triangles});
@@ -32,7 +33,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       for (const TriangleIndices& triangle : mesh->triangles) {
         for (const std::uint32_t v : triangle) require(v < vertices, "corners are vertices");
       }
-      require(vertices <= size && mesh->triangles.size() <= size, "no more than the file can hold");
+      // The nodes of a GLB may show one mesh in many places.
+      const std::size_t most = std::string_view(format) == "glb" ? size * size : size;
+      require(vertices <= most && mesh->triangles.size() <= most, "no more than the file can hold");
     } catch (const Error& error) {
       require(!error.parts().cause.empty(), "a cause");
     }

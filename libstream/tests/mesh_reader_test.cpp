@@ -98,6 +98,30 @@ TEST_F(MeshReader, ReadsWhatTheLibraryWrites) {
   }
 }
 
+/// GLB holds floats beside the middle of the mesh.
+TEST_F(MeshReader, ReadsTheGlbThatTheLibraryWrites) {
+  const Box3 bounds{{5e5, 5e6, 100}, {5e5 + 64, 5e6 + 64, 300}};
+  const std::vector<Point3> positions{
+      bounds.min, {5e5 + 0.1, 5e6 + 60.3, 123.456}, {5e5 + 64, 5e6, 7}, bounds.max};
+  const std::vector<TriangleIndices> triangles{{0, 2, 1}, {1, 2, 3}};
+  path_ = scratch_.path() / "round.glb";
+  const auto writer = open_mesh_writer(
+      path_,
+      {.vertices = 4, .triangles = 2, .attributes = {"level"}, .comments = {}, .bounds = bounds},
+      {.format = "glb"});
+  writer->add_vertices(positions, std::vector<float>{1, 2, 3, 4});
+  writer->add_triangles(triangles);
+  writer->finish();
+  const auto file = read_mesh(path_);
+  ASSERT_TRUE(file);
+  EXPECT_EQ(file->triangles, triangles);
+  ASSERT_EQ(file->vertices.size(), positions.size());
+  const MeshRounding rounding(path_, bounds);
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    EXPECT_EQ(file->vertices.positions[v], rounding(positions[v]));
+  }
+}
+
 // A damaged file is read as it stands, or refused: never beyond its end.
 TEST_F(MeshReader, SurvivesDamage) {
   const std::string good = kSquare;

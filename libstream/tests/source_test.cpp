@@ -135,7 +135,6 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
       {"\0\0\x27\x0a\0\0\0\0"s, "shapefile", "ogr2ogr"},
       {geopackage, "GeoPackage", "gdal_translate"},
       {"\n<!DOCTYPE HTML>", "HTML", "download"},
-      {"glTF\2\0\0\0"s, "glTF", "PLY"},
       {"\xfd"
        "7zXZ\0"s,
        "by xz", "xz -dk"},
@@ -157,7 +156,7 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
        std::vector<std::pair<std::string, std::string>>{{"b.stl", "too short for STL"},
                                                         {"c.laz", "LASF"},
                                                         {"d.img", "ERDAS"},
-                                                        {"e.gltf", "glTF"},
+                                                        {"e.gltf", "GLB"},
                                                         {"f.geojson", "GeoJSON"}}) {
     const std::string text = refusal({put(file, binary)});
     EXPECT_NE(text.find(name), std::string::npos) << text;

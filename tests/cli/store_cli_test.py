@@ -250,6 +250,9 @@ class StoreTest(unittest.TestCase):
             self.assertEqual(set(summary), {'vertices', 'triangles', 'seconds', 'peak_rss_bytes'})
             self.assertGreater(summary['triangles'], summary['vertices'])
             self.assertGreater(os.path.getsize(out), 100)
+            self.assertEqual(json.loads(self.run_ok('info', out, '--json'))['points'], summary['vertices'])
+            drawn = self.run_ok('render', out, '-o', self.path(f'{ending}.png'), '--size', '64x48', '--json')
+            self.assertEqual(json.loads(drawn)['triangles'], summary['triangles'])
 
     def heights(self, *options):
         """Heights by place, of the mesh that these options make."""

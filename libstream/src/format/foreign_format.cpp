@@ -23,8 +23,6 @@ struct KnownFormat {
 };
 
 constexpr std::string_view kRaster = "convert it, e.g. 'gdal_translate FILE out.tif'";
-constexpr std::string_view kMesh =
-    "convert it, e.g. 'assimp export FILE out.ply', or with MeshLab, to PLY";
 constexpr std::string_view kVector =
     "convert its points, e.g. 'ogr2ogr -f CSV -lco GEOMETRY=AS_XYZ out.csv FILE', to text";
 
@@ -80,8 +78,7 @@ constexpr KnownFormat kRows[] = {
      {0, "<html", true}},
     {{"XML (GML, KML, LandXML?)", kVector}, ".kml .gml .xml", {}},
     // Meshes.
-    {{"glTF", kMesh}, ".glb", {0, "glTF"}},
-    {{"glTF", kMesh}, ".gltf", {}},
+    {{"glTF as text", "write it in its binary form, GLB"}, ".gltf", {}},
     {{"JSON, and no GeoJSON", kVector}, ".json", {}},
     {{"VTK", "convert it, e.g. with ParaView, to PLY"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
     // What may hold any of them.

@@ -19,8 +19,9 @@ const Format& las_format();
 const Format& ept_format();
 /// The Stanford polygon format: ASCII, binary little-endian and big-endian.
 const Format& ply_format();
-/// The vertices of Wavefront's OBJ and of Geomview's OFF, and the corners of STL: see
-/// mesh/points.cpp.
+/// The vertices of binary glTF, of Wavefront's OBJ and of Geomview's OFF, and the corners of STL:
+/// see mesh/points.cpp.
+const Format& glb_format();
 const Format& obj_format();
 const Format& off_format();
 const Format& stl_format();

@@ -22,7 +22,9 @@ class ReadAhead final : public PointSource {
         most_(std::max<std::size_t>(blocks, 1)),
         info_(source_->info()),
         reading_(reading),
-        on_stop_(stop, Forward{reading}) {}
+        on_stop_(stop, Forward{reading}) {
+    if (!info_.grid) start();
+  }
 
   ~ReadAhead() override {
     {

@@ -160,8 +160,9 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
         {.file = shown_name(files.front()),
          .where = {},
          .cause = "is " + format.name + ", which has no " + (triangles ? "triangles" : "lines"),
-         .remedy = std::string(triangles ? "name a mesh (OBJ, OFF, PLY, STL)" : "name GeoJSON") +
-                   ", or leave `entities` out"});
+         .remedy =
+             std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)" : "name GeoJSON") +
+             ", or leave `entities` out"});
   }
   auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
@@ -193,11 +194,11 @@ std::optional<Entities> entities_named(std::string_view name) {
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 15> all{geotiff_format(),     vrt_format(),      las_format(),
-                                          ept_format(),         ply_format(),      hgt_format(),
-                                          ascii_grid_format(),  usgs_dem_format(), png_format(),
-                                          binary_grid_format(), obj_format(),      off_format(),
-                                          stl_format(),         geojson_format(),  xyz_format()};
+  static const std::array<Format, 16> all{
+      geotiff_format(),  vrt_format(), las_format(),         ept_format(),
+      ply_format(),      glb_format(), hgt_format(),         ascii_grid_format(),
+      usgs_dem_format(), png_format(), binary_grid_format(), obj_format(),
+      off_format(),      stl_format(), geojson_format(),     xyz_format()};
   return all;
 }
 

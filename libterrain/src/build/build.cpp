@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -75,6 +76,22 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   }
   return schema;
 }
+
+/// Where a source lies.
+struct Located {
+  Located(const stream::SourceInfo& info, const BuildRequest& request)
+      : crs(crs_of_source(info, request.datum_shift)), ground(placement(info), request.z_weight) {}
+
+  SourceCrs crs;
+  Ground ground;
+
+ private:
+  [[nodiscard]] stream::Placement placement(const stream::SourceInfo& info) const {
+    stream::Placement placement = info;
+    placement.crs = crs.crs;
+    return placement;
+  }
+};
 
 /// What a source takes, unless it says that it needs more. What --memory leaves over goes to the
 /// source as well, which keeps more files of a mosaic open by it.
@@ -224,10 +241,10 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     source = std::make_unique<FirstPoints>(std::move(source), request.most_points);
   }
   const stream::SourceInfo& info = source->info();
-  const SourceCrs crs = crs_of_source(info, request.datum_shift);
-  stream::Placement placement = info;
-  placement.crs = crs.crs;
-  const Ground ground(placement, request.z_weight);
+  // Found by whoever asks first. PROJ takes tens of milliseconds to open its database, in which the
+  // first points are read.
+  const std::shared_future<Located> located =
+      std::async(std::launch::deferred, [&info, &request] { return Located(info, request); });
   const ProgressReport report(context, "points");
   std::optional<ProgressReport> reading_report;
   std::mutex reporting;
@@ -246,7 +263,9 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
         {.order = request.order,
          .block_points = request.block_points,
          .unit_lengths =
-             [&ground](const stream::Box3& box) { return unit_lengths(ground.map(box)); },
+             [located](const stream::Box3& box) {
+               return unit_lengths(located.get().ground.map(box));
+             },
          .folder = folder,
          .threads = std::max(1U, context.threads),
          .parts_ahead = memory_bytes < kMemory ? 0 : std::min(context.threads / 4, kMostPartsAhead),
@@ -254,7 +273,11 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
          .reading = set_aside});
     in_order = ordered.get();
     points = std::move(ordered);
+    if (request.order != stream::Order::stream) {
+      points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
+    }
   }
+  const auto& [crs, ground] = located.get();
   BuildOutcome outcome;
   const std::uint64_t source_bytes = std::max(kSourceMemory, points->reading_bytes());
   const stream::StoreSchema schema = schema_of(info, crs, request);

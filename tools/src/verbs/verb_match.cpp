@@ -219,9 +219,10 @@ class MatchCommand final : public Command {
         "--tree", tree_,
         "Match the pairs again, and so on: the binary tree. Row k is node n + k of n points "
         "and joins the nodes a and b; size: points below");
-    app.add_option("--entities", entities_,
-                   "triangles: those of a mesh (OBJ, OFF, PLY, STL) in place of its vertices, by "
-                   "their centroids; with --tree, which is a bounding volume hierarchy then")
+    app.add_option(
+           "--entities", entities_,
+           "triangles: those of a mesh (GLB, OBJ, OFF, PLY, STL) in place of its vertices, by "
+           "their centroids; with --tree, which is a bounding volume hierarchy then")
         ->check(CLI::IsMember({"points", "triangles"}))
         ->capture_default_str();
     app.add_option("--labels", labels_,

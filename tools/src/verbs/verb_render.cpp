@@ -289,10 +289,11 @@ double slope_degrees(const std::array<float, 3>& normal) {
 class RenderCommand : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("input", input_,
-                   "Store, raster, mesh (PLY, OBJ, OFF, STL), cloud of points, dendrogram (CSV), "
-                   "or pairs or "
-                   "tree of 'match' (CSV)")
+    app.add_option(
+           "input", input_,
+           "Store, raster, mesh (PLY, GLB, OBJ, OFF, STL), cloud of points, dendrogram (CSV), "
+           "or pairs or "
+           "tree of 'match' (CSV)")
         ->required()
         ->type_name("FILE");
     add_output(app, output_, "The picture (PNG); - is standard output");

@@ -17,8 +17,9 @@ struct MeshFile {
   std::vector<TriangleIndices> triangles;  ///< oriented as in the file; corners are vertex indices
 };
 
-/// Reads the triangles of a PLY (ASCII, both binaries), OBJ, OFF (text) or STL (text, binary) file:
-/// polygons are cut into fans, the strips of "tristrips" into triangles. Vertices are as from
+/// Reads the triangles of a PLY (ASCII, both binaries), GLB, OBJ, OFF (text) or STL (text, binary)
+/// file: polygons are cut into fans, strips into triangles; of a GLB those of all nodes of its
+/// scene, each where its node puts it and turned from y up to z up. Vertices are as from
 /// open_source(), except that coincident vertices of an STL are merged; only PLY vertices have
 /// attributes. Formats are recognised by content, then by ending, or set by options.format.
 ///

@@ -124,7 +124,7 @@ using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 /// for bit. Other attributes are left out.
 enum class Entities : std::uint8_t {
   points,  ///< of meshes and GeoJSON: the vertices
-  /// The triangles of a mesh (OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
+  /// The triangles of a mesh (GLB, OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
   /// file: "x2", "y2", "z2", "x3", "y3", "z3".
   triangles,
   /// The segments of lines (GeoJSON, including rings of polygons), in the order of the file: "x2",
@@ -155,8 +155,8 @@ struct SourceOptions {
   std::optional<Crs> crs{};  ///< replaces what the file says
   /// Ends any wait for a pipe, in opening the source and in next(), with Stopped.
   std::stop_token stop{};
-  /// Above 0: blocks are read on a separate thread, at most this many ahead, from the first next()
-  /// on (see read_ahead()). The source's destructor does not wait for a pipe.
+  /// Above 0: blocks are read on a separate thread, at most this many ahead (see read_ahead()). The
+  /// source's destructor does not wait for a pipe.
   std::size_t blocks_ahead = 0;
   unsigned threads = 1;  ///< decoding threads, for formats with independent parts (LAZ, EPT)
   OnDamage on_damage{};  ///< empty: damage is thrown
@@ -175,10 +175,10 @@ std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 
 /// The same stream, read on a separate thread, at most `blocks` blocks ahead. An Error thrown there
-/// is rethrown by the `next` that would have delivered the block. The thread starts with the first
-/// `next`; if none can be started the caller's thread reads.
-/// reading: the stop source of `source`; a stop is requested by `stop` and when the object is
-/// destroyed, so that its destructor does not wait for a pipe.
+/// is rethrown by the `next` that would have delivered the block. The thread starts at once, that
+/// of a raster with the first `next`, as refine() comes before it; if none can be started the
+/// caller's thread reads. reading: the stop source of `source`; a stop is requested by `stop` and
+/// when the object is destroyed, so that its destructor does not wait for a pipe.
 std::unique_ptr<PointSource> read_ahead(
     std::unique_ptr<PointSource> source, std::size_t blocks = 8,
     const std::stop_source& reading = std::stop_source(std::nostopstate),

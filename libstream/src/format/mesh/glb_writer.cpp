@@ -8,27 +8,20 @@
 
 #include <nlohmann/json.hpp>
 
+#include "format/mesh/glb.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/sink.hpp"
 
-/// glTF 2.0 (ISO/IEC 12113), section 4.4: GLB is a header of 12 bytes, a JSON chunk and a binary
-/// chunk, each padded to 4 bytes. The bounds of the positions stand in the JSON, before the
-/// positions: its place is kept, and it is written at the end.
+/// The bounds of the positions stand in the JSON, before the positions: its place is kept, and it
+/// is written at the end.
 
 namespace terrace::stream {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr std::size_t kGlbPieceBytes = 64u << 10;
-constexpr std::uint64_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 constexpr std::size_t kMaxStride = 252;  // of a vertex buffer, by the specification
-// Values of the specification: componentType, target, mode.
-constexpr int kFloat = 5126, kUnsignedInt = 5125;
-constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
-constexpr int kPoints = 0, kTriangles = 4;
 
 /// z up to y up: a rotation, so that triangles keep their sense.
 std::array<double, 3> y_up(const Point3& p) { return {p[0], p[2], -p[1]}; }
@@ -58,7 +51,7 @@ class GlbWriter final : public MeshWriter {
     // Two sizes that cannot overflow first, then the whole.
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
     if (header.vertices >= kMost / stride_ || header.triangles >= kMost / 12 ||
-        kHeaderBytes + 2 * kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
+        glb::kHeaderBytes + 2 * glb::kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
                 binary_bytes() >
             kMost) {
       refuse("GLB holds at most 4 GiB");
@@ -76,16 +69,17 @@ class GlbWriter final : public MeshWriter {
     json_bytes_ += (4 - json_bytes_ % 4) % 4;
     sink_.emplace(path, options.replace, options.stop);
     std::string text;
-    append_little_endian(text, std::uint32_t{0x46546C67});  // "glTF"
-    append_little_endian(text, std::uint32_t{2});
-    append_little_endian(text, static_cast<std::uint32_t>(kHeaderBytes + kChunkHeaderBytes +
-                                                          json_bytes_ + binary_chunk_bytes()));
+    append_little_endian(text, glb::kMagic);
+    append_little_endian(text, glb::kVersion);
+    append_little_endian(
+        text, static_cast<std::uint32_t>(glb::kHeaderBytes + glb::kChunkHeaderBytes + json_bytes_ +
+                                         binary_chunk_bytes()));
     append_little_endian(text, static_cast<std::uint32_t>(json_bytes_));
-    append_little_endian(text, std::uint32_t{0x4E4F534A});  // "JSON"
+    append_little_endian(text, glb::kJson);
     text.append(json_bytes_, ' ');
     if (header_.vertices > 0) {
       append_little_endian(text, static_cast<std::uint32_t>(binary_bytes()));
-      append_little_endian(text, std::uint32_t{0x004E4942});  // "BIN"
+      append_little_endian(text, glb::kBinary);
     }
     sink_->write(text);
   }
@@ -129,16 +123,18 @@ class GlbWriter final : public MeshWriter {
     };
     const std::string text = json(y_up(origin_), widened(min_), widened(max_));
     assert(text.size() <= json_bytes_);
-    sink_->write_at(kHeaderBytes + kChunkHeaderBytes, text);
+    sink_->write_at(glb::kHeaderBytes + glb::kChunkHeaderBytes, text);
     sink_->commit();
   }
 
  private:
+  using Json = nlohmann::ordered_json;
+
   [[nodiscard]] std::uint64_t binary_bytes() const {
     return header_.vertices * stride_ + header_.triangles * 12;
   }
   [[nodiscard]] std::uint64_t binary_chunk_bytes() const {
-    return header_.vertices == 0 ? 0 : kChunkHeaderBytes + binary_bytes();
+    return header_.vertices == 0 ? 0 : glb::kChunkHeaderBytes + binary_bytes();
   }
 
   [[nodiscard]] std::string json(const std::array<double, 3>& translation,
@@ -157,7 +153,7 @@ class GlbWriter final : public MeshWriter {
     primitive["attributes"]["POSITION"] = 0;
     Json accessors = Json::array();
     accessors.push_back({{"bufferView", 0},
-                         {"componentType", kFloat},
+                         {"componentType", glb::kFloat},
                          {"count", header_.vertices},
                          {"type", "VEC3"},
                          {"min", min},
@@ -166,7 +162,7 @@ class GlbWriter final : public MeshWriter {
       primitive["attributes"][attribute_name(header_.attributes[i])] = accessors.size();
       accessors.push_back({{"bufferView", 0},
                            {"byteOffset", 12 + 4 * i},
-                           {"componentType", kFloat},
+                           {"componentType", glb::kFloat},
                            {"count", header_.vertices},
                            {"type", "SCALAR"}});
     }
@@ -175,19 +171,19 @@ class GlbWriter final : public MeshWriter {
     views.push_back({{"buffer", 0},
                      {"byteLength", vertex_bytes},
                      {"byteStride", stride_},
-                     {"target", kArrayBuffer}});
+                     {"target", glb::kArrayBuffer}});
     if (header_.triangles > 0) {
       primitive["indices"] = accessors.size();
       accessors.push_back({{"bufferView", 1},
-                           {"componentType", kUnsignedInt},
+                           {"componentType", glb::kUnsignedInt},
                            {"count", header_.triangles * 3},
                            {"type", "SCALAR"}});
       views.push_back({{"buffer", 0},
                        {"byteOffset", vertex_bytes},
                        {"byteLength", header_.triangles * 12},
-                       {"target", kElementArrayBuffer}});
+                       {"target", glb::kElementArrayBuffer}});
     }
-    primitive["mode"] = header_.triangles > 0 ? kTriangles : kPoints;
+    primitive["mode"] = header_.triangles > 0 ? glb::kTriangles : glb::kPoints;
     primitive["material"] = 0;
     out["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
     // Without a material glTF's default is a mirror of metal, dark in most viewers.

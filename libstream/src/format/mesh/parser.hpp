@@ -13,7 +13,7 @@
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/schema.hpp"
 
-/// Meshes read front to back: OBJ, OFF and STL have one parser each, for read_mesh(), for the
+/// Meshes read front to back: GLB, OBJ, OFF and STL have one parser each, for read_mesh(), for the
 /// points of the vertices and for triangles; PLY has one for triangles (in ply/source.cpp).
 
 namespace terrace::stream {
@@ -54,11 +54,14 @@ class MeshParser {
 bool read_vertex(std::string_view& text, Point3& vertex);
 
 /// input: at its first byte; must outlive the parser. faces: false skips them.
+/// Sets the binary part of the file aside in a temporary file.
+std::unique_ptr<MeshParser> glb_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> obj_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> off_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> stl_parser(Input& input, bool faces);
 
 /// See Format::recognise.
+bool recognise_glb(std::span<const std::byte> head);
 bool recognise_obj(std::span<const std::byte> head);
 bool recognise_off(std::span<const std::byte> head);
 /// Only the text form: the binary one has no signature.

@@ -85,6 +85,16 @@ std::unique_ptr<PointSource> open_meshes(std::span<const std::string> files,
 
 }  // namespace
 
+const Format& glb_format() {
+  static const Format format{.name = "glb",
+                             .endings = {".glb"},
+                             .streams = true,
+                             .recognise = &recognise_glb,
+                             .open = &open_meshes<&glb_parser>,
+                             .triangles = true};
+  return format;
+}
+
 const Format& obj_format() {
   static const Format format{.name = "obj",
                              .endings = {".obj"},

@@ -22,8 +22,10 @@ struct SimpleFormat {
   const Format& (*format)();
   std::unique_ptr<MeshParser> (*parser)(Input& input, bool faces);
 };
-constexpr std::array<SimpleFormat, 3> kSimpleFormats{
-    {{&obj_format, &obj_parser}, {&off_format, &off_parser}, {&stl_format, &stl_parser}}};
+constexpr std::array<SimpleFormat, 4> kSimpleFormats{{{&glb_format, &glb_parser},
+                                                      {&obj_format, &obj_parser},
+                                                      {&off_format, &off_parser},
+                                                      {&stl_format, &stl_parser}}};
 
 /// Gives vertices at one place one number.
 class Welder {

@@ -1,0 +1,528 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "format/mesh/glb.hpp"
+#include "format/mesh/parser.hpp"
+#include "io/bytes.hpp"
+#include "io/spool.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::string_view kGlbRemedy = "the file is damaged; write it anew";
+constexpr std::string_view kPlainRemedy = "write it as plain glTF 2.0 in one .glb file";
+
+/// A linear map and a translation: rows of four numbers.
+using Transform = std::array<double, 12>;
+constexpr Transform kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+/// First b, then a.
+Transform product(const Transform& a, const Transform& b) {
+  Transform out{};
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      double& sum = out[4 * row + column];
+      for (std::size_t k = 0; k < 3; ++k) sum += a[4 * row + k] * b[4 * k + column];
+      if (column == 3) sum += a[4 * row + 3];
+    }
+  }
+  return out;
+}
+
+double determinant(const Transform& t) {
+  return t[0] * (t[5] * t[10] - t[6] * t[9]) - t[1] * (t[4] * t[10] - t[6] * t[8]) +
+         t[2] * (t[4] * t[9] - t[5] * t[8]);
+}
+
+/// Numbers of the binary chunk.
+struct Accessor {
+  std::uint64_t begin = 0, count = 0, stride = 0, bytes = 0;  ///< `bytes`: of one element
+};
+
+/// The elements of an accessor in their order, through a window.
+class Elements {
+ public:
+  Elements() = default;
+  Elements(const ByteSource& source, const Accessor& accessor)
+      : source_(&source), accessor_(accessor) {}
+
+  /// The bytes of the next element; nullptr behind the last. Valid until the next call.
+  const char* next() {
+    if (done_ == accessor_.count) return nullptr;
+    if (done_ == end_) fill();
+    return window_.data() + (done_++ - begin_) * accessor_.stride;
+  }
+
+ private:
+  static constexpr std::uint64_t kWindowBytes = std::uint64_t{64} << 10;
+
+  void fill() {
+    begin_ = end_;
+    end_ = std::min(accessor_.count, begin_ + kWindowBytes / accessor_.stride + 1);
+    window_.resize((end_ - begin_ - 1) * accessor_.stride + accessor_.bytes);
+    source_->read(accessor_.begin + begin_ * accessor_.stride,
+                  std::as_writable_bytes(std::span(window_)));
+  }
+
+  const ByteSource* source_ = nullptr;
+  Accessor accessor_;
+  std::uint64_t begin_ = 0, end_ = 0, done_ = 0;  ///< elements: of the window, and delivered
+  std::vector<char> window_;
+};
+
+/// The primitives of the meshes of a scene's nodes, in the order of the tree. Section numbers are
+/// those of the specification.
+class GlbParser final : public MeshParser {
+ public:
+  GlbParser(Input& input, bool faces)
+      : input_(&input), wants_faces_(faces), numbers_(input.name()) {
+    read_chunks();
+    refuse_extensions();
+    read_scene();
+    json_ = {};
+  }
+
+  const char* format() const override { return "glb"; }
+  const Input& input() const override { return *input_; }
+  std::optional<std::uint64_t> vertices() const override { return vertices_; }
+  ScalarType type() const override { return moved_ ? ScalarType::f64 : ScalarType::f32; }
+
+  Item next() override {
+    for (; at_ < parts_.size(); ++at_, begun_ = false) {
+      if (!begun_) begin(parts_[at_]);
+      if (read_position()) return Item::vertex;
+      if (wants_faces_ && read_face()) return Item::face;
+    }
+    return Item::end;
+  }
+
+ private:
+  using Json = nlohmann::json;
+
+  static constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t kMostJsonBytes = std::size_t{64} << 20;
+  /// Far more than a scene of many thousand nodes has, few enough to fit into memory.
+  static constexpr std::size_t kMostJsonValues = std::size_t{1} << 20;
+  static constexpr int kDeepestJson = 16;
+
+  /// A primitive (3.7.2.1).
+  struct Part {
+    Transform transform = kIdentity;
+    bool mirrored = false;    ///< the transform turns triangles over
+    Accessor positions;       ///< count 0: an earlier part has delivered them
+    std::uint64_t first = 0;  ///< the number of the first of its vertices
+    std::uint64_t vertices = 0;
+    std::optional<Accessor> indices;
+    std::uint64_t corners = 0, mode = glb::kTriangles;
+  };
+
+  [[noreturn]] void fail(std::string where, std::string cause,
+                         std::string_view remedy = kGlbRemedy) const {
+    throw Error({.file = input_->name(),
+                 .where = std::move(where),
+                 .cause = std::move(cause),
+                 .remedy = std::string(remedy)});
+  }
+  [[noreturn]] void fail_here(std::string cause, std::string_view remedy = kGlbRemedy) const {
+    fail("byte " + std::to_string(input_->offset()), std::move(cause), remedy);
+  }
+
+  // The chunks (4.4).
+
+  std::uint32_t word(std::size_t at) const {
+    return load_little_endian<std::uint32_t>(input_->window().data() + at);
+  }
+
+  void read_chunks() {
+    constexpr std::size_t kHeaders = glb::kHeaderBytes + glb::kChunkHeaderBytes;
+    if (input_->fill(kHeaders).size() < kHeaders) fail_here("is too short for GLB");
+    if (word(0) != glb::kMagic) fail_here("does not begin with glTF");
+    if (word(4) != glb::kVersion) {
+      fail_here("is glTF of version " + std::to_string(word(4)) + ", not 2", kPlainRemedy);
+    }
+    const std::uint64_t all = word(8), json_bytes = word(12);
+    if (input_->size() && *input_->size() < all) {
+      fail_here("is cut off: its header promises " + std::to_string(all) + " bytes and there are " +
+                    std::to_string(*input_->size()),
+                "get it anew");
+    }
+    if (word(16) != glb::kJson) fail_here("its first chunk is not JSON");
+    if (all < kHeaders + json_bytes) fail_here("its JSON is larger than the file");
+    if (json_bytes > kMostJsonBytes) fail_here("its JSON is larger than 64 MiB", kPlainRemedy);
+    input_->consume(kHeaders);
+    parse(input_->fill(json_bytes).substr(0, json_bytes), json_bytes);
+    input_->consume(json_bytes);
+
+    std::uint64_t left = all - kHeaders - json_bytes;
+    if (left < glb::kChunkHeaderBytes) return;
+    if (input_->fill(glb::kChunkHeaderBytes).size() < glb::kChunkHeaderBytes)
+      fail_here("ends before its second chunk");
+    std::uint64_t bytes = word(0);
+    const bool binary = word(4) == glb::kBinary;
+    input_->consume(glb::kChunkHeaderBytes);
+    left -= glb::kChunkHeaderBytes;
+    if (!binary) return;
+    if (bytes > left) fail_here("its binary chunk is larger than the file");
+    // Positions and corners may lie in any order and are read side by side.
+    while (bytes > 0) {
+      const std::string_view some = input_->fill(1);
+      if (some.empty()) fail_here("ends within its binary chunk", "get it anew");
+      const auto taken = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, some.size()));
+      numbers_.append(std::as_bytes(std::span(some.data(), taken)));
+      input_->consume(taken);
+      bytes -= taken;
+    }
+  }
+
+  void parse(std::string_view text, std::uint64_t promised) {
+    if (text.size() < promised) fail_here("ends within its JSON", "get it anew");
+    std::size_t values = 0;
+    try {
+      json_ = Json::parse(text, [&](int depth, Json::parse_event_t, const Json&) {
+        if (depth > kDeepestJson) fail_here("its JSON is nested too deeply");
+        if (++values > kMostJsonValues) fail_here("its JSON has too many values", kPlainRemedy);
+        return true;
+      });
+    } catch (const Json::parse_error& error) {
+      fail("byte " + std::to_string(input_->offset() + error.byte), "is not JSON");
+    }
+    if (!json_.is_object()) fail_here("its JSON is not an object");
+  }
+
+  // What the JSON holds.
+
+  /// The list of that name; an empty one if there is none.
+  const Json& list(const Json& object, const char* name) const {
+    static const Json none = Json::array();
+    const auto found = object.find(name);
+    if (found == object.end()) return none;
+    if (!found->is_array()) fail(name, "is not a list");
+    return *found;
+  }
+
+  /// Entry `index` of a list at the top.
+  const Json& entry(const char* name, std::uint64_t index) const {
+    const Json& all = list(json_, name);
+    if (index >= all.size() || !all[index].is_object()) {
+      fail(std::string(name) + " " + std::to_string(index), "is missing");
+    }
+    return all[index];
+  }
+
+  static std::optional<std::uint64_t> whole(const Json& value) {
+    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMost) return std::nullopt;
+    return value.get<std::uint64_t>();
+  }
+
+  std::optional<std::uint64_t> count(const Json& object, const char* name) const {
+    const auto found = object.find(name);
+    if (found == object.end()) return std::nullopt;
+    const std::optional<std::uint64_t> value = whole(*found);
+    if (!value) fail(name, "is not a number from 0 to " + std::to_string(kMost));
+    return value;
+  }
+
+  /// So many finite numbers; false if there is no such list.
+  bool take_numbers(const Json& object, const char* name, std::span<double> out) const {
+    if (!object.contains(name)) return false;
+    const Json& all = list(object, name);
+    if (all.size() != out.size()) {
+      fail(name, "does not have " + std::to_string(out.size()) + " numbers");
+    }
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      if (!all[i].is_number()) fail(name, "is not a list of numbers");
+      out[i] = all[i].get<double>();
+      if (!std::isfinite(out[i])) fail(name, "has a number that is not finite");
+    }
+    return true;
+  }
+
+  /// An accessor (3.6.2) whose elements lie in the binary chunk as a whole.
+  Accessor accessor(std::uint64_t index, const char* type, std::uint64_t& component) const {
+    const std::string where = "accessors " + std::to_string(index);
+    const Json& json = entry("accessors", index);
+    if (json.value("type", Json()) != type) fail(where, std::string("is not of type ") + type);
+    component = count(json, "componentType").value_or(0);
+    const std::uint64_t bytes = component == glb::kUnsignedByte                              ? 1
+                                : component == glb::kUnsignedShort                           ? 2
+                                : component == glb::kUnsignedInt || component == glb::kFloat ? 4
+                                                                                             : 0;
+    if (bytes == 0) fail(where, "has a type of numbers that is not read", kPlainRemedy);
+    const std::optional<std::uint64_t> view_index = count(json, "bufferView");
+    if (json.contains("sparse") || !view_index) {
+      fail(where, "is sparse, which is not read", kPlainRemedy);
+    }
+    const Json& view = entry("bufferViews", *view_index);
+    const std::uint64_t buffer = count(view, "buffer").value_or(0);
+    if (buffer != 0 || entry("buffers", 0).contains("uri")) {
+      fail(where, "lies in another file, which is not read", kPlainRemedy);
+    }
+    Accessor out;
+    out.bytes = bytes * (std::string_view(type) == "VEC3" ? 3 : 1);
+    out.stride = count(view, "byteStride").value_or(out.bytes);
+    out.count = count(json, "count").value_or(0);
+    const std::uint64_t offset = count(json, "byteOffset").value_or(0);
+    const std::uint64_t view_bytes = count(view, "byteLength").value_or(0);
+    out.begin = count(view, "byteOffset").value_or(0);
+    if (out.stride < out.bytes) fail(where, "has elements that overlap");
+    if (out.begin > numbers_.size() || view_bytes > numbers_.size() - out.begin ||
+        (out.count > 0 && offset + (out.count - 1) * out.stride + out.bytes > view_bytes)) {
+      fail(where, "reaches beyond the binary chunk");
+    }
+    out.begin += offset;
+    return out;
+  }
+
+  /// Compressed geometry, for example. What concerns colours alone is no hindrance.
+  void refuse_extensions() const {
+    for (const Json& extension : list(json_, "extensionsRequired")) {
+      const std::string name = extension.is_string() ? extension.get<std::string>() : "?";
+      const auto begins = [&](const char* text) { return name.starts_with(text); };
+      if (begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_")) continue;
+      fail({}, "needs the extension " + name + ", which is not read", kPlainRemedy);
+    }
+  }
+
+  // The scene (3.5).
+
+  Transform transform_of(const Json& node) const {
+    std::array<double, 16> columns{};
+    if (take_numbers(node, "matrix", columns)) {
+      Transform out{};
+      for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 4; ++column) {
+          out[4 * row + column] = columns[4 * column + row];
+        }
+      }
+      return out;
+    }
+    std::array<double, 3> move{}, scale{1, 1, 1};
+    std::array<double, 4> turn{0, 0, 0, 1};
+    take_numbers(node, "translation", move);
+    take_numbers(node, "rotation", turn);
+    take_numbers(node, "scale", scale);
+    const auto [x, y, z, w] = turn;
+    const Transform rotation{
+        1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),     0,
+        2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),     0,
+        2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y), 0};
+    Transform out{};
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        out[4 * row + column] = rotation[4 * row + column] * scale[column];
+      }
+      out[4 * row + 3] = move[row];
+    }
+    return out;
+  }
+
+  /// The nodes that a scene begins with: those of the scene to be shown, or else all without a
+  /// parent.
+  std::vector<std::uint64_t> roots() const {
+    std::vector<std::uint64_t> out;
+    const auto add = [&](const Json& nodes) {
+      for (const Json& node : nodes) {
+        const std::optional<std::uint64_t> number = whole(node);
+        if (!number) fail("nodes", "a number of a node is wrong");
+        out.push_back(*number);
+      }
+    };
+    if (!list(json_, "scenes").empty()) {
+      add(list(entry("scenes", count(json_, "scene").value_or(0)), "nodes"));
+      return out;
+    }
+    const Json& nodes = list(json_, "nodes");
+    for (std::uint64_t i = 0; i < nodes.size(); ++i) add(list(entry("nodes", i), "children"));
+    std::vector<std::uint64_t> children = std::move(out);
+    std::sort(children.begin(), children.end());
+    out.clear();
+    for (std::uint64_t i = 0; i < nodes.size(); ++i) {
+      if (!std::binary_search(children.begin(), children.end(), i)) out.push_back(i);
+    }
+    return out;
+  }
+
+  void read_scene() {
+    std::vector<bool> seen(list(json_, "nodes").size());
+    std::vector<std::pair<std::uint64_t, Transform>> stack;
+    for (const std::uint64_t root : roots()) stack.emplace_back(root, kIdentity);
+    std::reverse(stack.begin(), stack.end());
+    while (!stack.empty()) {
+      const auto [index, above] = stack.back();
+      stack.pop_back();
+      const Json& node = entry("nodes", index);
+      if (seen[index]) fail("nodes " + std::to_string(index), "is in the scene twice");
+      seen[index] = true;
+      const Transform transform = product(above, transform_of(node));
+      if (const auto mesh = count(node, "mesh")) add_mesh(*mesh, transform);
+      const Json& children = list(node, "children");
+      for (std::size_t i = children.size(); i-- > 0;) {
+        const std::optional<std::uint64_t> child = whole(children[i]);
+        if (!child) fail("nodes " + std::to_string(index), "a number of a child is wrong");
+        stack.emplace_back(*child, transform);
+      }
+    }
+  }
+
+  void add_mesh(std::uint64_t index, const Transform& transform) {
+    struct Placed {
+      std::uint64_t positions, first;
+    };
+    std::vector<Placed> placed;  // in this mesh: primitives may share their vertices
+    const std::string where = "meshes " + std::to_string(index);
+    for (const Json& primitive : list(entry("meshes", index), "primitives")) {
+      const auto attributes = primitive.find("attributes");
+      const std::optional<std::uint64_t> positions =
+          attributes == primitive.end() ? std::nullopt : count(*attributes, "POSITION");
+      if (!positions) continue;  // there is nothing to be seen (3.7.2.1)
+      Part part;
+      part.transform = transform;
+      part.mirrored = determinant(transform) < 0;
+      part.mode = count(primitive, "mode").value_or(glb::kTriangles);
+      std::uint64_t component = 0;
+      part.positions = accessor(*positions, "VEC3", component);
+      if (component != glb::kFloat) fail(where, "has positions that are not floats", kPlainRemedy);
+      part.vertices = part.positions.count;
+      part.first = vertices_;
+      const auto same = std::find_if(placed.begin(), placed.end(),
+                                     [&](const Placed& p) { return p.positions == *positions; });
+      if (same != placed.end()) {
+        part.first = same->first;
+        part.positions.count = 0;
+      } else {
+        placed.push_back({*positions, vertices_});
+        vertices_ += part.vertices;
+        if (vertices_ >= kMost) fail(where, "has more vertices than can be numbered");
+      }
+      if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
+      moved_ = moved_ || transform != kIdentity;
+      parts_.push_back(part);
+    }
+  }
+
+  void add_corners(const Json& primitive, const std::string& where, Part& part) const {
+    if (part.mode > glb::kFan) fail(where, "is drawn in a way that glTF does not know");
+    part.corners = part.vertices;
+    if (const auto indices = count(primitive, "indices")) {
+      std::uint64_t component = 0;
+      part.indices = accessor(*indices, "SCALAR", component);
+      if (component == glb::kFloat) fail(where, "has numbers of vertices that are floats");
+      part.corners = part.indices->count;
+    }
+    if (part.mode == glb::kTriangles && part.corners % 3 != 0) {
+      fail(where, "has " + std::to_string(part.corners) + " corners, not three for each triangle");
+    }
+  }
+
+  // The vertices and faces.
+
+  void begin(const Part& part) {
+    begun_ = true;
+    positions_ = Elements(numbers_, part.positions);
+    indices_ = Elements(numbers_, part.indices.value_or(Accessor()));
+    corner_ = 0;
+  }
+
+  bool read_position() {
+    const char* at = positions_.next();
+    if (at == nullptr) return false;
+    Point3 p;
+    for (double& value : p) {
+      value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
+      at += sizeof(float);
+    }
+    Point3 world;
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double* const t = parts_[at_].transform.data() + 4 * row;
+      world[row] = moved_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
+      if (!std::isfinite(world[row])) fail({}, "has a vertex that is not finite");
+    }
+    vertex_ = {world[0], -world[2], world[1]};  // y up to z up
+    return true;
+  }
+
+  std::uint32_t read_corner() {
+    const Part& part = parts_[at_];
+    std::uint64_t vertex = corner_++;
+    if (part.indices) {
+      const char* const at = indices_.next();
+      vertex = part.indices->bytes == 1   ? static_cast<unsigned char>(*at)
+               : part.indices->bytes == 2 ? load_little_endian<std::uint16_t>(at)
+                                          : load_little_endian<std::uint32_t>(at);
+    }
+    if (vertex >= part.vertices) {
+      fail({}, "a face names the vertex " + std::to_string(vertex) + ", which is not there");
+    }
+    return static_cast<std::uint32_t>(part.first + vertex);
+  }
+
+  bool read_face() {
+    const Part& part = parts_[at_];
+    while (corner_ < part.corners) {
+      if (part.mode == glb::kTriangles) {
+        face_ = {read_corner(), 0, 0};
+        face_[1] = read_corner();
+        face_[2] = read_corner();
+        if (part.mirrored) std::swap(face_[1], face_[2]);
+        return true;
+      }
+      // Strips and fans: two corners, then a triangle with each.
+      const std::uint64_t number = corner_;
+      const std::uint32_t corner = read_corner();
+      if (number < 2) {
+        last_[number] = corner;
+        continue;
+      }
+      // In a strip every other triangle runs the other way.
+      face_ = {last_[0], last_[1], corner};
+      const bool turned = part.mode == glb::kStrip && number % 2 == 1;
+      if (turned != part.mirrored) std::swap(face_[1], face_[2]);
+      if (part.mode == glb::kStrip) last_[0] = last_[1];
+      last_[1] = corner;
+      // Triangles without area join strips.
+      if (face_[0] != face_[1] && face_[1] != face_[2] && face_[2] != face_[0]) return true;
+    }
+    return false;
+  }
+
+  Input* input_;
+  bool wants_faces_;
+  Spool numbers_;  ///< the binary chunk
+  Json json_;
+  std::vector<Part> parts_;
+  std::uint64_t vertices_ = 0;
+  bool moved_ = false;  ///< by a node
+
+  std::size_t at_ = 0;  ///< the part in work
+  bool begun_ = false;
+  Elements positions_, indices_;
+  std::uint64_t corner_ = 0;  ///< of the part in work, that have been read
+  std::array<std::uint32_t, 2> last_{};
+};
+
+}  // namespace
+
+bool recognise_glb(std::span<const std::byte> bytes) {
+  return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size())
+      .starts_with("glTF");
+}
+
+std::unique_ptr<MeshParser> glb_parser(Input& input, bool faces) {
+  return std::make_unique<GlbParser>(input, faces);
+}
+
+}  // namespace terrace::stream
