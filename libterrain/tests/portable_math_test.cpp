@@ -21,12 +21,10 @@ TEST(PortableMath, AgreesWithTheLibrary) {
   }
 }
 
-TEST(PortableMath, LogarithmsAndLengthsAgreeWithTheLibrary) {
+TEST(PortableMath, LengthsAgreeWithTheLibrary) {
   for (double x = 1e-300; x < 1e300; x *= 1.9) {
-    EXPECT_NEAR(portable_log(x), std::log(x), 1e-15 * std::abs(std::log(x))) << x;
     EXPECT_NEAR(portable_hypot(x, 0.7 * x) / std::hypot(x, 0.7 * x), 1.0, 4e-16) << x;
   }
-  EXPECT_EQ(portable_log(1), 0.0);
   EXPECT_EQ(portable_hypot(0, -0.0), 0.0);
   EXPECT_EQ(portable_hypot(-3, 4), 5.0);
   EXPECT_TRUE(std::isinf(portable_hypot(-INFINITY, 1)));

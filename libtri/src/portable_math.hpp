@@ -80,4 +80,33 @@ inline double angle_degrees(double y, double x) {
   return std::copysign(degrees, y);
 }
 
+/// ln 2 in two parts, the first with trailing zeros, so that integer multiples of it are exact.
+inline constexpr double kLn2High = 0x1.62e42fefa0000p-1, kLn2Low = 0x1.cf79abc9e3b3ap-40;
+
+/// e^x, within 1e-15 relative for |x| <= 700; clamped beyond.
+inline double exponential(double x) {
+  x = std::clamp(x, -700.0, 700.0);
+  // x = k ln 2 + r with |r| <= ln(2) / 2.
+  const double k = std::nearbyint(x * 1.4426950408889634074);
+  const double r = (x - k * kLn2High) - k * kLn2Low;
+  double sum = 1;
+  for (int n = 17; n >= 1; --n) sum = 1.0 + sum * (r / n);
+  return std::ldexp(sum, static_cast<int>(k));
+}
+
+/// Natural logarithm of a positive finite number, within 1e-15 relative.
+inline double logarithm(double x) {
+  // x = m 2^e with m from sqrt(1/2) to sqrt(2); ln m = 2 artanh(s) by its series.
+  int e = 0;
+  double m = std::frexp(x, &e);
+  if (m < 0.70710678118654752440) {
+    m += m;
+    --e;
+  }
+  const double s = (m - 1.0) / (m + 1.0), square = s * s;
+  double sum = 0;
+  for (int k = 23; k >= 3; k -= 2) sum = (sum + 1.0 / k) * square;
+  return e * kLn2High + (e * kLn2Low + 2.0 * (s + s * sum));
+}
+
 }  // namespace terrace::tri::portable

@@ -64,12 +64,12 @@ TEST(DeliveryOrder, RefusesWhatItCannotDo) {
 }
 
 TEST(Clouds, LieInTheirPlace) {
-  const auto uniform = make_uniform(1);
-  const auto surface = make_surface(5000, 1);
-  const auto clusters = make_clusters(5000, 1);
+  const auto uniform = uniform_cloud(1);
+  const auto surface = surface_cloud(5000, 1);
+  const auto clusters = cluster_cloud(5000, 1);
   stream::Point3 mean{};
   for (std::uint64_t n = 0; n < 5000; ++n) {
-    const stream::Point3 u = uniform->at(n), s = surface->at(n), c = clusters->at(n);
+    const stream::Point3 u = uniform(n), s = surface(n), c = clusters(n);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       EXPECT_GE(u[axis], 0);
       EXPECT_LE(u[axis], 1);
@@ -84,10 +84,10 @@ TEST(Clouds, LieInTheirPlace) {
 
 // A block of a swath is compact: successive points lie side by side.
 TEST(Surface, ComesInSwaths) {
-  const auto surface = make_surface(100000, 1);
+  const auto surface = surface_cloud(100000, 1);
   double near = 0;
   for (std::uint64_t n = 20000; n < 21000; ++n) {
-    const stream::Point3 a = surface->at(n), b = surface->at(n + 1);
+    const stream::Point3 a = surface(n), b = surface(n + 1);
     near += std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) < 4 ? 1 : 0;
   }
   EXPECT_GT(near, 900);
@@ -96,9 +96,9 @@ TEST(Surface, ComesInSwaths) {
 // Golden: the same bytes on every machine and compiler.
 TEST(Clouds, BytesAreFixed) {
   std::uint64_t hash = 14695981039346656037u;  // FNV-1a
-  for (const auto& cloud : {make_surface(1000, 1), make_uniform(1), make_clusters(1000, 1)}) {
+  for (const auto& cloud : {surface_cloud(1000, 1), uniform_cloud(1), cluster_cloud(1000, 1)}) {
     for (std::uint64_t n = 0; n < 1000; ++n) {
-      for (const double v : cloud->at(n)) {
+      for (const double v : cloud(n)) {
         hash = (hash ^ std::bit_cast<std::uint64_t>(v)) * 1099511628211u;
       }
     }

@@ -2,7 +2,6 @@
 #include "base/available_memory.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -11,6 +10,8 @@
 
 #include <sys/resource.h>
 #include <unistd.h>
+
+#include "base/units.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -88,11 +89,8 @@ std::optional<std::string> place_in(const Hierarchy& hierarchy, const fs::path& 
 std::optional<std::uint64_t> number_in(const fs::path& file) {
   std::ifstream in(file);
   std::string word;
-  std::uint64_t value = 0;
-  if (!(in >> word)) return std::nullopt;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
-  return value;
+  in >> word;
+  return number_from<std::uint64_t>(word);
 }
 
 void lower(std::optional<std::uint64_t>& least, std::optional<std::uint64_t> limit) {

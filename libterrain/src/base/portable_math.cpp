@@ -76,20 +76,6 @@ double portable_exp(double x) {
   return std::ldexp(sum, static_cast<int>(k));
 }
 
-double portable_log(double x) {
-  // x = m 2^e with m from sqrt(1/2) to sqrt(2); ln m = 2 artanh(s) by its series.
-  int e = 0;
-  double m = std::frexp(x, &e);
-  if (m < 0.70710678118654752440) {
-    m += m;
-    --e;
-  }
-  const double s = (m - 1.0) / (m + 1.0), square = s * s;
-  double sum = 0;
-  for (int k = 23; k >= 3; k -= 2) sum = (sum + 1.0 / k) * square;
-  return e * kLn2High + (e * kLn2Low + 2.0 * (s + s * sum));
-}
-
 double portable_hypot(double x, double y) {
   const double squares = x * x + y * y;
   if (squares > 1e-280 && squares < 1e300) return std::sqrt(squares);

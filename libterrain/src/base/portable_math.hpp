@@ -20,8 +20,6 @@ double portable_cos_degrees(double degrees);
 double portable_exp(double x);
 /// 2^x likewise.
 double portable_exp2(double x);
-/// Natural logarithm of a positive finite number, within 1e-15 relative.
-double portable_log(double x);
 
 /// sqrt(x^2 + y^2), where the squares would overflow or vanish as well.
 double portable_hypot(double x, double y);

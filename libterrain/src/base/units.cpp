@@ -79,25 +79,19 @@ std::uint64_t parse_count(std::string_view text) {
     const double count = power < 0 ? -1 : scaled(value, 1000, power);
     if (count >= 0 && count < kTooLarge && count == std::floor(count)) {
       // A plain integer is taken digit by digit: doubles stop being exact at 2^53.
-      std::uint64_t exact = 0;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), exact);
-      if (error == std::errc{} && end == text.data() + text.size()) return exact;
-      return static_cast<std::uint64_t>(count);
+      return number_from<std::uint64_t>(text).value_or(static_cast<std::uint64_t>(count));
     }
   }
   throw UsageError("'" + std::string(text) + "' is not a count; write 250000, 10k or 2.5M");
 }
 
 ImageSize parse_size(std::string_view text) {
-  ImageSize size;
-  const char* const end = text.data() + text.size();
-  const auto [middle, first_error] = std::from_chars(text.data(), end, size.width);
-  if (first_error == std::errc{} && middle != end && (*middle == 'x' || *middle == 'X')) {
-    const auto [last, second_error] = std::from_chars(middle + 1, end, size.height);
-    if (second_error == std::errc{} && last == end && size.width > 0 && size.height > 0 &&
-        size.width <= INT32_MAX && size.height <= INT32_MAX) {
-      return size;
-    }
+  const std::size_t x = text.find_first_of("xX");
+  if (x != std::string_view::npos) {
+    const auto width = number_from<std::uint64_t>(text.substr(0, x));
+    const auto height = number_from<std::uint64_t>(text.substr(x + 1));
+    const auto good = [](auto side) { return side && *side > 0 && *side <= INT32_MAX; };
+    if (good(width) && good(height)) return {*width, *height};
   }
   throw UsageError("'" + std::string(text) + "' is not a size; write WIDTHxHEIGHT, like 1600x1200");
 }

@@ -1,12 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <charconv>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace terrace::terrain {
+
+/// The number that all of `text` is, as std::from_chars() reads it; nullopt if it is not one.
+template <class Number>
+std::optional<Number> number_from(std::string_view text) {
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
 
 /// Bytes of "256M", "2G", "4096" (K, M, G, T are powers of 1024; "MB", "MiB" mean the same; without
 /// a suffix bytes). Throws: UsageError on anything else, and beyond 2^63.

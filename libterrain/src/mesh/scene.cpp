@@ -14,14 +14,13 @@ stream::Point3 difference(const stream::Point3& a, const stream::Point3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-/// Twice the area along the normal of the triangle.
+}  // namespace
+
 stream::Point3 area_vector(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t) {
   const stream::Point3 u = difference(mesh.positions[t[1]], mesh.positions[t[0]]);
   const stream::Point3 v = difference(mesh.positions[t[2]], mesh.positions[t[0]]);
   return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
 }
-
-}  // namespace
 
 bool is_height_field(const TriangleMesh& mesh) {
   double up = 0, down = 0;

@@ -2,11 +2,15 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "terrace/terrain/triangle_mesh.hpp"
 
 namespace terrace::terrain {
+
+/// Twice the area along the normal of the triangle.
+stream::Point3 area_vector(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t);
 
 /// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
 /// the same way. False for a cloud of points.

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
+#include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
@@ -44,10 +44,7 @@ std::optional<double> number_in(std::string_view cell) {
   cell = bare(cell);
   if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
   if (cell.front() == '+') cell.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc{} || end != cell.data() + cell.size()) return std::nullopt;
-  return value;
+  return number_from<double>(cell);
 }
 
 std::string lower(std::string_view text) {

@@ -3,27 +3,86 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/tri/interpolation.hpp>
 
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "base/store_checks.hpp"
 #include "earth/crs/crs_definition.hpp"
+#include "earth/ground.hpp"
 #include "sample/raster_grid.hpp"
-#include "sample/raster_shader.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
+
+stream::Placement placement_of(const RasterGrid& grid, const stream::StoreSchema& schema,
+                               const stream::Crs& crs) {
+  stream::Placement placement = schema;
+  placement.world.xy = {grid.step_x, 0, grid.x, 0, grid.step_y, grid.y};
+  // Heights are scaled already.
+  placement.coordinates[2].scale = 1;
+  placement.coordinates[2].offset = 0;
+  placement.crs = crs;
+  // Heights keep their unit where x and y get another.
+  if (placement.crs.vertical_unit.empty()) placement.crs.vertical_unit = schema.crs.vertical_unit;
+  return placement;
+}
+
+/// Slope, aspect or hillshade of the heights around a cell, see write_raster().
+class RasterShader {
+ public:
+  /// value: any but the height. crs: of the grid.
+  RasterShader(const RasterGrid& grid, const stream::StoreSchema& schema, const stream::Crs& crs,
+               RasterValue value)
+      : value_(value), ground_(placement_of(grid, schema, crs)) {}
+
+  /// Metres per cell going east and north, and per unit of height, at a cell.
+  struct Scale {
+    double east = 1, north = 1, up = 1;
+  };
+  [[nodiscard]] Scale scale(double column, double row) const {
+    const stream::Point3 here{column, row, 0};
+    const GroundMap map = ground_.map({here, here});
+    return {map[0], -map[4], map[8]};
+  }
+
+  /// z: the middle one of 3 x 3 heights by rows that are `stride` apart. NaN: no value.
+  [[nodiscard]] double operator()(const double* z, std::ptrdiff_t stride, const Scale& s) const {
+    const double *n = z - stride, *p = z + stride;
+    const double gx =
+        s.up * ((n[1] + 2 * z[1] + p[1]) - (n[-1] + 2 * z[-1] + p[-1])) / (8 * s.east);
+    const double gy =
+        s.up * ((n[-1] + 2 * n[0] + n[1]) - (p[-1] + 2 * p[0] + p[1])) / (8 * s.north);
+    if (!(gx == gx && gy == gy && z[0] == z[0])) return NAN;
+    if (value_ == RasterValue::slope) return tri::slope_degrees({gx, gy});
+    if (value_ == RasterValue::aspect) return tri::aspect_degrees({gx, gy});
+    // Towards the light: half north-west, as high as far.
+    const double light =
+        (0.5 * gx - 0.5 * gy + std::numbers::sqrt2 / 2) / std::sqrt(1 + gx * gx + gy * gy);
+    return light <= 0 ? 1 : 1 + 254 * light;
+  }
+
+  /// What had to be assumed of units; empty if nothing.
+  [[nodiscard]] const std::string& assumption() const { return ground_.assumption(); }
+
+ private:
+  RasterValue value_;
+  Ground ground_;
+};
 
 constexpr std::int64_t kRunTile = 256;
 /// Peak bytes per cell of the tiles at work: places twice, sorting, surface, heights.

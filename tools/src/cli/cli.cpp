@@ -34,7 +34,6 @@ std::string general_help() {
       "terrace turns point sets too large for memory into a store, and serves from it any part at "
       "any\nresolution.\n\nUsage: terrace VERB [OPTIONS]\n\nVerbs:\n";
   for (const Verb& verb : verbs()) {
-    if (verb.create == nullptr) continue;
     text += "  " + verb.name + std::string(10 - std::min<std::size_t>(verb.name.size(), 9), ' ') +
             verb.brief + '\n';
   }
@@ -51,10 +50,7 @@ std::string version_text() {
 
 const Verb& find_verb(const std::string& name) {
   for (const Verb& verb : verbs()) {
-    if (verb.name == name) {
-      if (verb.create == nullptr) throw UsageError("'" + name + "' is not available yet");
-      return verb;
-    }
+    if (verb.name == name) return verb;
   }
   throw UsageError("there is no verb '" + name + "'; `terrace --help` lists them");
 }
@@ -199,9 +195,6 @@ std::string message_of(const std::exception& error) {
       (text.find("::") != std::string::npos || text.find("max_size") != std::string::npos)) {
     return "what is asked for does not fit into any memory; ask for less";
   }
-  if (dynamic_cast<const std::invalid_argument*>(&error) != nullptr) {
-    return text + "; check the values of the options (`terrace VERB --help`)";
-  }
   return text;
 }
 
@@ -219,52 +212,50 @@ double number_of_option(const std::string& name, const std::string& text,
   return value;
 }
 
+template <class Value>
+CLI::Option* add_any_number(CLI::App& app, const std::string& name, Value& value,
+                            const std::string& description, const NumberRange& range) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, range, &value](const std::string& text) {
+            value = number_of_option(name, text, range);
+          },
+          description)
+      ->type_name("NUMBER");
+}
+
 }  // namespace
 
 CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
                         const std::string& description, const NumberRange& range) {
-  return app
-      .add_option_function<std::string>(
-          name,
-          [name, range, &value](const std::string& text) {
-            value = number_of_option(name, text, range);
-          },
-          description)
-      ->default_str(number_text(value))
-      ->type_name("NUMBER");
+  return add_any_number(app, name, value, description, range)->default_str(number_text(value));
 }
 
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
                         const std::string& description, const NumberRange& range) {
-  return app
-      .add_option_function<std::string>(
-          name,
-          [name, range, &value](const std::string& text) {
-            value = number_of_option(name, text, range);
-          },
-          description)
-      ->type_name("NUMBER");
+  return add_any_number(app, name, value, description, range);
 }
 
 std::uint64_t count_of_option(const std::string& name, const std::string& text) {
   return value_of_option(name, text, parse_count);
 }
 
-void not_yet(CLI::App& app, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    app.add_option_function<std::vector<std::string>>(
-           name,
-           [name](const std::vector<std::string>&) {
-             throw UsageError(std::string("'") + name + "' is not available yet");
-           })
-        ->expected(0, 1)
-        ->trigger_on_parse()
-        ->group("");
-  }
-}
-
 CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description) {
   return app.add_option("-o,--output", target, description)->required()->type_name("FILE");
+}
+
+void add_input_format(CLI::App& app, std::string& target) {
+  app.add_option("--input-format", target,
+                 "Format of the input; else by its content, then its ending")
+      ->type_name("NAME");
+}
+
+void add_point_format(CLI::App& app, std::string& target) {
+  app.add_option(
+         "--format", target,
+         "Format of the output: xyz, csv, ply, ply-ascii, las, laz, copc; else by its ending")
+      ->type_name("NAME");
 }
 
 CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target) {
@@ -305,13 +296,10 @@ int run_command_line(int argc, const char* const* argv) {
   } catch (const std::invalid_argument& error) {  // what the libraries say of wrong parameters
     print_message(with_option_names(error.what()));
     return kWrongUsage;
-  } catch (const Interrupted& error) {
-    print_message(error.what());
-    return kInterrupted;
   } catch (const std::exception& error) {
     // A wait, read or write that Ctrl-C cut short is not a failure.
     if (interrupted()) {
-      print_message("interrupted; run the same command again to start anew");
+      print_message(kStopped);
       return kInterrupted;
     }
     print_message(with_option_names(message_of(error)));

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -41,6 +40,12 @@ struct Summary {
   void add_cost(const Stopwatch& watch);
 };
 
+/// null for nullopt.
+template <class T>
+nlohmann::ordered_json or_null(const std::optional<T>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+}
+
 /// Largest resident set of this process so far.
 std::uint64_t peak_rss_bytes();
 
@@ -69,6 +74,8 @@ struct CommonOptions {
   [[nodiscard]] terrain::Context context() const;
 };
 
+/// The memory of the program itself, of what PROJ reads to tell a CRS, and of the blocks in flight.
+inline constexpr std::uint64_t kProgramMemory = std::uint64_t{32} << 20;
 /// The memory that `synth` takes unless --memory says otherwise.
 inline constexpr std::uint64_t kStreamingMemory = std::uint64_t{256} << 20;
 
@@ -79,23 +86,20 @@ class Command {
   /// Adds the verb's own options and arguments.
   virtual void define(CLI::App& app) = 0;
   /// Does the work. Throws: UsageError for values that make no sense (exit 2), stream::Error and
-  /// other exceptions for failed work (exit 1), Interrupted (exit 130).
+  /// other exceptions for failed work (exit 1), stream::Stopped (exit 130).
   virtual Summary run(const CommonOptions& common) = 0;
 };
 
 /// A row of the table of verbs.
 struct Verb {
   std::string name;
-  std::string brief;                               ///< one line for the list of verbs
-  std::string example;                             ///< ends the verb's help
-  std::unique_ptr<Command> (*create)() = nullptr;  ///< nullptr: not available yet
+  std::string brief;    ///< one line for the list of verbs
+  std::string example;  ///< ends the verb's help
+  std::unique_ptr<Command> (*create)() = nullptr;
 };
 
-/// All verbs, including those that are not available yet.
+/// In the order of use.
 std::span<const Verb> verbs();
-
-/// Options that are not available yet: refused with exit 2, hidden from the help.
-void not_yet(CLI::App& app, std::initializer_list<const char*> names);
 
 /// The finite numbers that an option takes.
 struct NumberRange {
@@ -122,6 +126,10 @@ std::uint64_t count_of_option(const std::string& name, const std::string& text);
 /// The option -o, --output: required, kept in `target`.
 CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description);
 
+/// --input-format.
+void add_input_format(CLI::App& app, std::string& target);
+/// --format, of a file of points.
+void add_point_format(CLI::App& app, std::string& target);
 /// The option --rgb, kept in `target`.
 CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
 /// --skip-damaged, of laser data.

@@ -36,9 +36,9 @@ std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
 }
 
 std::uint64_t CommonOptions::reading_memory(std::uint64_t parts) const {
-  constexpr std::uint64_t kLeast = std::uint64_t{64} << 20, kProgram = std::uint64_t{32} << 20;
+  constexpr std::uint64_t kLeast = std::uint64_t{64} << 20;
   const std::uint64_t memory = memory_or(0);
-  return std::max(kLeast, (memory - std::min(memory, kProgram)) / parts);
+  return std::max(kLeast, (memory - std::min(memory, kProgramMemory)) / parts);
 }
 
 void CommonOptions::say(const std::string& line) const {

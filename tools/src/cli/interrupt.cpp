@@ -21,8 +21,6 @@
 namespace terrace::tools {
 namespace {
 
-constexpr const char* kStopped = "interrupted; run the same command again to start anew";
-
 volatile std::sig_atomic_t stop_requested = 0;
 /// A pipe: the signal handler writes, a thread reads and does what a handler may not.
 std::array<int, 2> wake_pipe{-1, -1};
@@ -99,7 +97,7 @@ void install_signal_handlers() {
 bool interrupted() noexcept { return stop_requested != 0; }
 
 void check_interrupt() {
-  if (interrupted()) throw Interrupted(kStopped);
+  if (interrupted()) throw stream::Stopped();
 }
 
 std::stop_token stop_token() {

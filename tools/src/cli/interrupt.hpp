@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <stdexcept>
 #include <stop_token>
 #include <string>
 
@@ -11,11 +10,8 @@
 
 namespace terrace::tools {
 
-/// Thrown where work stops because of Ctrl-C. what() says how to go on.
-class Interrupted : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+/// What the user is told who has asked to stop.
+inline constexpr const char* kStopped = "interrupted; run the same command again to start anew";
 
 /// From then on SIGINT and SIGTERM only ask to stop (the second one ends the process at once), and
 /// a closed pipe is an error of the write instead of a signal.
@@ -24,7 +20,7 @@ void install_signal_handlers();
 /// True once the user has asked to stop. Cheap; may be called from any thread.
 [[nodiscard]] bool interrupted() noexcept;
 
-/// Throws Interrupted if the user has asked to stop. Loops call it once per block.
+/// Throws stream::Stopped if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
 
 /// A store whose reading throws stream::Stopped once the user has asked to stop, or the view of it

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/option_values.hpp"
 
-#include <charconv>
 #include <cmath>
-#include <system_error>
 
 #include <nlohmann/json.hpp>
 
@@ -131,23 +129,20 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
 
 std::optional<unsigned> parse_level(const std::string& text) {
   if (text == "top") return std::nullopt;
-  unsigned level = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
-  if (error != std::errc{} || end != text.data() + text.size() || level > 255) {
+  const auto level = number_from<unsigned>(text);
+  if (!level || *level > 255) {
     throw UsageError("'" + text + "' is not a level; write a number from 0 (full detail) or 'top'");
   }
   return level;
 }
 
 stream::ClusterId parse_cluster(const std::string& text) {
-  const char* const end = text.data() + text.size();
-  unsigned level = 0;
-  std::uint64_t number = 0;
-  const auto [colon, error] = std::from_chars(text.data(), end, level);
-  if (error == std::errc{} && colon != end && *colon == ':' && level < 256) {
-    const auto [rest, wrong] = std::from_chars(colon + 1, end, number);
-    if (wrong == std::errc{} && rest == end && number < std::uint64_t{1} << 56) {
-      return stream::cluster_id(level, number);
+  const std::size_t colon = text.find(':');
+  if (colon != std::string::npos) {
+    const auto level = number_from<unsigned>(text.substr(0, colon));
+    const auto number = number_from<std::uint64_t>(text.substr(colon + 1));
+    if (level && *level < 256 && number && *number < std::uint64_t{1} << 56) {
+      return stream::cluster_id(*level, *number);
     }
   }
   throw UsageError("--cluster '" + text +
@@ -197,19 +192,11 @@ std::vector<Point2> parse_line(const std::string& text) {
 std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const std::size_t colon = text.find(':');
-  const std::string name = text.substr(0, colon);
   tri::SmoothingOptions options;
-  if (name == "laplacian") {
-    options.method = tri::Smoothing::kLaplacian;
-  } else if (name == "taubin") {
-    options.method = tri::Smoothing::kTaubin;
-  } else if (name == "bilateral") {
-    options.method = tri::Smoothing::kBilateral;
-  } else {
-    throw UsageError(
-        "--smooth is laplacian, taubin or bilateral, with :STEPS behind if wanted, not '" + text +
-        "'");
-  }
+  options.method = choice<tri::Smoothing>(text.substr(0, colon), "--smooth",
+                                          {{"laplacian", tri::Smoothing::kLaplacian},
+                                           {"taubin", tri::Smoothing::kTaubin},
+                                           {"bilateral", tri::Smoothing::kBilateral}});
   if (colon != std::string::npos) {
     const std::uint64_t steps = parse_count(text.substr(colon + 1));
     if (steps == 0 || steps > 10000) throw UsageError("--smooth takes 1 to 10000 steps");

@@ -2,7 +2,6 @@
 #include "cli/output.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -28,10 +27,8 @@ bool is_number_of_ours(std::string_view cell) {
     return digits.size() == 1 || digits.front() != '0';
   }
   if (digits == "nan" || digits == "inf") return true;
-  double value = 0.0;
-  const char* end = cell.data() + cell.size();
-  const auto read = std::from_chars(cell.data(), end, value);
-  return read.ec == std::errc{} && read.ptr == end && number_text(value) == cell;
+  const auto value = number_from<double>(cell);
+  return value && number_text(*value) == cell;
 }
 
 /// Recognises a table of ours by its first line, or else line by line.
@@ -145,13 +142,11 @@ bool may_replace(const std::string& path, bool force) {
 
 stream::WriterOptions point_writer_options(const std::string& path, const std::string& format,
                                            const CommonOptions& common) {
-  // The program itself, PROJ's database, and the blocks in flight.
-  constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
   const std::uint64_t memory = common.memory_or(0);
   return {.format = format,
           .replace = may_replace(path, common.force),
           .stop = stop_token(),
-          .memory_bytes = memory - std::min(memory, kBeside),
+          .memory_bytes = memory - std::min(memory, kProgramMemory),
           .threads = common.threads};
 }
 

@@ -12,41 +12,51 @@
 
 namespace terrace::tools {
 
-Transformation CrsOptions::change(const stream::Store& store, const std::string& named,
-                                  const CommonOptions& common) const {
-  Transformation change = transformation_to(store, named, parse_datum_shift(shift_));
+std::optional<Transformation> CrsOptions::given(const stream::Store& store,
+                                                const CommonOptions& common) const {
+  if (given_.empty()) return std::nullopt;
+  Transformation change = transformation_to(store, given_, parse_datum_shift(shift_));
   if (!change.note().empty()) common.say(change.note());
   return change;
 }
 
 RegionConversion CrsOptions::regions(const stream::Store& store,
                                      const CommonOptions& common) const {
-  if (region_.empty()) return {};
-  return RegionConversion(store, change(store, region_, common));
+  std::optional<Transformation> change = given(store, common);
+  return change ? RegionConversion(store, std::move(*change)) : RegionConversion();
 }
 
 PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {
-  if (to_.empty()) return {};
-  return PlaceConversion(change(store, to_, common));
+  std::optional<Transformation> change = to(store, common);
+  return change ? PlaceConversion(std::move(*change)) : PlaceConversion();
+}
+
+std::optional<Transformation> CrsOptions::written(
+    const stream::Store& store, const CommonOptions& common,
+    const std::optional<Transformation>& given) const {
+  if (to_.empty()) return std::nullopt;
+  Transformation to = transformation_to(store, to_, parse_datum_shift(shift_));
+  if (given) to = Transformation(given->to(), to.to());
+  if (!to.note().empty()) common.say(to.note());
+  return to;
 }
 
 std::optional<Transformation> CrsOptions::to(const stream::Store& store,
                                              const CommonOptions& common) const {
-  if (to_.empty()) return std::nullopt;
-  Transformation to = change(store, to_, common);
-  if (to.identity()) return std::nullopt;
+  std::optional<Transformation> to = written(store, common);
+  if (to && to->identity()) to.reset();
   return to;
 }
 
-void CrsOptions::define(CLI::App& app) {
-  define_region(app);
+void CrsOptions::define(CLI::App& app, const std::string& name, const std::string& given) {
+  define_given(app, name, given);
   app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
 }
 
-void CrsOptions::define_region(CLI::App& app) {
-  app.add_option("--region-crs", region_,
-                 "the CRS of regions and focuses (EPSG:n or a WKT file; x,y is lon,lat), if it is "
-                 "not the store's");
+void CrsOptions::define_given(CLI::App& app, const std::string& name, const std::string& given) {
+  app.add_option(
+      name, given_,
+      "the CRS of " + given + " (EPSG:n or a WKT file; x,y is lon,lat), if it is not the store's");
   app.add_option("--towgs84", shift_,
                  "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
                  "if it is another");

@@ -25,25 +25,33 @@ struct CommonOptions;
 
 using namespace terrain;
 
-/// --region-crs, --to-crs and --towgs84.
+/// The CRS of what is given (--region-crs unless named otherwise), --to-crs and --towgs84.
 class CrsOptions {
  public:
-  void define(CLI::App& app);
+  /// given: as in "the CRS of regions".
+  void define(CLI::App& app, const std::string& name = "--region-crs",
+              const std::string& given = "regions and focuses");
   /// Without --to-crs.
-  void define_region(CLI::App& app);
+  void define_given(CLI::App& app, const std::string& name = "--region-crs",
+                    const std::string& given = "regions and focuses");
   /// Each reports the operation that it uses between datums. Throws: as transformation_to.
+  /// To the CRS of what is given; nullopt if none is named.
+  [[nodiscard]] std::optional<Transformation> given(const stream::Store& store,
+                                                    const CommonOptions& common) const;
   [[nodiscard]] RegionConversion regions(const stream::Store& store,
                                          const CommonOptions& common) const;
   [[nodiscard]] PlaceConversion places(const stream::Store& store,
                                        const CommonOptions& common) const;
-  /// To --to-crs; nullopt without it, or if it is the store's.
+  /// To --to-crs, from `given` or else from the store's CRS; nullopt without --to-crs.
+  [[nodiscard]] std::optional<Transformation> written(
+      const stream::Store& store, const CommonOptions& common,
+      const std::optional<Transformation>& given = {}) const;
+  /// To --to-crs from the store's CRS; nullopt also if both are the same.
   [[nodiscard]] std::optional<Transformation> to(const stream::Store& store,
                                                  const CommonOptions& common) const;
 
  private:
-  [[nodiscard]] Transformation change(const stream::Store& store, const std::string& named,
-                                      const CommonOptions& common) const;
-  std::string region_, to_, shift_;
+  std::string given_, to_, shift_;
 };
 
 /// Which part of a store at which detail: the store, --level, --region, --focus, --cluster, --where

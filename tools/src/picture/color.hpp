@@ -10,6 +10,12 @@ namespace terrace::tools {
 /// Red, green and blue of 255.
 using Rgb = std::array<std::uint8_t, 3>;
 
+/// Red, green and blue of 1.
+inline std::array<float, 3> as_floats(const Rgb& colour) {
+  return {static_cast<float>(colour[0]) / 255.0F, static_cast<float>(colour[1]) / 255.0F,
+          static_cast<float>(colour[2]) / 255.0F};
+}
+
 /// Hypsometric tint: deep to high land as green, straw, brown, grey, white. share: 0 lowest, 1
 /// highest; clamped.
 Rgb land_colour(double share);

@@ -58,9 +58,7 @@ void fill(double x0, double y0, double x1, double y1, const Rgb& rgb, Canvas& ca
   const auto bottom = static_cast<std::uint32_t>(std::clamp(y1, 0.0, canvas.height() - 1.0));
   for (std::uint32_t y = top; y <= bottom; ++y) {
     for (std::uint32_t x = left; x <= right; ++x) {
-      canvas.colour(x, y) = {static_cast<float>(rgb[0]) / 255.0F,
-                             static_cast<float>(rgb[1]) / 255.0F,
-                             static_cast<float>(rgb[2]) / 255.0F};
+      canvas.colour(x, y) = as_floats(rgb);
       canvas.depth(x, y) = 0.0F;
     }
   }

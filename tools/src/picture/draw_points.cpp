@@ -229,9 +229,8 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
         const auto& n = cloud.normals[i];
         shade = light.shade({n[0], n[1], n[2]}, camera.toward);
       }
-      const std::array<float, 3> colour{static_cast<float>(colours[i][0]) / 255.0F * shade,
-                                        static_cast<float>(colours[i][1]) / 255.0F * shade,
-                                        static_cast<float>(colours[i][2]) / 255.0F * shade};
+      std::array<float, 3> colour = as_floats(colours[i]);
+      for (float& c : colour) c *= shade;
       for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
         for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
           const float dx = static_cast<float>(x) + 0.5F - s.x;

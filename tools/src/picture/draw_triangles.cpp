@@ -86,11 +86,6 @@ void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_r
   }
 }
 
-std::array<float, 3> as_floats(const Rgb& colour) {
-  return {static_cast<float>(colour[0]) / 255.0F, static_cast<float>(colour[1]) / 255.0F,
-          static_cast<float>(colour[2]) / 255.0F};
-}
-
 }  // namespace
 
 void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, const Camera& camera,
@@ -118,13 +113,7 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
         corners[k] = {.p = vertices[t[k]], .colour = as_floats(colours[t[k]])};
       }
       if (options.wire) {
-        const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
-                             &c = mesh.positions[t[2]];
-        const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-        const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        const float shade = light.shade(
-            unit({u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]}),
-            camera.toward);
+        const float shade = light.shade(unit(area_vector(mesh, t)), camera.toward);
         for (ScreenCorner& corner : corners) corner.p.shade = shade;
       }
       fill(corners, options.wire, first_row, last_row, canvas);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "scan/criterion.hpp"
 
-#include <charconv>
 #include <cmath>
 
+#include "base/units.hpp"
 #include "scan/cgal_surface.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -13,14 +13,6 @@ namespace {
 /// Memory of CGAL's triangulation.
 constexpr std::uint64_t kCgalBytesPerPoint = 1200;
 
-std::optional<double> positive_number(const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  if (!(value > 0.0) || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 }  // namespace
 
 ScanSurfaceOptions parse_criterion(const std::string& text) {
@@ -29,8 +21,9 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
   ScanSurfaceOptions options;
   std::optional<double> value;
   if (colon != std::string::npos) {
-    value = positive_number(text.substr(colon + 1));
-    if (!value) throw UsageError("--criterion: a positive number must follow '" + name + ":'");
+    value = number_from<double>(text.substr(colon + 1));
+    if (!value || !(*value > 0.0) || !std::isfinite(*value))
+      throw UsageError("--criterion: a positive number must follow '" + name + ":'");
   }
   tri::ShapeOptions& shape = options.restore.shape;
   if (name == "poles" && !value) {

@@ -40,7 +40,7 @@ stream::Point3 random_direction(std::uint64_t seed, std::uint64_t n) {
   return v;
 }
 
-class CloudSurface : public Cloud {
+class CloudSurface {
  public:
   CloudSurface(std::uint64_t points, std::uint64_t seed) : seed_(seed) {
     for (std::size_t i = 0; i < waves_.size(); ++i) {
@@ -56,7 +56,7 @@ class CloudSurface : public Cloud {
     while (lay_swaths() < points) spacing_ *= 0.999;
   }
 
-  [[nodiscard]] stream::Point3 at(std::uint64_t n) const override {
+  stream::Point3 operator()(std::uint64_t n) const {
     const auto next = std::upper_bound(swaths_.begin(), swaths_.end(), n,
                                        [](std::uint64_t v, const Swath& s) { return v < s.first; });
     const Swath& swath = *(next - 1);
@@ -127,51 +127,34 @@ class CloudSurface : public Cloud {
 
 constexpr double kMillionths = 1e6;
 
-class Uniform : public Cloud {
- public:
-  explicit Uniform(std::uint64_t seed) : seed_(seed) {}
-  [[nodiscard]] stream::Point3 at(std::uint64_t n) const override {
-    return {rounded(random_unit(seed_, n, 0), kMillionths),
-            rounded(random_unit(seed_, n, 1), kMillionths),
-            rounded(random_unit(seed_, n, 2), kMillionths)};
-  }
+}  // namespace
 
- private:
-  std::uint64_t seed_;
-};
+Cloud surface_cloud(std::uint64_t points, std::uint64_t seed) { return CloudSurface(points, seed); }
 
-class Clusters : public Cloud {
- public:
-  Clusters(std::uint64_t points, std::uint64_t seed) : seed_(seed) {
-    const std::uint64_t blobs = std::max<std::uint64_t>(1, points / 1000);
-    per_blob_ = (points + blobs - 1) / blobs;
-  }
-  [[nodiscard]] stream::Point3 at(std::uint64_t n) const override {
-    const std::uint64_t blob = per_blob_ == 0 ? 0 : n / per_blob_;
-    const double deviation = 0.002 + 0.02 * random_unit(scramble(seed_), blob, 3);
+Cloud uniform_cloud(std::uint64_t seed) {
+  return [seed](std::uint64_t n) -> stream::Point3 {
+    return {rounded(random_unit(seed, n, 0), kMillionths),
+            rounded(random_unit(seed, n, 1), kMillionths),
+            rounded(random_unit(seed, n, 2), kMillionths)};
+  };
+}
+
+Cloud cluster_cloud(std::uint64_t points, std::uint64_t seed) {
+  const std::uint64_t blobs = std::max<std::uint64_t>(1, points / 1000);
+  const std::uint64_t per_blob = std::max<std::uint64_t>(1, (points + blobs - 1) / blobs);
+  return [seed, per_blob](std::uint64_t n) {
+    const std::uint64_t blob = n / per_blob;
+    const double deviation = 0.002 + 0.02 * random_unit(scramble(seed), blob, 3);
     stream::Point3 p{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       // The sum of twelve uniform numbers less 6: variance 1, and within 1 % of the normal density
       // where that matters.
       double sum = -6;
-      for (std::uint64_t k = 0; k < 12; ++k) sum += random_unit(seed_, n, axis * 12 + k);
-      p[axis] = rounded(random_unit(scramble(seed_), blob, axis) + deviation * sum, kMillionths);
+      for (std::uint64_t k = 0; k < 12; ++k) sum += random_unit(seed, n, axis * 12 + k);
+      p[axis] = rounded(random_unit(scramble(seed), blob, axis) + deviation * sum, kMillionths);
     }
     return p;
-  }
-
- private:
-  std::uint64_t seed_, per_blob_ = 1;
-};
-
-}  // namespace
-
-std::unique_ptr<Cloud> make_surface(std::uint64_t points, std::uint64_t seed) {
-  return std::make_unique<CloudSurface>(points, seed);
-}
-std::unique_ptr<Cloud> make_uniform(std::uint64_t seed) { return std::make_unique<Uniform>(seed); }
-std::unique_ptr<Cloud> make_clusters(std::uint64_t points, std::uint64_t seed) {
-  return std::make_unique<Clusters>(points, seed);
+  };
 }
 
 Permutation::Permutation(std::uint64_t size, std::uint64_t seed)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,23 +11,19 @@
 
 namespace terrace::tools {
 
-/// A synthetic cloud: the n-th point is a function of n and the seed alone, so points can be made
+/// A synthetic cloud: its n-th point, which depends on n and the seed alone, so points can be made
 /// in any order and by any number of threads. Coordinates are whole multiples of a unit (1 mm or
 /// 10^-6), as the decimals of real scans are. The same doubles on every machine.
-class Cloud {
- public:
-  virtual ~Cloud() = default;
-  [[nodiscard]] virtual stream::Point3 at(std::uint64_t n) const = 0;
-};
+using Cloud = std::function<stream::Point3(std::uint64_t n)>;
 
 /// A scan of a bumpy closed surface of about 100 m radius: swaths of 500 points across, line by
 /// line around the body, each swath nearer to the other pole.
-std::unique_ptr<Cloud> make_surface(std::uint64_t points, std::uint64_t seed);
+Cloud surface_cloud(std::uint64_t points, std::uint64_t seed);
 /// Uniform random points in the unit cube.
-std::unique_ptr<Cloud> make_uniform(std::uint64_t seed);
+Cloud uniform_cloud(std::uint64_t seed);
 /// Blobs of about 1000 points with bell-shaped density, one after the other, of
 /// different sizes, with random centres in the unit cube.
-std::unique_ptr<Cloud> make_clusters(std::uint64_t points, std::uint64_t seed);
+Cloud cluster_cloud(std::uint64_t points, std::uint64_t seed);
 
 /// A shuffled order of 0 ... size - 1 that needs no memory: a Feistel cipher on the next even
 /// number of bits, walked until it falls below size (J. Black, P. Rogaway, Ciphers with Arbitrary

@@ -39,7 +39,7 @@ struct SynthDemResult {
 /// stay; int16 heights never overflow: a roughness that could make them is refused.
 /// A raster of at most 2^22 cells is measured first and its roughness set right; larger ones have
 /// it within 1 % by the law of large numbers. progress(cells done) is called now and then, by any
-/// thread, one at a time. Throws: UsageError, stream::Error, Interrupted.
+/// thread, one at a time. Throws: UsageError, stream::Error, stream::Stopped.
 SynthDemResult write_synth_dem(const std::string& path, const SynthDemOptions& options,
                                const std::function<void(std::uint64_t)>& progress);
 

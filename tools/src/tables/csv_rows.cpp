@@ -29,32 +29,25 @@ std::optional<CsvRows> CsvRows::open(const std::string& path, std::string_view h
   return line == header ? std::optional(std::move(rows)) : std::nullopt;
 }
 
-bool CsvRows::read_line() {
-  line_.resize(kLongestLine);
-  stream_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
-  const auto taken = static_cast<std::size_t>(stream_.gcount());
-  if (stream_.fail()) {
-    if (stream_.eof() || stream_.bad()) return false;
-    ++number_;
-    throw stream::Error({.file = path_,
-                         .where = where(),
-                         .cause = "is longer than any row",
-                         .remedy = "rows are a few numbers with commas"});
-  }
-  ++number_;
-  // The line's end is counted too, where there is one.
-  line_.resize(stream_.eof() ? taken : taken - 1);
-  if (line_.ends_with('\r')) line_.pop_back();
-  return true;
-}
-
 bool CsvRows::next(std::string_view& line) {
-  while (read_line()) {
-    if (line_.empty()) continue;
-    line = line_;
-    return true;
-  }
-  return false;
+  do {
+    line_.resize(kLongestLine);
+    stream_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
+    const auto taken = static_cast<std::size_t>(stream_.gcount());
+    if (stream_.fail() && (stream_.eof() || stream_.bad())) return false;
+    ++number_;
+    if (stream_.fail()) {
+      throw stream::Error({.file = path_,
+                           .where = where(),
+                           .cause = "is longer than any row",
+                           .remedy = "rows are a few numbers with commas"});
+    }
+    // The line's end is counted too, where there is one.
+    line_.resize(stream_.eof() ? taken : taken - 1);
+    if (line_.ends_with('\r')) line_.pop_back();
+  } while (line_.empty());
+  line = line_;
+  return true;
 }
 
 }  // namespace terrace::tools

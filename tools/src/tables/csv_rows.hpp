@@ -25,7 +25,6 @@ class CsvRows {
  private:
   CsvRows(std::string path, std::ifstream stream)
       : path_(std::move(path)), stream_(std::move(stream)) {}
-  bool read_line();
 
   std::string path_;
   std::ifstream stream_;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tables/label_file.hpp"
 
-#include <charconv>
 #include <fstream>
 
 #include "base/units.hpp"
@@ -32,10 +31,8 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     if (labels.size() % 65536 == 0) check_interrupt();
     if (!line.empty() && line.back() == '\r') line.pop_back();
     const std::string where = "line " + std::to_string(labels.size() + 1);
-    std::uint32_t label = kNoCluster;
-    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), label);
-    const bool number = error == std::errc() && end == line.data() + line.size();
-    if ((!number || label == kNoCluster) && line != "-1") {
+    const std::uint32_t label = number_from<std::uint32_t>(line).value_or(kNoCluster);
+    if (label == kNoCluster && line != "-1") {
       throw stream::Error({.file = path,
                            .where = where,
                            .cause = "'" + line.substr(0, 40) + "' is not a cluster number",

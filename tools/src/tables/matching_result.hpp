@@ -46,7 +46,7 @@ struct MatchingPicture {
   void keep_levels(const std::string& level);
 };
 
-/// Reads the result and its points' file. Throws: stream::Error, Interrupted.
+/// Reads the result and its points' file. Throws: stream::Error, stream::Stopped.
 MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
                                       const CommonOptions& common);
 

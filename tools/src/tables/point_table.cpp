@@ -32,17 +32,10 @@ std::vector<double> PointTable::column(const std::string& name) const {
                    (known.empty() ? ": they have none but x, y and z" : "; there are: " + known));
 }
 
-namespace {
-
-/// The program itself, what PROJ reads to tell the CRS, and the blocks that are read ahead.
-constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
-
-}  // namespace
-
 void writing_within_memory(const stream::PointWriter& writer, const std::string& file,
                            std::uint64_t memory_bytes, std::uint64_t reading) {
   const std::uint64_t writing = writer.writing_bytes();
-  const std::uint64_t needed = kBeside + reading + writing;
+  const std::uint64_t needed = kProgramMemory + reading + writing;
   if (writing == 0 || needed <= memory_bytes) return;
   throw stream::Error({.file = file,
                        .where = {},
@@ -54,15 +47,27 @@ void writing_within_memory(const stream::PointWriter& writer, const std::string&
 
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
   const std::uint64_t reading = source.reading_bytes();
-  if (reading == 0 || kBeside + reading <= memory_bytes) return reading;
+  if (reading == 0 || kProgramMemory + reading <= memory_bytes) return reading;
   throw stream::Error(
       {.file = source.info().files.front(),
        .where = {},
-       .cause = "reading it needs " + std::to_string(((kBeside + reading) >> 20) + 1) +
+       .cause = "reading it needs " + std::to_string(((kProgramMemory + reading) >> 20) + 1) +
                 "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) + "M",
        .remedy = source.info().grid ? "raise --memory, or rewrite large strips and tiles as small "
                                       "tiles: gdal_translate -co TILED=YES"
                                     : "raise --memory"});
+}
+
+void for_each_block(stream::PointSource& source, const CommonOptions& common,
+                    const std::function<void(stream::PointBlock&)>& take) {
+  ProgressMeter meter(common.progress, "points");
+  stream::PointBlock block;
+  while (source.next(block)) {
+    check_interrupt();
+    take(block);
+    const stream::Progress progress = source.progress();
+    meter.update(progress.points, progress.fraction);
+  }
 }
 
 PointTable read_point_table(const std::string& file, const std::string& format,
@@ -78,10 +83,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   PointTable table;
   table.info = source->info();
   const std::size_t bytes_per_point = sizeof(stream::Point3) + table.info.payload_size();
-  ProgressMeter meter(common.progress, "points");
-  stream::PointBlock block;
-  while (source->next(block)) {
-    check_interrupt();
+  for_each_block(*source, common, [&](stream::PointBlock& block) {
     stream::to_world(table.info, block);
     // A growing vector exists twice for a moment.
     if (2 * bytes_per_point * (table.size() + block.size()) > memory_bytes - reading) {
@@ -94,9 +96,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     }
     table.positions.insert(table.positions.end(), block.positions.begin(), block.positions.end());
     table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());
-    const stream::Progress progress = source->progress();
-    meter.update(progress.points, progress.fraction);
-  }
+  });
   table.nodata = source->progress().nodata;
   if (table.positions.empty()) {
     throw stream::Error({.file = file,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,11 @@ struct PointTable {
   [[nodiscard]] std::vector<double> column(const std::string& name) const;
 };
 
+/// Reads a source to its end and shows the progress. Throws: stream::Error, stream::Stopped, what
+/// `take` throws.
+void for_each_block(stream::PointSource& source, const CommonOptions& common,
+                    const std::function<void(stream::PointBlock&)>& take);
+
 /// The memory that reading the source takes. Throws: stream::Error if it is more than memory_bytes,
 /// saying what it needs.
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes);
@@ -37,7 +43,7 @@ void writing_within_memory(const stream::PointWriter& writer, const std::string&
                            std::uint64_t memory_bytes, std::uint64_t reading = 0);
 
 /// Throws: stream::Error on bad data, on no points, and if the points take more than memory_bytes;
-/// Interrupted.
+/// stream::Stopped.
 PointTable read_point_table(const std::string& file, const std::string& format,
                             std::uint64_t memory_bytes, const CommonOptions& common,
                             stream::Entities entities = stream::Entities::points);

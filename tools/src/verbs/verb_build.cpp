@@ -50,8 +50,7 @@ class BuildCommand final : public Command {
            "line, or a pattern in quotes; - is standard input")
         ->required();
     add_output(app, output_, "the store to write");
-    app.add_option("--input-format", request_.input_format,
-                   "format of the input; else by its content, then its ending");
+    add_input_format(app, request_.input_format);
     app.add_option(
            "--entities", entities_,
            "what is read and clustered: points; the triangles of a mesh (OBJ, OFF, PLY, "
@@ -105,7 +104,6 @@ class BuildCommand final : public Command {
         ->check(CLI::IsMember({"auto", "stream", "spatial"}))
         ->capture_default_str();
     app.add_flag("--dry-run", dry_run_, "only estimate points, disk and time, from a trial");
-    not_yet(app, {"--resume", "--append"});
   }
 
   Summary run(const CommonOptions& common) override {

@@ -144,16 +144,12 @@ void no_channels(const FacilityPoints& problem, const char* method) {
 
 /// Steps towards the lower bound: as many as requested, else some seconds' worth, as a step looks
 /// at a few clusters' worth of points around each point.
-std::uint32_t bound_steps(const ClusterRequest& request, double points, double clusters) {
-  if (request.bound_iterations) return *request.bound_iterations;
-  const double distances = 4.0 * points * points / clusters;
-  return static_cast<std::uint32_t>(std::clamp(3e9 / distances, 15.0, 300.0));
-}
-
 double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
                 const FacilitySolution& solution, const ClusterProgress& progress) {
-  const std::uint32_t steps = bound_steps(request, static_cast<double>(problem.points.size()),
-                                          static_cast<double>(solution.facilities.size()));
+  const auto points = static_cast<double>(problem.points.size());
+  const double distances = 4.0 * points * points / static_cast<double>(solution.facilities.size());
+  const std::uint32_t steps = request.bound_iterations.value_or(
+      static_cast<std::uint32_t>(std::clamp(3e9 / distances, 15.0, 300.0)));
   if (steps == 0) return 0.0;
   cluster::LowerBoundOptions options;
   options.steps = steps;
@@ -385,7 +381,7 @@ ChannelTable read_channels(const PointTable& table, const std::vector<std::strin
 
 /// The table with two more columns, `cluster` and `representative` (the number of the point that
 /// stands for the cluster), both -1 for outliers; columns of these names are replaced.
-/// Throws: stream::Error, Interrupted.
+/// Throws: stream::Error, stream::Stopped.
 void write_clustered(const std::string& path, stream::WriterOptions writing,
                      const PointTable& table, const ClusterOutcome& outcome,
                      std::uint64_t memory_bytes) {
@@ -444,9 +440,6 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
   const auto rounded = [](double value) { return readable_number(value, 6); };
   const auto outliers = static_cast<std::size_t>(
       std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
-  const auto number = [](const std::optional<double>& value) -> nlohmann::ordered_json {
-    return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
-  };
   std::optional<double> cost;
   if (outcome.connection_cost) {
     cost = *outcome.connection_cost + outcome.opening_cost.value_or(0.0) +
@@ -460,12 +453,12 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
   summary.json = {{"points", points},
                   {"clusters", outcome.representatives.size()},
                   {"outliers", outliers},
-                  {"cost", number(cost)},
-                  {"opening_cost", number(outcome.opening_cost)},
-                  {"connection_cost", number(outcome.connection_cost)},
-                  {"outlier_cost", number(outcome.outlier_cost)},
-                  {"lower_bound", number(outcome.lower_bound)},
-                  {"gap", number(gap)}};
+                  {"cost", or_null(cost)},
+                  {"opening_cost", or_null(outcome.opening_cost)},
+                  {"connection_cost", or_null(outcome.connection_cost)},
+                  {"outlier_cost", or_null(outcome.outlier_cost)},
+                  {"lower_bound", or_null(outcome.lower_bound)},
+                  {"gap", or_null(gap)}};
   summary.add_cost(watch);
   std::string& text = summary.text;
   text = with_commas(points) + " points, ";
@@ -507,13 +500,8 @@ class ClusterCommand final : public Command {
     app.add_option("--dendrogram", dendrogram_,
                    "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
         ->type_name("FILE.csv");
-    app.add_option(
-           "--format", format_,
-           "Format of the output: xyz, csv, ply, ply-ascii, las, laz, copc; else by its ending")
-        ->type_name("NAME");
-    app.add_option("--input-format", input_format_,
-                   "Format of the input; else by its content, then its ending")
-        ->type_name("NAME");
+    add_point_format(app, format_);
+    add_input_format(app, input_format_);
     app.add_option("--method", method_,
                    "facility, primal-dual, k-means, k-median, single or complete")
         ->capture_default_str()

@@ -34,7 +34,7 @@ class ContourCommand final : public Command {
     app.add_flag("--own-crs", request_.own_crs,
                  "x and y of the store's own CRS, also of one that is not known, instead of "
                  "longitude and latitude");
-    crs_.define_region(app);
+    crs_.define_given(app);
   }
 
   Summary run(const CommonOptions& common) override {

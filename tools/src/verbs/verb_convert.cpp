@@ -35,13 +35,8 @@ class ConvertCommand : public Command {
            "them, @FILE with a name a line, or a pattern in quotes; - is standard input")
         ->required();
     add_output(app, output_, "The file to write; - is standard output");
-    app.add_option(
-           "--format", format_,
-           "Format of the output: xyz, csv, ply, ply-ascii, las, laz, copc; else by its ending")
-        ->type_name("NAME");
-    app.add_option("--input-format", input_format_,
-                   "Format of the input; else by its content, then its ending")
-        ->type_name("NAME");
+    add_point_format(app, format_);
+    add_input_format(app, input_format_);
     selection_.define(app);
     add_skip_damaged(app, skip_damaged_);
     add_heights_of_colour(app, colours_);
@@ -73,17 +68,10 @@ class ConvertCommand : public Command {
                                                    .lattice = lattice_of(info)},
                                                   writing);
     writing_within_memory(*writer, output_, memory, held);
-    {
-      ProgressMeter meter(common.progress, "points");
-      stream::PointBlock block;
-      while (source->next(block)) {
-        check_interrupt();
-        stream::to_world(info, block);
-        writer->append(block);
-        const stream::Progress progress = source->progress();
-        meter.update(progress.points, progress.fraction);
-      }
-    }
+    for_each_block(*source, common, [&](stream::PointBlock& block) {
+      stream::to_world(info, block);
+      writer->append(block);
+    });
     writer->finish();
     tell_spooled(info, common.context());
     damage.tell(common.context());

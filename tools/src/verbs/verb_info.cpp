@@ -179,19 +179,14 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
   const bool upright = info.world.xy[1] == 0 && info.world.xy[3] == 0;
   Contents contents;
   Sum heights;
-  ProgressMeter meter(common.progress, "points");
-  stream::PointBlock block;
-  while (source.next(block)) {
-    check_interrupt();
+  for_each_block(source, common, [&](const stream::PointBlock& block) {
     for (const stream::Point3& p : block.positions) {
       contents.stored.include(p);
       heights.add(p[2]);
       if (!upright) contents.world.include(world_point(placement, p));
     }
     contents.points += block.size();
-    const stream::Progress progress = source.progress();
-    meter.update(progress.points, progress.fraction);
-  }
+  });
   contents.nodata = source.progress().nodata;
   contents.withheld = source.progress().withheld;
   if (upright) contents.world = world_box(placement, contents.stored);
@@ -282,7 +277,7 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
   json["levels"] = Json::array();
   const std::string vertical = crs.heights == Heights::unknown ? "" : name_of(crs.heights);
   add_placement(info, contents.world, crs.crs, vertical, json);
-  if (info.grid) json["nodata_value"] = info.nodata ? Json(*info.nodata) : Json(nullptr);
+  if (info.grid) json["nodata_value"] = or_null(info.nodata);
   json["height"] = nullptr;
   if (contents.points > 0) {
     const auto [low, high] =

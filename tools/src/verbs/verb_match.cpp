@@ -5,9 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -199,9 +197,7 @@ class MatchCommand final : public Command {
                "The pairs, rows a,b,distance: numbers of points in the order of the input, from 0, "
                "and metres; with --tree rows a,b,distance,size,level, of triangles with the box of "
                "what is below: minx,miny,minz,maxx,maxy,maxz; - is standard output");
-    app.add_option("--input-format", input_format_,
-                   "Format of the input; else by its content, then its ending")
-        ->type_name("NAME");
+    add_input_format(app, input_format_);
     app.add_option("--method", method_,
                    "auto: the optimum up to half a million points, beyond it clusters first, then "
                    "windows, with a proven bound; exact: the optimum; monotone: repeated halving, "
@@ -289,9 +285,7 @@ class MatchCommand final : public Command {
                                           {"exact", MatchMethod::exact},
                                           {"monotone", MatchMethod::monotone},
                                           {"monte-carlo", MatchMethod::monte_carlo}});
-    const bool halving =
-        request.method == MatchMethod::monotone || request.method == MatchMethod::monte_carlo;
-    if (!halving && (!iterations_.empty() || seconds_)) {
+    if (!halves(request.method) && (!iterations_.empty() || seconds_)) {
       throw UsageError("--iterations and --seconds are for --method monotone and monte-carlo");
     }
     if (!labels_.empty() && !tree_ && request.method != MatchMethod::automatic) {
@@ -384,8 +378,7 @@ class MatchCommand final : public Command {
                     {"clusters", outcome.clusters}};
     summary.json["left_over"] = nullptr;
     if (odd) summary.json["left_over"] = alone - outcome.mate.begin();
-    summary.json["lower_bound"] = nullptr;
-    if (outcome.lower_bound) summary.json["lower_bound"] = *outcome.lower_bound;
+    summary.json["lower_bound"] = or_null(outcome.lower_bound);
     summary.text =
         with_commas(pairs) + " pairs, total distance " + readable_number(outcome.cost, 6);
     summary.text += guarantee(outcome);

@@ -92,7 +92,6 @@ class MeshCommand final : public Command {
                    "(holes), flat (at the lowest height), interpolate")
         ->capture_default_str()
         ->type_name("NAME");
-    not_yet(app, {"--base"});
   }
 
   Summary run(const CommonOptions& common) override {

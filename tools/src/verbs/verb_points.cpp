@@ -132,7 +132,6 @@ class PointsCommand final : public Command {
         ->type_name("FILE")
         ->excludes("--near")
         ->excludes("--cluster");
-    not_yet(app, {"--max-points"});
   }
 
   Summary run(const CommonOptions& common) override {

@@ -27,6 +27,7 @@
 #include "picture/draw.hpp"
 #include "tables/dendrogram_file.hpp"
 #include "tables/matching_result.hpp"
+#include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/png.hpp"
@@ -117,10 +118,7 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
   PictureInput input;
   std::optional<HeightGrid> grid;
   if (info.grid) grid.emplace(info.columns, info.rows, most_cells);
-  ProgressMeter meter(common.progress, "points");
-  stream::PointBlock block;
-  while (source->next(block)) {
-    check_interrupt();
+  for_each_block(*source, common, [&](const stream::PointBlock& block) {
     if (grid) {
       for (const stream::Point3& p : block.positions) grid->add(p);
     } else {
@@ -133,9 +131,7 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
              .remedy = "build a store and render that, or raise --memory"});
       }
     }
-    const stream::Progress progress = source->progress();
-    meter.update(progress.points, progress.fraction);
-  }
+  });
   if (grid) {
     input.mesh = grid->mesh();
     input.terrain = true;
@@ -238,7 +234,7 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
 }
 
 /// Reads a store, a raster (reduced to about four cells per pixel), a mesh, or a cloud of points.
-/// Throws: stream::Error, UsageError, Interrupted.
+/// Throws: stream::Error, UsageError, stream::Stopped.
 PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
                                 const ImageSize& size, const CommonOptions& common) {
   const std::uint64_t most_cells = 2 * size.width * size.height;
@@ -266,15 +262,11 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
 double rms_slope(const TriangleMesh& mesh) {
   double sum = 0, area = 0;
   for (const auto& t : mesh.triangles) {
-    const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
-                         &c = mesh.positions[t[2]];
-    const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    const double nx = u[1] * v[2] - u[2] * v[1], ny = u[2] * v[0] - u[0] * v[2];
-    const double nz = std::abs(u[0] * v[1] - u[1] * v[0]);
-    if (nz <= 0) continue;
-    sum += (nx * nx + ny * ny) / nz;
-    area += nz;
+    const stream::Point3 n = area_vector(mesh, t);
+    const double flat = std::abs(n[2]);
+    if (flat <= 0) continue;
+    sum += (n[0] * n[0] + n[1] * n[1]) / flat;
+    area += flat;
   }
   return area > 0 ? std::sqrt(sum / area) : 0;
 }

@@ -36,14 +36,7 @@ class SampleCommand final : public Command {
                    "no data")
         ->capture_default_str()
         ->type_name("FILE");
-    app.add_option("--points-crs", points_crs_,
-                   "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
-                   "store's");
-    app.add_option("--to-crs", to_crs_, "the CRS of the places in what is written");
-    app.add_option(
-        "--towgs84", shift_,
-        "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
-        "if it is another");
+    crs_.define(app, "--points-crs", "the places");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -80,26 +73,20 @@ class SampleCommand final : public Command {
   [[nodiscard]] PlaceConversions conversions_for(const stream::Store& store,
                                                  const CommonOptions& common) const {
     PlaceConversions conversions;
-    std::optional<CoordinateSystem> from;
-    if (!points_crs_.empty()) {
-      const Transformation change =
-          transformation_to(store, points_crs_, parse_datum_shift(shift_));
-      if (!change.note().empty()) common.say(change.note());
-      conversions.to_store = [change](std::span<Point2> here) { change.reverse(here); };
-      from = change.to();
+    const std::optional<Transformation> given = crs_.given(store, common);
+    if (given) {
+      conversions.to_store = [given](std::span<Point2> here) { given->reverse(here); };
     }
-    if (!to_crs_.empty()) {
-      Transformation change = transformation_to(store, to_crs_, parse_datum_shift(shift_));
-      conversions.writes_degrees = change.to().is_geographic();
-      if (from) change = Transformation(*from, change.to());
-      if (!change.note().empty()) common.say(change.note());
-      conversions.to_written = [change](std::span<Point2> here) { change.forward(here); };
+    if (const auto written = crs_.written(store, common, given)) {
+      conversions.writes_degrees = written->to().is_geographic();
+      conversions.to_written = [written](std::span<Point2> here) { written->forward(here); };
     }
     return conversions;
   }
 
   SurfaceOptions surface_;
-  std::string points_ = "-", output_ = "-", points_crs_, to_crs_, shift_;
+  CrsOptions crs_;
+  std::string points_ = "-", output_ = "-";
 };
 
 }  // namespace

@@ -111,9 +111,9 @@ class SynthCommand : public Command {
   Summary make_cloud(const CommonOptions& common) {
     const Stopwatch watch;
     const std::uint64_t points = points_.empty() ? 1000000 : count_of_option("--points", points_);
-    const std::unique_ptr<Cloud> cloud = kind_ == "surface"   ? make_surface(points, common.seed)
-                                         : kind_ == "uniform" ? make_uniform(common.seed)
-                                                              : make_clusters(points, common.seed);
+    const Cloud cloud = kind_ == "surface"   ? surface_cloud(points, common.seed)
+                        : kind_ == "uniform" ? uniform_cloud(common.seed)
+                                             : cluster_cloud(points, common.seed);
     const DeliveryOrder order(shuffle_, points, common.seed, common.memory_or(kStreamingMemory));
     const auto writer =
         stream::open_point_writer(output_, {.attributes = {}, .comments = {kWriterMark}},
@@ -129,7 +129,7 @@ class SynthCommand : public Command {
         for_bands(static_cast<std::uint32_t>(block.size()), common.threads,
                   [&](std::uint32_t begin, std::uint32_t end) {
                     for (std::uint32_t i = begin; i < end; ++i) {
-                      block.positions[i] = cloud->at(order(first + i));
+                      block.positions[i] = cloud(order(first + i));
                     }
                   });
         writer->append(block);

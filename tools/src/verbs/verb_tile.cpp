@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <charconv>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,12 +25,9 @@ namespace {
 void set_zooms(const std::string& text, TilesRequest& request) {
   if (text.empty()) return;
   const auto number = [&](std::string_view part) {
-    unsigned value = 0;
-    const auto result = std::from_chars(part.data(), part.data() + part.size(), value);
-    if (result.ec != std::errc{} || result.ptr != part.data() + part.size()) {
-      throw UsageError("--zoom '" + text + "': FIRST-LAST, as in 0-14");
-    }
-    return value;
+    const auto value = number_from<unsigned>(part);
+    if (!value) throw UsageError("--zoom '" + text + "': FIRST-LAST, as in 0-14");
+    return *value;
   };
   const std::size_t dash = text.find('-');
   if (dash != std::string::npos) {
@@ -91,61 +87,57 @@ class TileCommand final : public Command {
     app.add_option("--name", name_, "of the tile set, in layer.json");
   }
 
-  Summary run(const CommonOptions& common) override;
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    const TilesOutcome result =
+        write_tiles(open_store(store_, where_), request(common), common.context());
+
+    Summary summary;
+    nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
+    for (const TileZoom& zoom : result.zooms) {
+      zooms.push_back({{"zoom", zoom.zoom}, {"tiles", zoom.tiles}, {"max_error", zoom.max_error}});
+      summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile") +
+                      ", within " + readable_bound(zoom.max_error) + " m\n";
+    }
+    summary.json = {{"tiles", result.tiles}, {"bytes", result.bytes},     {"made", result.made},
+                    {"kept", result.kept},   {"removed", result.removed}, {"zooms", zooms}};
+    summary.add_cost(watch);
+    summary.text += output_ + ": " + counted(result.tiles, "tile") + ", " +
+                    readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
+    if (result.made < result.tiles) {
+      summary.text += "; " + with_commas(result.tiles - result.made) + " were there already";
+    }
+    summary.text += "\n";
+    return summary;
+  }
 
  private:
-  [[nodiscard]] TilesRequest request(const CommonOptions& common) const;
+  [[nodiscard]] TilesRequest request(const CommonOptions& common) const {
+    if (format_ != "quantized-mesh") {
+      throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
+    }
+    TilesRequest request{.folder = output_, .name = name_};
+    set_zooms(zoom_, request);
+    request.max_error = max_error_;
+    request.quality = parse_quality(quality_);
+    request.vertical = parse_height_reference(vertical_);
+    request.geoid = geoid_;
+    set_fill(fill_, request);
+    request.water = !water_.empty();
+    if (request.water && water_ != "nodata") request.water_height = parse_number(water_, "--water");
+    request.normals = normals_;
+    request.metadata = metadata_;
+    request.gzip = gzip_;
+    request.resume = resume_;
+    request.replace = common.force;
+    return request;
+  }
 
   std::string store_, output_, format_ = "quantized-mesh", zoom_, quality_ = "removal";
   std::string fill_ = "interpolate", water_, vertical_, geoid_, name_, where_;
   std::optional<double> max_error_;
   bool gzip_ = false, normals_ = false, metadata_ = false, resume_ = false;
 };
-
-TilesRequest TileCommand::request(const CommonOptions& common) const {
-  if (format_ != "quantized-mesh") {
-    throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
-  }
-  TilesRequest request{.folder = output_, .name = name_};
-  set_zooms(zoom_, request);
-  request.max_error = max_error_;
-  request.quality = parse_quality(quality_);
-  request.vertical = parse_height_reference(vertical_);
-  request.geoid = geoid_;
-  set_fill(fill_, request);
-  request.water = !water_.empty();
-  if (request.water && water_ != "nodata") request.water_height = parse_number(water_, "--water");
-  request.normals = normals_;
-  request.metadata = metadata_;
-  request.gzip = gzip_;
-  request.resume = resume_;
-  request.replace = common.force;
-  return request;
-}
-
-Summary TileCommand::run(const CommonOptions& common) {
-  const Stopwatch watch;
-  const TilesOutcome result =
-      write_tiles(open_store(store_, where_), request(common), common.context());
-
-  Summary summary;
-  nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
-  for (const TileZoom& zoom : result.zooms) {
-    zooms.push_back({{"zoom", zoom.zoom}, {"tiles", zoom.tiles}, {"max_error", zoom.max_error}});
-    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile") +
-                    ", within " + readable_bound(zoom.max_error) + " m\n";
-  }
-  summary.json = {{"tiles", result.tiles}, {"bytes", result.bytes},     {"made", result.made},
-                  {"kept", result.kept},   {"removed", result.removed}, {"zooms", zooms}};
-  summary.add_cost(watch);
-  summary.text += output_ + ": " + counted(result.tiles, "tile") + ", " +
-                  readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
-  if (result.made < result.tiles) {
-    summary.text += "; " + with_commas(result.tiles - result.made) + " were there already";
-  }
-  summary.text += "\n";
-  return summary;
-}
 
 }  // namespace
 

@@ -60,91 +60,87 @@ class VerifyCommand final : public Command {
   [[nodiscard]] bool has_store_options() const {
     return !where_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty();
   }
-  [[nodiscard]] Summary store(const CommonOptions& common) const;
-  [[nodiscard]] Summary tiles(const CommonOptions& common) const;
+  [[nodiscard]] Summary store(const CommonOptions& common) const {
+    const Stopwatch watch;
+    const stream::Store store = open_store(path_);
+    Summary summary;
+    nlohmann::ordered_json problems = nlohmann::ordered_json::array();
+    const bool ok = store.verify(
+        [&](const stream::Problem& problem) { add_problem(problem, problems, summary.text); },
+        common.threads);
+    std::uint64_t clusters = 0;
+    for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
+    summary.json = {
+        {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
+    summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
+                    " points in " + with_commas(clusters) + " clusters, " +
+                    readable_bytes(store.bytes()) + ", checked in " +
+                    readable_seconds(watch.seconds()) + "\n";
+    summary.exit_code = ok ? 0 : 1;
+    return summary;
+  }
+  [[nodiscard]] Summary tiles(const CommonOptions& common) const {
+    const Stopwatch watch;
+    if (store_.empty() && has_store_options()) {
+      throw UsageError(
+          "--where, --max-error, --vertical and --geoid have a meaning with --store alone");
+    }
+    std::optional<stream::Store> store;
+    if (!store_.empty()) store.emplace(open_store(store_, where_));
+    const TileCheckResult result = check_tiles({.folder = path_,
+                                                .max_error = max_error_,
+                                                .store = store ? &*store : nullptr,
+                                                .vertical = parse_height_reference(vertical_),
+                                                .geoid = geoid_},
+                                               common.context());
+
+    Summary summary;
+    nlohmann::ordered_json problems = nlohmann::ordered_json::array();
+    for (const stream::Problem& problem : result.problems) {
+      add_problem(problem, problems, summary.text);
+    }
+    nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
+    for (const ZoomCheck& zoom : result.zooms) {
+      nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
+      summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile");
+      if (store) {
+        line["samples"] = zoom.samples;
+        line["covered"] = zoom.samples - zoom.uncovered;
+        line["uncovered"] = zoom.uncovered;
+        line["max_error"] = zoom.max_error;
+        summary.text += ", within " + readable_bound(zoom.max_error) + " m of " +
+                        (zoom.uncovered == 0 ? "all " + with_commas(zoom.samples)
+                                             : with_commas(zoom.samples - zoom.uncovered) + " of " +
+                                                   with_commas(zoom.samples)) +
+                        " samples";
+        if (zoom.uncovered > 0) {
+          summary.text += " (" + with_commas(zoom.uncovered) + " lie on no triangle)";
+        }
+      }
+      summary.text += "\n";
+      zooms.push_back(std::move(line));
+    }
+    const bool ok = result.problems.empty();
+    if (result.torn > 0) {
+      summary.text += with_commas(result.torn) + (result.torn == 1 ? " file" : " files") +
+                      " left over from a run that was killed, no part of the set: the next "
+                      "`terrace tile` into the folder removes them\n";
+    }
+    summary.json = {{"ok", ok},
+                    {"problems", problems},
+                    {"tiles", result.tiles},
+                    {"samples", result.samples},
+                    {"left_over", result.torn},
+                    {"zooms", zooms}};
+    summary.text += std::string(ok ? "sound: " : "damaged: ") + counted(result.tiles, "tile") +
+                    ", checked in " + readable_seconds(watch.seconds()) + "\n";
+    summary.exit_code = ok ? 0 : 1;
+    return summary;
+  }
 
   std::string path_, store_, where_, vertical_, geoid_;
   std::optional<double> max_error_;
 };
-
-Summary VerifyCommand::store(const CommonOptions& common) const {
-  const Stopwatch watch;
-  const stream::Store store = open_store(path_);
-  Summary summary;
-  nlohmann::ordered_json problems = nlohmann::ordered_json::array();
-  const bool ok = store.verify(
-      [&](const stream::Problem& problem) { add_problem(problem, problems, summary.text); },
-      common.threads);
-  std::uint64_t clusters = 0;
-  for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
-  summary.json = {
-      {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
-  summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
-                  " points in " + with_commas(clusters) + " clusters, " +
-                  readable_bytes(store.bytes()) + ", checked in " +
-                  readable_seconds(watch.seconds()) + "\n";
-  summary.exit_code = ok ? 0 : 1;
-  return summary;
-}
-
-Summary VerifyCommand::tiles(const CommonOptions& common) const {
-  const Stopwatch watch;
-  if (store_.empty() && has_store_options()) {
-    throw UsageError(
-        "--where, --max-error, --vertical and --geoid have a meaning with --store alone");
-  }
-  std::optional<stream::Store> store;
-  if (!store_.empty()) store.emplace(open_store(store_, where_));
-  const TileCheckResult result = check_tiles({.folder = path_,
-                                              .max_error = max_error_,
-                                              .store = store ? &*store : nullptr,
-                                              .vertical = parse_height_reference(vertical_),
-                                              .geoid = geoid_},
-                                             common.context());
-
-  Summary summary;
-  nlohmann::ordered_json problems = nlohmann::ordered_json::array();
-  for (const stream::Problem& problem : result.problems) {
-    add_problem(problem, problems, summary.text);
-  }
-  nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
-  for (const ZoomCheck& zoom : result.zooms) {
-    nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
-    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile");
-    if (store) {
-      line["samples"] = zoom.samples;
-      line["covered"] = zoom.samples - zoom.uncovered;
-      line["uncovered"] = zoom.uncovered;
-      line["max_error"] = zoom.max_error;
-      summary.text += ", within " + readable_bound(zoom.max_error) + " m of " +
-                      (zoom.uncovered == 0 ? "all " + with_commas(zoom.samples)
-                                           : with_commas(zoom.samples - zoom.uncovered) + " of " +
-                                                 with_commas(zoom.samples)) +
-                      " samples";
-      if (zoom.uncovered > 0) {
-        summary.text += " (" + with_commas(zoom.uncovered) + " lie on no triangle)";
-      }
-    }
-    summary.text += "\n";
-    zooms.push_back(std::move(line));
-  }
-  const bool ok = result.problems.empty();
-  if (result.torn > 0) {
-    summary.text += with_commas(result.torn) + (result.torn == 1 ? " file" : " files") +
-                    " left over from a run that was killed, no part of the set: the next "
-                    "`terrace tile` into the folder removes them\n";
-  }
-  summary.json = {{"ok", ok},
-                  {"problems", problems},
-                  {"tiles", result.tiles},
-                  {"samples", result.samples},
-                  {"left_over", result.torn},
-                  {"zooms", zooms}};
-  summary.text += std::string(ok ? "sound: " : "damaged: ") + counted(result.tiles, "tile") +
-                  ", checked in " + readable_seconds(watch.seconds()) + "\n";
-  summary.exit_code = ok ? 0 : 1;
-  return summary;
-}
 
 }  // namespace
 

@@ -6,7 +6,6 @@
 namespace terrace::tools {
 
 std::span<const Verb> verbs() {
-  // In the order of use. A verb without a factory is refused.
   static const std::array<Verb, 18> kVerbs{{
       {"build", "stream the inputs once and write a store", "terrace build dem.tif -o dem.terrace",
        make_build},

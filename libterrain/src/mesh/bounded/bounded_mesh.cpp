@@ -6,9 +6,9 @@
 #include <string>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/tri/least_error.hpp>
 
 #include "base/store_checks.hpp"
-#include "mesh/bounded/least_error.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesher.hpp"
 #include "mesh/bounded/raster_mesher.hpp"
@@ -32,14 +32,14 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& opti
   if (options.max_points == 0) {
     run(options.max_error / metres, ~std::uint64_t{0});
   } else {
-    LeastErrorSearch search;
+    tri::LeastErrorSearch search;
     search.most = options.max_points;
     search.range = mesher.bounds().max[2] - mesher.bounds().min[2];
     if (mesher.can_estimate()) {
       search.estimate = [&](double bound) { return mesher.estimate(bound); };
     }
     search.run = [&](double bound) { return run(bound, options.max_points); };
-    if (!least_error(search)) {
+    if (!tri::least_error(search)) {
       run(search.range, ~std::uint64_t{0});
       throw stream::Error(
           {.file = options.path,

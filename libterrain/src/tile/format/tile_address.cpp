@@ -2,12 +2,12 @@
 #include "tile/format/tile_address.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 #include <utility>
 
 #include "base/portable_math.hpp"
+#include "base/units.hpp"
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {
@@ -28,9 +28,7 @@ std::pair<std::uint32_t, std::uint32_t> span_of(double from, double to, std::uin
 std::optional<std::uint32_t> take_number(std::string_view& text, char end) {
   const std::size_t stop = text.find(end);
   if (stop == std::string_view::npos || stop == 0 || (stop > 1 && text[0] == '0')) return {};
-  std::uint32_t value = 0;
-  const auto result = std::from_chars(text.data(), text.data() + stop, value);
-  if (result.ec != std::errc{} || result.ptr != text.data() + stop) return {};
+  const auto value = number_from<std::uint32_t>(text.substr(0, stop));
   text.remove_prefix(stop + 1);
   return value;
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <filesystem>
 #include <optional>
 #include <string_view>
@@ -27,8 +26,9 @@ template <class Number>
 bool take(std::string_view& line, Number& number) {
   const std::size_t end = line.find(' ');
   if (end == std::string_view::npos) return false;
-  const auto result = std::from_chars(line.data(), line.data() + end, number);
-  if (result.ec != std::errc{} || result.ptr != line.data() + end) return false;
+  const auto found = number_from<Number>(line.substr(0, end));
+  if (!found) return false;
+  number = *found;
   line.remove_prefix(end + 1);
   return true;
 }

@@ -12,6 +12,7 @@
 #include "removal.hpp"
 #include "samples.hpp"
 #include "start.hpp"
+#include "terrace/tri/least_error.hpp"
 #include "tin/lattice.hpp"
 #include "tin/rows/point_rows.hpp"
 
@@ -101,6 +102,15 @@ class Maker {
   [[nodiscard]] const Measured& measured() const { return measured_; }
   [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
 
+  /// Between the lowest and the highest of the samples and the frame.
+  [[nodiscard]] double height_range() const {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    const auto take = [&](double z) { low = std::min(low, z), high = std::max(high, z); };
+    for (const Sample& sample : span_of(samples_)) take(sample.z);
+    for (const Point3& vertex : frame_) take(vertex[2]);
+    return high - low;
+  }
+
   /// Moves the mesh into the result; nothing is left.
   void publish(PointTin& result) {
     result.errors = measured_.errors;
@@ -169,60 +179,29 @@ class Maker {
   std::size_t removed_ = 0;
 };
 
-/// The least bound that leaves at most max_points after removal, or one at which they are nearly
-/// all used, searched from the bound at which greedy insertion stops, of whose vertices removal
-/// leaves about 0.6.
+/// The least bound that leaves at most max_points. Removal leaves about 0.6 of the vertices that
+/// greedy insertion takes for a bound, and their number is about linear in the bound's inverse.
 bool make_of_points(Maker& maker, const PointTinOptions& options) {
-  constexpr int kMostTries = 24;
-  constexpr double kFull = 0.98, kLeastStep = 1.002;
-  struct Tried {
-    double bound = 0, vertices = 0;
-  };
   const std::size_t limit = options.max_points;
   if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
   // More vertices than this are fixed.
   if (options.quality == TinQuality::kGreedy || maker.vertices() > limit) return true;
-  const double wanted = (1 + kFull) / 2 * static_cast<double>(limit);
-  Tried few, many;
-  double bound = std::max(maker.measured().errors.largest, options.max_error);
-  int in_a_row = 0;
-  for (int i = 0; i < kMostTries; ++i) {
-    maker.make(bound, kUnlimited, options.quality);
-    const Tried tried{bound, static_cast<double>(maker.vertices())};
-    const bool is_few = maker.vertices() <= limit;
-    in_a_row = is_few ? std::max(in_a_row, 0) + 1 : std::min(in_a_row, 0) - 1;
-    (is_few ? few : many) = tried;
-    if (is_few &&
-        (bound <= options.max_error || tried.vertices >= kFull * static_cast<double>(limit)))
-      return true;
-    if (few.vertices == 0) {
-      // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
-      if (bound == 0 || i >= kMostTries / 2) break;
-      bound *= 2;
-    } else if (many.vertices == 0) {
-      bound = in_a_row > 3
-                  ? options.max_error
-                  : std::max(bound / std::max(1.05, wanted / tried.vertices), options.max_error);
-    } else if (many.bound == 0) {
-      bound = few.bound / 4;
-    } else if (few.bound <= kLeastStep * many.bound) {
-      break;
-    } else if (std::abs(in_a_row) > 2) {
-      bound = std::sqrt(few.bound * many.bound);
-    } else {
-      // Their number is about linear in the bound's inverse.
-      const double part = (wanted - few.vertices) / (many.vertices - few.vertices);
-      const double inverse = (1 - part) / few.bound + part / many.bound;
-      bound = std::clamp(1 / inverse, many.bound * std::sqrt(kLeastStep),
-                         few.bound / std::sqrt(kLeastStep));
-    }
-  }
-  if (few.vertices > 0) {
-    maker.make(few.bound, kUnlimited, options.quality);
-  } else {
-    maker.make(options.max_error, limit, TinQuality::kGreedy);
-  }
-  return true;
+  const double left = 0.6 * static_cast<double>(limit) * maker.measured().errors.largest;
+  const bool found =
+      least_error({.most = limit,
+                   .least = options.max_error,
+                   .range = std::max(options.max_error, maker.height_range()),
+                   .estimate =
+                       [left](double bound) {
+                         return left / std::max(bound, std::numeric_limits<double>::min());
+                       },
+                   .run =
+                       [&](double bound) {
+                         maker.make(bound, kUnlimited, options.quality);
+                         return static_cast<double>(maker.vertices());
+                       }});
+  // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
+  return found || maker.make(options.max_error, limit, TinQuality::kGreedy);
 }
 
 }  // namespace

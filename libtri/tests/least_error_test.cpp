@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/least_error.hpp"
+#include "terrace/tri/least_error.hpp"
 
 #include <cmath>
 #include <string>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace terrace::terrain {
+namespace terrace::tri {
 namespace {
 
 constexpr double kRange = 1000.0;
@@ -116,6 +116,28 @@ TEST(LeastError, NothingRises) {
   EXPECT_EQ(runs, 1);
 }
 
+TEST(LeastError, NothingBelowTheLeastIsTried) {
+  const VertexCount count = relief(1e6, 1.5);
+  for (const VertexCount& estimate : {VertexCount{}, count}) {
+    for (const double least : {0.1, 40.0, kRange}) {
+      double last = 0.0;
+      EXPECT_TRUE(least_error({.most = 500'000,
+                               .least = least,
+                               .range = kRange,
+                               .estimate = estimate,
+                               .run = [&](double bound) {
+                                 EXPECT_GE(bound, least);
+                                 EXPECT_LE(bound, kRange);
+                                 last = bound;
+                                 return count(bound);
+                               }}));
+      if (count(least) <= 500'000) {
+        EXPECT_EQ(last, least);
+      }
+    }
+  }
+}
+
 TEST(LeastError, UselessEstimate) {
   const VertexCount count = relief(1e6, 1.7);
   const Outcome outcome = search(50'000, count, [](double) { return 17.0; });
@@ -124,4 +146,4 @@ TEST(LeastError, UselessEstimate) {
 }
 
 }  // namespace
-}  // namespace terrace::terrain
+}  // namespace terrace::tri

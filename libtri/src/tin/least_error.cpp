@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/least_error.hpp"
+#include "terrace/tri/least_error.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "base/portable_math.hpp"
+#include "portable_math.hpp"
 
-namespace terrace::terrain {
+namespace terrace::tri {
 namespace {
 
 constexpr double kLeastStep = 1.002;  // between bounds that are told apart
@@ -20,7 +20,8 @@ struct Tried {
 /// The bounds closest to the one wanted, on either side.
 class Bracket {
  public:
-  Bracket(double wanted, double range) : wanted_(wanted), range_(range) {}
+  Bracket(double wanted, const LeastErrorSearch& search)
+      : wanted_(wanted), least_(search.least), range_(search.range) {}
 
   void add(double bound, double vertices, bool few) {
     (few ? few_ : many_) = {bound, vertices, true};
@@ -38,17 +39,18 @@ class Bracket {
   [[nodiscard]] double next() const {
     if (!few_.known) return std::min(range_, std::max(4.0 * many_.bound, 1e-4 * range_));
     if (!many_.known) {
-      if (few_.bound < 1e-6 * range_) return 0.0;
+      if (few_.bound < 1e-6 * range_) return least_;
       const double by_power =
-          few_.bound * portable_exp(portable_log(few_.vertices / wanted_) / 1.5);
-      return std::clamp(by_power, few_.bound / 64.0, few_.bound / (in_a_row_ < 2 ? 1.05 : 4.0));
+          few_.bound * portable::exponential(portable::logarithm(few_.vertices / wanted_) / 1.5);
+      return inside(
+          std::clamp(by_power, few_.bound / 64.0, few_.bound / (in_a_row_ < 2 ? 1.05 : 4.0)));
     }
     if (many_.bound <= 0.0) return few_.bound / 4.0;
-    const double width = portable_log(few_.bound / many_.bound);
-    const double fall = portable_log(many_.vertices / few_.vertices);
+    const double width = portable::logarithm(few_.bound / many_.bound);
+    const double fall = portable::logarithm(many_.vertices / few_.vertices);
     double part = 0.5;
-    if (in_a_row_ < 3 && fall > 0.0) part = portable_log(many_.vertices / wanted_) / fall;
-    return inside(many_.bound * portable_exp(width * part));
+    if (in_a_row_ < 3 && fall > 0.0) part = portable::logarithm(many_.vertices / wanted_) / fall;
+    return inside(many_.bound * portable::exponential(width * part));
   }
 
   /// The nearest bound strictly between those known.
@@ -57,11 +59,11 @@ class Bracket {
     if (many_.known) bound = std::max(bound, many_.bound * kLeastStep);
     if (few_.known && many_.known && bound >= few_.bound)
       bound = std::sqrt(few_.bound * many_.bound);
-    return std::min(bound, range_);
+    return std::clamp(bound, least_, range_);
   }
 
  private:
-  double wanted_, range_;
+  double wanted_, least_, range_;
   Tried few_, many_;
   bool last_few_ = false;
   int in_a_row_ = 0;
@@ -70,14 +72,14 @@ class Bracket {
 /// A bound at which the estimate times `factor` is about `wanted`, searched from `start`.
 double by_estimate(const LeastErrorSearch& search, double wanted, double factor, double start) {
   constexpr int kMost = 12;
-  Bracket bracket(wanted, search.range);
+  Bracket bracket(wanted, search);
   double bound = start;
   for (int i = 0; i < kMost; ++i) {
     const double vertices = std::max(factor * search.estimate(bound), 1.0);
     const bool few = vertices <= wanted;
     bracket.add(bound, vertices, few);
     if (std::fabs(vertices / wanted - 1.0) < 0.004 || bracket.narrow()) break;
-    if ((few && bound <= 0.0) || (!few && bound >= search.range)) break;
+    if ((few && bound <= search.least) || (!few && bound >= search.range)) break;
     bound = bracket.next();
   }
   return bound;
@@ -89,15 +91,15 @@ bool least_error(const LeastErrorSearch& search) {
   constexpr int kMostRuns = 24, kRunsByEstimate = 4;
   const auto most = static_cast<double>(search.most);
   const double wanted = 0.99 * most;
-  Bracket bracket(wanted, search.range);
-  double bound = search.range / 64.0;
+  Bracket bracket(wanted, search);
+  double bound = std::max(search.least, search.range / 64.0);
   if (search.estimate) bound = by_estimate(search, wanted, 1.0, bound);
   double last = bound;
   for (int i = 0; i < kMostRuns; ++i) {
     last = bound;
     const double vertices = search.run(bound);
     const bool few = vertices <= most;
-    if (few && (bound <= 0.0 || vertices >= 0.98 * most)) return true;
+    if (few && (bound <= search.least || vertices >= 0.98 * most)) return true;
     if (!few && bound >= search.range) return false;
     bracket.add(bound, vertices, few);
     if (bracket.narrow()) break;
@@ -116,4 +118,4 @@ bool least_error(const LeastErrorSearch& search) {
   return true;
 }
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tri
