@@ -25,7 +25,7 @@ class Mesh:
 
     @classmethod
     def read(cls, path):
-        """The triangles of a file: .ply, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without
+        """The triangles of a file: .ply, .glb, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without
         triangles; OSError; Error."""
         path = os.fspath(path)
         with open(path, 'rb'):  # what is not there is an error of the system
