@@ -575,7 +575,6 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from, c
       if (along >= 0 && along <= length && std::abs(left) <= kProfileWidth / 2 * length)
         line.push_back({along, height});
     }
-    std::sort(line.begin(), line.end());
     return line;
   } else {
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
@@ -603,14 +602,6 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from, c
       line.push_back(cut(first));
       line.push_back(cut(last));
     }
-  }
-  if constexpr (kRaster) {
-    std::sort(line.begin(), line.end());
-    // Neighbouring triangles meet the line at the same place, up to rounding.
-    const double same = 1e-6 * length;
-    line.erase(std::unique(line.begin(), line.end(),
-                           [&](const auto& a, const auto& b) { return b[0] - a[0] <= same; }),
-               line.end());
   }
   return line;
 }

@@ -112,9 +112,9 @@ class Scene {
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
   /// The cut along the plane through two places of the view frame and the unit vector `up`, as
-  /// pairs of the distance over ground from the first place and the height, both in metres. Of a
-  /// raster each edge that is crossed, in order; of a surface in space the ends of a line per
-  /// triangle; of points those within 1 % of the length to either side, in order. O(what is drawn).
+  /// pairs of the distance over ground from the first place and the height, both in metres. Of
+  /// triangles the ends of a line each; of points those within 1 % of the length to either side.
+  /// O(what is drawn).
   [[nodiscard]] virtual std::vector<std::array<double, 2>> profile(
       const stream::Point3& from, const stream::Point3& to, const stream::Point3& up) const = 0;
   /// The lines, as slots of their ends, around the triangles whose corners all belong to a cluster:
