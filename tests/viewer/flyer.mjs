@@ -4,8 +4,8 @@
 /// A worker with its answers to wait for.
 export class Flyer {
   /// connect(heard): starts worker.js, returns {tell(message)}; heard takes what it says. base: the URL of a published
-  /// folder. name: of a store in it.
-  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, heard = () => {}} = {}) {
+  /// folder. name: of a store in it; choose: as in messages.ts.
+  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, choose = false, heard = () => {}} = {}) {
     this.serial = 0;
     this.waiting = [];
     this.last = null;  ///< frame
@@ -16,11 +16,10 @@ export class Flyer {
     });
     this.worker.tell({
       type: 'open',
-      wasm: `${base}core.wasm`,
-      body: `${base}body.wasm`,
+      base,
+      name,
+      choose,
       asPoints,
-      store: `${base}stores/${name}/`,
-      start: `${base}stores/${name}.start`,
       maxPoints
     });
   }

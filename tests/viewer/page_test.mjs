@@ -44,8 +44,14 @@ async function open(hash = '', {url = site.url, size = {width: 720, height: 450}
   if (settle) await settled(page);
   return {page, errors, outside, close: () => context.close()};
 }
-const settled = page => page.waitForFunction(() => window.terrace?.settled, null, {timeout: 120_000});
-const state = page => page.evaluate(() => window.terrace.state);
+async function settled(page) {
+  try {
+    await page.waitForFunction(() => window.terrace?.settled, null, {timeout: 120_000});
+  } catch (error) {
+    throw new Error(`${error.message} ${page.url()} ${JSON.stringify(await state(page))} ${await page.textContent('body')}`);
+  }
+}
+const state = page => page.evaluate(() => window.terrace?.state);
 
 /// Colours of the picture at some places, 0 to 255.
 const pixels = (page, places) => page.evaluate(places => {
@@ -311,6 +317,128 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
+  test('the worker is at work before WebGL starts', async () => {
+    const context = await browser.newContext();
+    const page = await context.newPage();
+    await page.addInitScript(() => {
+      window.order = [];
+      const {Worker} = window, {getContext} = HTMLCanvasElement.prototype;
+      window.Worker = class extends Worker {
+        constructor(url) {
+          super(url);
+          this.addEventListener('message', ({data}) => window.order.push(data.type));
+        }
+      };
+      HTMLCanvasElement.prototype.getContext = function(...args) {
+        window.order.push('webgl');
+        return getContext.apply(this, args);
+      };
+    });
+    await page.goto(`${site.url}#s=flat&q=32`);
+    await settled(page);
+    const order = await page.evaluate(() => window.order);
+    assert.deepEqual(order.slice(0, 2), ['started', 'webgl'], order.slice(0, 5).join());
+    await context.close();
+  });
+
+  test('all is seen at first, between the panels, at any size', async () => {
+    for (const size of [{width: 1100, height: 500}, {width: 700, height: 700}, {width: 390, height: 760}]) {
+      for (const name of ['flat', 'ball']) {
+        const {page, errors, close} = await open(`#s=${name}&q=32`, {size});
+        const rim = Array.from({length: 40}, (_, i) => (i + 0.5) / 40).flatMap(t => [[t, 0.003], [t, 0.97], [0.003, t], [size.width > 900 ? 0.8 : 0.996, t]]);
+        const seen = await pixels(page, rim);
+        assert.equal(new Set(seen.map(String)).size, 1, `${name} is cut off at ${JSON.stringify(size)}`);
+        const inside = await pixels(page, Array.from({length: 900}, (_, i) => [(i % 30) / 30, Math.floor(i / 30) / 30]));
+        assert.ok(inside.filter(colour => String(colour) !== String(seen[0])).length > 90, `${name} is small at ${JSON.stringify(size)}`);
+        assert.deepEqual(errors, []);
+        await close();
+      }
+    }
+  });
+
+  test('few points, one row of cells, a single cell: seen, and met by a click', async () => {
+    for (const [name, points] of Object.entries({point: 1, three: 3, cell: 1, row: 60})) {
+      const {page, errors, close} = await open(`#s=${name}`, {size: {width: 600, height: 400}});
+      assert.equal((await state(page)).points, points);
+      assert.match(await page.textContent('#status'), points === 1 ? /^1 point ·/ : /^\d+ points ·/);
+      const shown = await page.evaluate(() => {
+        const canvas = document.getElementById('picture'), gl = canvas.getContext('webgl2');
+        const all = new Uint8Array(4 * canvas.width * canvas.height), found = [];
+        gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, all);
+        for (let i = 0; i < all.length; i += 4) {
+          if (Math.hypot(...[0, 1, 2].map(c => all[i + c] - all[c])) > 12) found.push([(i / 4) % canvas.width, canvas.height - 1 - Math.floor(i / 4 / canvas.width)]);
+        }
+        return found;
+      });
+      assert.ok(shown.length >= 2 * points, `${name}: ${shown.length} pixels`);
+      const [x, y] = shown[Math.floor(shown.length / 2)];
+      await page.mouse.click(x, y);
+      await page.waitForSelector('#place:not([hidden])');
+      assert.deepEqual(errors, []);
+      await close();
+    }
+  });
+
+  test('a plain without relief is of one colour', async () => {
+    const {page, errors, close} = await open('#s=plain', {size: {width: 600, height: 400}});
+    const shown = await pixels(page, Array.from({length: 400}, (_, i) => [0.4 + 0.2 * (i % 20) / 20, 0.45 + 0.2 * Math.floor(i / 20) / 20]));
+    const spread = Math.max(...[0, 1, 2].map(c => Math.max(...shown.map(colour => colour[c])) - Math.min(...shown.map(colour => colour[c]))));
+    // But for the haze.
+    assert.ok(spread < 12, `colours differ by ${spread}`);
+    assert.deepEqual(errors, []);
+    await close();
+  });
+
+  test('by keyboard alone: looks, reads the middle, expands and collapses a cluster', async () => {
+    const {page, errors, close} = await open('#s=flat&q=32', {size: {width: 800, height: 600}});
+    await page.keyboard.press('Tab');
+    assert.equal(await page.evaluate(() => document.activeElement.id), 'picture');
+    assert.ok(await page.isVisible('#cross'));
+    const before = await state(page);
+    for (const key of ['ArrowUp', 'e', 'r', '+']) await page.keyboard.press(key);
+    await settled(page);
+    const now = await state(page);
+    for (const what of ['azimuth', 'tilt', 'distance']) assert.notEqual(now.camera[what], before.camera[what], what);
+    await page.keyboard.press('Home');
+    await settled(page);
+    const coarse = (await state(page)).points;
+    await page.keyboard.press('Enter');
+    await page.waitForSelector('#place:not([hidden])');
+    await page.keyboard.press('x');
+    await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points > points, coarse);
+    await page.keyboard.press('v');
+    await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points === points, coarse);
+    await page.keyboard.press('Escape');
+    assert.ok(!await page.isVisible('#place'));
+    assert.deepEqual(errors, []);
+    await close();
+  });
+
+  test('two fingers zoom, one moves, a tap reads a point', async () => {
+    const context = await browser.newContext({viewport: {width: 390, height: 760}, hasTouch: true, isMobile: true});
+    const page = await context.newPage();
+    await page.goto(`${site.url}#s=flat&q=32`);
+    await settled(page);
+    const touches = await context.newCDPSession(page);
+    const touch = (type, ...points) => touches.send('Input.dispatchTouchEvent', {type, touchPoints: points.map(([x, y], id) => ({x, y, id}))});
+    const before = (await state(page)).camera;
+    await touch('touchStart', [170, 380], [220, 380]);
+    for (let i = 1; i <= 10; ++i) await touch('touchMove', [170 - 5 * i, 380], [220 + 5 * i, 380]);
+    await touch('touchEnd');
+    await settled(page);
+    const near = (await state(page)).camera;
+    assert.ok(near.distance < 0.6 * before.distance, `${before.distance} ${near.distance}`);
+    await touch('touchStart', [200, 400]);
+    for (let i = 1; i <= 10; ++i) await touch('touchMove', [200 - 6 * i, 400]);
+    await touch('touchEnd');
+    await settled(page);
+    assert.ok((await state(page)).camera.target[0] > near.target[0]);
+    assert.ok(!await page.isVisible('#place'));
+    await page.touchscreen.tap(195, 380);
+    await page.waitForSelector('#place:not([hidden])');
+    await context.close();
+  });
+
   test('a cloud by its colours, classes and intensities', async () => {
     const {page, errors, close} = await open('#s=cloud', {size: {width: 900, height: 600}});
     const spots = Array.from({length: 400}, (_, i) => [0.3 + 0.4 * (i % 20) / 20, 0.4 + 0.25 * Math.floor(i / 20) / 20]);
@@ -347,6 +475,12 @@ describe('pages side by side', {concurrency: 3}, () => {
     }
     const rows = await page.$$eval('#place-text dt', dts => dts.map(dt => dt.textContent));
     for (const name of ['red', 'green', 'blue', 'classification', 'intensity']) assert.ok(rows.includes(name), rows.join());
+    // Between two places the points of a strip; those of the cluster are marked.
+    await page.mouse.click(330, 330);
+    await page.waitForSelector('#profile:not([hidden])');
+    const dots = await page.getAttribute('#profile path', 'd');
+    assert.ok(dots.split('M').length > 4, dots);
+    await page.screenshot({path: join(packages, 'viewer-cloud-profile.png')});
     assert.match(page.url(), /c=intensity/);
     assert.deepEqual(errors, []);
     await close();

@@ -58,7 +58,21 @@ export class Sites {
       writeFileSync(join(this.folder, `${name}.csv`), points);
       this.terrace('build', `${name}.csv`, '-o', `${name}.store`, '--block', '1000', '-q');
     }
-    const stores = ['alps.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store'];
+    // Few points, and such as have no triangles.
+    const grid = (columns, rows, value) => [`ncols ${columns}`, `nrows ${rows}`, 'xllcorner 0', 'yllcorner 0', 'cellsize 10', 'nodata_value -9999',
+      ...Array.from({length: rows}, (_, row) => Array.from({length: columns}, (_, column) => value(column, row)).join(' '))].join('\n');
+    const small = {
+      'point.csv': 'x,y,z\n500000,5000000,100\n',
+      'three.csv': 'x,y,z\n500000,5000000,100\n500010,5000000,105\n500000,5000010,99\n',
+      'cell.asc': grid(50, 40, (column, row) => column === 25 && row === 20 ? 123.5 : -9999),
+      'row.asc': grid(60, 1, column => column % 7),
+      'plain.asc': grid(60, 60, () => 7)
+    };
+    for (const [name, text] of Object.entries(small)) {
+      writeFileSync(join(this.folder, name), text);
+      this.terrace('build', name, '-o', `${name.split('.')[0]}.store`, '-q');
+    }
+    const stores = ['alps.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);

@@ -5,7 +5,7 @@ import {join} from 'node:path';
 import vm from 'node:vm';
 
 /// fetch() of the files of a folder under http://folder/, with ranges. `fault(request, response)` may change what
-/// comes, `latency` milliseconds after the request; `log` is of all requests, with the number of those
+/// comes (undefined: nothing ever), `latency` milliseconds after the request; `log` is of all requests, with the number of those
 /// made before that were still `unanswered`, without those made at once with it.
 export function folderFetch(folder, fault = (_, response) => response, latency = 1) {
   const log = [];
@@ -37,6 +37,9 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
     if (options.signal?.aborted) throw new DOMException('aborted', 'AbortError');
     const response = answer(url, request);
     if (response === null) throw new TypeError('fetch failed');
+    if (response === undefined) {
+      await new Promise((_, reject) => options.signal.addEventListener('abort', () => reject(new DOMException('aborted', 'AbortError'))));
+    }
     const bytes = Uint8Array.from(response.body);
     return {
       status: response.status,
@@ -49,9 +52,9 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
   return {fetch, log};
 }
 
-/// Starts `script` (worker.js). What it says goes to `said`.
+/// Starts `script` (worker.js), in which times pass `haste` times as fast. What it says goes to `said`.
 export class Worker {
-  constructor(script, fetch, said) {
+  constructor(script, fetch, said, haste = 1) {
     this.self = {
       postMessage: message => {
         if (message.type === 'frame') queueMicrotask(() => this.tell({type: 'drawn', buffer: message.changes.buffer}));
@@ -74,7 +77,7 @@ export class Worker {
         port1 = {};
         port2 = {postMessage: () => setImmediate(() => this.port1.onmessage())};
       },
-      setTimeout: (work, time) => setTimeout(work, time ?? 0),
+      setTimeout: (work, time) => setTimeout(work, (time ?? 0) / haste),
       clearTimeout,
       ArrayBuffer,
       Uint8Array,

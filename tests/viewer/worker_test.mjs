@@ -19,12 +19,13 @@ after(() => sites.remove());
 
 /// A worker over a store of the site.
 class Tested extends Flyer {
-  constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, changed = () => {}} = {}) {
+  constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, choose = false, haste = 1, changed = () => {}} = {}) {
     const {fetch, log} = folderFetch(site, fault, latency);
     const messages = [];
     let blocks = 0, broken = null;
-    super(heard => new Worker(join(site, 'worker.js'), fetch, heard), 'http://folder/', name, {
+    super(heard => new Worker(join(site, 'worker.js'), fetch, heard, haste), 'http://folder/', name, {
       maxPoints,
+      choose,
       asPoints,
       heard: message => {
         messages.push(message.type);
@@ -41,6 +42,12 @@ class Tested extends Flyer {
   }
   async settle({eye, direction, error}) {
     return (await this.view({eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error})).state;
+  }
+  /// What it answers to a message.
+  async ask(message, type) {
+    const done = this.until(m => m.type === type);
+    this.worker.tell(message);
+    return done;
   }
   async hash() {
     const done = this.until(message => message.type === 'hashed');
@@ -369,23 +376,75 @@ test('a scan as points and back, with the bytes that are there', async () => {
 test('by hand: a cluster of a surface expands, collapses and is released; a point of it is met', async () => {
   const flyer = new Tested('ball');
   await flyer.opened();
-  const answer = async (message, type) => {
-    const done = flyer.until(m => m.type === type);
-    flyer.worker.tell(message);
-    return done;
-  };
   const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: 1e6};
   const before = (await flyer.settle(camera)).points;
-  const {hit} = await answer({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
+  const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
   assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));
   flyer.worker.tell({type: 'pin', how: 1});
   const more = (await flyer.settle(camera)).points;
   assert.ok(more > before, `${before} ${more}`);
-  const {lines} = await answer({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
+  const {lines} = await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
   assert.equal(lines.length % 2, 0);
-  assert.equal((await answer({type: 'profile', id: 2, from: [0, 0, 0], to: [5, 5, 5]}, 'profiled')).line.length, 0);
   flyer.worker.tell({type: 'pin', how: -1});
   assert.equal((await flyer.settle(camera)).points, before);
+});
+
+test('a cluster of points expands by hand, and its points are told', async () => {
+  const flyer = new Tested('cloud');
+  await flyer.opened();
+  const camera = {eye: [0, 0, 300], direction: [0, 0.01, -1], error: 1e6};
+  const before = (await flyer.settle(camera)).points;
+  const outline = async hit => (await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined')).lines;
+  const pick = async () => (await flyer.ask({type: 'pick', id: 1, origin: [0, 0, 300], direction: [0, 0, -1], angle: 0.05}, 'picked')).hit;
+  const coarse = await pick();
+  assert.equal((await outline(coarse)).length, 0, 'a cluster of the top is not expanded');
+  flyer.worker.tell({type: 'pin', how: 1});
+  const more = (await flyer.settle(camera)).points - before;
+  assert.ok(more > 0);
+  let lines = new Uint32Array();
+  // A member of the new cluster is somewhere near the head.
+  for (let i = 0; i < 400 && lines.length === 0; ++i) {
+    const at = [coarse.place[0] + (i % 20 - 10) / 5, coarse.place[1] + (Math.floor(i / 20) - 10) / 5];
+    const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [...at, 300], direction: [0, 0, -1], angle: 0.001}, 'picked');
+    if (hit && hit.clusterLevel < coarse.clusterLevel) lines = await outline(hit);
+  }
+  // Each twice, as both ends of a line: the members and the head.
+  assert.equal(lines.length, 2 * (more + 1));
+  for (let i = 0; i < lines.length; i += 2) assert.equal(lines[i], lines[i + 1]);
+});
+
+test('profiles: of points a strip, of a body its cut', async () => {
+  const cloud = new Tested('cloud');
+  await cloud.opened();
+  await cloud.settle({eye: [0, 0, 300], direction: [0, 0.01, -1], error: 0.01});
+  const up = [0, 0, 1], from = [-40, -10, 0], to = [40, 10, 3];
+  const {line} = await cloud.ask({type: 'profile', id: 1, from, to, up}, 'profiled');
+  // Their share of all 40,000 on 100 m x 80 m, and the heights of ground and trees.
+  const length = Math.hypot(80, 20), expected = 40_000 / 8000 * length * 0.02 * length;
+  assert.ok(Math.abs(line.length - expected) < 5 * Math.sqrt(expected), `${line.length} ${expected}`);
+  for (const [i, [along, height]] of line.entries()) {
+    assert.ok(along >= (line[i - 1]?.[0] ?? 0) && along <= length);
+    // A point of the strip is up to 0.8 m aside.
+    const ground = 3 * Math.sin((from[0] + along * 80 / length + 50) / 9);
+    assert.ok(height > ground - 0.1 && height < ground + 4.1, `${height} over ${ground}`);
+  }
+  const ball = new Tested('ball');
+  await ball.opened();
+  await ball.settle({eye: [40, 0, 0], direction: [-1, 0, 0], error: 0.01});
+  for (const up of [[0, 0, 1], [0, 1, 0]]) {
+    const to = up[1] === 1 ? [15, 0, 2] : [15, 2, 0], from = to.map(c => -c);
+    const {line} = await ball.ask({type: 'profile', id: 2, from, to, up}, 'profiled');
+    // A closed curve: each place is the end of two lines.
+    const ends = new Map();
+    for (const [along, height] of line) {
+      const key = `${along.toFixed(9)} ${height.toFixed(9)}`;
+      ends.set(key, (ends.get(key) ?? 0) + 1);
+      const far = Math.hypot(along - Math.hypot(15, 2), height);
+      assert.ok(far > 8.5 && far < 11.2, `${far} from the middle`);
+    }
+    assert.ok(line.length > 100);
+    assert.ok([...ends.values()].every(count => count === 2), 'the cut is open');
+  }
 });
 
 test('an open scan: a ray through its opening meets the far side', async () => {
@@ -490,6 +549,35 @@ test('one short body or damaged part is fetched again without a word', async () 
     await flyer.opened();
     await flyer.settle(CLOSE);
     assert.ok(!flyer.messages.includes('failed'));
+  }
+});
+
+test('a server that falls silent: a message after two tries, and a retry that helps', async () => {
+  let silent = range => range;
+  const flyer = new Tested('alps', {haste: 100, fault: ({range}, response) => silent(range) ? undefined : response});
+  await flyer.opened();
+  const failed = flyer.failed(), stop = sites.flight('alps')[1];
+  flyer.worker.tell({type: 'view', serial: 1, camera: {...stop, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800}});
+  assert.match(await failed, /silent for 10 seconds/);
+  const tries = flyer.log.filter(({range}) => range).map(({path, range}) => path + range);
+  assert.ok(tries.some(range => tries.filter(other => other === range).length === 2));
+  silent = () => false;
+  flyer.worker.tell({type: 'retry'});
+  const state = await flyer.settle(stop);
+  assert.equal(state.points, stop.points);
+
+  const dead = new Tested('alps', {haste: 100, fault: () => undefined});
+  assert.match(await dead.failed(), /silent/);
+});
+
+test('the store of a link, or else the first of stores.json', async () => {
+  for (const [name, chosen] of [['cloud', 'cloud'], ['', 'alps'], ['nothing', 'alps']]) {
+    const flyer = new Tested(name, {choose: true});
+    const message = await flyer.until(message => message.type === 'chosen');
+    assert.equal(message.name, chosen);
+    assert.ok(message.stores.length >= 5);
+    await flyer.opened();
+    assert.ok(flyer.log.some(({path}) => path === `/stores/${chosen}.start`));
   }
 });
 

@@ -273,13 +273,13 @@ TERRACE_EXPORT(pick) int terrace_pick() {
   });
 }
 
-/// input: two places in the view frame. numbers: how many points the profile between them has, and
-/// distance and height of each.
+/// input: two places in the view frame, the unit vector upward. numbers: how many points the
+/// profile between them has, and distance and height of each.
 TERRACE_EXPORT(profile) int terrace_profile() {
   return guarded([&] {
     Module& m = module();
     const double* in = m.input.data();
-    const auto line = m.scene->profile(point_of(in), point_of(in + 3));
+    const auto line = m.scene->profile(point_of(in), point_of(in + 3), point_of(in + 6));
     m.numbers = {static_cast<double>(line.size())};
     for (const auto& [distance, height] : line)
       m.numbers.insert(m.numbers.end(), {distance, height});

@@ -37,6 +37,8 @@ class SceneOf final : public Scene {
   /// What the page takes for a slide, and for how long what has gone is drawn on: a little longer.
   /// What is drawn on and changes again and again ends in time, too.
   static constexpr double kSlide = 0.45, kWait = 0.5, kLongestWait = 3.0;
+  /// The strip whose points a profile shows, in lengths of the profile.
+  static constexpr double kProfileWidth = 0.02;
 
  public:
   using View = terrain::StoreView<Shown>;
@@ -116,8 +118,8 @@ class SceneOf final : public Scene {
   [[nodiscard]] std::uint64_t hash() const override { return mesh().hash(); }
   [[nodiscard]] std::optional<SceneHit> pick(const Point3& origin, const Point3& direction,
                                              double angle) const override;
-  [[nodiscard]] std::vector<std::array<double, 2>> profile(const Point3& from,
-                                                           const Point3& to) const override;
+  [[nodiscard]] std::vector<std::array<double, 2>> profile(const Point3& from, const Point3& to,
+                                                           const Point3& up) const override;
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const override;
   void pin(const SceneHit& hit, tri::ViewPin how) override {
@@ -498,104 +500,108 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     }
   };
   if constexpr (kTriangles) {
-    // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
-    // doi:10.1080/10867651.1997.10487468.
-    tri::TriangleId found = tri::kNoTriangle;
-    std::array<double, 3> weights{};
-    for (const tri::TriangleId triangle : mesh().all_triangles()) {
-      const auto corners = mesh().vertices(triangle);
-      const Point3 a = position(corners[0]);
-      const Point3 ab = difference(position(corners[1]), a),
-                   ac = difference(position(corners[2]), a);
-      const Point3 p = cross(way, ac);
-      const double determinant = dot(ab, p);
-      if (determinant == 0) continue;
-      const Point3 from = difference(origin, a);
-      const double u = dot(from, p) / determinant;
-      if (!(u >= 0 && u <= 1)) continue;
-      const Point3 q = cross(from, ab);
-      const double v = dot(way, q) / determinant;
-      if (!(v >= 0 && u + v <= 1)) continue;
-      const double distance = dot(ac, q) / determinant;
-      if (!(distance > 0 && distance < best)) continue;
-      best = distance;
-      found = triangle;
-      weights = {1 - u - v, u, v};
+    // Points on one line have no triangles, and are drawn as points.
+    if (mesh().triangle_count() > 0) {
+      // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
+      // doi:10.1080/10867651.1997.10487468.
+      tri::TriangleId found = tri::kNoTriangle;
+      std::array<double, 3> weights{};
+      for (const tri::TriangleId triangle : mesh().all_triangles()) {
+        const auto corners = mesh().vertices(triangle);
+        const Point3 a = position(corners[0]);
+        const Point3 ab = difference(position(corners[1]), a),
+                     ac = difference(position(corners[2]), a);
+        const Point3 p = cross(way, ac);
+        const double determinant = dot(ab, p);
+        if (determinant == 0) continue;
+        const Point3 from = difference(origin, a);
+        const double u = dot(from, p) / determinant;
+        if (!(u >= 0 && u <= 1)) continue;
+        const Point3 q = cross(from, ab);
+        const double v = dot(way, q) / determinant;
+        if (!(v >= 0 && u + v <= 1)) continue;
+        const double distance = dot(ac, q) / determinant;
+        if (!(distance > 0 && distance < best)) continue;
+        best = distance;
+        found = triangle;
+        weights = {1 - u - v, u, v};
+      }
+      if (found == tri::kNoTriangle) return {};
+      const auto vertices = mesh().vertices(found);
+      Point3 stored{};
+      std::size_t nearest = 0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Point3 corner = view_.stored(vertices[i]);
+        for (std::size_t k = 0; k < 3; ++k) stored[k] += weights[i] * corner[k];
+        if (weights[i] > weights[nearest]) nearest = i;
+      }
+      told(vertices[nearest], stored,
+           {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
+      return hit;
     }
-    if (found == tri::kNoTriangle) return {};
-    const auto vertices = mesh().vertices(found);
-    Point3 stored{};
-    std::size_t nearest = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Point3 corner = view_.stored(vertices[i]);
-      for (std::size_t k = 0; k < 3; ++k) stored[k] += weights[i] * corner[k];
-      if (weights[i] > weights[nearest]) nearest = i;
-    }
-    told(vertices[nearest], stored,
-         {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
-  } else {
-    for (const tri::VertexId vertex : mesh().all_vertices()) {
-      const Point3 place = position(vertex), to = difference(place, origin);
-      const double along = dot(to, way);
-      if (along <= 0) continue;
-      const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
-      // Among points about as near to the line, the nearest to the eye hides the others.
-      if (aside > angle || along * (1 + aside / angle) >= best) continue;
-      best = along * (1 + aside / angle);
-      told(vertex, view_.stored(vertex), place);
-    }
+  }
+  for (const tri::VertexId vertex : mesh().all_vertices()) {
+    const Point3 place = position(vertex), to = difference(place, origin);
+    const double along = dot(to, way);
+    if (along <= 0) continue;
+    const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
+    // Among points about as near to the line, the nearest to the eye hides the others.
+    if (aside > angle || along * (1 + aside / angle) >= best) continue;
+    best = along * (1 + aside / angle);
+    told(vertex, view_.stored(vertex), place);
   }
   return hit;
 }
 
 template <class Shown>
-std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from,
-                                                           const Point3& to) const {
+std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from, const Point3& to,
+                                                           const Point3& up) const {
   std::vector<std::array<double, 2>> line;
-  if constexpr (kRaster) {
-    const double dx = to[0] - from[0], dy = to[1] - from[1];
-    const double length = std::sqrt(dx * dx + dy * dy);
-    if (!(length > 0)) return line;
+  const Point3 way = difference(to, from);
+  const double rise = dot(way, up);
+  Point3 ahead{way[0] - rise * up[0], way[1] - rise * up[1], way[2] - rise * up[2]};
+  const double length = std::sqrt(dot(ahead, ahead));
+  if (!(length > 0)) return line;
+  for (double& c : ahead) c /= length;
+  const Point3 aside = cross(up, ahead);
+  // How far along the line, how far to its left, how high.
+  const auto seen = [&](tri::VertexId vertex) {
+    const Point3 p = position(vertex), d = difference(p, from);
+    return Point3{dot(d, ahead), dot(d, aside), dot(p, up)};
+  };
+  if constexpr (!kTriangles) {
+    for (const tri::VertexId vertex : mesh().all_vertices()) {
+      const auto [along, left, height] = seen(vertex);
+      if (along >= 0 && along <= length && std::abs(left) <= kProfileWidth / 2 * length)
+        line.push_back({along, height});
+    }
+    return line;
+  } else {
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
       const auto corners = mesh().vertices(triangle);
-      std::array<Point3, 3> at;
-      // For each corner, how far along the line it is and how far to its left.
-      std::array<double, 3> along, left;
-      for (std::size_t i = 0; i < 3; ++i) {
-        at[i] = position(corners[i]);
-        const double x = at[i][0] - from[0], y = at[i][1] - from[1];
-        along[i] = (x * dx + y * dy) / length;
-        left[i] = (dx * y - dy * x) / length;
-      }
-      if (std::min({left[0], left[1], left[2]}) > 0 || std::max({left[0], left[1], left[2]}) < 0 ||
-          std::min({along[0], along[1], along[2]}) > length ||
-          std::max({along[0], along[1], along[2]}) < 0) {
-        continue;
-      }
-      std::array<double, 2> first{1e300, 0}, last{-1e300, 0};
-      const auto meet = [&](double distance, double height) {
-        if (distance < first[0]) first = {distance, height};
-        if (distance > last[0]) last = {distance, height};
+      const std::array<Point3, 3> at{seen(corners[0]), seen(corners[1]), seen(corners[2])};
+      // Where its edges meet the plane: the first and the last place.
+      std::array<double, 2> first{std::numeric_limits<double>::infinity(), 0}, last{-first[0], 0};
+      const auto meet = [&](double along, double height) {
+        first = std::min(first, {along, height});
+        last = std::max(last, {along, height});
       };
       for (std::size_t i = 0; i < 3; ++i) {
-        const std::size_t j = (i + 1) % 3;
-        if (left[i] == 0) meet(along[i], at[i][2]);
-        if (left[i] * left[j] >= 0) continue;
-        const double t = left[i] / (left[i] - left[j]);
-        meet(along[i] + t * (along[j] - along[i]), at[i][2] + t * (at[j][2] - at[i][2]));
+        const Point3 &a = at[i], &b = at[(i + 1) % 3];
+        if (a[1] == 0) meet(a[0], a[2]);
+        if (!((a[1] < 0 && b[1] > 0) || (a[1] > 0 && b[1] < 0))) continue;
+        const double t = a[1] / (a[1] - b[1]);
+        meet(a[0] + t * (b[0] - a[0]), a[2] + t * (b[2] - a[2]));
       }
-      if (!(last[0] > first[0]) || last[0] < 0 || first[0] > length) continue;
-      const double slope = (last[1] - first[1]) / (last[0] - first[0]);
-      const double begin = std::max(first[0], 0.0), end = std::min(last[0], length);
-      line.push_back({begin, first[1] + slope * (begin - first[0])});
-      line.push_back({end, first[1] + slope * (end - first[0])});
+      if (!(first < last) || last[0] < 0 || first[0] > length) continue;
+      const auto cut = [&](const std::array<double, 2>& end) -> std::array<double, 2> {
+        const double along = std::clamp(end[0], 0.0, length);
+        if (along == end[0]) return end;
+        return {along, first[1] + (along - first[0]) / (last[0] - first[0]) * (last[1] - first[1])};
+      };
+      line.push_back(cut(first));
+      line.push_back(cut(last));
     }
-    std::sort(line.begin(), line.end());
-    // Neighbouring triangles meet the line at the same place, up to rounding.
-    const double same = 1e-6 * length;
-    line.erase(std::unique(line.begin(), line.end(),
-                           [&](const auto& a, const auto& b) { return b[0] - a[0] <= same; }),
-               line.end());
   }
   return line;
 }
@@ -603,23 +609,27 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from,
 template <class Shown>
 std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId cluster) const {
   std::vector<std::array<std::uint32_t, 2>> lines;
-  if constexpr (kTriangles) {
-    const auto& model = view_.model();
-    if (tri::level_of(cluster) >= model.top() || !model.is_expanded(cluster)) return lines;
-    std::vector<tri::ClusterId> below{cluster}, children;
-    for (std::size_t i = 0; i < below.size(); ++i) {
-      model.children(below[i], children);
-      for (const tri::ClusterId child : children) {
-        if (model.is_expanded(child)) below.push_back(child);
-      }
+  const auto& model = view_.model();
+  if (tri::level_of(cluster) >= model.top() || !model.is_expanded(cluster)) return lines;
+  std::vector<tri::ClusterId> below{cluster}, children;
+  for (std::size_t i = 0; i < below.size(); ++i) {
+    model.children(below[i], children);
+    for (const tri::ClusterId child : children) {
+      if (model.is_expanded(child)) below.push_back(child);
     }
-    std::sort(below.begin(), below.end());
-    std::vector<bool> belongs(vertices_.size());
-    for (const tri::VertexId vertex : mesh().all_vertices()) {
-      belongs[drawn(vertex)] =
-          std::binary_search(below.begin(), below.end(), model.point_id(vertex).cluster);
+  }
+  std::sort(below.begin(), below.end());
+  std::vector<bool> belongs(vertices_.size());
+  for (const tri::VertexId vertex : mesh().all_vertices()) {
+    belongs[drawn(vertex)] =
+        std::binary_search(below.begin(), below.end(), model.point_id(vertex).cluster);
+  }
+  belongs[drawn(model.head_vertex(cluster))] = true;
+  if constexpr (!kTriangles) {
+    for (std::uint32_t i = 0; i < belongs.size(); ++i) {
+      if (belongs[i]) lines.push_back({i, i});
     }
-    belongs[drawn(model.head_vertex(cluster))] = true;
+  } else {
     // An edge between two triangles inside comes twice, once each way.
     std::vector<std::array<std::uint32_t, 2>> edges;
     for (const tri::TriangleId triangle : mesh().all_triangles()) {

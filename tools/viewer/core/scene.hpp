@@ -111,13 +111,15 @@ class Scene {
   /// cluster that it is a member of. They stay so until release().
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
-  /// The surface along the straight line between two places of the view frame, from above: distance
-  /// in metres and height at each edge that it crosses. Empty except for rasters. O(triangles).
+  /// The cut along the plane through two places of the view frame and the unit vector `up`, as
+  /// pairs of the distance over ground from the first place and the height, both in metres. Of
+  /// triangles the ends of a line each; of points those within 1 % of the length to either side.
+  /// O(what is drawn).
   [[nodiscard]] virtual std::vector<std::array<double, 2>> profile(
-      const stream::Point3& from, const stream::Point3& to) const = 0;
+      const stream::Point3& from, const stream::Point3& to, const stream::Point3& up) const = 0;
   /// The lines, as slots of their ends, around the triangles whose corners all belong to a cluster:
-  /// its head and what lies below it. Empty for points and for clusters that are not expanded.
-  /// O(triangles).
+  /// its head and what lies below it. Of points these themselves, each as both ends. Empty for
+  /// clusters that are not expanded. O(what is drawn).
   [[nodiscard]] virtual std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const = 0;
   /// What points can be drawn by; nothing for rasters.

@@ -47,15 +47,38 @@ export class OrbitCamera {
     return cross(this.right, this.direction);
   }
 
-  fit(box: number[], aspect: number): void {
-    const size: Vec3 = [box[3] - box[0], box[4] - box[1], box[5] - box[2]];
-    const extent = Math.max(length(size), 1e-3);
-    this.target = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2, (box[2] + box[5]) / 2];
+  /// From the south, as near as all of the box is seen between these edges of the picture, from -1 to 1, right and up.
+  fit(box: number[], aspect: number, left = -1, right = 1, bottom = -1, top = 1): void {
+    // One point is looked at from a metre.
+    const extent = length([box[3] - box[0], box[4] - box[1], box[5] - box[2]]) || 1;
+    const middle: Vec3 = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2, (box[2] + box[5]) / 2];
     this.azimuth = 0;
     this.tilt = this.body ? 12 : 42;
-    this.distance = (this.body ? 0.55 : 0.4) * extent / Math.tan(FOV / 2 * RADIANS) / Math.min(1, aspect);
     this.least = extent * 1e-5;
     this.most = extent * 8;
+    const t = Math.tan(FOV / 2 * RADIANS);
+    const corners = Array.from({length: 8}, (_, i) => add([box[i & 1 ? 3 : 0], box[i & 2 ? 4 : 1], box[i & 4 ? 5 : 2]], middle, -1));
+    const axes: Array<[Vec3, number, number]> = [[this.right, left * t * aspect, right * t * aspect], [this.up, bottom * t, top * t]];
+    // How far back no corner lies beyond either edge: edges are lines from the eye, and the corners that touch them are the
+    // same wherever it is along the axis.
+    this.distance = extent / 2;
+    for (const [axis, low, high] of axes) {
+      const beyondHigh = Math.max(...corners.map(c => dot(c, axis) - high * dot(c, this.direction)));
+      const beyondLow = Math.max(...corners.map(c => low * dot(c, this.direction) - dot(c, axis)));
+      this.distance = Math.max(this.distance, (beyondHigh + beyondLow) / (high - low));
+    }
+    // And there the eye goes along each axis until as much is left at one edge as at the other.
+    this.target = middle;
+    for (const [axis, low, high] of axes) {
+      let at = 0;
+      for (let step = 0; step < 8; ++step) {
+        const seen = corners.map(c => (dot(c, axis) - at) / (dot(c, this.direction) + this.distance));
+        at += this.distance * (Math.max(...seen) + Math.min(...seen) - high - low) / 2;
+      }
+      this.target = add(this.target, axis, at);
+    }
+    // A ground is turned about the place of its mean height in the middle of the picture.
+    if (!this.body) this.retarget(this.distance + (middle[2] - this.target[2]) / this.direction[2]);
   }
   orbit(turn: number, tilt: number): void {
     this.azimuth = (this.azimuth + turn + 360) % 360;

@@ -222,12 +222,14 @@ export class Core {
       attributes: this.numbers(11 + n[10]).slice(11)
     };
   }
-  /// Distances and heights, in metres, of the surface between two places of the view frame.
-  profile(from: number[], to: number[]): Array<[number, number]> {
-    this.writeNumbers([...from, ...to]);
+  /// Distances and heights, in metres, of the cut between two places of the view frame: as Scene::profile() has it,
+  /// of rasters and points in order.
+  profile(from: number[], to: number[], up: number[]): Array<[number, number]> {
+    this.writeNumbers([...from, ...to, ...up]);
     this.check(this.wasm.profile());
     const n = this.numbers(1 + 2 * this.numbers(1)[0]);
-    return Array.from({length: n[0]}, (_, i) => [n[1 + 2 * i], n[2 + 2 * i]]);
+    const line = Array.from({length: n[0]}, (_, i): [number, number] => [n[1 + 2 * i], n[2 + 2 * i]]);
+    return this.kind === 'surface' ? line : line.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   }
   /// The ends, as slots, of the lines around a cluster.
   outline(level: number, ordinal: number): Uint32Array {

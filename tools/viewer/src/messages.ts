@@ -3,23 +3,27 @@
 
 import type {Camera, Changes, Hit, Opened, State} from './core';
 import type {Stats} from './ranges';
-import type {Manifest} from './store';
+import type {Listed, Manifest} from './store';
 
 export type ToWorker =
-    |{type: 'open', wasm: string, body: string, asPoints: boolean, store: string, start: string, maxPoints: number}
+    /// base: the URL of a published folder; name: of a store in it. choose: stores.json is read, and if it does not have the
+    /// name, its first store is opened.
+    |{type: 'open', base: string, name: string, choose: boolean, asPoints: boolean, maxPoints: number}
     |{type: 'show', asPoints: boolean}  ///< how to show a scan
     |{type: 'view', camera: Camera, serial: number}
     |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
     |{type: 'pin', how: number}
-    |{type: 'profile', id: number, from: number[], to: number[]}
+    |{type: 'profile', id: number, from: number[], to: number[], up: number[]}
     |{type: 'outline', level: number, ordinal: number}
     |{type: 'hash', id: number}
     |{type: 'retry'};
 
 export type FromWorker =
+    |{type: 'started'}  ///< on the way to what is to be opened
+    |{type: 'chosen', stores: Listed[], name: string}  ///< from stores.json
     |{type: 'progress', bytes: number}
-    |{type: 'opened', manifest: Manifest, scene: Opened}
+    |{type: 'opened', manifest: Manifest, scene: Opened, heightUnit: number}  ///< heightUnit: of the store, in metres
     |{type: 'frame', serial: number, state: State, changes: Changes, stats: Stats, milliseconds: number, loading: boolean, time: number}
     |{type: 'picked', id: number, hit: Hit|null}
     |{type: 'profiled', id: number, line: Array<[number, number]>}

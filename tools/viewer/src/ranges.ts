@@ -16,6 +16,8 @@ const INDEX_BLOCK = 1024;
 const SMALL = 4096, PAUSE = 20;
 const MOST_REQUESTS = 4;
 const TRIES = 4;
+/// Milliseconds for which a server may be silent, before its answer begins and until the bytes are there; this is tried twice.
+const SILENCE = 10_000;
 /// A request that another view does not want is given up after this time.
 const PATIENCE = 700;
 
@@ -23,6 +25,53 @@ const PATIENCE = 700;
 export class FetchFault extends Error {
   constructor(message: string, readonly fatal: boolean) {
     super(message);
+  }
+}
+
+class SilentFault extends FetchFault {}
+
+/// Gives a request up when nothing comes for too long.
+class Watch {
+  private readonly abort = new AbortController();
+  private timer: ReturnType<typeof setTimeout>|undefined;
+  private silent = false;
+
+  constructor(signal?: AbortSignal) {
+    signal?.addEventListener('abort', () => this.abort.abort());
+    this.heard();
+  }
+  get signal(): AbortSignal {
+    return this.abort.signal;
+  }
+  heard(): void {
+    this.end();
+    this.timer = setTimeout(() => {
+      this.silent = true;
+      this.abort.abort();
+    }, SILENCE);
+  }
+  end(): void {
+    clearTimeout(this.timer);
+  }
+  /// What is to be said of an error of fetch() or of what reads its answer.
+  fault(what: string, error: unknown): unknown {
+    if (this.silent) return new SilentFault(`${what}: the server has been silent for ${SILENCE / 1000} seconds.`, false);
+    return error instanceof FetchFault ? error : new FetchFault(`${what}: the server does not answer.`, false);
+  }
+}
+
+/// The bytes at a URL, which is `what` in words.
+export async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
+  const watch = new Watch();
+  try {
+    const response = await fetch(url, {signal: watch.signal});
+    watch.heard();
+    if (!response.ok) throw new FetchFault(`${what}: the server answers with HTTP ${response.status}.`, false);
+    return new Uint8Array(await response.arrayBuffer());
+  } catch (error) {
+    throw watch.fault(what, error);
+  } finally {
+    watch.end();
   }
 }
 
@@ -183,21 +232,30 @@ export class Ranges {
         return await this.once(range, signal);
       } catch (error) {
         if (signal.aborted) throw error;
-        if (error instanceof FetchFault && error.fatal) throw error;
-        const why = error instanceof FetchFault ? error.message : `${range.file}: the server does not answer`;
-        if (turn === TRIES) throw new FetchFault(why, false);
+        if ((error as FetchFault).fatal || turn === (error instanceof SilentFault ? 2 : TRIES)) throw error;
         await new Promise(resume => setTimeout(resume, 250 * 2 ** turn));
       }
     }
   }
   private async once(range: ByteRange, signal: AbortSignal): Promise<Uint8Array> {
+    const watch = new Watch(signal);
+    try {
+      return await this.answer(range, watch);
+    } catch (error) {
+      throw watch.fault(range.file, error);
+    } finally {
+      watch.end();
+    }
+  }
+  private async answer(range: ByteRange, watch: Watch): Promise<Uint8Array> {
     const last = range.offset + range.bytes - 1;
     ++this.stats.requests;
     const response = await fetch(this.base + encodeURIComponent(range.file), {
       headers: {Range: `bytes=${range.offset}-${last}`},
       cache: this.fresh ? 'reload' : 'default',
-      signal
+      signal: watch.signal
     });
+    watch.heard();
     const fault = (what: string, fatal: boolean) => {
       response.body?.cancel().catch(() => {});
       return new FetchFault(`${range.file}: ${what}`, fatal);

@@ -60,7 +60,7 @@ in float levelOf;
 in vec3 own;
 in vec2 attributesOf;
 uniform sampler2D ramp;
-uniform int mode;  // as in COLOURS; -1 for the wire
+uniform int mode;  // as in COLOURS; -1 for lines
 uniform vec2 heights;
 uniform float top;
 uniform int lit;   // 0 not, 1 as a map, 2 as a body
@@ -78,7 +78,7 @@ void main() {
     return;
   }
   vec3 n = lit > 0 ? normalize(up) : vec3(0.0, 0.0, 1.0);
-  float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-6)
+  float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-30)
       : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
       : mode == 2 ? 1.0 - levelOf / max(top, 1.0)
       : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
@@ -150,6 +150,7 @@ export class Renderer {
   private slidingUntil = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
+    this.resize();  // once there is a context, each change of size takes long
     const gl = canvas.getContext('webgl2', {antialias: true, alpha: false, preserveDrawingBuffer: true});
     if (!gl) throw new Error('This browser has no WebGL 2, which the viewer draws with.');
     this.gl = gl;
@@ -245,7 +246,7 @@ export class Renderer {
     if (!this.state) return;
     const aspect = this.canvas.width / this.canvas.height;
     const eye = camera.eye, box = this.box;
-    const extent = Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]);
+    const extent = Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]) || 1;
     let farthest = 0;
     for (let i = 0; i < 8; ++i) {
       farthest = Math.max(farthest, Math.hypot(box[i & 1 ? 3 : 0] - eye[0], box[i & 2 ? 4 : 1] - eye[1],
@@ -259,7 +260,10 @@ export class Renderer {
     gl.uniform1f(this.uniform('pointSize'), look.pointSize);
     const yUp = camera.body && camera.yUp;
     gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
-    gl.uniform2f(this.uniform('heights'), yUp ? box[1] : box[2], yUp ? box[4] : box[5]);
+    // What is flat has the middle colour: differences from rounding are none.
+    const low = yUp ? box[1] : box[2], high = yUp ? box[4] : box[5], middle = (low + high) / 2;
+    const reach = Math.max((high - low) / 2, 1e-5 * Math.abs(middle));
+    gl.uniform2f(this.uniform('heights'), middle - reach, middle + reach);
     gl.uniform1f(this.uniform('top'), this.top);
     gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);
     // Cartographic light from the upper left, turned with the viewer; on a body from beside the eye.
@@ -277,9 +281,17 @@ export class Renderer {
     gl.uniform1i(this.uniform('slides'), {points: 0, raster: 1, surface: 2}[this.kind]);
     gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
-    if (this.kind === 'points') {
+    // All on one line there are no triangles.
+    if (this.kind === 'points' || this.state.triangles === 0) {
+      gl.uniform1i(this.uniform('lit'), 0);
       gl.bindVertexArray(this.surface);
       gl.drawArrays(gl.POINTS, 0, this.state.vertexSlots);
+      if (this.rimCount === 0) return;
+      gl.uniform1i(this.uniform('mode'), -1);
+      gl.uniform1f(this.uniform('pointSize'), look.pointSize + 2);
+      gl.depthFunc(gl.LEQUAL);
+      this.drawRim(gl.POINTS);
+      gl.depthFunc(gl.LESS);
       return;
     }
     gl.enable(gl.POLYGON_OFFSET_FILL);
@@ -298,13 +310,15 @@ export class Renderer {
       gl.depthMask(true);
       gl.disable(gl.BLEND);
     }
-    if (this.rimCount > 0) {
-      gl.uniform4f(this.uniform('wire'), OUTLINE[0] / 255, OUTLINE[1] / 255, OUTLINE[2] / 255, 1);
-      gl.bindVertexArray(this.rims);
-      gl.drawElements(gl.LINES, this.rimCount, gl.UNSIGNED_INT, 0);
-    }
+    if (this.rimCount > 0) this.drawRim(gl.LINES);
   }
 
+  private drawRim(what: number): void {
+    const gl = this.gl;
+    gl.uniform4f(this.uniform('wire'), OUTLINE[0] / 255, OUTLINE[1] / 255, OUTLINE[2] / 255, 1);
+    gl.bindVertexArray(this.rims);
+    gl.drawElements(what, this.rimCount, gl.UNSIGNED_INT, 0);
+  }
   private lineCount = 0;
   /// Each edge once: of the two triangles that have it the one that goes upward in slots, or the only one.
   private makeLines(): void {

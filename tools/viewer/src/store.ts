@@ -4,8 +4,15 @@
 
 import type {ByteRange} from './core';
 
+/// A store of a published folder, from its stores.json.
+export interface Listed {
+  name: string;
+  points: number;
+}
+
 export interface Channel {
   name: string;
+  type: string;
   unit: string;
   scale: number;
   offset: number;
@@ -18,7 +25,7 @@ export interface Manifest {
   world: number[];
   coordinates: Channel[];
   attributes: Channel[];
-  crs: {epsg: number, name: string, geographic: boolean, horizontal_unit: string};
+  crs: {epsg: number, name: string, geographic: boolean, horizontal_unit: string, vertical_unit: string};
   levels: Array<{level: number, points: number}>;
   files: Map<string, number>;  ///< sizes by name
 }

@@ -6,15 +6,10 @@ import {type Hit, type Kind, type Opened, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {CATEGORIES, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
 import {type Colour, COLOURS, type Look, Renderer} from './render';
-import {type Manifest, worldPoint} from './store';
-
-/// A store that the page shows, from stores.json.
-interface Listed {
-  name: string;
-  points: number;
-}
+import {type Listed, type Manifest, worldPoint} from './store';
 
 const phone = matchMedia('(max-width: 640px)').matches;
+const touch = matchMedia('(pointer: coarse)').matches;
 /// Points at once: what phones draw without effort is less.
 const MOST_POINTS = phone ? 400_000 : 1_500_000;
 /// The standard classes of ASPRS LAS 1.4.
@@ -28,7 +23,26 @@ function element<T extends HTMLElement>(id: string): T {
 const count = (n: number) => Math.round(n).toLocaleString('en');
 const readable = (bytes: number) =>
     bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} KB` : `${(bytes / 1e6).toFixed(1)} MB`;
-const metres = (n: number) => Math.abs(n) < 10_000 ? `${n.toFixed(Math.abs(n) < 10 ? 2 : Math.abs(n) < 1000 ? 1 : 0)} m` : `${(n / 1000).toFixed(2)} km`;
+const rounded = (n: number) => n.toFixed(Math.abs(n) < 10 ? 2 : Math.abs(n) < 1000 ? 1 : 0);
+const metres = (n: number) => Math.abs(n) < 10_000 ? `${rounded(n)} m` : `${(n / 1000).toFixed(2)} km`;
+const counted = (n: number, what: string) => `<b>${count(n)}</b> ${what}${n === 1 ? '' : 's'}`;
+/// Short names of units.
+const UNITS: Record<string, string> = {metre: 'm', foot: 'ft', 'US survey foot': 'ft'};
+
+const NO_WORKER = 'The viewer\'s worker cannot be loaded. Load the page anew.';
+function fail(message: string, again = true): void {
+  element('progress').hidden = true;
+  element('message').hidden = false;
+  element('message-text').textContent = message;
+  element('retry').hidden = !again;
+}
+
+/// Starts a worker, which begins to fetch a store. choose: as in ToWorker.
+function launch(name: string, choose: boolean, asPoints: boolean): Worker {
+  const worker = new Worker('worker.js'), base = new URL('.', document.baseURI).href;
+  worker.postMessage({type: 'open', base, name, choose, asPoints, maxPoints: MOST_POINTS} satisfies ToWorker);
+  return worker;
+}
 
 class Viewer {
   private readonly canvas = element<HTMLCanvasElement>('picture');
@@ -42,6 +56,7 @@ class Viewer {
   private manifest: Manifest|null = null;
   private box: number[] = [];
   private kind: Kind = 'raster';
+  private heightUnit = 1;   ///< metres
   private scan = false;     ///< of a body
   private asPoints = false; ///< how a scan is to be shown
   private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
@@ -59,34 +74,19 @@ class Viewer {
   private lastDrawn = 0;
   private hit: Hit|null = null;
   private before: Hit|null = null;
+  private pointer: [number, number] = [0, 0];  ///< over the picture; the middle if it is not
   private linkTimer = 0;
   private pivotTimer = 0;
   private pivoting = false;  ///< the ground in the middle of the picture is being looked for
 
-  constructor() {
+  /// first: a worker that has been launched for what the link names.
+  constructor(first: Worker) {
     this.renderer = new Renderer(this.canvas);
-    this.setDark(matchMedia('(prefers-color-scheme: dark)').matches);
     this.readLink();
+    this.listen(first, true);
+    this.setDark(matchMedia('(prefers-color-scheme: dark)').matches);
     this.bind();
     requestAnimationFrame(() => this.tick());
-  }
-
-  async start(): Promise<void> {
-    try {
-      const response = await fetch('stores.json');
-      if (!response.ok) throw new Error(`the server answers with HTTP ${response.status}.`);
-      const list = await response.json();
-      this.stores = list.stores;
-      if (this.stores.length === 0) throw new Error('it lists no store.');
-    } catch (error) {
-      this.fail(`stores.json: ${(error as Error).message}`);
-      return;
-    }
-    const select = element<HTMLSelectElement>('store');
-    select.replaceChildren(...this.stores.map(store => new Option(store.name, store.name)));
-    select.disabled = this.stores.length === 1;
-    const wanted = this.link.get('s');
-    this.open(this.stores.find(store => store.name === wanted)?.name ?? this.stores[0].name, true);
   }
 
   /// For tests and for those who look behind the curtain.
@@ -128,6 +128,7 @@ class Viewer {
   private open(name: string, first: boolean): void {
     this.worker?.terminate();
     this.renderer.clear();
+    this.lastDrawn = 0;
     this.store = name;
     this.manifest = null;
     this.status = null;
@@ -139,25 +140,31 @@ class Viewer {
     element('progress').hidden = false;
     element('message').hidden = true;
     document.title = `${name} · terrace`;
-    this.worker = new Worker('worker.js');
-    this.worker.onmessage = event => this.hear(event.data as FromWorker, first);
-    this.worker.onerror = event => this.fail(event.message || 'the viewer\'s worker cannot be loaded.');
-    const at = (path: string) => new URL(path, document.baseURI).href;
-    this.tell({
-      type: 'open',
-      wasm: at('core.wasm'),
-      body: at('body.wasm'),
-      asPoints: this.asPoints,
-      store: at(`stores/${encodeURIComponent(name)}/`),
-      start: at(`stores/${encodeURIComponent(name)}.start`),
-      maxPoints: MOST_POINTS
-    });
+    this.listen(launch(name, this.stores.length === 0, this.asPoints), first);
+  }
+  private listen(worker: Worker, first: boolean): void {
+    this.worker = worker;
+    worker.onmessage = event => this.hear(event.data as FromWorker, first);
+    worker.onerror = event => fail(event.message || NO_WORKER);
+  }
+  /// The stores that there are, and which of them is shown.
+  private list(stores: Listed[], name: string): void {
+    this.stores = stores;
+    this.store = name;
+    document.title = `${name} · terrace`;
+    const select = element<HTMLSelectElement>('store');
+    select.replaceChildren(...stores.map(store => new Option(store.name, store.name)));
+    select.disabled = stores.length === 1;
+    select.value = name;
   }
   private tell(message: ToWorker): void {
     this.worker?.postMessage(message);
   }
   private hear(message: FromWorker, first: boolean): void {
     switch (message.type) {
+      case 'chosen':
+        this.list(message.stores, message.name);
+        break;
       case 'progress':
         element('progress-text').textContent = `Loading, ${readable(message.bytes)}`;
         break;
@@ -166,6 +173,7 @@ class Viewer {
         this.manifest = message.manifest;
         this.box = message.scene.box;
         this.kind = message.scene.kind;
+        this.heightUnit = message.heightUnit;
         this.scan = this.camera.body = message.scene.scan;
         this.colours = message.scene.colours;
         element<HTMLInputElement>('level').max = String(message.manifest.levels.length - 1);
@@ -176,15 +184,16 @@ class Viewer {
           // Most scans have Y upward; what is tallest along Z stands on it.
           const [x, y, z] = [0, 1, 2].map(i => this.box[i + 3] - this.box[i]);
           if (!first || !this.link.has('u')) this.camera.yUp = z <= 1.2 * Math.max(x, y);
-          this.camera.fit(this.box, this.aspect);
+          this.fit();
         }
         if (first && !again) this.applyLink();
         element('with-wire').hidden = this.kind === 'points';
         element('with-size').hidden = this.kind !== 'points';
         element('as').hidden = element('upright').hidden = !this.scan;
-        element('keys').textContent = this.scan ?
-            'Drag to turn, right-drag or Ctrl-drag to move, wheel or pinch to zoom, click for a point.' :
-            'Drag to move, right-drag or Ctrl-drag to turn, wheel or pinch to zoom, click for the height.';
+        element('keys').textContent = touch ?
+            `Drag to ${this.scan ? 'turn; with two fingers move and zoom' : 'move; with two fingers zoom, turn and tilt'}; tap for a point.` :
+            `Drag to ${this.scan ? 'turn' : 'move'}, right-drag or Ctrl-drag to ${this.scan ? 'move' : 'turn'}, wheel to zoom, click for a point.`;
+        element('keyboard').hidden = touch;
         if (!this.offers(this.look.colour) || (!again && (this.colours.rgb || this.scan) && !this.link.has('c'))) {
           this.look.colour = this.colours.rgb ? 'rgb' : this.kind === 'surface' ? 'grey' : 'height';
         }
@@ -222,7 +231,7 @@ class Viewer {
         this.hashes.delete(message.id);
         break;
       case 'failed':
-        this.fail(message.message);
+        fail(message.message);
         break;
     }
   }
@@ -237,11 +246,6 @@ class Viewer {
         floats[i] += by;
       }
     }
-  }
-  private fail(message: string): void {
-    element('progress').hidden = true;
-    element('message').hidden = false;
-    element('message-text').textContent = message;
   }
   private pick(x: number, y: number, pixels: number): Promise<Hit|null> {
     const ray = this.camera.ray(x, y, this.aspect);
@@ -273,6 +277,7 @@ class Viewer {
     }
     const time = this.now;
     if (!this.redraw && !this.renderer.sliding(time)) return;
+    if (!this.status && this.lastDrawn > 0) return;  // nothing more than before
     this.redraw = false;
     this.renderer.draw(this.camera, this.look, time);
     // A pause is no frame.
@@ -303,12 +308,13 @@ class Viewer {
   private showStatus(): void {
     const s = this.status;
     if (!s) return;
-    const parts = [`<b>${count(s.state.points)}</b> points`];
-    if (this.kind !== 'points') parts.push(`<b>${count(s.state.triangles)}</b> triangles`);
+    const parts = [counted(s.state.points, 'point')];
+    if (this.kind !== 'points') parts.push(counted(s.state.triangles, 'triangle'));
     parts.push(`<b>${readable(s.stats.bytes)}</b>`);
-    parts[parts.length - 1] += `<span class="wide"> · <b>${count(s.stats.requests)}</b> requests · ` +
+    parts[parts.length - 1] += `<span class="wide"> · ${counted(s.stats.requests, 'request')} · ` +
         `<b>${this.frameTime.toFixed(0)}</b> ms a frame</span>`;
-    parts.push(s.state.settled ? (s.state.worst > 1 ? 'as fine as memory allows' : 'as fine as asked for') : 'refining');
+    const [brief, whole] = !s.state.settled ? ['refining', ''] : s.state.worst > 1 ? ['full', 'as fine as memory allows'] : ['done', 'as fine as asked for'];
+    parts.push(whole ? `<span class="wide">${whole}</span><span class="brief">${brief}</span>` : brief);
     element('status').innerHTML = parts.join(' · ');
   }
   /// Whether the store can be drawn by it.
@@ -333,7 +339,7 @@ class Viewer {
     }));
     if (!ramp) return;
     const texts: Partial<Record<Colour, [string, string]>> = {
-      height: this.scan ? ['low', 'high'] : [metres(this.box[2]), metres(this.box[5])],
+      height: this.scan ? ['low', 'high'] : [this.height(this.box[2]), this.height(this.box[5])],
       slope: ['0°', '60°'],
       level: ['coarse', 'fine'],
       intensity: ['weak', 'strong']
@@ -351,23 +357,23 @@ class Viewer {
     const crs = this.manifest.crs;
     const world = worldPoint(this.manifest, hit.stored);
     const digits = crs.geographic ? 6 : 2;
-    const unit = this.manifest.coordinates[2].unit;
     const rows: Array<[string, string]> = this.scan ? world.map((c, i): [string, string] => ['XYZ'[i], this.plain(c)]) : [
       [crs.geographic ? 'Longitude' : 'East', world[0].toFixed(digits)],
       [crs.geographic ? 'Latitude' : 'North', world[1].toFixed(digits)],
-      ['Height', `${world[2].toFixed(2)}${unit ? ` ${unit === 'metre' ? 'm' : unit}` : ''}`]
+      ['Height', `${world[2].toFixed(2)}${this.unit}`]
     ];
-    rows.push(['Level', `${hit.level}`], ['Cluster', `${hit.clusterLevel}/${hit.clusterOrdinal}`]);
+    // As the command takes it: --cluster L:N.
+    rows.push(['Level', `${hit.level}`], ['Cluster', `${hit.clusterLevel}:${hit.clusterOrdinal}`]);
     if (crs.epsg) rows.push(['CRS', `EPSG:${crs.epsg}`]);
     this.manifest.attributes.forEach((channel, i) => {
       if (i >= hit.attributes.length) return;
       const value = hit.attributes[i] * channel.scale + channel.offset;
       const named = channel.name === 'classification' && CLASSES[value] ? ` ${CLASSES[value]}` : '';
-      rows.push([channel.name.replaceAll('_', ' '), `${Number(value.toPrecision(12))}${named}`]);
+      rows.push([channel.name.replaceAll('_', ' '), `${Number(value.toPrecision(channel.type === 'float32' ? 7 : 12))}${named}`]);
     });
     if (this.before) {
       const way = add(hit.place as Vec3, this.before.place as Vec3, -1);
-      rows.push(['From the last', this.scan ? this.plain(length(way)) : `${metres(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${metres(Math.abs(way[2]))}`]);
+      rows.push(['From the last', this.scan ? this.plain(length(way)) : `${this.ground(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${this.height(Math.abs(way[2]))}`]);
     }
     element('place-text').replaceChildren(...rows.flatMap(([name, value]) => {
       const dt = document.createElement('dt'), dd = document.createElement('dd');
@@ -385,6 +391,19 @@ class Viewer {
     const size = Math.max(...[0, 1, 2].map(i => this.box[i + 3] - this.box[i]));
     return n.toFixed(Math.min(12, Math.max(0, 5 - Math.floor(Math.log10(size || 1)))));
   }
+  /// The unit of heights, if it is known.
+  private get unit(): string {
+    const unit = this.manifest?.coordinates[2].unit || this.manifest?.crs.vertical_unit;
+    return unit ? ` ${UNITS[unit] ?? unit}` : '';
+  }
+  /// A height of the view frame, or a difference of two, in the unit of the store.
+  private height(metres: number): string {
+    return `${rounded(metres / this.heightUnit)}${this.unit}`;
+  }
+  /// A distance over ground.
+  private ground(n: number): string {
+    return this.manifest?.crs.horizontal_unit ? metres(n) : rounded(n);
+  }
   private closePlace(): void {
     this.hit = this.before = null;
     element('place').hidden = true;
@@ -397,28 +416,39 @@ class Viewer {
     clearTimeout(this.detailTimer);
     this.detailTimer = window.setTimeout(() => {
       this.detailTimer = 0;
-      if (!this.hit || this.kind === 'points') return;
+      if (!this.hit) return;
       this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
-      if (this.before && this.kind === 'raster') void this.showProfile(this.before.place, this.hit.place);
+      if (this.before) void this.showProfile(this.before.place, this.hit);
     }, delay);
   }
-  private async showProfile(from: number[], to: number[]): Promise<void> {
+  private async showProfile(from: number[], {place: to, stored}: Hit): Promise<void> {
+    const axis = this.scan && this.camera.yUp ? 1 : 2;
     const line = await new Promise<Array<[number, number]>>(resolve => {
       const id = ++this.next;
       this.profiles.set(id, resolve);
-      this.tell({type: 'profile', id, from, to});
+      this.tell({type: 'profile', id, from, to, up: [0, axis === 1 ? 1 : 0, axis === 2 ? 1 : 0]});
     });
     element('profile').hidden = line.length < 2 || !this.before;
     if (line.length < 2) return;
-    const heights = line.map(point => point[1]), low = Math.min(...heights), high = Math.max(...heights);
-    const length = line[line.length - 1][0], rise = Math.max(high - low, 1e-9);
+    const heights = line.map(point => point[1]);
+    const low = heights.reduce((a, b) => Math.min(a, b)), high = heights.reduce((a, b) => Math.max(a, b));
+    const length = line.reduce((most, [d]) => Math.max(most, d), 0) || 1, rise = high - low || 1;
     const path = line.map(([d, h]) => `${(256 * d / length).toFixed(2)},${(80 - 76 * (h - low) / rise).toFixed(2)}`);
     const shape = document.createElementNS('http://www.w3.org/2000/svg', 'path');
-    shape.setAttribute('d', `M0,84 L${path.join(' ')} L256,84 Z`);
+    // The ground down to the bottom; the points; or the cut of a body, triangle by triangle.
+    shape.setAttribute('class', this.kind);
+    shape.setAttribute('d', {
+      raster: () => `M0,84 L${path.join(' ')} L256,84 Z`,
+      points: () => path.map(at => `M${at}h0`).join(''),
+      surface: () => path.map((at, i) => (i % 2 ? 'L' : 'M') + at).join('')
+    }[this.kind]());
     element('profile-plot').replaceChildren(shape);
-    element('profile-low').textContent = `${metres(low)} lowest`;
-    element('profile-length').textContent = metres(length);
-    element('profile-high').textContent = `${metres(high)} highest`;
+    // The view frame counts Y from the middle of the store.
+    const above = axis === 1 ? worldPoint(this.manifest!, stored)[1] - to[1] : 0;
+    const brief = (n: number, text: string) => this.scan ? `${Number(n.toPrecision(3))}` : text;
+    element('profile-low').textContent = `${brief(low + above, this.height(low))} lowest`;
+    element('profile-length').textContent = brief(length, this.ground(length));
+    element('profile-high').textContent = `${brief(high + above, this.height(high))} highest`;
   }
   private showMark(): void {
     this.showMarkAt('mark', this.hit);
@@ -529,6 +559,7 @@ class Viewer {
       travelled = pointers.size > 1 ? 1e9 : 0;
     });
     canvas.addEventListener('pointermove', event => {
+      this.pointer = this.at(event);
       const last = pointers.get(event.pointerId);
       if (!last) return;
       const dx = event.clientX - last.x, dy = event.clientY - last.y;
@@ -564,6 +595,7 @@ class Viewer {
       }
     };
     canvas.addEventListener('pointerup', up);
+    canvas.addEventListener('pointerleave', () => this.pointer = [0, 0]);
     canvas.addEventListener('pointercancel', up);
     canvas.addEventListener('wheel', event => {
       event.preventDefault();
@@ -592,6 +624,7 @@ class Viewer {
         this.asPoints = points;
         this.closePlace();
         this.status = null;
+        this.lastDrawn = 0;
         this.tell({type: 'show', asPoints: points});
         this.writeLink();
       });
@@ -637,12 +670,10 @@ class Viewer {
     element('release').addEventListener('click', () => this.tell({type: 'pin', how: -1}));
     element('retry').addEventListener('click', () => {
       element('message').hidden = true;
-      if (this.stores.length === 0) {
-        void this.start();
-      } else if (this.manifest) {
+      if (this.manifest) {
         this.tell({type: 'retry'});
       } else {
-        this.open(this.store, true);
+        this.open(this.stores.length === 0 ? this.link.get('s') ?? '' : this.store, true);
       }
     });
     addEventListener('hashchange', () => {
@@ -658,7 +689,7 @@ class Viewer {
     });
     canvas.addEventListener('webglcontextlost', event => {
       event.preventDefault();
-      this.fail('The graphics driver has given up. Load the page anew.');
+      fail('The graphics driver has given up. Load the page anew.', false);
     });
   }
   private changeLook(): void {
@@ -668,8 +699,18 @@ class Viewer {
   }
   private fit(): void {
     if (!this.manifest) return;
-    this.camera.fit(this.box, this.aspect);
+    const {clientWidth: width, clientHeight: height} = this.canvas;
+    const across = (pixels: number) => 2 * pixels / width, down = (pixels: number) => 2 * pixels / height;
+    // Between the panels.
+    const edge = phone ? across(16) : across(24), tools = phone || width < 900 ? 0 : across(256);
+    this.camera.fit(
+        this.box, this.aspect, -1 + edge, 1 - Math.max(edge, tools), -1 + down(52), 1 - down(phone ? 72 : 24));
     this.moved = true;
+  }
+  /// Expands or collapses the cluster under the pointer.
+  private async pinPointed(how: number): Promise<void> {
+    this.showPlace(await this.pick(...this.pointer, 12));
+    if (this.hit) this.tell({type: 'pin', how});
   }
   private key(event: KeyboardEvent): void {
     const step = event.shiftKey ? 180 : 60;
@@ -686,6 +727,9 @@ class Viewer {
       e: () => this.camera.orbit(6, 0),
       r: () => this.camera.orbit(0, 4),
       f: () => this.camera.orbit(0, -4),
+      x: () => void this.pinPointed(1),
+      c: () => void this.pinPointed(0),
+      v: () => this.tell({type: 'pin', how: -1}),
       Home: () => this.fit(),
       Escape: () => this.closePlace(),
       Enter: () => void this.pick(0, 0, 12).then(hit => this.showPlace(hit))
@@ -694,17 +738,19 @@ class Viewer {
     if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     act();
-    this.change('+=-'.includes(event.key));
+    if (!['x', 'c', 'v', 'enter', 'escape'].includes(event.key.toLowerCase())) this.change('+=-'.includes(event.key));
   }
 }
 
-try {
-  const viewer = new Viewer();
-  Object.assign(window, {terrace: viewer});
-  void viewer.start();
-} catch (error) {
-  element('progress').hidden = true;
-  element('message').hidden = false;
-  element('message-text').textContent = (error as Error).message;
-  element('retry').hidden = true;
-}
+// The worker fetches while WebGL starts, which takes long and holds the page; before that the worker has to be there.
+const link = new URLSearchParams(location.hash.slice(1));
+const first = launch(link.get('s') ?? '', true, link.get('p') === '1');
+first.onmessage = () => {
+  try {
+    Object.assign(window, {terrace: new Viewer(first)});
+  } catch (error) {
+    first.terminate();
+    fail((error as Error).message, false);
+  }
+};
+first.onerror = event => fail(event.message || NO_WORKER, false);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The worker: the core, the bytes that it lacks, and a frame whenever there is something to do.
 
-import {type Camera, Core, CoreError} from './core';
+import {type Camera, Core, CoreError, type Kind} from './core';
 import type {FromWorker, ToWorker} from './messages';
-import {FetchFault, Ranges} from './ranges';
-import {type Manifest, parseManifest, parseStart} from './store';
+import {FetchFault, fetchWhole, Ranges} from './ranges';
+import {type Listed, type Manifest, parseManifest, parseStart} from './store';
 
 /// What a frame may take in the worker, in milliseconds, and what of it is kept in hand for what the core cannot foresee:
 /// garbage to collect, requests to start, other programs.
@@ -27,17 +27,6 @@ declare const self: {
 
 function post(message: FromWorker, transfer: Transferable[] = []): void {
   self.postMessage(message, transfer);
-}
-
-async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
-  let response: Response;
-  try {
-    response = await fetch(url);
-  } catch {
-    throw new FetchFault(`${what}: the server does not answer`, false);
-  }
-  if (!response.ok) throw new FetchFault(`${what}: the server answers with HTTP ${response.status}.`, false);
-  return new Uint8Array(await response.arrayBuffer());
 }
 
 class Session {
@@ -76,9 +65,9 @@ class Session {
 
   async open(): Promise<void> {
     try {
-      const [wasm, bytes] =
-          await Promise.all([fetchWhole(this.request.wasm, 'the viewer'), fetchWhole(this.request.start, 'the store')]);
-      this.core = this.points = await Core.load(wasm as BufferSource);
+      const fetched = this.choose().then(name => fetchWhole(this.at(`stores/${encodeURIComponent(name)}.start`), 'the store'));
+      const [core, bytes] = await Promise.all([this.load('core.wasm'), fetched]);
+      this.core = this.points = core;
       let start;
       try {
         start = await parseStart(bytes);
@@ -92,7 +81,7 @@ class Session {
       for (const [name, size] of this.manifest.files) this.core.addFile(name, size);
       for (const part of start.parts) this.give(part.file, part.offset, part.data);
       this.ranges = new Ranges(
-          this.request.store, this.manifest.files,
+          this.at(`stores/${encodeURIComponent(this.request.name)}/`), this.manifest.files,
           (range, data) => this.give(range.file, range.offset, data), fault => this.fail(fault.message),
           () => this.wake());
       this.ranges.stats.requests = 1;
@@ -102,6 +91,28 @@ class Session {
     } catch (error) {
       this.fail((error as Error).message);
     }
+  }
+  private at(path: string): string {
+    return this.request.base + path;
+  }
+  private async load(module: string, kind?: Kind): Promise<Core> {
+    return Core.load(await fetchWhole(this.at(module), 'the viewer') as BufferSource, kind);
+  }
+  /// The store that is opened.
+  private async choose(): Promise<string> {
+    if (this.request.choose) {
+      let stores: Listed[];
+      try {
+        stores = JSON.parse(new TextDecoder().decode(await fetchWhole(this.at('stores.json'), 'stores.json'))).stores;
+      } catch (error) {
+        throw error instanceof FetchFault ? error : new FetchFault(`stores.json: ${(error as Error).message}`, false);
+      }
+      if (stores.length === 0) throw new FetchFault('stores.json: it lists no store.', false);
+      this.request.name = (stores.find(store => store.name === this.request.name) ?? stores[0]).name;
+      this.request.choose = false;
+      post({type: 'chosen', stores, name: this.request.name});
+    }
+    return this.request.name;
   }
   /// After a fault: the same again.
   retry(): void {
@@ -130,7 +141,7 @@ class Session {
     post({type: 'picked', id: request.id, hit});
   }
   profile(request: ToWorker&{type: 'profile'}): void {
-    post({type: 'profiled', id: request.id, line: this.opened ? this.core.profile(request.from, request.to) : []});
+    post({type: 'profiled', id: request.id, line: this.opened ? this.core.profile(request.from, request.to, request.up) : []});
   }
   outline(request: ToWorker&{type: 'outline'}): void {
     if (this.opened) post({type: 'outlined', lines: this.core.outline(request.level, request.ordinal)});
@@ -143,7 +154,7 @@ class Session {
   async show(asPoints: boolean): Promise<void> {
     if (asPoints === this.asPoints || !this.scan) return;
     this.asPoints = asPoints;
-    if (this.opened) await this.choose();
+    if (this.opened) await this.change();
   }
   hash(id: number): void {
     if (this.opened && this.showsSurface) {
@@ -210,12 +221,13 @@ class Session {
     }
     this.scan ||= result.scan;
     if (this.scan && this.showsSurface === this.asPoints) {
-      void this.choose();
+      void this.change();
       return;
     }
     if (!this.scan) this.dropGiven();
     this.opened = true;
-    post({type: 'opened', manifest: this.manifest, scene: {...result, scan: this.scan}});
+    const heightUnit = this.ground[8] / this.manifest.coordinates[2].scale || 1;
+    post({type: 'opened', manifest: this.manifest, scene: {...result, scan: this.scan}, heightUnit});
     this.schedule();
   }
   private dropGiven(): void {
@@ -226,13 +238,13 @@ class Session {
     return this.core === this.surface;
   }
   /// Goes on with the module for what a scan is to be shown as, and with the bytes that are there.
-  private async choose(): Promise<void> {
+  private async change(): Promise<void> {
     this.opened = false;
     clearTimeout(this.restTimer);
     const asPoints = this.asPoints;
     try {
       if (!asPoints && this.surface === null) {
-        const core = await Core.load(await fetchWhole(this.request.body, 'the viewer') as BufferSource, 'surface');
+        const core = await this.load('body.wasm', 'surface');
         for (const [name, size] of this.manifest.files) core.addFile(name, size);
         this.surface ??= core;
       }
@@ -297,6 +309,7 @@ self.onmessage = event => {
   switch (message.type) {
     case 'open':
       session = new Session(message);
+      post({type: 'started'});
       void session.open();
       break;
     case 'view':
