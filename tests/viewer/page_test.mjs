@@ -169,6 +169,22 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   await close();
 });
 
+test('lines have the colours of levels, from violet at the top to yellow', async () => {
+  const name = 'bunny' in sites.real ? 'bunny' : 'ball';
+  const warmth = async hash => {
+    const {page, errors, close} = await open(`#s=${name}&c=grey&${hash}`, {size: {width: 700, height: 600}});
+    await page.waitForTimeout(300);
+    const seen = await pixels(page, Array.from({length: 900}, (_, i) => [0.44 + 0.12 * (i % 30) / 30, 0.44 + 0.12 * Math.floor(i / 30) / 30]));
+    const link = await page.evaluate(() => location.hash);
+    assert.equal(/&w=1/.test(link), hash.includes('w=1'), link);
+    assert.deepEqual(errors, []);
+    await close();
+    return seen.reduce((sum, [r, , b]) => sum + r - b, 0) / seen.length;
+  };
+  const plain = await warmth('q=32'), top = await warmth('q=32&w=1'), all = await warmth('q=0.5&l=0&w=1');
+  assert.ok(top < plain - 0.5 && all > plain + 5, `red less blue ${plain} without lines, ${top} at the top, ${all} at level 0`);
+});
+
 test('a scan: its surface from all sides, as points and back, a link that restores it', async () => {
   const name = 'bunny' in sites.real ? 'bunny' : 'ball';
   const {page, errors, outside, close} = await open(`#s=${name}&q=2`, {size: {width: 900, height: 600}});
@@ -312,6 +328,8 @@ describe('pages side by side', {concurrency: 3}, () => {
     await page.click('#menu');
     assert.ok(await page.isVisible('#tools'));
     assert.ok(!await page.isVisible('#with-wire'));
+    await page.fill('#size', '6');
+    assert.match(await page.evaluate(() => location.hash), /&r=6(&|$)/);
     await page.screenshot({path: join(packages, 'viewer-phone.png')});
     assert.deepEqual(errors, []);
     await close();

@@ -60,7 +60,7 @@ in float levelOf;
 in vec3 own;
 in vec2 attributesOf;
 uniform sampler2D ramp;
-uniform int mode;  // as in COLOURS; -1 for lines
+uniform int mode;  // as in COLOURS; -1 for lines, -2 for lines by level
 uniform vec2 heights;
 uniform float top;
 uniform int lit;   // 0 not, 1 as a map, 2 as a body
@@ -73,17 +73,21 @@ uniform vec3 eye;
 uniform float haze;
 out vec4 colour;
 void main() {
-  if (mode < 0) {
+  if (mode == -1) {
     colour = wire;
     return;
   }
   vec3 n = lit > 0 ? normalize(up) : vec3(0.0, 0.0, 1.0);
   float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-30)
       : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
-      : mode == 2 ? 1.0 - levelOf / max(top, 1.0)
+      : abs(mode) == 2 ? 1.0 - levelOf / max(top, 1.0)
       : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
       : attributesOf.y;
   vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
+  if (mode == -2) {
+    colour = vec4(0.6 * base, 0.4);
+    return;
+  }
   if (lit > 0) {
     // As the command's pictures have it: what faces the eye (the ground of a map) keeps its tint, slopes toward the light grow
     // paler, the others darker. A body has two sides.
@@ -257,7 +261,8 @@ export class Renderer {
     gl.useProgram(this.program);
     gl.uniformMatrix4fv(this.uniform('matrix'), false, camera.matrix(aspect, near, far));
     gl.uniform1f(this.uniform('time'), time);
-    gl.uniform1f(this.uniform('pointSize'), look.pointSize);
+    const pointSize = look.pointSize * this.canvas.width / this.canvas.clientWidth;
+    gl.uniform1f(this.uniform('pointSize'), pointSize);
     const yUp = camera.body && camera.yUp;
     gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
     // What is flat has the middle colour: differences from rounding are none.
@@ -276,8 +281,7 @@ export class Renderer {
     gl.uniform3f(this.uniform('sky'), sky[0], sky[1], sky[2]);
     gl.uniform3f(this.uniform('eye'), eye[0], eye[1], eye[2]);
     gl.uniform1f(this.uniform('haze'), extent * (camera.body ? 100 : 2.5));
-    const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
-    gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
+    gl.uniform4f(this.uniform('wire'), 0.02, 0.03, 0.05, 0.28);
     gl.uniform1i(this.uniform('slides'), {points: 0, raster: 1, surface: 2}[this.kind]);
     gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
@@ -288,7 +292,7 @@ export class Renderer {
       gl.drawArrays(gl.POINTS, 0, this.state.vertexSlots);
       if (this.rimCount === 0) return;
       gl.uniform1i(this.uniform('mode'), -1);
-      gl.uniform1f(this.uniform('pointSize'), look.pointSize + 2);
+      gl.uniform1f(this.uniform('pointSize'), pointSize + 2);
       gl.depthFunc(gl.LEQUAL);
       this.drawRim(gl.POINTS);
       gl.depthFunc(gl.LESS);
@@ -302,6 +306,11 @@ export class Renderer {
     gl.uniform1i(this.uniform('mode'), -1);
     if (look.wire) {
       if (this.linesStale) this.makeLines();
+      // Lines have the colours of the levels where the surface shows something else.
+      if (look.colour !== 'level') {
+        gl.uniform1i(this.uniform('mode'), -2);
+        gl.bindTexture(gl.TEXTURE_2D, this.ramps.level);
+      }
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
       gl.depthMask(false);
@@ -310,6 +319,7 @@ export class Renderer {
       gl.depthMask(true);
       gl.disable(gl.BLEND);
     }
+    gl.uniform1i(this.uniform('mode'), -1);
     if (this.rimCount > 0) this.drawRim(gl.LINES);
   }
 

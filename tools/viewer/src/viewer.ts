@@ -483,6 +483,8 @@ class Viewer {
     this.level = level !== null && /^\d{1,2}$/.test(level) ? Number(level) : 255;
     const error = Number(this.link.get('q'));
     if (error >= 0.5 && error <= 32) this.error = error;
+    const size = Number(this.link.get('r'));
+    this.look.pointSize = size >= 1 && size <= 8 ? size : 2.5;
   }
   private applyLink(): void {
     const numbers = (this.link.get('v') ?? '').split(',').map(Number);
@@ -497,6 +499,7 @@ class Viewer {
     const view = [...c.target.map(n => this.scan ? this.plain(n) : n.toFixed(2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
     const parts = [`s=${encodeURIComponent(this.store)}`, `v=${view.join(',')}`, `c=${this.look.colour}`, `q=${this.error}`];
     if (this.look.wire) parts.push('w=1');
+    if (this.look.pointSize !== 2.5) parts.push(`r=${this.look.pointSize}`);
     if (this.scan && this.asPoints) parts.push('p=1');
     if (this.scan) parts.push(`u=${c.yUp ? 'y' : 'z'}`);
     if (this.level !== 255) parts.push(`l=${this.level}`);
@@ -518,6 +521,7 @@ class Viewer {
     element<HTMLInputElement>('wire').checked = this.look.wire;
     element<HTMLInputElement>(this.asPoints ? 'as-points' : 'as-surface').checked = true;
     element<HTMLInputElement>(this.camera.yUp ? 'up-y' : 'up-z').checked = true;
+    element<HTMLInputElement>('size').value = String(this.look.pointSize);
     element<HTMLInputElement>('detail').value = String(4 - Math.log2(this.error));
     element('detail-text').textContent = `within ${this.error} px`;
     const top = (this.manifest?.levels.length ?? 1) - 1;
@@ -648,8 +652,8 @@ class Viewer {
       this.moved = true;
     });
     element('size').addEventListener('input', event => {
-      this.look.pointSize = Number((event.target as HTMLInputElement).value) * Math.min(devicePixelRatio || 1, 2);
-      this.redraw = true;
+      this.look.pointSize = Number((event.target as HTMLInputElement).value);
+      this.changeLook();
     });
     element('store').addEventListener('change', event => this.open((event.target as HTMLSelectElement).value, false));
     element('fit').addEventListener('click', () => this.fit());
