@@ -69,6 +69,8 @@ TEST(Ept, RefusesWhatCannotBe) {
     EXPECT_PRED2(has, error_of([&] { read_file(file); }), "not JSON");
     write_text(file, "");
     EXPECT_PRED2(has, error_of([&] { read_file(file); }), "ept.json");
+    write_text(file, "{\"points\": 1e999}");
+    EXPECT_PRED2(has, error_of([&] { read_file(file); }), "too large for a double");
     write_text(file, "[1, 2, 3]");
     EXPECT_PRED2(has, error_of([&] { read_file(file); }), "object");
   }

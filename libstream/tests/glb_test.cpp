@@ -353,6 +353,7 @@ TEST_F(GlbFiles, WhatIsWrongIsNamed) {
            {old, "glTF of version 1"},
            {good.bytes_of("[]"), "not an object"},
            {good.bytes_of("{\"a\": }"), "not JSON"},
+           {good.bytes_of("{\"a\": 1e999}"), "too large for a double"},
            {good.bytes_of(std::string(100, '[') + std::string(100, ']')), "nested too deeply"},
            {with("/extensionsRequired", {"KHR_draco_mesh_compression"}), "KHR_draco"},
            {with("/accessors/0/count", 4), "reaches beyond"},

@@ -107,6 +107,8 @@ class EptMetadataReader {
       });
     } catch (const Json::parse_error& error) {
       fail("byte " + std::to_string(error.byte), "it is not JSON");
+    } catch (const Json::out_of_range&) {
+      fail({}, "its JSON has a number too large for a double");
     }
   }
 

@@ -199,6 +199,8 @@ class GlbParser final : public MeshParser {
       });
     } catch (const Json::parse_error& error) {
       fail("byte " + std::to_string(input_->offset() + error.byte), "is not JSON");
+    } catch (const Json::out_of_range&) {
+      fail_here("its JSON has a number too large for a double");
     }
     if (!json_.is_object()) fail_here("its JSON is not an object");
   }
