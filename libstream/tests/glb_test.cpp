@@ -284,6 +284,7 @@ TEST_F(GlbFiles, TrianglesComeFromListsStripsAndFans) {
                                                           {5, 3, 2},
                                                           {0, 1, 2},
                                                           {3, 4, 5}}));
+  for (const Point3& p : mesh.vertices.positions) EXPECT_FALSE(std::signbit(p[1]));
   // Where no node moves them, floats stay floats.
   EXPECT_EQ(mesh.info.coordinates[0].type, ScalarType::f32);
 }

@@ -453,7 +453,7 @@ class GlbParser final : public MeshParser {
       world[row] = moved_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
       if (!std::isfinite(world[row])) fail({}, "has a vertex that is not finite");
     }
-    vertex_ = {world[0], -world[2], world[1]};  // y up to z up
+    vertex_ = {world[0], 0.0 - world[2], world[1]};  // y up to z up; zero stays without a sign
     return true;
   }
 
