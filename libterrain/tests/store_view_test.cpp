@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <random>
 #include <set>
@@ -29,15 +30,21 @@ class StoreViews : public testing::Test {
  protected:
   static constexpr std::uint32_t kColumns = 300, kRows = 260;
 
-  stream::Store build(const std::string& name, const std::array<double, 6>& world, int epsg) {
+  using HasData = std::function<bool(std::uint32_t column, std::uint32_t row)>;
+
+  stream::Store build(
+      const std::string& name, const std::array<double, 6>& world, int epsg,
+      const HasData& has_data = [](auto, auto) { return true; }) {
     stream::GeoTiffOptions options;
+    options.nodata = -9999;
     options.columns = kColumns;
     options.rows = kRows;
     options.world.xy = world;
     options.crs.epsg = epsg;
     options.crs.geographic = epsg == 4326;
     const std::string file = (folder_.path() / (name + ".tif")).string();
-    tests::write_made_raster(file, options, [](std::uint32_t column, std::uint32_t row) {
+    tests::write_made_raster(file, options, [&](std::uint32_t column, std::uint32_t row) {
+      if (!has_data(column, row)) return -9999.0;
       return 300.0 + 150.0 * std::sin(column / 17.0) * std::cos(row / 23.0) + (column * row) % 7;
     });
     BuildRequest request{.inputs = {file}, .store = folder_.path() / name};
@@ -139,6 +146,94 @@ TEST_F(StoreViews, AFrameOfMetresWhateverTheCrs) {
   EXPECT_NEAR(static_cast<double>(flat.model().point_count()),
               static_cast<double>(geographic.model().point_count()),
               0.1 * static_cast<double>(flat.model().point_count()));
+}
+
+/// Whether a triangle spans a gap, from the definition, by all clusters' records.
+bool spans_gap_by_records(const StoreView<std::int32_t>& view, const stream::Store& store,
+                          tri::TriangleId triangle) {
+  const auto& model = view.model();
+  const auto corners = model.triangulation().vertices(triangle);
+  stream::Box3 around;
+  stream::Point3 centroid{};
+  for (const tri::VertexId corner : corners) {
+    const auto p = model.triangulation().point(corner);
+    around.include(stream::Point3{1.0 * p[0], 1.0 * p[1], 0});
+    for (std::size_t k = 0; k < 2; ++k) centroid[k] += p[k] / 3.0;
+  }
+  if (around.max[0] - around.min[0] <= 1 && around.max[1] - around.min[1] <= 1) return false;
+  std::vector<tri::ClusterId> expanded = model.expanded(), children;
+  expanded.push_back(tri::cluster_id(model.top(), 0));
+  for (const tri::ClusterId cluster : expanded) {
+    if (tri::level_of(cluster) == 0) continue;
+    model.children(cluster, children);
+    for (const tri::ClusterId child : children) {
+      if (model.is_expanded(child)) continue;
+      const stream::Box3 box =
+          store.record(stream::cluster_id(tri::level_of(child), tri::ordinal_of(child)))
+              .summary.box;
+      bool near = true;
+      for (std::size_t k = 0; k < 2; ++k) {
+        near = near && box.min[k] <= centroid[k] + 1.001 && box.max[k] >= centroid[k] - 1.001;
+      }
+      if (near) return false;
+    }
+  }
+  return true;
+}
+
+// Coast, lakes down to single cells, and an island: what is drawn without the triangles that span a
+// gap is the land.
+TEST_F(StoreViews, TrianglesThatSpanGapsAreKnown) {
+  const auto has_data = [](std::uint32_t column, std::uint32_t row) {
+    const double x = column, y = row;
+    const bool land = x + 20 * std::sin(y / 15) < 200 && std::hypot(x - 80, y - 100) > 30;
+    return (land && (column * 7 + row * 13) % 101 != 0) || std::hypot(x - 270, y - 200) < 15;
+  };
+  const stream::Store store = build("coast", {30, 0, 500000, 0, -30, 5200000}, 32632, has_data);
+  // Rotated by 30 degrees, and without gaps.
+  const stream::Store rotated =
+      build("rotated", {26, 15, 500000, 15, -26, 5200000}, 32632, has_data);
+  const stream::Store whole = in_metres();
+  for (const stream::Store* of : {&store, &rotated, &whole}) {
+    StoreView<std::int32_t> view(*of);
+    std::mt19937 random(1);
+    std::size_t gaps = 0, differ = 0;
+    for (int stop = 0; stop < 8; ++stop) {
+      tri::View wish =
+          looking_down(-4000.0 + 1000.0 * stop, static_cast<double>(random() % 4000) - 2000,
+                       stop % 3 == 0 ? 40.0 : 3.0);
+      if (stop == 7) wish.ground_error = 0;
+      ASSERT_TRUE(settle(view, wish));
+      for (const tri::TriangleId triangle : view.model().triangulation().all_triangles()) {
+        const bool spans = view.spans_gap(triangle);
+        gaps += spans;
+        if (spans == spans_gap_by_records(view, *of, triangle)) continue;
+        // Bounds of records that are not read yet, and boxes of a rotated raster, hold more.
+        ASSERT_FALSE(spans);
+        ++differ;
+      }
+    }
+    if (of == &whole) {
+      EXPECT_EQ(gaps, 0u);
+      continue;
+    }
+    EXPECT_GT(gaps, 2000u);
+    EXPECT_LT(differ, gaps / 4);
+    // At full detail exactly the triangles between neighbours are left.
+    EXPECT_EQ(view.model().point_count(), of->points());
+    std::size_t drawn = 0, between_neighbours = 0;
+    for (const tri::TriangleId triangle : view.model().triangulation().all_triangles()) {
+      drawn += !view.spans_gap(triangle);
+    }
+    for (std::uint32_t row = 0; row + 1 < kRows; ++row) {
+      for (std::uint32_t column = 0; column + 1 < kColumns; ++column) {
+        const int corners = has_data(column, row) + has_data(column + 1, row) +
+                            has_data(column, row + 1) + has_data(column + 1, row + 1);
+        between_neighbours += corners == 4 ? 2 : corners == 3 ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(drawn, between_neighbours);
+  }
 }
 
 // As in a browser: bytes come when they will, a few of those that are missing after each frame. The

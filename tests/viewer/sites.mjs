@@ -26,7 +26,7 @@ export class Sites {
     const {status, stderr, error} = spawnSync(process.env.TERRACE, args, {cwd: this.folder, encoding: 'utf8'});
     assert.equal(status, 0, `terrace ${args.join(' ')}: ${error ?? stderr}`);
   }
-  /// A DEM of the Alps, a raster whose points are cocircular wherever one looks, and a cloud.
+  /// A DEM of the Alps with voids, one of hills without, a coast, a raster whose points are cocircular wherever one looks, and a cloud.
   build() {
     this.terrace('build', join(ROOT, 'libterrain', 'examples', 'alps.tif'), '-o', 'alps.store', '-q');
     const flat = ['ncols 200', 'nrows 180', 'xllcorner 0', 'yllcorner 0', 'cellsize 30'];
@@ -35,6 +35,18 @@ export class Sites {
     }
     writeFileSync(join(this.folder, 'flat.asc'), `${flat.join('\n')}\n`);
     this.terrace('build', 'flat.asc', '-o', 'flat.store', '--block', '1000', '-q');
+    this.terrace('synth', 'dem', '--size', '1000x1000', '-o', 'hills.tif', '-q');
+    this.terrace('build', 'hills.tif', '-o', 'hills.store', '-q');
+    // Land in the west and a bay in it, 3 km wide, and a lake of one cell.
+    const coast = ['ncols 200', 'nrows 200', 'xllcorner 0', 'yllcorner 0', 'cellsize 30', 'nodata_value -9999'];
+    for (let row = 0; row < 200; ++row) {
+      coast.push(Array.from({length: 200}, (_, column) => {
+        const land = column < 150 && !(column > 40 && row >= 50 && row < 150) && (column !== 20 || row !== 100);
+        return land ? (100 + 20 * Math.sin(column / 9) * Math.cos(row / 7)).toFixed(2) : -9999;
+      }).join(' '));
+    }
+    writeFileSync(join(this.folder, 'coast.asc'), `${coast.join('\n')}\n`);
+    this.terrace('build', 'coast.asc', '-o', 'coast.store', '--block', '1000', '-q');
     let cloud = 'x,y,z,red,green,blue,classification,intensity\n', state = 12345;
     const random = () => (state = (state * 1103515245 + 12345) % 2147483648) / 2147483648;
     for (let i = 0; i < 40_000; ++i) {
@@ -72,7 +84,7 @@ export class Sites {
       writeFileSync(join(this.folder, name), text);
       this.terrace('build', name, '-o', `${name.split('.')[0]}.store`, '-q');
     }
-    const stores = ['alps.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
+    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cassert>
+#include <cstddef>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -145,6 +147,36 @@ stream::Point3 StoreView<Shown>::stored(tri::VertexId vertex) const {
   } else {
     const auto p = model().triangulation().point(vertex);
     return {static_cast<double>(p[0]), static_cast<double>(p[1]), model().height(vertex)};
+  }
+}
+
+template <class Shown>
+bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
+  if constexpr (!std::is_integral_v<Shown>) {
+    return false;
+  } else {
+    const auto& mesh = model().triangulation();
+    const auto corners = mesh.vertices(triangle);
+    stream::Box3 around;
+    stream::Point3 centroid{};
+    for (const tri::VertexId corner : corners) {
+      const stream::Point3 p = stored(corner);
+      around.include(p);
+      for (std::size_t k = 0; k < 3; ++k) centroid[k] += p[k] / 3;
+    }
+    if (around.max[0] - around.min[0] <= 1 && around.max[1] - around.min[1] <= 1) return false;
+
+    const auto cells = impl_->frame.box_of({{centroid[0] - 1, centroid[1] - 1, around.min[2]},
+                                            {centroid[0] + 1, centroid[1] + 1, around.max[2]}});
+    constexpr double kEverywhere = std::numeric_limits<double>::infinity();
+    tri::Box3 near{{cells.min[0], cells.min[1], -kEverywhere},
+                   {cells.max[0], cells.max[1], kEverywhere}};
+    // Mostly it is one of those that the corners stand for.
+    for (const tri::VertexId corner : corners) {
+      const auto record = control().stands_for(corner);
+      if (record && intersects(record->box, near)) return false;
+    }
+    return !control().meets_collapsed(near);
   }
 }
 

@@ -393,6 +393,24 @@ void ViewControl<Triangulation>::give_record(ClusterId cluster, const ClusterRec
   if (const auto place = impl_->tree().find(cluster)) impl_->front_.set_record(*place, record);
 }
 template <class Triangulation>
+std::optional<ClusterRecord> ViewControl<Triangulation>::stands_for(VertexId vertex) const {
+  const ClusterTree& tree = impl_->tree();
+  std::optional<ClusterRecord> record;
+  impl_->model_.impl_->owners_.for_each(vertex, [&](VertexOwners::Owner owner) {
+    for (unsigned level = tree.level(owner.slot); level-- > 0 && !record;) {
+      const auto place = tree.find(tree.headed_by(owner.slot, owner.index, level));
+      if (place && tree.child_slot(*place) == ClusterTree::kNoSlot) {
+        record = impl_->front_.record(*place);
+      }
+    }
+  });
+  return record;
+}
+template <class Triangulation>
+bool ViewControl<Triangulation>::meets_collapsed(const Box3& box) const {
+  return impl_->front_.meets_collapsed(box);
+}
+template <class Triangulation>
 void ViewControl<Triangulation>::forget(ClusterId cluster) {
   impl_->asked_.erase(cluster);
 }

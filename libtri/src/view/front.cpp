@@ -98,6 +98,21 @@ ClusterRecord ViewFront::record(ChildRef child) const {
   return record;
 }
 
+bool ViewFront::meets_collapsed(const Box3& box, Slot below) const {
+  if (group_of_[below] == kNone) return false;
+  const ViewColumns& columns = groups_[group_of_[below]]->columns;
+  for (std::uint32_t i = 0; i < columns.size(); ++i) {
+    bool meets = true;
+    for (std::size_t k = 0; k < 3 && meets; ++k) {
+      meets = columns.column(k)[i] <= box.max[k] && columns.column(k + 3)[i] >= box.min[k];
+    }
+    if (!meets) continue;
+    const Slot child = tree_->child_slot({below, i});
+    if (child == ClusterTree::kNoSlot || meets_collapsed(box, child)) return true;
+  }
+  return false;
+}
+
 void ViewFront::set_record(ChildRef child, const ClusterRecord& record) {
   const std::uint32_t number = group_of_[child.parent];
   Group& group = *groups_[number];

@@ -51,6 +51,8 @@ class ViewFront {
   }
   /// As given, except for bounds beyond 1e150.
   [[nodiscard]] ClusterRecord record(ChildRef child) const;
+  /// Whether the box of a collapsed cluster below an expanded one meets a box.
+  [[nodiscard]] bool meets_collapsed(const Box3& box, Slot below = ClusterTree::kRoot) const;
   /// The record of a child of which there were only bounds. Not to be called in a step.
   void set_record(ChildRef child, const ClusterRecord& record);
 

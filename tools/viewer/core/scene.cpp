@@ -56,7 +56,10 @@ class SceneOf final : public Scene {
       : store_(store), view_(store, ground, options, given), bounds_(store.bounds()) {
     vertices_.reserve(options.max_points);
     if constexpr (kTriangles) triangles_.reserve(2 * options.max_points);
-    if constexpr (!kRaster) {
+    if constexpr (kRaster) {
+      has_gaps_ = (bounds_.max[0] - bounds_.min[0] + 1) * (bounds_.max[1] - bounds_.min[1] + 1) >
+                  static_cast<double>(store.points());
+    } else {
       std::vector<std::byte> records;
       for (const tri::VertexId vertex : mesh().all_vertices()) {
         const auto record = view_.attributes(vertex);
@@ -78,6 +81,7 @@ class SceneOf final : public Scene {
     const double start = now();
     waiting_.end_until(time);
     waiting_.sweep();
+    renew_gaps(start + seconds);
     const auto& step = view_.frame(wish, seconds - (now() - start), after_rate_);
     const double begin = now();
     apply(*step.delta, time);
@@ -89,7 +93,7 @@ class SceneOf final : public Scene {
                      .expanded = view_.model().expanded_count(),
                      .vertex_slots = kSpareVertices + mesh().vertex_slots(),
                      .settled = view_.settled(),
-                     .waiting = !waiting_.empty(),
+                     .waiting = !waiting_.empty() || unsure_ > 0,
                      .worst = step.worst,
                      .clusters = static_cast<std::size_t>(traffic.clusters),
                      .stored_bytes = static_cast<std::size_t>(traffic.bytes)};
@@ -206,7 +210,7 @@ class SceneOf final : public Scene {
     const auto corners = mesh().vertices(triangle);
     for (const tri::VertexId corner : corners) list(corner);
     if constexpr (!kRaster) normals_.add({slot(corners[0]), slot(corners[1]), slot(corners[2])});
-    return drawn(corners);
+    return seen(triangle);
   }
   void list(tri::VertexId vertex) {
     if (slot(vertex) >= listed_.size() || listed_[slot(vertex)]) return;
@@ -259,6 +263,17 @@ class SceneOf final : public Scene {
     return {v.x, v.y, v.z};
   }
 
+  /// The triangle as it is drawn: not at all where a raster has no data.
+  [[nodiscard]] SceneTriangle seen(tri::TriangleId triangle) const {
+    if (hides(triangle)) return {};
+    return drawn(mesh().vertices(triangle));
+  }
+  [[nodiscard]] bool hides(tri::TriangleId triangle) const {
+    if constexpr (kRaster) return has_gaps_ && view_.spans_gap(triangle);
+    return false;
+  }
+  void renew_gaps(double until);
+
   stream::Store store_;
   View view_;
   stream::Box3 bounds_;
@@ -270,6 +285,9 @@ class SceneOf final : public Scene {
   std::vector<bool> listed_;  // in without_normal_, by slot
   std::vector<tri::VertexId> without_normal_, ring_;
   std::vector<tri::ClusterId> pinned_;
+  bool has_gaps_ = false;  ///< a raster has cells without data
+  /// The slots of triangles that are to be looked at from next_unsure_ on, see renew_gaps().
+  std::uint32_t unsure_ = 0, next_unsure_ = 0;
   mutable tri::VertexId picked_ = tri::kNoVertex;
   /// Seconds that the changes of a point that came, or went, cost after a step.
   std::array<double, 2> after_rate_{};
@@ -291,6 +309,29 @@ class SceneOf final : public Scene {
   /// Triangles that are drawn on with such a vertex, and their groups.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> leaving_kept_;
 };
+
+/// What is known of clusters changes whether a triangle far from them spans a gap, so all are
+/// looked at in turn: a thousand in a frame, and once nothing else is to be done as many as there
+/// is time for.
+template <class Shown>
+void SceneOf<Shown>::renew_gaps(double until) {
+  constexpr std::uint32_t kAtOnce = 1024;
+  const bool settled = view_.settled() && waiting_.empty();
+  if constexpr (kRaster) {
+    if (!has_gaps_) return;
+    const std::uint32_t slots = mesh().triangle_slots();
+    if (!settled) unsure_ = slots;
+    for (std::uint32_t looks = 0; unsure_ > 0; --unsure_) {
+      if (++looks % kAtOnce == 0 && (!settled || now() > until)) break;
+      next_unsure_ = (next_unsure_ + 1) % slots;
+      const tri::TriangleId triangle{next_unsure_};
+      const std::uint32_t at = drawn(triangle);
+      if (!mesh().alive(triangle) || waiting_.hiding(at) != Waiting<Vertex>::kNone) continue;
+      const SceneTriangle corners = seen(triangle);
+      if (triangles_[at] != corners) triangles_.change(at) = corners;
+    }
+  }
+}
 
 /// The connected parts of a step in which vertices go and none come wait: collapses. Where a
 /// part changes what is hidden, it joins the group that does, or ends it if it does not wait.
@@ -382,7 +423,7 @@ void SceneOf<Shown>::wait(const Delta& delta, double time) {
     if (!part.waits) continue;
     if (waiting_.hiding(triangle) != kNone) {
       waiting_.forget(triangle);
-    } else {
+    } else if (triangles_[triangle] != SceneTriangle{}) {
       waiting_.keep(part.group, drawn_on(triangles_[triangle]));
     }
   }
@@ -521,7 +562,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
         const double v = dot(way, q) / determinant;
         if (!(v >= 0 && u + v <= 1)) continue;
         const double distance = dot(ac, q) / determinant;
-        if (!(distance > 0 && distance < best)) continue;
+        if (!(distance > 0 && distance < best) || hides(triangle)) continue;
         best = distance;
         found = triangle;
         weights = {1 - u - v, u, v};
@@ -593,7 +634,7 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from, c
         const double t = a[1] / (a[1] - b[1]);
         meet(a[0] + t * (b[0] - a[0]), a[2] + t * (b[2] - a[2]));
       }
-      if (!(first < last) || last[0] < 0 || first[0] > length) continue;
+      if (!(first < last) || last[0] < 0 || first[0] > length || hides(triangle)) continue;
       const auto cut = [&](const std::array<double, 2>& end) -> std::array<double, 2> {
         const double along = std::clamp(end[0], 0.0, length);
         if (along == end[0]) return end;

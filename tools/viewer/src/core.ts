@@ -110,7 +110,10 @@ export class Core {
   static async load(bytes: BufferSource, kind?: Kind): Promise<Core> {
     let memory: WebAssembly.Memory;
     const imports = {
-      env: {emscripten_notify_memory_growth: () => {}},
+      env: {
+        emscripten_notify_memory_growth: () => {},
+        number: (at: number, bytes: number) => Number(new TextDecoder().decode(new Uint8Array(memory.buffer, at, bytes)))
+      },
       wasi_snapshot_preview1: {
         clock_time_get: (_clock: number, _precision: bigint, at: number) => {
           new DataView(memory.buffer).setBigUint64(at, BigInt(Math.round(performance.now() * 1e6)), true);

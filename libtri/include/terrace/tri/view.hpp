@@ -304,6 +304,12 @@ class ViewControl {
   /// Delivers the record of a cluster of which only bounds were given. Nothing happens if it is no
   /// longer needed. O(log n).
   void give_record(ClusterId cluster, const ClusterRecord& record);
+  /// The record, or its bounds, of the cluster that a living vertex stands for: the coarsest
+  /// collapsed one that it heads. nullopt if it stands for itself alone. O(its level).
+  [[nodiscard]] std::optional<ClusterRecord> stands_for(VertexId vertex) const;
+  /// Whether the box of a collapsed cluster, or the bounds of it, meets a box. O(children of the
+  /// expanded clusters that do).
+  [[nodiscard]] bool meets_collapsed(const Box3& box) const;
   /// Loading failed or was cancelled: the cluster may be requested again.
   void forget(ClusterId cluster);
 
