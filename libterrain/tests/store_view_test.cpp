@@ -21,6 +21,7 @@
 #include "made_raster.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -233,6 +234,32 @@ TEST_F(StoreViews, TrianglesThatSpanGapsAreKnown) {
       }
     }
     EXPECT_EQ(drawn, between_neighbours);
+    EXPECT_EQ(detail_mesh(*of, {.level = 0}).triangles.size(), between_neighbours);
+  }
+}
+
+// The coarsest mesh leaves the sea open; nothing is left out of a raster without gaps.
+TEST_F(StoreViews, MeshesOfALevelHaveNoTrianglesOverGaps) {
+  const auto has_data = [](std::uint32_t column, std::uint32_t row) {
+    return column < 100 || (column > 200 && row > 100);
+  };
+  const stream::Store bay = build("bay", {1, 0, 0, 0, -1, 0}, 32632, has_data);
+  const stream::Store whole = build("whole", {1, 0, 0, 0, -1, 0}, 32632);
+  for (unsigned level = 0; level <= bay.top(); ++level) {
+    const TriangleMesh mesh = detail_mesh(bay, {.level = level});
+    EXPECT_EQ(mesh.positions.size(), bay.levels()[level].points);
+    EXPECT_GT(mesh.triangles.size(), mesh.positions.size());
+    for (const auto& triangle : mesh.triangles) {
+      double x = 0;
+      for (const std::uint32_t corner : triangle) x += mesh.positions[corner][0] / 3;
+      EXPECT_FALSE(x > 130 && x < 170) << "level " << level;
+    }
+  }
+  for (unsigned level = 0; level <= whole.top(); ++level) {
+    const TriangleMesh mesh = detail_mesh(whole, {.level = level});
+    tri::Delaunay2<double> delaunay;
+    for (const stream::Point3& p : mesh.positions) delaunay.insert({p[0], p[1]});
+    EXPECT_EQ(mesh.triangles.size(), delaunay.triangle_count());
   }
 }
 

@@ -11,6 +11,7 @@
 #include <numeric>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -25,9 +26,11 @@
 #include "mesh/matching_points.hpp"
 #include "mesh/mesh_heights.hpp"
 #include "mesh/wanted_entities.hpp"
+#include "surface/box_tree.hpp"
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_source.hpp"
+#include "view/raster_gap.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -171,11 +174,43 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
   return tri::MetricField2(std::move(regions));
 }
 
-/// `heights`: by slot in real units; empty: the model's.
+/// The clusters of a raster that a model has not expanded.
+class CollapsedClusters {
+ public:
+  CollapsedClusters(const tri::Multiresolution2<std::int32_t>& model, tri::ClusterSource& source) {
+    std::vector<BoxTree::Item>& items = boxes_.start();
+    std::vector<tri::ClusterId> expanded = model.expanded(), children;
+    expanded.push_back(tri::cluster_id(model.top(), 0));
+    for (const tri::ClusterId cluster : expanded) {
+      if (tri::level_of(cluster) == 0) continue;
+      model.children(cluster, children);
+      for (const tri::ClusterId child : children) {
+        if (model.is_expanded(child)) continue;
+        const tri::Box3 box = source.record(child).box;
+        items.push_back({.box = {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}});
+      }
+    }
+    boxes_.build();
+  }
+  [[nodiscard]] bool leave_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners) const {
+    return spans_gap(corners, [&](const stream::Box3& cells) {
+      bool far = true;
+      boxes_.visit([&](const StoredBox& box) { return far && box.meets(cells); },
+                   [&](std::uint32_t) { far = false; });
+      return far;
+    });
+  }
+
+ private:
+  BoxTree boxes_;
+};
+
+/// `heights`: by slot in real units; empty: the model's. collapsed: null if there are no gaps.
 template <class Model>
 TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placement,
                            const std::optional<Region>& region, const std::vector<double>& heights,
-                           const std::optional<tri::MetricField2>& field) {
+                           const std::optional<tri::MetricField2>& field,
+                           const CollapsedClusters* collapsed = nullptr) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
@@ -207,6 +242,11 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
     for (const tri::VertexId v : triangulation.all_vertices()) number_of(v);
   }
   const auto add = [&](std::array<tri::VertexId, 3> corners) {
+    if constexpr (std::is_same_v<decltype(triangulation.point(corners[0])),
+                                 std::array<std::int32_t, 2>>) {
+      const auto place = [&](std::size_t i) { return triangulation.point(corners[i]); };
+      if (collapsed && collapsed->leave_gap({place(0), place(1), place(2)})) return;
+    }
     if (mirrored) std::swap(corners[1], corners[2]);
     if (region &&
         !region->touches({position(corners[0]), position(corners[1]), position(corners[2])})) {
@@ -230,20 +270,27 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
   if (options.metric.kind == MetricChoice::Kind::elliptical) {
     field = field_of(options.metric, store, placement);
   }
-  const auto finish = [&](const auto& model) {
+  const auto finish = [&](const auto& model, const CollapsedClusters* collapsed = nullptr) {
     std::vector<double> heights;
     if (options.heights.any()) {
       heights = changed_heights(model, placement, detail.region, options.heights);
     }
-    return mesh_of_model(model, placement, detail.region, heights, field);
+    return mesh_of_model(model, placement, detail.region, heights, field, collapsed);
   };
   if (store.condition() != nullptr) return finish(MatchingPoints<Coord>(store, detail));
   StoreSource whole(store);
   std::optional<ClusterTop> part;
   if (detail.cluster) part.emplace(store, *detail.cluster);
   tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
-  return finish(tri::Multiresolution2<Coord>(source, in_stored_coordinates(detail, placement),
-                                             {.deltas = false}));
+  const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
+                                           {.deltas = false});
+  if constexpr (std::is_integral_v<Coord>) {
+    if (has_gaps(store)) {
+      const CollapsedClusters collapsed(model, source);
+      return finish(model, &collapsed);
+    }
+  }
+  return finish(model);
 }
 
 /// Three corners, their places in order, and the mesh.
@@ -321,7 +368,8 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   const Detail wide = with_margin(store, detail, store.schema());
   check_memory(store, wide, context.memory_or(0),
                height_bytes_per_vertex(options.heights) +
-                   (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
+                   (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0) +
+                   (has_gaps(store) ? sizeof(BoxTree::Item) * 2 : 0));
   return store.schema().grid ? mesh_of<std::int32_t>(store, wide, options)
                              : mesh_of<double>(store, wide, options);
 }

@@ -12,6 +12,7 @@
 
 #include "terrace/terrain/store_view.hpp"
 #include "view/cluster_reader.hpp"
+#include "view/raster_gap.hpp"
 #include "view/view_frame.hpp"
 
 /// The template of store_view.hpp, for those who instantiate it.
@@ -157,26 +158,19 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
   } else {
     const auto& mesh = model().triangulation();
     const auto corners = mesh.vertices(triangle);
-    stream::Box3 around;
-    stream::Point3 centroid{};
-    for (const tri::VertexId corner : corners) {
-      const stream::Point3 p = stored(corner);
-      around.include(p);
-      for (std::size_t k = 0; k < 3; ++k) centroid[k] += p[k] / 3;
-    }
-    if (around.max[0] - around.min[0] <= 1 && around.max[1] - around.min[1] <= 1) return false;
-
-    const auto cells = impl_->frame.box_of({{centroid[0] - 1, centroid[1] - 1, around.min[2]},
-                                            {centroid[0] + 1, centroid[1] + 1, around.max[2]}});
-    constexpr double kEverywhere = std::numeric_limits<double>::infinity();
-    tri::Box3 near{{cells.min[0], cells.min[1], -kEverywhere},
-                   {cells.max[0], cells.max[1], kEverywhere}};
-    // Mostly it is one of those that the corners stand for.
-    for (const tri::VertexId corner : corners) {
-      const auto record = control().stands_for(corner);
-      if (record && intersects(record->box, near)) return false;
-    }
-    return !control().meets_collapsed(near);
+    const auto far = [&](const stream::Box3& cells) {
+      tri::Box3 near = impl_->frame.box_of({cells.min, cells.max});
+      near.min[2] = -std::numeric_limits<double>::infinity();
+      near.max[2] = std::numeric_limits<double>::infinity();
+      // Mostly it is one of those that the corners stand for.
+      for (const tri::VertexId corner : corners) {
+        const auto record = control().stands_for(corner);
+        if (record && intersects(record->box, near)) return false;
+      }
+      return !control().meets_collapsed(near);
+    };
+    return terrain::spans_gap(
+        {mesh.point(corners[0]), mesh.point(corners[1]), mesh.point(corners[2])}, far);
   }
 }
 

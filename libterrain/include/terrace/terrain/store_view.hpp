@@ -122,8 +122,8 @@ class StoreView {
 
   /// Whether a triangle of a raster spans samples without data; false for other stores. Its corners
   /// are then not neighbours in columns and rows, and its centroid is farther than a cell from the
-  /// boxes of all collapsed clusters. Never true where every sample has data; coarse triangles hide
-  /// what is narrower than a cluster. 0.03 to 0.6 us.
+  /// boxes of all collapsed clusters. Never true where every sample has data; gaps narrower than
+  /// the clusters beside them are not seen. 0.03 to 0.6 us.
   [[nodiscard]] bool spans_gap(tri::TriangleId triangle) const;
 
   /// The attributes of a vertex's point, a record of the store's schema; empty if its cluster is no
