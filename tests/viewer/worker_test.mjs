@@ -355,6 +355,21 @@ test('a raster that is left in a flight: no holes, nothing twice, and less moves
   assert.ok(slides > 0 && jumps < 0.3 * slides, `${jumps} of ${slides}`);
 });
 
+/// How far normals of vertices, times 127, are from those of the triangles drawn around them, by area.
+function worstNormal(arrays) {
+  const sums = new Map(), view = new DataView(arrays.vertices.buffer);
+  for (const corners of arrays.drawn()) {
+    const [a, b, c] = [...corners].map(slot => arrays.place(slot)), u = b.map((x, k) => x - a[k]), v = c.map((x, k) => x - a[k]);
+    const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    for (const slot of corners) {
+      const sum = sums.get(slot) ?? [0, 0, 0];
+      sums.set(slot, sum.map((x, k) => x + Math.sign(normal[2]) * normal[k]));
+    }
+  }
+  return Math.max(...[...sums].flatMap(
+      ([slot, sum]) => sum.map((x, k) => Math.abs(127 * x / Math.hypot(...sum) - view.getInt8(24 * slot + 12 + k)))));
+}
+
 test('a raster with cells without data: nothing is drawn, met or cut there', async () => {
   const arrays = new Arrays(24), flyer = new Tested('coast', {changed: message => arrays.apply(message)});
   await flyer.opened();
@@ -379,6 +394,7 @@ test('a raster with cells without data: nothing is drawn, met or cut there', asy
     assert.ok(fine || longest() < 2500, `${longest()} m`);
     assert.equal(await meets(...middle), false);
     assert.equal(await meets(middle[0], 2000), true);
+    assert.ok(worstNormal(arrays) < 2, `${worstNormal(arrays)} of 127`);
     const line = await cut();
     assert.ok(line.some(([at]) => at < 1000) && line.some(([at]) => at > 4800));
     // The ends of a line each.

@@ -218,6 +218,20 @@ class SceneOf final : public Scene {
     without_normal_.push_back(vertex);
   }
   void renew_normals();
+  template <class Visit>
+  void for_triangles_around(tri::VertexId vertex, const Visit& visit) const {
+    // Counter-clockwise, and from the hull the other way as well.
+    const tri::TriangleId first = mesh().triangle_at(vertex);
+    for (const std::size_t turn : {1, 2}) {
+      for (tri::TriangleId at = first; at != tri::kNoTriangle;) {
+        if (turn == 1 || at != first) visit(at);
+        const auto corners = mesh().vertices(at);
+        const std::size_t i = corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2;
+        at = mesh().neighbours(at)[(i + turn) % 3];
+        if (at == first) return;
+      }
+    }
+  }
   /// Where a vertex is drawn at a time, as the page has it.
   [[nodiscard]] static Point3 place_at(const Vertex& v, double time) {
     const double t = std::clamp((time - v.start_time) / kSlide, 0.0, 1.0);
@@ -328,8 +342,11 @@ void SceneOf<Shown>::renew_gaps(double until) {
       const std::uint32_t at = drawn(triangle);
       if (!mesh().alive(triangle) || waiting_.hiding(at) != Waiting<Vertex>::kNone) continue;
       const SceneTriangle corners = seen(triangle);
-      if (triangles_[at] != corners) triangles_.change(at) = corners;
+      if (triangles_[at] == corners) continue;
+      triangles_.change(at) = corners;
+      for (const tri::VertexId corner : mesh().vertices(triangle)) list(corner);
     }
+    renew_normals();
   }
 }
 
@@ -492,22 +509,21 @@ void SceneOf<Shown>::renew_normals() {
     for (const tri::VertexId vertex : without_normal_) {
       listed_[slot(vertex)] = false;
       if (!mesh().alive(vertex)) continue;
-      mesh().adjacent(vertex, ring_);
-      const Point3 middle = position(vertex);
-      const auto stored = mesh().point(vertex);
       Point3 sum{};
-      for (std::size_t i = 0; i < ring_.size(); ++i) {
-        const tri::VertexId a = ring_[i], b = ring_[(i + 1) % ring_.size()];
-        // The ring of a vertex on the hull is open; there the turn is not to the left.
-        const auto p = mesh().point(a), q = mesh().point(b);
-        const std::int64_t turn = std::int64_t{p[0] - stored[0]} * (q[1] - stored[1]) -
-                                  std::int64_t{p[1] - stored[1]} * (q[0] - stored[0]);
-        if (turn <= 0) continue;
-        Point3 normal = cross(difference(position(a), middle), difference(position(b), middle));
+      for_triangles_around(vertex, [&](tri::TriangleId triangle) {
+        const std::uint32_t at = drawn(triangle);
+        // What waits is not drawn either.
+        if (triangles_[at] == SceneTriangle{} &&
+            (waiting_.hiding(at) == Waiting<Vertex>::kNone || hides(triangle))) {
+          return;
+        }
+        const auto c = mesh().vertices(triangle);
+        const Point3 a = position(c[0]);
+        const Point3 normal = cross(difference(position(c[1]), a), difference(position(c[2]), a));
         // Rows grow downward: in the view frame the same triangle turns the other way.
         const double sign = normal[2] < 0 ? -1 : 1;
         for (std::size_t k = 0; k < 3; ++k) sum[k] += sign * normal[k];
-      }
+      });
       const double length = std::sqrt(dot(sum, sum));
       SceneVertex& v = vertices_.change(drawn(vertex));
       for (std::size_t k = 0; k < 3; ++k) {
