@@ -272,7 +272,8 @@ for (const [name, kind] of [['alps', 'raster'], ['ball', 'surface']]) {
       }
     });
     await flyer.opened();
-    const [stop] = sites.flight(name, {kind}), fine = {...stop, error: stop.error / 4}, coarse = {...stop, error: 4 * stop.error};
+    // Hundreds of points go: there is room for them, however many go in a frame.
+    const [fine] = sites.flight(name, {kind}), coarse = {...fine, error: 4 * fine.error};
     await flyer.settle(fine);
     await flyer.rest();
     begin = 0;

@@ -380,6 +380,8 @@ class Store:
              smoothing=None, overlay=None, save_overlay=None, replace=False, progress=None, threads=None, memory=None):
         """The Delaunay triangulation of a level, with finer detail in focuses.
 
+        Where a raster has no data there are no triangles, but for gaps narrower than the clusters beside them.
+
         level: by default the finest of at most ``max_points`` (100,000). region, focus, where, cluster, crs: as
         points(); the triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow
         it. smoothing: a method of Delaunay2.smooth(), or a dict of ``method`` and its options; with a region inside it

@@ -222,7 +222,7 @@ class SceneOf final : public Scene {
   void for_triangles_around(tri::VertexId vertex, const Visit& visit) const {
     // Counter-clockwise, and from the hull the other way as well.
     const tri::TriangleId first = mesh().triangle_at(vertex);
-    for (const std::size_t turn : {1, 2}) {
+    for (const std::size_t turn : {std::size_t{1}, std::size_t{2}}) {
       for (tri::TriangleId at = first; at != tri::kNoTriangle;) {
         if (turn == 1 || at != first) visit(at);
         const auto corners = mesh().vertices(at);
