@@ -174,22 +174,28 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
   return tri::MetricField2(std::move(regions));
 }
 
-/// The clusters of a raster that a model has not expanded.
+/// The clusters of a raster that a mesh of this detail does not open.
 class CollapsedClusters {
  public:
-  CollapsedClusters(const tri::Multiresolution2<std::int32_t>& model, tri::ClusterSource& source) {
+  CollapsedClusters(const stream::Store& store, const Detail& detail) {
     std::vector<BoxTree::Item>& items = boxes_.start();
-    std::vector<tri::ClusterId> expanded = model.expanded(), children;
-    expanded.push_back(tri::cluster_id(model.top(), 0));
-    for (const tri::ClusterId cluster : expanded) {
-      if (tri::level_of(cluster) == 0) continue;
-      model.children(cluster, children);
-      for (const tri::ClusterId child : children) {
-        if (model.is_expanded(child)) continue;
-        const tri::Box3 box = source.record(child).box;
-        items.push_back({.box = {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}});
-      }
-    }
+    const bool all_open = detail.level == 0 && !detail.region && !detail.cluster;
+    if (all_open) return;
+    for_each_wanted(
+        store, detail,
+        [&](stream::ClusterId id, const stream::ClusterRecord&,
+            const stream::ClusterPoints& points) {
+          const unsigned level = stream::level_of(id);
+          for (std::size_t i = 0; i < points.children.size(); i += level) {
+            for (unsigned below = level; below-- > 0;) {
+              const stream::Box3 box =
+                  store.record(stream::cluster_id(below, points.children[i + below])).summary.box;
+              if (detail.wants(below, world_box(store.schema(), box))) continue;
+              items.push_back({.box = {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}});
+              break;
+            }
+          }
+        });
     boxes_.build();
   }
   [[nodiscard]] bool leave_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners) const {
@@ -210,7 +216,7 @@ template <class Model>
 TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placement,
                            const std::optional<Region>& region, const std::vector<double>& heights,
                            const std::optional<tri::MetricField2>& field,
-                           const CollapsedClusters* collapsed = nullptr) {
+                           const CollapsedClusters* collapsed) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
@@ -270,27 +276,23 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
   if (options.metric.kind == MetricChoice::Kind::elliptical) {
     field = field_of(options.metric, store, placement);
   }
-  const auto finish = [&](const auto& model, const CollapsedClusters* collapsed = nullptr) {
+  std::optional<CollapsedClusters> collapsed;
+  if (has_gaps(store)) collapsed.emplace(store, detail);
+  const auto finish = [&](const auto& model) {
     std::vector<double> heights;
     if (options.heights.any()) {
       heights = changed_heights(model, placement, detail.region, options.heights);
     }
-    return mesh_of_model(model, placement, detail.region, heights, field, collapsed);
+    return mesh_of_model(model, placement, detail.region, heights, field,
+                         collapsed ? &*collapsed : nullptr);
   };
   if (store.condition() != nullptr) return finish(MatchingPoints<Coord>(store, detail));
   StoreSource whole(store);
   std::optional<ClusterTop> part;
   if (detail.cluster) part.emplace(store, *detail.cluster);
   tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
-  const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
-                                           {.deltas = false});
-  if constexpr (std::is_integral_v<Coord>) {
-    if (has_gaps(store)) {
-      const CollapsedClusters collapsed(model, source);
-      return finish(model, &collapsed);
-    }
-  }
-  return finish(model);
+  return finish(tri::Multiresolution2<Coord>(source, in_stored_coordinates(detail, placement),
+                                             {.deltas = false}));
 }
 
 /// Three corners, their places in order, and the mesh.

@@ -30,12 +30,14 @@ bool spans_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners, const 
   return !neighbours && far(cells);
 }
 
-/// Whether cells of a raster within its bounds have no data.
+/// Whether a store is a raster of which cells within its bounds have no data, or are left out by a
+/// view's condition.
 inline bool has_gaps(const stream::Store& store) {
+  if (!store.schema().grid || store.points() == 0) return false;
+  if (store.condition() != nullptr) return true;
   const stream::Box3& bounds = store.bounds();
-  return store.schema().grid && store.points() > 0 &&
-         (bounds.max[0] - bounds.min[0] + 1) * (bounds.max[1] - bounds.min[1] + 1) >
-             static_cast<double>(store.points());
+  return (bounds.max[0] - bounds.min[0] + 1) * (bounds.max[1] - bounds.min[1] + 1) >
+         static_cast<double>(store.points());
 }
 
 }  // namespace terrace::terrain

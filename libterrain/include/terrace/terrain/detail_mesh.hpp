@@ -42,11 +42,10 @@ struct DetailMeshOptions {
 
 /// The 2D Delaunay triangulation of what `detail` wants: rasters in column and row, exactly; other
 /// points in x and y. Triangles of a raster that span samples without data are left out, as
-/// StoreView::spans_gap() tells them; not those of a view with a condition. Positions are in the
-/// store's CRS, triangles counter-clockwise seen from above, levels the highest of each vertex's
-/// point. With a region, the triangles that reach into it, whole. With a cluster, of the points
-/// that it stands for alone; its representative counts as of its level. The store never changes.
-/// One thread.
+/// StoreView::spans_gap() tells them. Positions are in the store's CRS, triangles counter-clockwise
+/// seen from above, levels the highest of each vertex's point. With a region, the triangles that
+/// reach into it, whole. With a cluster, of the points that it stands for alone; its representative
+/// counts as of its level. The store never changes. One thread.
 ///
 /// A store of triangles gives those that `detail` wants, bit for bit and with their orientation;
 /// equal corners are one vertex. A triangle is where its first corner is, for
