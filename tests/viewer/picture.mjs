@@ -2,7 +2,7 @@
 // picture.mjs PACKAGES STORE LINK OUT [WIDTHxHEIGHT [dark]]: a picture of a store in the viewer, taken by headless
 // Chromium once all is there. TERRACE names the command, CHROMIUM the browser. The picture of README:
 //   tests/clients/clients_test.sh build "$PWD/tests/viewer/picture.mjs" alps.store
-//     '#s=alps&q=3&v=-3000,-9000,1500,25,24,42000&c=height' docs/viewer.jpg 1200x640
+//     '#s=alps&q=2&v=20500,-44500,1000,15,40,20000&c=height' docs/viewer.jpg 1200x640
 import {mkdtempSync, rmSync} from 'node:fs';
 import {spawnSync} from 'node:child_process';
 import {tmpdir} from 'node:os';
