@@ -81,7 +81,7 @@ class SceneOf final : public Scene {
     const double start = now();
     waiting_.end_until(time);
     waiting_.sweep();
-    renew_gaps(start + seconds);
+    renew_gaps(start + seconds / 2);
     const auto& step = view_.frame(wish, seconds - (now() - start), after_rate_);
     const double begin = now();
     apply(*step.delta, time);
@@ -325,8 +325,8 @@ class SceneOf final : public Scene {
 };
 
 /// What is known of clusters changes whether a triangle far from them spans a gap, so all are
-/// looked at in turn: a thousand in a frame, and once nothing else is to be done as many as there
-/// is time for.
+/// looked at in turn: a thousand in a frame, and once nothing else is to be done as many as half of
+/// the time allows.
 template <class Shown>
 void SceneOf<Shown>::renew_gaps(double until) {
   constexpr std::uint32_t kAtOnce = 1024;

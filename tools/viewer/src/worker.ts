@@ -16,7 +16,7 @@ const MOST_GIVEN = 64 << 20;
 /// The surface is computed from scratch once nothing has changed for so many milliseconds.
 const REST = 700;
 /// A frame looks after so many milliseconds whether what has gone is to be drawn no longer.
-const EXCHANGE = 100;
+const EXCHANGE = 30;
 /// Frames that the page may be behind.
 const AHEAD = 6;
 
