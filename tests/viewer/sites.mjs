@@ -78,7 +78,8 @@ export class Sites {
       'three.csv': 'x,y,z\n500000,5000000,100\n500010,5000000,105\n500000,5000010,99\n',
       'cell.asc': grid(50, 40, (column, row) => column === 25 && row === 20 ? 123.5 : -9999),
       'row.asc': grid(60, 1, column => column % 7),
-      'plain.asc': grid(60, 60, () => 7)
+      'plain.asc': grid(60, 60, () => 7),
+      'sparse.asc': grid(40, 40, (column, row) => (column + row) % 2 === 0 ? column : -9999)
     };
     for (const [name, text] of Object.entries(small)) {
       writeFileSync(join(this.folder, name), text);

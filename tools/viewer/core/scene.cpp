@@ -98,7 +98,7 @@ class SceneOf final : public Scene {
                      .clusters = static_cast<std::size_t>(traffic.clusters),
                      .stored_bytes = static_cast<std::size_t>(traffic.bytes)};
     if constexpr (kTriangles) {
-      state.triangles = mesh().triangle_count();
+      state.triangles = mesh().triangle_count() - gaps_;
       state.triangle_slots = kSpareTriangles + mesh().triangle_slots();
     }
     return state;
@@ -184,6 +184,7 @@ class SceneOf final : public Scene {
     vertices_.grow(kSpareVertices + mesh().vertex_slots());
     listed_.resize(mesh().vertex_slots());
     if constexpr (kTriangles) triangles_.grow(kSpareTriangles + mesh().triangle_slots());
+    if constexpr (kRaster) spans_gap_.resize(has_gaps_ ? mesh().triangle_slots() : 0);
     if constexpr (kTriangles && !kRaster) normals_.grow(mesh().vertex_slots());
   }
   /// Without sliding.
@@ -210,7 +211,7 @@ class SceneOf final : public Scene {
     const auto corners = mesh().vertices(triangle);
     for (const tri::VertexId corner : corners) list(corner);
     if constexpr (!kRaster) normals_.add({slot(corners[0]), slot(corners[1]), slot(corners[2])});
-    return seen(triangle);
+    return look_at(triangle);
   }
   void list(tri::VertexId vertex) {
     if (slot(vertex) >= listed_.size() || listed_[slot(vertex)]) return;
@@ -278,13 +279,16 @@ class SceneOf final : public Scene {
   }
 
   /// The triangle as it is drawn: not at all where a raster has no data.
-  [[nodiscard]] SceneTriangle seen(tri::TriangleId triangle) const {
-    if (hides(triangle)) return {};
-    return drawn(mesh().vertices(triangle));
+  [[nodiscard]] SceneTriangle look_at(tri::TriangleId triangle) {
+    if (has_gaps_) set_gap(triangle, view_.spans_gap(triangle));
+    return is_gap(triangle) ? SceneTriangle{} : drawn(mesh().vertices(triangle));
   }
-  [[nodiscard]] bool hides(tri::TriangleId triangle) const {
-    if constexpr (kRaster) return has_gaps_ && view_.spans_gap(triangle);
-    return false;
+  void set_gap(tri::TriangleId triangle, bool spans) {
+    gaps_ += static_cast<std::size_t>(spans) - static_cast<std::size_t>(is_gap(triangle));
+    spans_gap_[slot(triangle)] = spans;
+  }
+  [[nodiscard]] bool is_gap(tri::TriangleId triangle) const {
+    return has_gaps_ && spans_gap_[slot(triangle)];
   }
   void renew_gaps(double until);
 
@@ -299,7 +303,9 @@ class SceneOf final : public Scene {
   std::vector<bool> listed_;  // in without_normal_, by slot
   std::vector<tri::VertexId> without_normal_, ring_;
   std::vector<tri::ClusterId> pinned_;
-  bool has_gaps_ = false;  ///< a raster has cells without data
+  bool has_gaps_ = false;        ///< a raster has cells without data
+  std::vector<bool> spans_gap_;  ///< if so, by slot of a triangle
+  std::size_t gaps_ = 0;         ///< the triangles that span one
   /// The slots of triangles that are to be looked at from next_unsure_ on, see renew_gaps().
   std::uint32_t unsure_ = 0, next_unsure_ = 0;
   mutable tri::VertexId picked_ = tri::kNoVertex;
@@ -341,7 +347,7 @@ void SceneOf<Shown>::renew_gaps(double until) {
       const tri::TriangleId triangle{next_unsure_};
       const std::uint32_t at = drawn(triangle);
       if (!mesh().alive(triangle) || waiting_.hiding(at) != Waiting<Vertex>::kNone) continue;
-      const SceneTriangle corners = seen(triangle);
+      const SceneTriangle corners = look_at(triangle);
       if (triangles_[at] == corners) continue;
       triangles_.change(at) = corners;
       for (const tri::VertexId corner : mesh().vertices(triangle)) list(corner);
@@ -464,6 +470,7 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
       const auto& c = changes.removed_corners[i];
       if constexpr (!kRaster) normals_.remove({slot(c[0]), slot(c[1]), slot(c[2])});
       triangles_.change(drawn(changes.removed_triangles[i])) = {};
+      if (has_gaps_) set_gap(changes.removed_triangles[i], false);
     }
   }
   for (const tri::VertexId vertex : changes.removed_vertices) vertices_.change(drawn(vertex)) = {};
@@ -511,12 +518,7 @@ void SceneOf<Shown>::renew_normals() {
       if (!mesh().alive(vertex)) continue;
       Point3 sum{};
       for_triangles_around(vertex, [&](tri::TriangleId triangle) {
-        const std::uint32_t at = drawn(triangle);
-        // What waits is not drawn either.
-        if (triangles_[at] == SceneTriangle{} &&
-            (waiting_.hiding(at) == Waiting<Vertex>::kNone || hides(triangle))) {
-          return;
-        }
+        if (is_gap(triangle)) return;
         const auto c = mesh().vertices(triangle);
         const Point3 a = position(c[0]);
         const Point3 normal = cross(difference(position(c[1]), a), difference(position(c[2]), a));
@@ -558,7 +560,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
   };
   if constexpr (kTriangles) {
     // Points on one line have no triangles, and are drawn as points.
-    if (mesh().triangle_count() > 0) {
+    if (mesh().triangle_count() > gaps_) {
       // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
       // doi:10.1080/10867651.1997.10487468.
       tri::TriangleId found = tri::kNoTriangle;
@@ -578,7 +580,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
         const double v = dot(way, q) / determinant;
         if (!(v >= 0 && u + v <= 1)) continue;
         const double distance = dot(ac, q) / determinant;
-        if (!(distance > 0 && distance < best) || hides(triangle)) continue;
+        if (!(distance > 0 && distance < best) || is_gap(triangle)) continue;
         best = distance;
         found = triangle;
         weights = {1 - u - v, u, v};
@@ -650,7 +652,7 @@ std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from, c
         const double t = a[1] / (a[1] - b[1]);
         meet(a[0] + t * (b[0] - a[0]), a[2] + t * (b[2] - a[2]));
       }
-      if (!(first < last) || last[0] < 0 || first[0] > length || hides(triangle)) continue;
+      if (!(first < last) || last[0] < 0 || first[0] > length || is_gap(triangle)) continue;
       const auto cut = [&](const std::array<double, 2>& end) -> std::array<double, 2> {
         const double along = std::clamp(end[0], 0.0, length);
         if (along == end[0]) return end;
