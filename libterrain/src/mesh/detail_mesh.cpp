@@ -198,6 +198,12 @@ class CollapsedClusters {
         });
     boxes_.build();
   }
+  /// An item and its share of the tree for each vertex that heads a cluster: all but those of level
+  /// 0, of which clusters have ten and more.
+  [[nodiscard]] static std::uint64_t bytes_per_vertex(const Detail& detail) {
+    constexpr std::uint64_t kBytes = 2 * sizeof(BoxTree::Item);
+    return detail.finest() == 0 ? kBytes / 10 : kBytes;
+  }
   [[nodiscard]] bool leave_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners) const {
     return spans_gap(corners, [&](const stream::Box3& cells) {
       bool far = true;
@@ -371,7 +377,7 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   check_memory(store, wide, context.memory_or(0),
                height_bytes_per_vertex(options.heights) +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0) +
-                   (has_gaps(store) ? sizeof(BoxTree::Item) * 2 : 0));
+                   (has_gaps(store) ? CollapsedClusters::bytes_per_vertex(detail) : 0));
   return store.schema().grid ? mesh_of<std::int32_t>(store, wide, options)
                              : mesh_of<double>(store, wide, options);
 }

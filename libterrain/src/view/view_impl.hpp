@@ -175,6 +175,11 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
 }
 
 template <class Shown>
+bool StoreView<Shown>::has_gaps() const {
+  return std::is_integral_v<Shown> && terrain::has_gaps(impl_->store);
+}
+
+template <class Shown>
 std::span<const std::byte> StoreView<Shown>::attributes(tri::VertexId vertex) const {
   const tri::PointId id = model().point_id(vertex);
   const std::size_t bytes = impl_->store.schema().payload_size();

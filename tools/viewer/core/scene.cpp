@@ -56,10 +56,7 @@ class SceneOf final : public Scene {
       : store_(store), view_(store, ground, options, given), bounds_(store.bounds()) {
     vertices_.reserve(options.max_points);
     if constexpr (kTriangles) triangles_.reserve(2 * options.max_points);
-    if constexpr (kRaster) {
-      has_gaps_ = (bounds_.max[0] - bounds_.min[0] + 1) * (bounds_.max[1] - bounds_.min[1] + 1) >
-                  static_cast<double>(store.points());
-    } else {
+    if constexpr (!kRaster) {
       std::vector<std::byte> records;
       for (const tri::VertexId vertex : mesh().all_vertices()) {
         const auto record = view_.attributes(vertex);
@@ -303,7 +300,7 @@ class SceneOf final : public Scene {
   std::vector<bool> listed_;  // in without_normal_, by slot
   std::vector<tri::VertexId> without_normal_, ring_;
   std::vector<tri::ClusterId> pinned_;
-  bool has_gaps_ = false;        ///< a raster has cells without data
+  bool has_gaps_ = view_.has_gaps();
   std::vector<bool> spans_gap_;  ///< if so, by slot of a triangle
   std::size_t gaps_ = 0;         ///< the triangles that span one
   /// The slots of triangles that are to be looked at from next_unsure_ on, see renew_gaps().

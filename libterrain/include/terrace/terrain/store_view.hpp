@@ -125,6 +125,8 @@ class StoreView {
   /// boxes of all collapsed clusters. Never true where every sample has data; gaps narrower than
   /// the clusters beside them are not seen. 0.03 to 0.6 us.
   [[nodiscard]] bool spans_gap(tri::TriangleId triangle) const;
+  /// Whether that can be true of any triangle.
+  [[nodiscard]] bool has_gaps() const;
 
   /// The attributes of a vertex's point, a record of the store's schema; empty if its cluster is no
   /// longer kept. Those of what a frame has added are there until the next frame, those of the root
