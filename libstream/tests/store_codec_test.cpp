@@ -66,12 +66,12 @@ std::vector<Frequencies> some_frequencies(Random& random, std::size_t contexts) 
 struct BothTables {
   explicit BothTables(const std::vector<Frequencies>& frequencies) : decode(frequencies.size()) {
     for (std::size_t c = 0; c < frequencies.size(); ++c) {
-      encode.push_back(encode_table(frequencies[c]));
+      encode.append(frequencies[c]);
       fill_decode_table(frequencies[c], decode[c]);
     }
     for (const DecodeTable& table : decode) pointers.push_back(&table);
   }
-  std::vector<EncodeTable> encode;
+  EncodeTables encode;
   std::vector<DecodeTable> decode;
   std::vector<const DecodeTable*> pointers;
 };
@@ -105,10 +105,10 @@ TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
       const bool raw = random() % 2 == 0;
       coders[k].start();
       for (Item& item : items[k]) {
-        item.context = static_cast<unsigned>(random() % tables.encode.size());
+        item.context = static_cast<unsigned>(random() % tables.encode.contexts());
         item.symbol = static_cast<unsigned>(random() % kClasses);
         // Without raw bits only symbols that need no escape.
-        while (!raw && tables.encode[item.context].entries[item.symbol] == 0) {
+        while (!raw && tables.encode.entries()[item.context * kSymbols + item.symbol] == 0) {
           item.symbol = static_cast<unsigned>(random() % kClasses);
         }
         item.bits = raw ? static_cast<unsigned>(random() % 65) : 0;
@@ -354,10 +354,12 @@ TEST(StoreCodec, ColumnsAlongLinesComeBackInEveryKind) {
     SymbolEncoder encoder(tables.encode);
     encoder.start();
     Lines lines;
-    std::vector<std::int64_t> scratch(n), guide_in = guide, values_in = values;
-    code_guide(encoder, 0, guide_kind, nullptr, lines, 100, guide_in.data(), scratch.data(), n);
+    ColumnScratch scratch;
+    scratch.resize(n);
+    std::vector<std::int64_t> guide_in = guide, values_in = values;
+    code_guide(encoder, 0, guide_kind, nullptr, lines, 100, guide_in.data(), &scratch, n);
     code_column(encoder, kOther, kind, nullptr, &lines, before.data(), values_in.data(),
-                scratch.data(), n);
+                &scratch, n);
     Bytes bytes;
     encoder.finish(7, bytes);
     const Bytes room = padded(bytes);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "store/codec/coding.hpp"
+#include "store/codec/column_passes.hpp"
 #include "store/codec/numbers.hpp"
 
 /// What travels with the points of a cluster, in the order in which their positions are coded:
@@ -129,22 +130,6 @@ inline std::uint64_t common_divisor(const std::int64_t* differences, std::uint32
   return divisor >> 63 != 0 ? 1 : divisor;
 }
 
-/// Fills `differences` from the second on with those of neighbours in the column, less those of the
-/// column before unless that is null. False if all values are one.
-inline bool find_differences(const std::int64_t* values, const std::int64_t* beside,
-                             std::int64_t* differences, std::uint32_t n) {
-  std::uint64_t several = 0;
-  for (std::uint32_t i = 1; i < n; ++i) {
-    several |= static_cast<std::uint64_t>(values[i]) ^ static_cast<std::uint64_t>(values[0]);
-    differences[i] = wrapped_difference(values[i], values[i - 1]);
-  }
-  for (std::uint32_t i = 1; beside != nullptr && i < n; ++i) {
-    differences[i] =
-        wrapped_difference(differences[i], wrapped_difference(beside[i], beside[i - 1]));
-  }
-  return several != 0;
-}
-
 /// How the points of a cluster follow one another, as their guide tells: mostly the times of a
 /// scanner's pulses.
 class Lines {
@@ -174,6 +159,7 @@ class Lines {
   }
 
   [[nodiscard]] Step operator[](std::uint32_t i) const { return steps_[i]; }
+  [[nodiscard]] const Step* steps() const { return steps_.data(); }
   /// The point before; where a line begins, the first of the line before.
   [[nodiscard]] std::uint32_t reference(std::uint32_t i) const { return references_[i]; }
 
@@ -273,18 +259,65 @@ inline void refer_to_lines(const Lines& lines, ColumnKind kind, std::int64_t* di
   }
 }
 
+/// Working memory of columns that are encoded.
+struct ColumnScratch {
+  std::vector<std::int64_t> differences;
+  std::vector<std::uint64_t> numbers;  ///< that stand for them
+  std::vector<std::uint8_t> classes;
+  std::vector<std::uint32_t> slots;
+
+  void resize(std::uint32_t n) {
+    differences.resize(n);
+    numbers.resize(n);
+    classes.resize(n);
+    slots.resize(n);
+  }
+};
+
+/// By step and class before: where the slots of a number's context begin, from those of the
+/// column's first on.
+inline constexpr auto kStepSlots = [] {
+  std::array<std::array<std::uint16_t, 256>, Lines::kSteps> slots{};
+  for (unsigned step = 0; step < Lines::kSteps; ++step) {
+    for (unsigned c = 0; c < kClasses; ++c) {
+      const unsigned context = kStepContexts[step] + (difference_step(c) >> kStepShifts[step]);
+      slots[step][c] = static_cast<std::uint16_t>(context * kSymbols);
+    }
+  }
+  return slots;
+}();
+
+/// The same as code_differences() for kinds without recent ones, many at once.
+template <bool kLined, class Coder>
+void encode_differences(Coder& coder, unsigned first, const Lines* lines, ColumnScratch& scratch,
+                        std::uint32_t n, unsigned number_class) {
+  std::uint8_t* const classes = scratch.classes.data();
+  classify(scratch.differences.data() + 1, scratch.numbers.data() + 1, classes + 1, n - 1);
+  classes[0] = static_cast<std::uint8_t>(number_class);
+  std::uint32_t* const slots = scratch.slots.data();
+  const Lines::Step* const steps = kLined ? lines->steps() : nullptr;
+  for (std::uint32_t i = 1; i < n; ++i) {
+    const Lines::Step step = kLined ? steps[i] : Lines::kAlong;
+    slots[i] = kStepSlots[step][classes[i - 1]] + classes[i];
+  }
+  coder.numbers(first, {scratch.numbers.data() + 1, n - 1}, classes + 1, slots + 1);
+}
+
 /// The differences of a column, which code_column() describes.
 template <bool kLined, bool kRecent, class Coder>
 void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines* lines,
-                      const std::int64_t* beside, std::int64_t* values, const std::int64_t* scratch,
+                      const std::int64_t* beside, std::int64_t* values, ColumnScratch* scratch,
                       std::uint32_t n, std::int64_t by, unsigned number_class) {
+  if constexpr (!kRecent && !Coder::kDecoding) {
+    return encode_differences<kLined>(coder, first, lines, *scratch, n, number_class);
+  }
   RecentCoder<Coder, kColumnRecent> recent;
   Trend trend(kind);
   for (std::uint32_t i = 1; i < n; ++i) {
     Lines::Step step = Lines::kAlong;
     if constexpr (kLined) step = (*lines)[i];
     std::int64_t difference = 0;
-    if constexpr (!Coder::kDecoding) difference = scratch[i];
+    if constexpr (!Coder::kDecoding) difference = scratch->differences[i];
     if (kRecent && step == Lines::kAlong) {
       recent.code(coder, first, difference);
     } else {
@@ -310,18 +343,19 @@ void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines
 /// A column of values: the first, then differences as `kind` says, divided by what is common to
 /// them.
 /// first: context. form: coded where it is not null. lines: null if there is no guide. beside: the
-/// column before, for kinds beside it alone. scratch: room for n differences.
+/// column before, for kinds beside it alone. scratch: of n, for encoding alone.
 template <class Coder>
 void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form,
                  const Lines* lines, const std::int64_t* beside, std::int64_t* values,
-                 std::int64_t* scratch, std::uint32_t n) {
+                 ColumnScratch* scratch, std::uint32_t n) {
   if (along_line(kind) != ColumnKind::beside) beside = nullptr;
   typename Coder::Local coder = shared;
   bool several = false;
   std::uint64_t divisor = 1;
   if constexpr (!Coder::kDecoding) {
-    several = find_differences(values, beside, scratch, n);
-    if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
+    std::int64_t* const differences = scratch->differences.data();
+    several = find_differences(values, beside, differences, n);
+    if (several) divisor = std::max<std::uint64_t>(common_divisor(differences + 1, n - 1), 1);
   }
   unsigned number_class = 0;
   if (!code_head(coder, first, form, values[0], several, divisor, number_class)) {
@@ -333,8 +367,9 @@ void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* for
   }
   const auto by = static_cast<std::int64_t>(divisor);
   if constexpr (!Coder::kDecoding) {
-    for (std::uint32_t i = 1; by != 1 && i < n; ++i) scratch[i] /= by;
-    if (lines != nullptr) refer_to_lines(*lines, kind, scratch, n);
+    std::int64_t* const differences = scratch->differences.data();
+    for (std::uint32_t i = 1; by != 1 && i < n; ++i) differences[i] /= by;
+    if (lines != nullptr) refer_to_lines(*lines, kind, differences, n);
   }
   const auto code = [&](auto lined, auto is_recent) {
     code_differences<decltype(lined)::value, decltype(is_recent)::value>(
@@ -355,15 +390,16 @@ void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* for
 /// least_jump: for encoding alone.
 template <class Coder>
 void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form, Lines& lines,
-                std::uint64_t least_jump, std::int64_t* values, std::int64_t* scratch,
+                std::uint64_t least_jump, std::int64_t* values, ColumnScratch* scratch,
                 std::uint32_t n) {
   typename Coder::Local coder = shared;
   bool several = false;
   std::uint64_t divisor = 1;
   if constexpr (!Coder::kDecoding) {
-    several = find_differences(values, nullptr, scratch, n);
-    if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
-    lines.find_steps(scratch, least_jump, n);
+    std::int64_t* const differences = scratch->differences.data();
+    several = find_differences(values, nullptr, differences, n);
+    if (several) divisor = std::max<std::uint64_t>(common_divisor(differences + 1, n - 1), 1);
+    lines.find_steps(differences, least_jump, n);
   } else {
     lines.resize(n);
   }
@@ -385,7 +421,7 @@ void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form
     const unsigned context = first + context::kWithinPulse + step;
     if constexpr (!Coder::kDecoding) {
       step = lines[i];
-      difference = scratch[i] / by;
+      difference = scratch->differences[i] / by;
     }
     code_symbol(coder, context, step);
     if (step >= Lines::kSteps) throw Damage("a guide has an unknown step");

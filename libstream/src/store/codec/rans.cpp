@@ -5,6 +5,8 @@
 #include <array>
 #include <cassert>
 #include <cstring>
+#include <optional>
+#include <utility>
 
 namespace terrace::stream::store {
 namespace {
@@ -26,15 +28,13 @@ inline std::uint32_t divided(std::uint32_t state, std::uint32_t frequency) {
 
 }  // namespace
 
-EncodeTable encode_table(const Frequencies& frequencies) {
-  EncodeTable table;
+void EncodeTables::append(const Frequencies& frequencies) {
   unsigned start = 0;
-  for (unsigned s = 0; s < kSymbols; ++s) {
-    if (frequencies[s] > 0) table.entries[s] = start << 16 | frequencies[s];
-    start += frequencies[s];
+  for (const std::uint16_t frequency : frequencies) {
+    entries_.push_back(frequency > 0 ? start << 16 | frequency : 0);
+    start += frequency;
   }
   assert(start == kScale);
-  return table;
 }
 
 void fill_decode_table(const Frequencies& frequencies, DecodeTable& table) {
@@ -67,9 +67,44 @@ void BitWriter::append_reversed(Bytes& out) const {
   }
 }
 
-void SymbolEncoder::grow() {
-  symbols_.resize(2 * used_ + 1024);
+void SymbolCounter::numbers(unsigned first, std::span<const std::uint64_t> numbers,
+                            const std::uint8_t* classes, const std::uint32_t* slots) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    ++counts_[first + slots[i] / kSymbols][classes[i]];
+    raw_bits_ += kClassRange[classes[i]].bits;
+  }
+}
+
+void SymbolEncoder::grow(std::size_t more) {
+  symbols_.resize(2 * used_ + more + 1024);
   room_ = symbols_.size();
+}
+
+void SymbolEncoder::numbers(unsigned first, std::span<const std::uint64_t> numbers,
+                            const std::uint8_t* classes, const std::uint32_t* slots) {
+  const std::size_t n = numbers.size();
+  if (room_ - used_ < n) grow(n);
+  const Entry* const entries = entries_ + std::size_t{first} * kSymbols;
+  Entry* const out = symbols_.data() + used_;
+  bool escape = false;
+  std::uint64_t any = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    out[i] = entries[slots[i]];
+    escape |= out[i] == 0;
+    any |= numbers[i];
+  }
+  used_ += n;
+  if (any < 16 && !escape) return;  // no open bits
+  BitWriter bits = std::move(bits_);  // a copy, which the compiler keeps in registers
+  for (std::size_t i = 0; i < n; ++i) {
+    const unsigned number_class = classes[i];
+    if (out[i] == 0) [[unlikely]] {
+      out[i] = entries[slots[i] - number_class + kEscape];
+      bits.put(number_class, kEscapeBits);
+    }
+    bits.put(numbers[i] - kClassRange[number_class].base, kClassRange[number_class].bits);
+  }
+  bits_ = std::move(bits);
 }
 
 /// The rANS stream of an encoder's symbols. rANS is last in, first out: the symbols go in
@@ -90,7 +125,7 @@ class SymbolEncoder::Words {
   std::size_t left;  ///< symbols to go in
 
   TERRACE_STORE_INLINE void step() {
-    const EncodeTable::Entry entry = symbols_[--left];
+    const Entry entry = symbols_[--left];
     const std::uint32_t frequency = entry & 0xffff, begin = entry >> 16;
     // Written whether it counts or not: a branch upon that is often guessed wrong.
     next_[-1] = static_cast<std::uint16_t>(state_);
@@ -111,36 +146,45 @@ class SymbolEncoder::Words {
   }
 
  private:
-  const EncodeTable::Entry* symbols_;
+  const Entry* symbols_;
   std::uint16_t *next_, *end_;
   bool alone_;  ///< no raw bits follow
   std::uint32_t state_;
 };
 
-void SymbolEncoder::finish(std::uint32_t last, Bytes& out) {
-  Words words(*this, last);
-  while (words.left > 0) words.step();
-  words.write(out);
-  bits_.append_reversed(out);
+/// Until one has no symbols left, and so on with the others.
+template <std::size_t kLanes>
+void SymbolEncoder::finish_lanes(std::array<Words*, kTogether>& lanes) {
+  std::sort(lanes.begin(), lanes.begin() + kLanes,
+            [](const Words* a, const Words* b) { return a->left > b->left; });
+  // Copies, which the compiler keeps in registers.
+  [&]<std::size_t... kLane>(std::index_sequence<kLane...>) {
+    std::array<Words, kLanes> words{*lanes[kLane]...};
+    for (std::size_t steps = words.back().left; steps > 0; --steps) (words[kLane].step(), ...);
+    ((*lanes[kLane] = words[kLane]), ...);
+  }(std::make_index_sequence<kLanes>());
+  if constexpr (kLanes > 1) finish_lanes<kLanes - 1>(lanes);
 }
 
-std::size_t SymbolEncoder::finish_both(SymbolEncoder& first, std::uint32_t last_of_first,
-                                       SymbolEncoder& second, std::uint32_t last_of_second,
-                                       Bytes& out) {
-  Words a(first, last_of_first), b(second, last_of_second);
-  for (std::size_t both = std::min(a.left, b.left); both > 0; --both) {
-    a.step();
-    b.step();
+void SymbolEncoder::finish(std::span<SymbolEncoder> coders, std::span<std::uint32_t> last,
+                           Bytes& out) {
+  assert(coders.size() <= kTogether && last.size() == coders.size());
+  std::array<std::optional<Words>, kTogether> words;
+  std::array<Words*, kTogether> lanes{};
+  for (std::size_t i = 0; i < coders.size(); ++i) lanes[i] = &words[i].emplace(coders[i], last[i]);
+  if (coders.size() == kTogether) {
+    finish_lanes<kTogether>(lanes);
+  } else {
+    for (std::size_t i = 0; i < coders.size(); ++i) {
+      while (words[i]->left > 0) words[i]->step();
+    }
   }
-  while (a.left > 0) a.step();
-  while (b.left > 0) b.step();
-  const std::size_t start = out.size();
-  a.write(out);
-  first.bits_.append_reversed(out);
-  const std::size_t middle = out.size();
-  b.write(out);
-  second.bits_.append_reversed(out);
-  return middle - start;
+  for (std::size_t i = 0; i < coders.size(); ++i) {
+    const std::size_t start = out.size();
+    words[i]->write(out);
+    coders[i].bits_.append_reversed(out);
+    last[i] = static_cast<std::uint32_t>(out.size() - start);
+  }
 }
 
 }  // namespace terrace::stream::store

@@ -32,11 +32,20 @@ inline constexpr std::uint32_t kLow = 1u << 16;
 /// always has one.
 using Frequencies = std::array<std::uint16_t, kSymbols>;
 
-/// A context's table as the encoder uses it.
-struct EncodeTable {
-  /// Frequency, and above its 16 bits the start.
+/// The tables of all contexts as the encoder uses them.
+class EncodeTables {
+ public:
+  /// Frequency, and above its 16 bits the start; 0 for symbols that go by the escape.
   using Entry = std::uint32_t;
-  std::array<Entry, kSymbols> entries{};
+
+  /// That of the next context.
+  void append(const Frequencies& frequencies);
+  /// By *slot*: context * kSymbols + symbol.
+  [[nodiscard]] const Entry* entries() const { return entries_.data(); }
+  [[nodiscard]] std::size_t contexts() const { return entries_.size() / kSymbols; }
+
+ private:
+  std::vector<Entry> entries_;
 };
 
 /// A context's table as the decoder uses it. Two small arrays rather than one of 32-bit slots: a
@@ -49,7 +58,6 @@ struct DecodeTable {
   std::array<Range, kSymbols> ranges{};        ///< by symbol
 };
 
-EncodeTable encode_table(const Frequencies& frequencies);
 void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
 
 /// Bits, most significant first; `append_reversed` puts them so that the first is in the last byte.
@@ -106,6 +114,9 @@ class SymbolCounter {
     ++counts_[context][symbol];
   }
   TERRACE_STORE_INLINE void raw(std::uint64_t /*value*/, unsigned bits) { raw_bits_ += bits; }
+  /// See SymbolEncoder.
+  void numbers(unsigned first, std::span<const std::uint64_t> numbers, const std::uint8_t* classes,
+               const std::uint32_t* slots);
 
  private:
   std::span<std::array<std::uint32_t, kSymbols>> counts_;
@@ -118,39 +129,49 @@ class SymbolEncoder {
   static constexpr bool kDecoding = false;
   using Local = SymbolEncoder&;
 
-  /// `tables`: one per context. They must outlive the encoder.
-  explicit SymbolEncoder(std::span<const EncodeTable> tables) : tables_(tables) {}
+  /// The tables must outlive the encoder.
+  explicit SymbolEncoder(const EncodeTables& tables) : entries_(tables.entries()) {}
 
   void start() {
     used_ = 0;
     bits_.clear();
   }
   TERRACE_STORE_INLINE void symbol(unsigned context, unsigned symbol) {
-    EncodeTable::Entry entry = tables_[context].entries[symbol];
+    const Entry* const table = entries_ + std::size_t{context} * kSymbols;
+    Entry entry = table[symbol];
     if (entry == 0) [[unlikely]] {
-      entry = tables_[context].entries[kEscape];
+      entry = table[kEscape];
       bits_.put(symbol, kEscapeBits);
     }
     if (used_ == room_) [[unlikely]]
-      grow();
+      grow(1);
     symbols_[used_++] = entry;
   }
   TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) { bits_.put(value, bits); }
+  /// Numbers with their classes, as symbol() and raw() take them one by one, faster.
+  /// slots: of the classes, counted from those of context `first` on.
+  void numbers(unsigned first, std::span<const std::uint64_t> numbers, const std::uint8_t* classes,
+               const std::uint32_t* slots);
   /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state: with
   /// raw bits above kLow; otherwise the state itself, as the string's end then tells that no word
   /// is left.
-  void finish(std::uint32_t last, Bytes& out);
-  /// The same for two clusters, the first one's string before the other's; returns how many bytes
-  /// are the first one's. Faster than one by one: each step of rANS waits for the one before.
-  static std::size_t finish_both(SymbolEncoder& first, std::uint32_t last_of_first,
-                                 SymbolEncoder& second, std::uint32_t last_of_second, Bytes& out);
+  void finish(std::uint32_t last, Bytes& out) { finish({this, 1}, {&last, 1}, out); }
+  /// How many clusters are best finished at a time.
+  static constexpr std::size_t kTogether = 4;
+  /// The same for up to kTogether clusters, one string after the other. Faster than one by one:
+  /// each step of rANS waits for the one before.
+  /// last: for each; replaced by how many bytes each has.
+  static void finish(std::span<SymbolEncoder> coders, std::span<std::uint32_t> last, Bytes& out);
 
  private:
+  using Entry = EncodeTables::Entry;
   class Words;
-  void grow();
+  template <std::size_t kLanes>
+  static void finish_lanes(std::array<Words*, kTogether>& lanes);
+  void grow(std::size_t more);
 
-  std::span<const EncodeTable> tables_;
-  std::vector<EncodeTable::Entry> symbols_;  ///< the first used_
+  const Entry* entries_;
+  std::vector<Entry> symbols_;  ///< the first used_
   std::size_t used_ = 0, room_ = 0;
   std::vector<std::uint16_t> words_;
   BitWriter bits_;

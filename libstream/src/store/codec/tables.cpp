@@ -168,9 +168,8 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
 
 EncodingTables::EncodingTables(const Tables& from)
     : predictor(from.predictor), guide(from.guide), kinds(from.kinds) {
-  tables.reserve(from.frequencies.size());
   for (const Frequencies& frequencies : from.frequencies) {
-    tables.push_back(encode_table(frequencies));
+    tables.append(frequencies);
   }
 }
 

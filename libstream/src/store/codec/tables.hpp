@@ -58,7 +58,7 @@ struct EncodingTables {
   Predictor predictor;
   Guide guide;
   std::vector<ColumnKind> kinds;
-  std::vector<EncodeTable> tables;
+  EncodeTables tables;
 
   explicit EncodingTables(const Tables& from);
 };

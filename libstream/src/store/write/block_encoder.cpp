@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
 #include "differing_bits.hpp"
@@ -82,14 +83,42 @@ KeyRange range_of(ScalarType type, NumberForm form, std::span<const std::int64_t
     }
     return range;
   }
-  std::int64_t low = INT64_MAX, high = INT64_MIN;
-  for (const std::int64_t value : values) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
+  const auto [low, high] = extent_of(values);
   if (!is_floating(type)) return {attribute_key(low), attribute_key(high)};
   // Number forms keep the order, and NaN at its ends.
   return {attribute_key(to_double(low, form)), attribute_key(to_double(high, form))};
+}
+
+/// Counts the columns of a cluster as each kind would have them, and nothing else.
+class KindCounter {
+ public:
+  static constexpr bool kDecoding = false;
+  using Local = KindCounter&;
+
+  explicit KindCounter(KindCounts& trials) : trials_(trials) {}
+
+  void symbol(unsigned /*context*/, unsigned /*symbol*/) {}
+  void raw(std::uint64_t /*value*/, unsigned /*bits*/) {}
+  template <class Code>
+  void column(unsigned number, Code&& code) {
+    for (const ColumnKind kind : trials_.kinds[number]) {
+      SymbolCounter counter(trials_.counts[static_cast<std::size_t>(kind)]);
+      code(counter, kind);
+    }
+  }
+
+ private:
+  KindCounts& trials_;
+};
+
+/// Has `code` code a column with its kind, or with each that is tried.
+template <class Coder, class Code>
+void code_as_kinds(Coder& coder, const Columns& columns, unsigned number, Code&& code) {
+  if constexpr (std::is_same_v<Coder, KindCounter>) {
+    coder.column(number, code);
+  } else {
+    code(coder, columns.kinds[number]);
+  }
 }
 
 }  // namespace
@@ -162,11 +191,8 @@ void BlockEncoder::measure(std::size_t axis) {
   extents_[axis].resize(clusters);
   Extent whole;
   for (std::size_t c = 0; c < clusters; ++c) {
-    Extent extent;
-    for (std::uint32_t i = block_->first[c]; i < block_->first[c + 1]; ++i) {
-      extent.low = std::min(extent.low, values[i]);
-      extent.high = std::max(extent.high, values[i]);
-    }
+    const Extent extent =
+        extent_of({values + block_->first[c], block_->first[c + 1] - block_->first[c]});
     extents_[axis][c] = extent;
     whole.low = std::min(whole.low, extent.low);
     whole.high = std::max(whole.high, extent.high);
@@ -339,9 +365,11 @@ void BlockEncoder::sequence(Coder& coder, const Columns& columns) {
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto number = static_cast<unsigned>(layout_->attributes.size()) + axis;
     column_.assign(relative_[axis].begin(), relative_[axis].end());
-    code_column(coder, layout_->first_context(number), columns.kinds[number], nullptr,
-                columns.guide.exists() ? &lines_ : nullptr, nullptr, column_.data(),
-                scratch_.data(), static_cast<std::uint32_t>(members_.size()));
+    code_as_kinds(coder, columns, number, [&](auto& with, ColumnKind kind) {
+      code_column(with, layout_->first_context(number), kind, nullptr,
+                  columns.guide.exists() ? &lines_ : nullptr, nullptr, column_.data(), &scratch_,
+                  static_cast<std::uint32_t>(members_.size()));
+    });
   }
 }
 
@@ -373,8 +401,10 @@ void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
   if (columns.guide.exists()) {
     const unsigned a = columns.guide.attribute;
     gather(attributes_[a]);
-    code_guide(coder, layout_->first_context(a), columns.kinds[a], coded_form(attributes_[a]),
-               lines_, columns.guide.least_jump, column_.data(), scratch_.data(), n);
+    code_as_kinds(coder, columns, a, [&](auto& with, ColumnKind kind) {
+      code_guide(with, layout_->first_context(a), kind, coded_form(attributes_[a]), lines_,
+                 columns.guide.least_jump, column_.data(), &scratch_, n);
+    });
     std::swap(column_, guide_);
   }
   const Lines* const lines = columns.guide.exists() ? &lines_ : nullptr;
@@ -390,13 +420,17 @@ void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
     } else if (attribute.one_value) {
       std::int64_t value = attribute.value;
       ranges_.push_back(range_of(attribute.type, attribute.form, {&value, 1}));
-      code_column(coder, first, columns.kinds[a], form, nullptr, nullptr, &value, nullptr, 1);
+      code_as_kinds(coder, columns, a, [&](auto& with, ColumnKind kind) {
+        code_column(with, first, kind, form, nullptr, nullptr, &value, &scratch_, 1);
+      });
     } else {
       std::swap(column_, beside_);
       gather(attribute);
       ranges_.push_back(range_of(attribute.type, attribute.form, column_));
-      code_column(coder, first, columns.kinds[a], form, lines, beside ? beside_.data() : nullptr,
-                  column_.data(), scratch_.data(), n);
+      code_as_kinds(coder, columns, a, [&](auto& with, ColumnKind kind) {
+        code_column(with, first, kind, form, lines, beside ? beside_.data() : nullptr,
+                    column_.data(), &scratch_, n);
+      });
     }
     beside = !attribute.one_value;
   }
@@ -443,6 +477,16 @@ std::uint64_t BlockEncoder::count(const Predictor& predictor, const Columns& col
   return coder.raw_bits();
 }
 
+void BlockEncoder::count_kinds(const Predictor& predictor, bool sequence, const Guide& guide,
+                               KindCounts& trials) {
+  for (Counts& counts : trials.counts) counts.resize(layout_->contexts());
+  KindCounter coder(trials);
+  for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
+    ranges_.clear();
+    if (enter(c).points > 0) encode_cluster(coder, predictor, {sequence, guide, {}});
+  }
+}
+
 std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
   const std::uint32_t point = block_->representatives[cluster];
   if (point == UINT32_MAX) return 0;
@@ -455,22 +499,20 @@ std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
 void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
                           std::vector<Entry>& entries, std::vector<KeyRange>& ranges) {
   const Columns columns{sequence, tables.guide, tables.kinds};
-  // Two clusters at a time.
-  SymbolEncoder coders[] = {SymbolEncoder(tables.tables), SymbolEncoder(tables.tables)};
-  std::array<std::uint32_t, 2> last{};
-  std::array<std::size_t, 2> entry_of{};
-  unsigned waiting = 0;
+  constexpr std::size_t kTogether = SymbolEncoder::kTogether;
+  std::vector<SymbolEncoder> coders(kTogether, SymbolEncoder(tables.tables));
+  std::array<std::uint32_t, kTogether> last{};
+  std::array<std::size_t, kTogether> entry_of{};
+  std::size_t waiting = 0;
   const auto finish = [&] {
-    std::size_t start = bytes.size(), size = 0;
-    if (waiting == 2)
-      size = SymbolEncoder::finish_both(coders[0], last[0], coders[1], last[1], bytes);
-    if (waiting == 1) coders[0].finish(last[0], bytes);
-    for (unsigned i = 0; i < waiting; ++i) {
-      if (i + 1 == waiting) size = bytes.size() - start;
+    std::size_t start = bytes.size();
+    const std::span sizes = std::span(last).first(waiting);
+    SymbolEncoder::finish(std::span(coders).first(waiting), sizes, bytes);
+    for (std::size_t i = 0; i < waiting; ++i) {
       Entry& entry = entries[entry_of[i]];
-      entry.bytes = static_cast<std::uint32_t>(size);
-      entry.checksum = layout_->checksum({bytes.data() + start, size});
-      start += size;
+      entry.bytes = sizes[i];
+      entry.checksum = layout_->checksum({bytes.data() + start, sizes[i]});
+      start += sizes[i];
     }
     waiting = 0;
   };
@@ -486,7 +528,7 @@ void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& by
       if (entries.back().points >= kLow) coder.raw(at >> 16, 16);
       last[waiting] = at & 0xffff;
       entry_of[waiting] = entries.size() - 1;
-      if (++waiting == 2) finish();
+      if (++waiting == kTogether) finish();
     } else {
       ranges_.assign(attributes_.size(), {0, UINT64_MAX});
     }

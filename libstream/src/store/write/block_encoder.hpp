@@ -19,6 +19,12 @@ struct Columns {
   std::span<const ColumnKind> kinds;
 };
 
+/// The symbols of columns, each coded as several kinds would have it.
+struct KindCounts {
+  std::vector<std::vector<ColumnKind>> kinds;  ///< to be tried, by column
+  std::array<Counts, kColumnKinds> counts;
+};
+
 /// Encodes the clusters of a block, each into a byte string of its own. Keeps its memory between
 /// blocks. One object per thread.
 class BlockEncoder {
@@ -33,6 +39,9 @@ class BlockEncoder {
   void count_differences(unsigned attribute, std::array<std::uint64_t, 65>& widths);
   /// ... and its symbols are counted. Returns the raw bits beside them.
   std::uint64_t count(const Predictor& predictor, const Columns& columns, Counts& counts);
+  /// The same for all kinds of columns to choose from.
+  void count_kinds(const Predictor& predictor, bool sequence, const Guide& guide,
+                   KindCounts& trials);
 
   /// Appends the clusters' bytes, entries and, attribute by attribute, ranges.
   void encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
@@ -48,10 +57,6 @@ class BlockEncoder {
     std::int64_t value = 0;
     std::vector<std::int64_t> numbers;  ///< point by point, of floating types with several values
   };
-  struct Extent {
-    std::int64_t low = INT64_MAX, high = INT64_MIN;
-  };
-
   void load_axes();
   void load_decimals(std::size_t axis);
   void measure(std::size_t axis);
@@ -97,7 +102,8 @@ class BlockEncoder {
   GridCodec grid_;
   SplitEncoder split_;
   Lines lines_;
-  std::vector<std::int64_t> column_, beside_, guide_, scratch_;
+  std::vector<std::int64_t> column_, beside_, guide_;
+  ColumnScratch scratch_;
   std::vector<double> doubles_;
 };
 

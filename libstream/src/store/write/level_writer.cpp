@@ -37,6 +37,13 @@ std::string file_name(unsigned level, const char* what) {
   return "level-" + std::to_string(level) + ".0." + what;
 }
 
+void add(const Counts& counts, Counts& to) {
+  to.resize(std::max(to.size(), counts.size()));
+  for (std::size_t c = 0; c < counts.size(); ++c) {
+    for (unsigned s = 0; s < kSymbols; ++s) to[c][s] += counts[c][s];
+  }
+}
+
 }  // namespace
 
 LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout, ThreadTeam& team)
@@ -87,47 +94,53 @@ std::uint64_t LevelWriter::Trial::bits() const {
   return bits;
 }
 
-std::uint64_t LevelWriter::Trial::bits_of_column(const Layout& layout, unsigned column) const {
+std::uint64_t LevelWriter::bits_of_column(const Counts& counts, unsigned column) const {
   std::uint64_t bits = 0;
-  for (unsigned c = layout.first_context(column); c < layout.first_context(column + 1); ++c) {
+  for (unsigned c = layout_.first_context(column); c < layout_.first_context(column + 1); ++c) {
     bits += entropy_of(counts[c]) + open_bits_of(counts[c]);
   }
   return bits;
 }
 
-LevelWriter::Trial LevelWriter::count(const Predictor& predictor, const Columns& columns,
-                                      std::size_t step) {
-  std::vector<Trial> parts(encoders_.size());
+template <class Count>
+void LevelWriter::each_block(std::size_t step, Count&& count) {
   team_.run((held_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
     const ClusteredBlock view = held_[i * step].view();
     encoders_[worker].load(layout_, view);
-    parts[worker].raw_bits += encoders_[worker].count(predictor, columns, parts[worker].counts);
+    count(encoders_[worker], worker);
   });
-  Trial all;
-  all.counts.resize(layout_.contexts());
-  for (const Trial& part : parts) {
-    all.raw_bits += part.raw_bits;
-    for (std::size_t c = 0; c < part.counts.size(); ++c) {
-      for (unsigned s = 0; s < kSymbols; ++s) all.counts[c][s] += part.counts[c][s];
+}
+
+std::vector<LevelWriter::Trial> LevelWriter::count(const Predictor& predictor,
+                                                   std::span<const Columns> columns,
+                                                   std::size_t step) {
+  std::vector<std::vector<Trial>> parts(encoders_.size(), std::vector<Trial>(columns.size()));
+  each_block(step, [&](BlockEncoder& encoder, std::size_t worker) {
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      Trial& part = parts[worker][i];
+      part.raw_bits += encoder.count(predictor, columns[i], part.counts);
+    }
+  });
+  std::vector<Trial> all(columns.size());
+  for (const std::vector<Trial>& part : parts) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      add(part[i].counts, all[i].counts);
+      all[i].raw_bits += part[i].raw_bits;
     }
   }
   return all;
+}
+
+/// Every so many-th block is used to choose how columns are coded.
+std::size_t LevelWriter::trial_step() const {
+  const std::size_t most = layout_.grid && layout_.level > 0 ? kRasterTrialBlocks : kTrialBlocks;
+  return (held_.size() + most - 1) / most;
 }
 
 bool LevelWriter::possible(ColumnKind kind, unsigned column, const Guide& guide) const {
   if (column == guide.attribute) return kind == ColumnKind::plain || kind == ColumnKind::recent;
   if (along_line(kind) == ColumnKind::beside && !layout_.may_lie_beside(column)) return false;
   return guide.exists() || static_cast<unsigned>(kind) < kUnguidedKinds;
-}
-
-LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence, const Guide& guide,
-                                      ColumnKind kind) {
-  std::vector<ColumnKind> kinds(layout_.columns(), kind);
-  for (unsigned c = 0; c < kinds.size(); ++c) {
-    if (!possible(kind, c, guide)) kinds[c] = ColumnKind::plain;
-  }
-  const std::size_t most = layout_.grid && layout_.level > 0 ? kRasterTrialBlocks : kTrialBlocks;
-  return count(predictor, {sequence, guide, kinds}, (held_.size() + most - 1) / most);
 }
 
 /// Attributes that may tell scan lines: times are doubles or long integers. Takes for jumps what
@@ -174,36 +187,54 @@ void LevelWriter::choose_columns(Tables& tables) {
     sequence_ = false;
     return;
   }
-  std::array<std::optional<Trial>, kColumnKinds> trials;
   std::vector<Guide> guides = find_guides();
   guides.emplace(guides.begin());
-  const std::vector<bool> orders = sequence_                     ? std::vector<bool>{*sequence_}
-                                   : layout_.has_point_columns() ? std::vector<bool>{false, true}
-                                                                 : std::vector<bool>{false};
-  std::uint64_t least_bits = UINT64_MAX;
-  for (const bool order : orders) {
-    for (const Guide& guide : guides) {
-      Trial plain = trial(tables.predictor, order, guide, ColumnKind::plain);
-      const std::uint64_t bits = plain.bits() + (order ? plain.bits() / kOrderShare : 0);
-      if (bits >= least_bits) continue;
-      least_bits = bits;
-      sequence_ = order;
-      tables.guide = guide;
-      trials[0] = std::move(plain);
+  std::vector<Columns> choices;
+  for (const bool sequence : {false, true}) {
+    const bool is_fixed = sequence_ || !layout_.has_point_columns();
+    if (is_fixed && sequence != sequence_.value_or(false)) continue;
+    for (const Guide& guide : guides) choices.push_back({sequence, guide, tables.kinds});
+  }
+  const std::vector<Trial> trials = count(tables.predictor, choices, trial_step());
+  std::uint64_t least = UINT64_MAX;
+  std::size_t best = 0;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    std::uint64_t bits = trials[i].bits();
+    if (choices[i].sequence) bits += bits / kOrderShare;
+    if (bits >= least) continue;
+    least = bits;
+    best = i;
+  }
+  sequence_ = choices[best].sequence;
+  tables.guide = choices[best].guide;
+  choose_kinds(tables, trials[best].counts);
+}
+
+/// plain: the counts of columns that are coded as ColumnKind::plain.
+void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
+  std::vector<std::vector<ColumnKind>> possible_kinds(layout_.columns());
+  for (unsigned c = 0; c < layout_.columns(); ++c) {
+    for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
+      if (possible(static_cast<ColumnKind>(kind), c, tables.guide)) {
+        possible_kinds[c].push_back(static_cast<ColumnKind>(kind));
+      }
     }
   }
+  std::vector<KindCounts> parts(encoders_.size(), {possible_kinds, {}});
+  each_block(trial_step(), [&](BlockEncoder& encoder, std::size_t worker) {
+    encoder.count_kinds(tables.predictor, *sequence_, tables.guide, parts[worker]);
+  });
+  std::array<Counts, kColumnKinds> counts;
   for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
-    if (kind >= kUnguidedKinds && !tables.guide.exists()) break;
-    trials[kind] = trial(tables.predictor, *sequence_, tables.guide, static_cast<ColumnKind>(kind));
+    for (const KindCounts& part : parts) add(part.counts[kind], counts[kind]);
   }
-  for (unsigned c = 0; c < tables.kinds.size(); ++c) {
-    std::uint64_t least = trials[0]->bits_of_column(layout_, c);
-    for (unsigned kind = 1; kind < kColumnKinds && trials[kind]; ++kind) {
-      if (!possible(static_cast<ColumnKind>(kind), c, tables.guide)) continue;
-      const std::uint64_t bits = trials[kind]->bits_of_column(layout_, c);
+  for (unsigned c = 0; c < layout_.columns(); ++c) {
+    std::uint64_t least = bits_of_column(plain, c);
+    for (const ColumnKind kind : possible_kinds[c]) {
+      const std::uint64_t bits = bits_of_column(counts[static_cast<std::size_t>(kind)], c);
       if (bits >= least) continue;
       least = bits;
-      tables.kinds[c] = static_cast<ColumnKind>(kind);
+      tables.kinds[c] = kind;
     }
   }
 }
@@ -224,7 +255,7 @@ void LevelWriter::train() {
   }
   choose_columns(tables);
   const Columns columns{*sequence_, tables.guide, tables.kinds};
-  Counts counts = count(tables.predictor, columns, many ? 2 : 1).counts;
+  Counts counts = std::move(count(tables.predictor, {&columns, 1}, many ? 2 : 1)[0].counts);
   // A symbol costs its table two bytes and more. Where the tables are for what was counted alone,
   // one that came once does not earn them.
   const std::uint32_t least = many ? 1 : 2;

@@ -73,11 +73,16 @@ class LevelWriter {
     std::uint64_t raw_bits = 0;
 
     [[nodiscard]] std::uint64_t bits() const;
-    [[nodiscard]] std::uint64_t bits_of_column(const Layout& layout, unsigned column) const;
   };
-  /// Counts every step-th block held back.
-  Trial count(const Predictor& predictor, const Columns& columns, std::size_t step);
-  Trial trial(const Predictor& predictor, bool sequence, const Guide& guide, ColumnKind kind);
+  /// Has an encoder count every step-th block held back.
+  template <class Count>
+  void each_block(std::size_t step, Count&& count);
+  /// Counts every step-th block held back, with each of these columns.
+  std::vector<Trial> count(const Predictor& predictor, std::span<const Columns> columns,
+                           std::size_t step);
+  [[nodiscard]] std::size_t trial_step() const;
+  [[nodiscard]] std::uint64_t bits_of_column(const Counts& counts, unsigned column) const;
+  void choose_kinds(Tables& tables, const Counts& plain);
   [[nodiscard]] bool possible(ColumnKind kind, unsigned column, const Guide& guide) const;
   std::vector<Guide> find_guides();
   void choose_columns(Tables& tables);
