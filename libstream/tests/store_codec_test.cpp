@@ -86,7 +86,7 @@ ByteView inside(const Bytes& bytes) {
   return ByteView(bytes).subspan(kPadding, bytes.size() - 2 * kPadding);
 }
 
-TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
+TEST(StoreCodec, SymbolsOfSeveralClustersComeBackTogetherAsAlone) {
   Random random(2);
   for (int round = 0; round < 200; ++round) {
     SCOPED_TRACE(round);
@@ -96,11 +96,12 @@ TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
       std::uint64_t value;
       unsigned bits;
     };
-    std::array<std::vector<Item>, 2> items;
-    SymbolEncoder coders[] = {SymbolEncoder(tables.encode), SymbolEncoder(tables.encode)};
-    std::array<std::uint32_t, 2> last{};
-    std::array<Bytes, 2> alone;
-    for (std::size_t k = 0; k < 2; ++k) {
+    const std::size_t n = 1 + random() % SymbolEncoder::kTogether;
+    std::vector<std::vector<Item>> items(n);
+    std::vector<SymbolEncoder> coders(n, SymbolEncoder(tables.encode));
+    std::vector<std::uint32_t> last(n);
+    std::vector<Bytes> alone(n);
+    for (std::size_t k = 0; k < n; ++k) {
       items[k].resize(1 + random() % (round % 4 == 0 ? 4 : 2000));
       const bool raw = random() % 2 == 0;
       coders[k].start();
@@ -119,14 +120,16 @@ TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
       last[k] = static_cast<std::uint32_t>(random() % kLow);
       coders[k].finish(last[k], alone[k]);
     }
-    Bytes both;
-    const std::size_t first =
-        SymbolEncoder::finish_both(coders[0], last[0], coders[1], last[1], both);
-    ASSERT_EQ(first, alone[0].size());
-    Bytes expected = alone[0];
-    expected.insert(expected.end(), alone[1].begin(), alone[1].end());
-    ASSERT_EQ(both, expected);
-    for (std::size_t k = 0; k < 2; ++k) {
+    Bytes together;
+    std::vector<std::uint32_t> sizes = last;
+    SymbolEncoder::finish(coders, sizes, together);
+    Bytes expected;
+    for (std::size_t k = 0; k < n; ++k) {
+      expected.insert(expected.end(), alone[k].begin(), alone[k].end());
+      ASSERT_EQ(sizes[k], alone[k].size());
+    }
+    ASSERT_EQ(together, expected);
+    for (std::size_t k = 0; k < n; ++k) {
       const Bytes bytes = padded(alone[k]);
       SymbolDecoder decoder(tables.pointers, inside(bytes));
       for (const Item& item : items[k]) {
@@ -135,6 +138,49 @@ TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
       }
       EXPECT_EQ(decoder.finish(), last[k]);
     }
+  }
+}
+
+/// Numbers that come many at once are those that come one by one, escapes and open bits included.
+TEST(StoreCodec, NumbersAtOnceAreNumbersOneByOne) {
+  Random random(4);
+  for (int round = 0; round < 500; ++round) {
+    SCOPED_TRACE(round);
+    constexpr unsigned kContexts = 6, kFirst = 2;
+    const BothTables tables(some_frequencies(random, kContexts));
+    const auto n = static_cast<std::uint32_t>(1 + random() % 200);
+    const unsigned most_bits = round % 3 == 0 ? 3 : round % 3 == 1 ? 20 : 64;
+    std::vector<std::int64_t> differences(n);
+    std::vector<std::uint64_t> numbers(n);
+    std::vector<std::uint8_t> classes(n);
+    std::vector<std::uint32_t> slots(n);
+    for (std::int64_t& difference : differences) {
+      difference = static_cast<std::int64_t>(any_number(random, most_bits));
+      if (random() % 2 == 0) difference = wrapped_difference(0, difference);
+    }
+    classify(differences.data(), numbers.data(), classes.data(), n);
+    SymbolEncoder one_by_one(tables.encode), at_once(tables.encode);
+    Counts counts_one_by_one(kContexts), counts_at_once(kContexts);
+    SymbolCounter counter_one_by_one(counts_one_by_one), counter_at_once(counts_at_once);
+    one_by_one.start();
+    at_once.start();
+    for (std::uint32_t i = 0; i < n; ++i) {
+      ASSERT_EQ(numbers[i], zigzag(differences[i]));
+      ASSERT_EQ(classes[i], class_of(numbers[i]));
+      const auto context = static_cast<unsigned>(random() % (kContexts - kFirst));
+      slots[i] = context * kSymbols + classes[i];
+      std::uint64_t number = numbers[i];
+      code_number(one_by_one, kFirst + context, number);
+      code_number(counter_one_by_one, kFirst + context, number);
+    }
+    at_once.numbers(kFirst, numbers, classes.data(), slots.data());
+    counter_at_once.numbers(kFirst, numbers, classes.data(), slots.data());
+    Bytes bytes_one_by_one, bytes_at_once;
+    one_by_one.finish(5, bytes_one_by_one);
+    at_once.finish(5, bytes_at_once);
+    ASSERT_EQ(bytes_at_once, bytes_one_by_one);
+    ASSERT_EQ(counts_at_once, counts_one_by_one);
+    ASSERT_EQ(counter_at_once.raw_bits(), counter_one_by_one.raw_bits());
   }
 }
 
