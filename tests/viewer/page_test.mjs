@@ -318,6 +318,29 @@ describe('pages side by side', {concurrency: 3}, () => {
     await server.close();
   });
 
+  test('the panels wait for the first picture, but not for long', async () => {
+    const context = await browser.newContext();
+    const page = await context.newPage();
+    let answer;
+    const wanted = new Promise(resolve => answer = resolve);
+    await context.route(/\.start$/, async route => {
+      await wanted;
+      await route.continue();
+    });
+    await page.goto(`${site.url}#s=alps&q=8`);
+    await page.waitForSelector('#progress');  // to be seen
+    assert.ok(await page.isVisible('#head'));
+    assert.equal(await page.evaluate(() => window.terrace?.state.points ?? 0), 0);
+    answer();
+    await settled(page);
+    assert.ok(!await page.isVisible('#progress'));
+    await context.close();
+
+    const quick = await open('#s=alps&q=8');
+    assert.equal(await quick.page.evaluate(() => document.body.className), '');
+    await quick.close();
+  });
+
   test('a phone and a cloud', async () => {
     const {page, errors, close} = await open('#s=cloud', {size: {width: 390, height: 760}});
     assert.equal((await state(page)).triangles, 0);

@@ -29,8 +29,13 @@ const counted = (n: number, what: string) => `<b>${count(n)}</b> ${what}${n === 
 /// Short names of units.
 const UNITS: Record<string, string> = {metre: 'm', foot: 'ft', 'US survey foot': 'ft'};
 
+/// What lies over the picture: at first it waits, as a browser that draws in software takes longer to begin with it
+/// than to show the picture. The style sheet lets it wait for a moment only.
+const showPanels = () => document.body.classList.remove('starting');
+
 const NO_WORKER = 'The viewer\'s worker cannot be loaded. Load the page anew.';
 function fail(message: string, again = true): void {
+  showPanels();
   element('progress').hidden = true;
   element('message').hidden = false;
   element('message-text').textContent = message;
@@ -210,6 +215,7 @@ class Viewer {
         this.status = message;
         if (this.hit && message.changes.vertexBlocks.length > 0) this.followSurface(400);
         element('progress').hidden = true;
+        requestAnimationFrame(showPanels);
         this.redraw = true;
         this.worker?.postMessage({type: 'drawn', buffer: message.changes.buffer} satisfies ToWorker, [message.changes.buffer]);
         break;
