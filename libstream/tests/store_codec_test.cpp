@@ -404,8 +404,8 @@ TEST(StoreCodec, ColumnsAlongLinesComeBackInEveryKind) {
     scratch.resize(n);
     std::vector<std::int64_t> guide_in = guide, values_in = values;
     code_guide(encoder, 0, guide_kind, nullptr, lines, 100, guide_in.data(), &scratch, n);
-    code_column(encoder, kOther, kind, nullptr, &lines, before.data(), values_in.data(),
-                &scratch, n);
+    code_column(encoder, kOther, kind, nullptr, &lines, before.data(), values_in.data(), &scratch,
+                n);
     Bytes bytes;
     encoder.finish(7, bytes);
     const Bytes room = padded(bytes);

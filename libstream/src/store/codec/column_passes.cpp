@@ -27,8 +27,7 @@ TERRACE_STORE_AVX2_TOO bool find_differences(const std::int64_t* values, const s
   std::uint64_t several = 0;
   for (std::uint32_t i = 1; i < n; ++i) {
     several |= unsigned_of(values[i]) ^ unsigned_of(values[0]);
-    differences[i] =
-        static_cast<std::int64_t>(unsigned_of(values[i]) - unsigned_of(values[i - 1]));
+    differences[i] = static_cast<std::int64_t>(unsigned_of(values[i]) - unsigned_of(values[i - 1]));
   }
   for (std::uint32_t i = 1; beside != nullptr && i < n; ++i) {
     const std::uint64_t rise = unsigned_of(beside[i]) - unsigned_of(beside[i - 1]);

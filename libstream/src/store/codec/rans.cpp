@@ -94,7 +94,7 @@ void SymbolEncoder::numbers(unsigned first, std::span<const std::uint64_t> numbe
     any |= numbers[i];
   }
   used_ += n;
-  if (any < 16 && !escape) return;  // no open bits
+  if (any < 16 && !escape) return;    // no open bits
   BitWriter bits = std::move(bits_);  // a copy, which the compiler keeps in registers
   for (std::size_t i = 0; i < n; ++i) {
     const unsigned number_class = classes[i];
@@ -162,7 +162,8 @@ void SymbolEncoder::finish_lanes(std::array<Words*, kTogether>& lanes) {
     std::array<Words, kLanes> words{*lanes[kLane]...};
     for (std::size_t steps = words.back().left; steps > 0; --steps) (words[kLane].step(), ...);
     ((*lanes[kLane] = words[kLane]), ...);
-  }(std::make_index_sequence<kLanes>());
+  }
+  (std::make_index_sequence<kLanes>());
   if constexpr (kLanes > 1) finish_lanes<kLanes - 1>(lanes);
 }
 
