@@ -102,55 +102,29 @@ void BlockState::reserve_pool(std::uint32_t more) {
   pool_used = end;
 }
 
-void BlockState::build_segments() {
-  for (std::uint32_t j = 0; j < facility_count; ++j) size[j] = 0;
-  for (std::uint32_t i = 0; i < count; ++i) ++size[nearest[i]];
-  // Facilities that a duplicate of theirs deprives of their clients.
+void BlockState::place_segments() {
   std::uint32_t kept = 0;
+  std::uint32_t end = 0;
   for (std::uint32_t j = 0; j < facility_count; ++j) {
-    near[j] = kept;
+    closes[j] = end;
+    // Its clients are those of a duplicate.
     if (size[j] == 0) continue;
     facility[kept] = facility[j];
     fx[kept] = fx[j];
     fy[kept] = fy[j];
     fz[kept] = fz[j];
+    begin[kept] = end;
+    end += round_to_lanes(size[j]) + kLanes;
     size[kept++] = size[j];
   }
   for (std::uint32_t j = kept; j < facility_count; ++j) {
     fx[j] = kFarAway;
     reach[j] = 0;
   }
-  const bool renumbered = kept != facility_count;
   facility_count = kept;
-
-  std::uint32_t end = 0;
-  for (std::uint32_t j = 0; j < facility_count; ++j) {
-    begin[j] = end;
-    end += round_to_lanes(size[j]);
-  }
   for (Column<float>* column : {&px, &py, &pz, &pw, &pd, &pp})
     column->reserve(2 * std::size_t{end});
   pool_used = end;
-  for (std::uint32_t j = 0; j < facility_count; ++j) closes[j] = begin[j];  // the next free place
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t j = renumbered ? near[nearest[i]] : nearest[i];
-    const std::uint32_t place = closes[j]++;
-    px[place] = x[i];
-    py[place] = y[i];
-    pz[place] = z[i];
-    pw[place] = w[i];
-    pd[place] = distance[i];
-    pp[place] = static_cast<float>(i);
-  }
-  for (std::uint32_t j = 0; j < facility_count; ++j) {
-    for (std::uint32_t place = begin[j] + size[j]; place < begin[j] + round_to_lanes(size[j]);
-         ++place) {
-      px[place] = fx[j];
-      py[place] = fy[j];
-      pz[place] = fz[j];
-      pw[place] = pd[place] = 0;
-    }
-  }
 }
 
 void BlockState::sort_facilities() {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "scaling.hpp"
 #include "terrace/cluster/point.hpp"
@@ -89,8 +90,9 @@ struct BlockState {
   std::uint32_t add_facility(std::uint32_t point);
   /// Removes facility j; the last one takes its number.
   void remove_facility(std::uint32_t j);
-  /// Fills the pool from `nearest` and `distance`; drops facilities without clients.
-  void build_segments();
+  /// Makes room for a segment per facility by its `size`, with sixteen lanes behind each; drops
+  /// facilities without clients. `closes` becomes the beginnings, by the old numbers.
+  void place_segments();
   /// Sorts the facilities in the order of the curve.
   void sort_facilities();
 
@@ -107,8 +109,14 @@ class CurveSorter {
             const Scaling& scaling, BlockState& state);
 
  private:
-  Column<float> x_, y_, z_;
-  Column<std::uint32_t> key_, other_key_, order_, other_order_;
+  /// A point in single precision, sixteen bytes that move at once.
+  struct alignas(16) Place {
+    float x, y, z;
+    std::uint32_t original;
+  };
+
+  std::vector<Place> places_, sorted_;
+  Column<std::uint32_t> key_, other_key_, order_;
 };
 
 }  // namespace terrace::cluster

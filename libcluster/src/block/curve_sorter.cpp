@@ -73,12 +73,11 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
                        double mean_weight, const Scaling& scaling, BlockState& state) {
   const auto count = static_cast<std::uint32_t>(points.size());
   const std::uint32_t padded = round_to_lanes(count);
-  for (Column<float>* column :
-       {&x_, &y_, &z_, &state.x, &state.y, &state.z, &state.w, &state.distance}) {
+  for (Column<float>* column : {&state.x, &state.y, &state.z, &state.w, &state.distance}) {
     column->reserve(padded);
   }
   for (Column<std::uint32_t>* column :
-       {&key_, &other_key_, &order_, &other_order_, &state.original, &state.nearest}) {
+       {&key_, &other_key_, &order_, &state.original, &state.nearest}) {
     column->reserve(padded);
   }
   for (Column<float>* column :
@@ -86,6 +85,10 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
     column->reserve(padded / kLanes);
   }
   state.scratch_pool.reserve(padded);
+  if (places_.size() < padded) {
+    places_.resize(padded);
+    sorted_.resize(padded);
+  }
   state.count = count;
 
   const CurveTable table(scaling.extent);
@@ -93,10 +96,10 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
   std::array<std::uint32_t, kDigits> high{};
   for (std::uint32_t i = 0; i < count; ++i) {
     const Point3 p = scaling.scaled(points[i]);
-    x_[i] = static_cast<float>(p[0]);
-    y_[i] = static_cast<float>(p[1]);
-    z_[i] = static_cast<float>(p[2]);
-    const std::uint32_t key = table.key(x_[i], y_[i], z_[i]);
+    const Place place{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]),
+                      i};
+    places_[i] = place;
+    const std::uint32_t key = table.key(place.x, place.y, place.z);
     key_[i] = key;
     ++low[key % kDigits];
     ++high[key / kDigits];
@@ -110,16 +113,18 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
   }
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t place = low[key_[i] % kDigits]++;
-    other_order_[place] = i;
+    order_[place] = i;
     other_key_[place] = key_[i] / kDigits;
   }
   for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t place = high[other_key_[i]]++;
-    const std::uint32_t from = other_order_[i];
-    state.original[place] = from;
-    state.x[place] = x_[from];
-    state.y[place] = y_[from];
-    state.z[place] = z_[from];
+    sorted_[high[other_key_[i]]++] = places_[order_[i]];
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Place& place = sorted_[i];
+    state.x[i] = place.x;
+    state.y[i] = place.y;
+    state.z[i] = place.z;
+    state.original[i] = place.original;
   }
   if (weights.empty()) {
     std::fill_n(static_cast<float*>(state.w), count, 1.0f);

@@ -84,7 +84,7 @@ class Facilities {
     }
     V best = V::broadcast(3.0e38f);
     V place = V::broadcast(0);
-    V here = V::iota() + V::broadcast(static_cast<float>(first));
+    V here = V::iota();
     const V lanes = V::broadcast(static_cast<float>(kLanes));
     for (std::uint32_t i = first; i < end; i += kLanes) {
       const V d = squared(V::load(s_.px + i), V::load(s_.py + i), V::load(s_.pz + i),
@@ -98,8 +98,8 @@ class Facilities {
     // Surplus lanes lie where the facility is; should one win, nothing changes.
     const Mask others = less(V::broadcast(closest), best);
     const float where = least(select(others, V::broadcast(3.0e38f), place));
-    const auto chosen = static_cast<std::uint32_t>(where);
-    if (chosen >= first + s_.size[j]) return;
+    if (!(where < static_cast<float>(s_.size[j]))) return;
+    const std::uint32_t chosen = first + static_cast<std::uint32_t>(where);
     const float x = s_.px[chosen];
     const float y = s_.py[chosen];
     const float z = s_.pz[chosen];

@@ -8,6 +8,7 @@
 #include "block/engine_facilities.hpp"
 #include "block/engine_gain.hpp"
 #include "block/engine_seed.hpp"
+#include "block/engine_segments.hpp"
 
 // The engine and its parts are templates over a vector of sixteen floats (simd_*.hpp), compiled
 // once for each instruction set. They use no library function: such a function, compiled for newer
@@ -46,7 +47,7 @@ class Engine {
   /// Gives every point to its nearest facility and makes the segments anew.
   void partition() {
     assigner_.assign();
-    s_.build_segments();
+    Segments<V>(s_).build();
     for (std::uint32_t j = 0; j < s_.facility_count; ++j) facilities_.summarise(j);
   }
 

@@ -42,6 +42,11 @@ struct Avx2 {
   __m256 low, high;
 
   static Avx2 load(const float* from) { return {_mm256_loadu_ps(from), _mm256_loadu_ps(from + 8)}; }
+  static Avx2 load_integers(const std::uint32_t* from) {
+    const auto* const eight = reinterpret_cast<const __m256i*>(from);
+    return {_mm256_cvtepi32_ps(_mm256_loadu_si256(eight)),
+            _mm256_cvtepi32_ps(_mm256_loadu_si256(eight + 1))};
+  }
   static Avx2 broadcast(float value) { return {_mm256_set1_ps(value), _mm256_set1_ps(value)}; }
   static Avx2 iota() {
     return {_mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_setr_ps(8, 9, 10, 11, 12, 13, 14, 15)};
@@ -76,6 +81,9 @@ struct Avx2 {
   friend Avx2 sqrt(Avx2 a) { return {_mm256_sqrt_ps(a.low), _mm256_sqrt_ps(a.high)}; }
   friend Mask less(Avx2 a, Avx2 b) {
     return {_mm256_cmp_ps(a.low, b.low, _CMP_LT_OQ), _mm256_cmp_ps(a.high, b.high, _CMP_LT_OQ)};
+  }
+  friend Mask equal(Avx2 a, Avx2 b) {
+    return {_mm256_cmp_ps(a.low, b.low, _CMP_EQ_OQ), _mm256_cmp_ps(a.high, b.high, _CMP_EQ_OQ)};
   }
   friend Avx2 select(Mask m, Avx2 a, Avx2 b) {
     return {_mm256_blendv_ps(b.low, a.low, m.low), _mm256_blendv_ps(b.high, a.high, m.high)};

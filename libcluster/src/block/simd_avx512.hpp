@@ -20,6 +20,9 @@ struct Avx512 {
   __m512 v;
 
   static Avx512 load(const float* from) { return {_mm512_loadu_ps(from)}; }
+  static Avx512 load_integers(const std::uint32_t* from) {
+    return {_mm512_cvtepi32_ps(_mm512_loadu_si512(from))};
+  }
   static Avx512 broadcast(float value) { return {_mm512_set1_ps(value)}; }
   static Avx512 iota() {
     return {_mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
@@ -37,6 +40,7 @@ struct Avx512 {
   friend Avx512 max(Avx512 a, Avx512 b) { return {_mm512_max_ps(a.v, b.v)}; }
   friend Avx512 sqrt(Avx512 a) { return {_mm512_sqrt_ps(a.v)}; }
   friend Mask less(Avx512 a, Avx512 b) { return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ)}; }
+  friend Mask equal(Avx512 a, Avx512 b) { return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_EQ_OQ)}; }
   friend Avx512 select(Mask m, Avx512 a, Avx512 b) {
     return {_mm512_mask_blend_ps(m.lanes, b.v, a.v)};
   }

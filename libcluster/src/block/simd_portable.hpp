@@ -34,6 +34,10 @@ struct Portable {
   static Portable load(const float* from) {
     return each([=](int i) { return from[i]; });
   }
+  /// Integers from 0 to 2^24
+  static Portable load_integers(const std::uint32_t* from) {
+    return each([=](int i) { return static_cast<float>(from[i]); });
+  }
   static Portable broadcast(float value) {
     return each([=](int) { return value; });
   }
@@ -74,6 +78,9 @@ struct Portable {
   friend Mask less(Portable a, Portable b) {
     return each_bit([&](int i) { return a.v[i] < b.v[i]; });
   }
+  friend Mask equal(Portable a, Portable b) {
+    return each_bit([&](int i) { return a.v[i] == b.v[i]; });
+  }
   friend Mask operator&(Mask a, Mask b) { return {a.lanes & b.lanes}; }
   friend Mask operator~(Mask m) { return {~m.lanes & 0xffffu}; }
   /// a where the mask is set, b elsewhere
@@ -100,8 +107,8 @@ struct Portable {
   }
   /// Stores the lanes of the mask densely. May write all of to[0 .. 15].
   friend void compress(float* to, Mask m, Portable a) {
-    for (int i = 0; i < 16; ++i) {
-      if (((m.lanes >> i) & 1u) != 0) *to++ = a.v[i];
+    for (std::uint32_t left = m.lanes; left != 0; left &= left - 1) {
+      *to++ = a.v[__builtin_ctz(left)];
     }
   }
 };
