@@ -51,6 +51,13 @@ void check_ground_map(const GroundMap& map, const Bounds& box, unsigned level,
 
 void to_ground(std::span<const Point3> positions, const Point3& origin, const GroundMap& map,
                std::span<Point3> out) {
+  if (is_diagonal(map)) {
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const Point3 p = difference(positions[i], origin);
+      out[i] = {map[0] * p[0], map[4] * p[1], map[8] * p[2]};
+    }
+    return;
+  }
   for (std::size_t i = 0; i < positions.size(); ++i) {
     out[i] = mapped(map, difference(positions[i], origin));
   }

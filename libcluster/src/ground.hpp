@@ -37,6 +37,12 @@ inline Point3 mapped(const GroundMap& m, const Point3& v) {
           m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
 }
 
+/// Whether axes stay apart: mapped() then multiplies them by the diagonal alone, up to the signs of
+/// zeros, if all is finite.
+inline bool is_diagonal(const GroundMap& m) {
+  return m[1] == 0.0 && m[2] == 0.0 && m[3] == 0.0 && m[5] == 0.0 && m[6] == 0.0 && m[7] == 0.0;
+}
+
 inline double squared_length(const Point3& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
 /// The sum of the ground extents of a box, with the absolute values of the map's entries: no vector

@@ -38,16 +38,18 @@ EngineFunction engine_of(SimdPath path) {
 
 /// A facility at the same place as one of lower number has no clients.
 void drop_empty_facilities(BlockState& state) {
-  for (std::uint32_t j = 0; j < state.facility_count; ++j) state.size[j] = 0;
-  for (std::uint32_t i = 0; i < state.count; ++i) ++state.size[state.nearest[i]];
+  std::uint32_t* const number = state.near;
+  std::fill_n(number, state.facility_count, 0u);
+  for (std::uint32_t i = 0; i < state.count; ++i) number[state.nearest[i]] = 1;
   std::uint32_t kept = 0;
   for (std::uint32_t j = 0; j < state.facility_count; ++j) {
-    state.near[j] = kept;
-    if (state.size[j] != 0) state.facility[kept++] = state.facility[j];
+    const bool serves = number[j] != 0;
+    number[j] = kept;
+    if (serves) state.facility[kept++] = state.facility[j];
   }
   if (kept == state.facility_count) return;
   state.facility_count = kept;
-  for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = state.near[state.nearest[i]];
+  for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = number[state.nearest[i]];
 }
 
 double mean_of(std::span<const double> weights) {

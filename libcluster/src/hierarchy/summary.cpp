@@ -37,20 +37,34 @@ double farthest_corner(const Point3& from, const GroundMap& map, const Bounds& b
   return length_bound(squared, map, box);
 }
 
-}  // namespace
-
-Summary summarise_points(std::span<const Point3> positions, std::span<const std::uint32_t> members,
-                         std::uint32_t representative, const GroundMap& map) {
+// ground: of a difference
+template <class Ground>
+Summary summarise(std::span<const Point3> positions, std::span<const std::uint32_t> members,
+                  std::uint32_t representative, const GroundMap& map, Ground ground) {
   const Point3 from = positions[representative];
   Bounds box{from, from};
   double squared = 0.0;
   for (const std::uint32_t member : members) {
     const Point3& p = positions[member];
     include(box, p);
-    const double d = squared_length(mapped(map, difference(p, from)));
+    const double d = squared_length(ground(difference(p, from)));
     squared = d > squared ? d : squared;
   }
   return {box, length_bound(squared, map, box), members.size()};
+}
+
+}  // namespace
+
+Summary summarise_points(std::span<const Point3> positions, std::span<const std::uint32_t> members,
+                         std::uint32_t representative, const GroundMap& map) {
+  if (is_diagonal(map)) {
+    const Point3 diagonal{map[0], map[4], map[8]};
+    return summarise(positions, members, representative, map, [diagonal](const Point3& v) {
+      return Point3{diagonal[0] * v[0], diagonal[1] * v[1], diagonal[2] * v[2]};
+    });
+  }
+  return summarise(positions, members, representative, map,
+                   [map](const Point3& v) { return mapped(map, v); });
 }
 
 Summary summarise_heads(std::span<const Point3> positions, std::span<const Summary> heads,

@@ -31,8 +31,9 @@ inline constexpr Bounds kEmptyBounds{
   Bounds box = kEmptyBounds;
   for (const Point3& p : points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      box.min[axis] = std::min(box.min[axis], p[axis]);
-      box.max[axis] = std::max(box.max[axis], p[axis]);
+      // Not std::min(), whose references keep the box in memory.
+      box.min[axis] = p[axis] < box.min[axis] ? p[axis] : box.min[axis];
+      box.max[axis] = p[axis] > box.max[axis] ? p[axis] : box.max[axis];
     }
   }
   return box;
