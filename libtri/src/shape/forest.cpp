@@ -14,6 +14,8 @@ namespace terrace::tri::shape {
 namespace {
 
 constexpr std::size_t kForestBlock = std::size_t{1} << 14;
+/// So many turns ahead memory is asked for.
+constexpr std::size_t kAhead = 8;
 
 /// A statement about two sets of tetrahedra: across a facet that they are alike, at a vertex that
 /// its poles differ.
@@ -248,15 +250,19 @@ class Forest {
                  std::size_t count = 0;
                  for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
                    if (!spheres_.finite(t)) continue;
-                   for (const std::uint32_t i : {0u, 1u, 2u, 3u})
-                     if (stands(t, tetrahedra[t].mate[i]))
-                       to[count++].what = spatial::make_side(t, i);
+                   for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
+                     const spatial::Side mate = tetrahedra[t].mate[i];
+                     if (!stands(t, mate)) continue;
+                     to[count].what = spatial::make_side(t, i);
+                     to[count++].other = spatial::tetrahedron_of(mate);
+                   }
                  }
-                 for (Statement& s : to) {
-                   const std::uint32_t t = spatial::tetrahedron_of(s.what);
-                   const std::uint32_t other =
-                       spatial::tetrahedron_of(tetrahedra[t].mate[spatial::index_of(s.what)]);
-                   s = make(key_of(spheres_.facet_defect(s.what), false), s.what, t, other, 0);
+                 for (std::size_t i = 0; i < to.size(); ++i) {
+                   // Neighbours lie anywhere.
+                   spheres_.prefetch(to[std::min(i + kAhead, to.size() - 1)].other);
+                   Statement& s = to[i];
+                   s = make(key_of(spheres_.facet_defect(s.what), false), s.what,
+                            spatial::tetrahedron_of(s.what), s.other, 0);
                  }
                });
     Statement* to = list_.data() + start.back();

@@ -122,6 +122,7 @@ class Spheres {
     const Vector3 shift = minus(places_[s.first].at, places_[vertex].at);
     return {shift[0] + s.centre[0], shift[1] + s.centre[1], shift[2] + s.centre[2]};
   }
+  void prefetch(std::uint32_t t) const { __builtin_prefetch(&sphere_[t]); }
   /// The outward unit normal of the hull facet that is this side of a finite tetrahedron.
   [[nodiscard]] Vector3 hull_normal(Side side) const;
 
