@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cassert>
-#include <utility>
+#include <cstring>
+#include <limits>
 
 namespace terrace::stream {
 namespace {
@@ -11,12 +12,36 @@ namespace {
 /// Parts of a box in which coordinates are counted to find one of a given rank.
 constexpr std::size_t kRankBins = 1024;
 
+template <class Coordinate>
 struct RankedPlace {
-  double value;
+  Coordinate value;
   std::uint64_t number;
 
+  // Without branches, which would be coin tosses.
   friend bool operator<(const RankedPlace& a, const RankedPlace& b) {
-    return a.value != b.value ? a.value < b.value : a.number < b.number;
+    return (a.value < b.value) | ((a.value == b.value) & (a.number < b.number));
+  }
+};
+
+template <class Coordinate>
+struct Extent {
+  using Limits = std::numeric_limits<Coordinate>;
+  static constexpr Coordinate kMost = Limits::has_infinity ? Limits::infinity() : Limits::max();
+  static constexpr Coordinate kLeast = Limits::has_infinity ? -Limits::infinity() : Limits::min();
+
+  std::array<Coordinate, 3> min{kMost, kMost, kMost}, max{kLeast, kLeast, kLeast};
+
+  explicit Extent(std::span<const Numbered<Coordinate>> points) {
+    for (const Numbered<Coordinate>& point : points) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Coordinate value = point.place[axis];
+        min[axis] = value < min[axis] ? value : min[axis];
+        max[axis] = value > max[axis] ? value : max[axis];
+      }
+    }
+  }
+  [[nodiscard]] double width(std::size_t axis) const {
+    return static_cast<double>(max[axis]) - static_cast<double>(min[axis]);
   }
 };
 
@@ -28,54 +53,72 @@ std::size_t rank_bin(double value, double low, double bins_per_unit) {
 
 /// The place that `first` others come before along the axis. Only those that share its part of the
 /// extent are sorted.
-RankedPlace place_of_rank(std::span<const NumberedPoint> points, std::size_t first,
-                          std::size_t axis, double low, double high) {
-  const double bins_per_unit = high > low ? kRankBins / (high - low) : 0;
+template <class Coordinate>
+RankedPlace<Coordinate> place_of_rank(std::span<const Numbered<Coordinate>> points,
+                                      std::size_t first, std::size_t axis,
+                                      const Extent<Coordinate>& extent) {
+  const auto low = static_cast<double>(extent.min[axis]);
+  const double width = extent.width(axis), bins_per_unit = width > 0 ? kRankBins / width : 0;
+  const auto bin_of = [&](const Numbered<Coordinate>& point) {
+    return rank_bin(static_cast<double>(point.place[axis]), low, bins_per_unit);
+  };
   std::array<std::uint32_t, kRankBins> counts{};
-  for (const NumberedPoint& p : points) ++counts[rank_bin(p.place[axis], low, bins_per_unit)];
+  for (const auto& point : points) ++counts[bin_of(point)];
   std::size_t bin = 0;
   for (; first >= counts[bin]; ++bin) first -= counts[bin];
-  std::vector<RankedPlace> places;
+  std::vector<RankedPlace<Coordinate>> places;
   places.reserve(counts[bin]);
-  for (const NumberedPoint& p : points) {
-    if (rank_bin(p.place[axis], low, bins_per_unit) == bin) {
-      places.push_back({p.place[axis], p.number});
-    }
+  for (const auto& point : points) {
+    if (bin_of(point) == bin) places.push_back({point.place[axis], point.number});
   }
   const auto found = places.begin() + static_cast<std::ptrdiff_t>(first);
   std::nth_element(places.begin(), found, places.end());
   return *found;
 }
 
+/// By words: parts that are stored one by one would be waited for when they are loaded as a whole.
+template <class Value>
+void exchange(Value& a, Value& b) {
+  using Words = std::array<std::uint64_t, sizeof(Value) / sizeof(std::uint64_t)>;
+  static_assert(sizeof(Words) == sizeof(Value));
+  Words of_a, of_b;
+  std::memcpy(&of_a, &a, sizeof a);
+  std::memcpy(&of_b, &b, sizeof b);
+  std::memcpy(&a, &of_b, sizeof a);
+  std::memcpy(&b, &of_a, sizeof b);
+}
+
 /// Puts the `first` points that come first along the widest axis before the others, which begin at
 /// the plane returned. Requires first < points.size(), unless there are no points.
-KdPlane divide(std::span<NumberedPoint> points, std::size_t first,
+template <class Coordinate>
+KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
                const std::array<double, 3>& lengths) {
   if (points.empty()) return {};
-  Box3 box;
-  for (const NumberedPoint& point : points) box.include(point.place);
+  const Extent<Coordinate> extent(points);
   std::size_t axis = 0;
   double most = -1;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double width = (box.max[a] - box.min[a]) * lengths[a];
+    const double width = extent.width(a) * lengths[a];
     if (width > most) {
       most = width;
       axis = a;
     }
   }
-  const RankedPlace middle = place_of_rank(points, first, axis, box.min[axis], box.max[axis]);
+  const RankedPlace<Coordinate> middle = place_of_rank<Coordinate>(points, first, axis, extent);
   std::size_t before = 0;
-  for (NumberedPoint& point : points) {
+  for (Numbered<Coordinate>& point : points) {
     // Exchanged always: a branch would be a coin toss.
-    const bool is_before = RankedPlace{point.place[axis], point.number} < middle;
-    std::swap(point, points[before]);
+    const bool is_before = RankedPlace<Coordinate>{point.place[axis], point.number} < middle;
+    exchange(point, points[before]);
     before += is_before ? 1 : 0;
   }
-  return {axis, middle.value};
+  return {axis, static_cast<double>(middle.value)};
 }
 
-void cut(std::span<NumberedPoint> points, std::size_t pieces, const std::array<double, 3>& lengths,
-         std::vector<std::size_t>& begins, std::size_t begin) {
+template <class Coordinate>
+void cut(std::span<Numbered<Coordinate>> points, std::size_t pieces,
+         const std::array<double, 3>& lengths, std::vector<std::size_t>& begins,
+         std::size_t begin) {
   if (pieces < 2) {
     begins.push_back(begin);
     return;
@@ -98,7 +141,8 @@ void plant(std::span<NumberedPoint> points, std::size_t node, const std::array<d
 
 }  // namespace
 
-std::vector<std::size_t> cut_in_pieces(std::span<NumberedPoint> points, std::size_t pieces,
+template <class Coordinate>
+std::vector<std::size_t> cut_in_pieces(std::span<Numbered<Coordinate>> points, std::size_t pieces,
                                        const std::array<double, 3>& lengths) {
   assert(pieces >= 1);
   std::vector<std::size_t> begins;
@@ -107,6 +151,10 @@ std::vector<std::size_t> cut_in_pieces(std::span<NumberedPoint> points, std::siz
   begins.push_back(points.size());
   return begins;
 }
+template std::vector<std::size_t> cut_in_pieces(std::span<NumberedPoint>, std::size_t,
+                                                const std::array<double, 3>&);
+template std::vector<std::size_t> cut_in_pieces(std::span<NumberedIntegers>, std::size_t,
+                                                const std::array<double, 3>&);
 
 std::vector<KdPlane> kd_planes(std::span<NumberedPoint> points, unsigned depth,
                                const std::array<double, 3>& lengths) {

@@ -97,7 +97,6 @@ class SpatialSource final : public OrderedSource {
 
   bool next(PointBlock& block) override {
     if (options_.stop.stop_requested()) throw Stopped();
-    block.clear();
     if (state_ == State::opening) open();
     if (state_ == State::gathering) gather();
     if (state_ == State::delivering) {
@@ -172,7 +171,8 @@ class SpatialSource final : public OrderedSource {
     for (std::size_t b = 0; b <= blocks; ++b) begins.push_back(b * places_.size() / blocks);
     measure_units();
     const double as_read = widths_of(places_, begins, lengths_);
-    const double compact = widths_of(places_, cut_in_pieces(places_, blocks, lengths_), lengths_);
+    const double compact =
+        widths_of(places_, cut_in_pieces(std::span(places_), blocks, lengths_), lengths_);
     const double spread = compact > 0 ? as_read / compact : 1.0;
     report_.spread = std::max(report_.spread, spread);
     return spread;
@@ -233,9 +233,9 @@ class SpatialSource final : public OrderedSource {
       // Done before more is read: a full disk is told even if the input's producer idles.
       team_.run(count, [&](std::size_t i, std::size_t) {
         Share& share = shares[i];
-        packed_->pack(share.block, share.records);
-        const auto& places = share.block.positions;
-        sort_by_leaf(share, places.size(), [&](std::size_t p) { return places[p]; });
+        find_leaves(share, share.block.positions.size(),
+                    [&](std::size_t p) -> const Point3& { return share.block.positions[p]; });
+        packed_->sort(share.block, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
       });
       distribute(std::span(shares).first(count), buckets);
       if (options_.reading) options_.reading(source_->progress());
@@ -285,21 +285,20 @@ class SpatialSource final : public OrderedSource {
 
   /// Points on their way to the buckets.
   struct Share {
-    PointBlock block;
-    std::vector<NumberedPoint> places;
-    std::vector<std::byte> records;
+    PointBlock block;                   ///< from the source
+    std::vector<std::byte> records;     ///< from another bucket
+    std::vector<NumberedPoint> places;  ///< of these
     std::vector<std::uint16_t> leaves;  ///< by record
     std::vector<std::byte> by_leaf;     ///< the records
     std::vector<std::size_t> begins;    ///< of each leaf's, and the end
   };
 
   template <class PlaceOf>
-  void sort_by_leaf(Share& share, std::size_t count, const PlaceOf& place_of) const {
+  void find_leaves(Share& share, std::size_t count, const PlaceOf& place_of) const {
     share.leaves.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      share.leaves[i] = static_cast<std::uint16_t>(kd_leaf(planes_, place_of(i)));
-    }
-    packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+    kd_leaves(planes_, count, place_of, [&](std::size_t i, std::size_t leaf) {
+      share.leaves[i] = static_cast<std::uint16_t>(leaf);
+    });
   }
 
   /// Adds the shares' records to the buckets, in order.
@@ -345,11 +344,16 @@ class SpatialSource final : public OrderedSource {
     joined.push_back(std::move(all));
   }
 
+  /// Fills the block with the next points; it is empty once there are no more.
   void deliver(PointBlock& block) {
     while (next_piece_ + 1 >= region_.pieces.size()) {
+      if (!region_.records.empty()) spare_.push_back(std::exchange(region_, {}));
       prepare_ahead();
-      if (coming_.empty()) return;
-      spare_.push_back(std::exchange(region_, coming_.front().get()));
+      if (coming_.empty()) {
+        file_.reset();
+        return block.clear();
+      }
+      region_ = coming_.front().get();
       coming_.pop_front();
       next_piece_ = 0;
       if (options_.parts_ahead > 0) prepare_ahead();
@@ -365,8 +369,9 @@ class SpatialSource final : public OrderedSource {
     std::vector<std::byte> records;
     std::vector<std::size_t> pieces;      ///< where each begins, and the end
     std::vector<std::uint32_t> in_order;  ///< records of the pieces
-    // Needed only while it is being prepared:
+    // Needed only while it is being prepared, the places in one form:
     std::vector<NumberedPoint> places;
+    std::vector<NumberedIntegers> integers;
     std::vector<std::uint32_t> piece_of;  ///< by record
   };
 
@@ -393,10 +398,19 @@ class SpatialSource final : public OrderedSource {
   }
 
   [[nodiscard]] Region cut_region(Region region) const {
-    std::vector<NumberedPoint>& places = region.places;
+    if (packed_->integers()) {
+      cut_region(region, region.integers);
+    } else {
+      cut_region(region, region.places);
+    }
+    return region;
+  }
+
+  template <class Coordinate>
+  void cut_region(Region& region, std::vector<Numbered<Coordinate>>& places) const {
     packed_->unpack(region.records, places);
     region.pieces =
-        cut_in_pieces(places, blocks_of(places.size(), options_.block_points), lengths_);
+        cut_in_pieces(std::span(places), blocks_of(places.size(), options_.block_points), lengths_);
     // Within a piece in the order of the source: neighbours in it are often alike.
     region.piece_of.resize(places.size());
     for (std::uint32_t piece = 0; piece + 1 < region.pieces.size(); ++piece) {
@@ -409,7 +423,6 @@ class SpatialSource final : public OrderedSource {
     for (std::uint32_t number = 0; number < places.size(); ++number) {
       region.in_order[next[region.piece_of[number]]++] = number;
     }
-    return region;
   }
 
   /// Puts smaller buckets in place of the next one.
@@ -434,8 +447,9 @@ class SpatialSource final : public OrderedSource {
       team_.run(taken, [&](std::size_t i, std::size_t) {
         Share& share = shares[i];
         packed_->unpack(share.records, share.places);
-        sort_by_leaf(share, share.places.size(),
-                     [&](std::size_t p) { return share.places[p].place; });
+        find_leaves(share, share.places.size(),
+                    [&](std::size_t p) -> const Point3& { return share.places[p].place; });
+        packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
       });
       distribute(std::span(shares).first(taken), buckets);
     }
