@@ -13,17 +13,6 @@ namespace {
 constexpr std::size_t kRankBins = 1024;
 
 template <class Coordinate>
-struct RankedPlace {
-  Coordinate value;
-  std::uint64_t number;
-
-  // Without branches, which would be coin tosses.
-  friend bool operator<(const RankedPlace& a, const RankedPlace& b) {
-    return (a.value < b.value) | ((a.value == b.value) & (a.number < b.number));
-  }
-};
-
-template <class Coordinate>
 struct Extent {
   using Limits = std::numeric_limits<Coordinate>;
   static constexpr Coordinate kMost = Limits::has_infinity ? Limits::infinity() : Limits::max();
@@ -45,36 +34,40 @@ struct Extent {
   }
 };
 
-/// The part of [low, ...] in which a value lies; not a number, which infinities make: the last.
-std::size_t rank_bin(double value, double low, double bins_per_unit) {
-  const double bin = (value - low) * bins_per_unit;
-  return bin < kRankBins ? static_cast<std::size_t>(bin) : kRankBins - 1;
-}
-
-/// The place that `first` others come before along the axis. Only those that share its part of the
-/// extent are sorted.
+/// Parts of an axis, in ascending order.
 template <class Coordinate>
-RankedPlace<Coordinate> place_of_rank(std::span<const Numbered<Coordinate>> points,
-                                      std::size_t first, std::size_t axis,
-                                      const Extent<Coordinate>& extent) {
-  const auto low = static_cast<double>(extent.min[axis]);
-  const double width = extent.width(axis), bins_per_unit = width > 0 ? kRankBins / width : 0;
-  const auto bin_of = [&](const Numbered<Coordinate>& point) {
-    return rank_bin(static_cast<double>(point.place[axis]), low, bins_per_unit);
-  };
-  std::array<std::uint32_t, kRankBins> counts{};
-  for (const auto& point : points) ++counts[bin_of(point)];
-  std::size_t bin = 0;
-  for (; first >= counts[bin]; ++bin) first -= counts[bin];
-  std::vector<RankedPlace<Coordinate>> places;
-  places.reserve(counts[bin]);
-  for (const auto& point : points) {
-    if (bin_of(point) == bin) places.push_back({point.place[axis], point.number});
+class RankBins {
+ public:
+  RankBins(const Extent<Coordinate>& extent, std::size_t axis) : low_(extent.min[axis]) {
+    if (extent.width(axis) > 0) bins_per_unit_ = kRankBins / extent.width(axis);
   }
-  const auto found = places.begin() + static_cast<std::ptrdiff_t>(first);
-  std::nth_element(places.begin(), found, places.end());
-  return *found;
-}
+
+  /// Not a number, which infinities make, is in the last.
+  [[nodiscard]] std::size_t of(Coordinate value) const {
+    const double bin = (value - low_) * bins_per_unit_;
+    return bin < kRankBins ? static_cast<std::size_t>(bin) : kRankBins - 1;
+  }
+
+ private:
+  double low_, bins_per_unit_ = 0;
+};
+
+template <>
+class RankBins<std::int32_t> {
+ public:
+  RankBins(const Extent<std::int32_t>& extent, std::size_t axis)
+      : low_(static_cast<std::uint32_t>(extent.min[axis])),
+        bins_per_unit_((std::uint64_t{kRankBins} << 32) /
+                       (static_cast<std::uint64_t>(extent.width(axis)) + 1)) {}
+
+  [[nodiscard]] std::size_t of(std::int32_t value) const {
+    return (static_cast<std::uint32_t>(value) - low_) * bins_per_unit_ >> 32;
+  }
+
+ private:
+  std::uint32_t low_;
+  std::uint64_t bins_per_unit_;  ///< times 2^32
+};
 
 /// By words: parts that are stored one by one would be waited for when they are loaded as a whole.
 template <class Value>
@@ -88,11 +81,32 @@ void exchange(Value& a, Value& b) {
   std::memcpy(&b, &of_a, sizeof b);
 }
 
+/// By the coordinate, then by number.
+template <class Point>
+bool comes_before(const Point& a, const Point& b, std::size_t axis) {
+  return (a.place[axis] < b.place[axis]) |
+         ((a.place[axis] == b.place[axis]) & (a.number < b.number));
+}
+
+/// Puts the points for which `is_before` holds before the others; returns how many they are.
+template <class Point, class IsBefore>
+std::size_t part(std::span<Point> points, const IsBefore& is_before) {
+  std::size_t before = 0;
+  for (Point& point : points) {
+    // Exchanged always: a branch would be a coin toss.
+    const bool first = is_before(point, before);
+    exchange(point, points[before]);
+    before += first ? 1 : 0;
+  }
+  return before;
+}
+
 /// Puts the `first` points that come first along the widest axis before the others, which begin at
 /// the plane returned. Requires first < points.size(), unless there are no points.
 template <class Coordinate>
 KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
                const std::array<double, 3>& lengths) {
+  using Point = Numbered<Coordinate>;
   if (points.empty()) return {};
   const Extent<Coordinate> extent(points);
   std::size_t axis = 0;
@@ -104,15 +118,41 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
       axis = a;
     }
   }
-  const RankedPlace<Coordinate> middle = place_of_rank<Coordinate>(points, first, axis, extent);
-  std::size_t before = 0;
-  for (Numbered<Coordinate>& point : points) {
-    // Exchanged always: a branch would be a coin toss.
-    const bool is_before = RankedPlace<Coordinate>{point.place[axis], point.number} < middle;
-    exchange(point, points[before]);
-    before += is_before ? 1 : 0;
+  const RankBins<Coordinate> bins(extent, axis);
+  std::array<std::uint32_t, kRankBins> counts{};
+  for (const Point& point : points) ++counts[bins.of(point.place[axis])];
+  std::size_t middle = 0, begin = 0;
+  for (; begin + counts[middle] <= first; ++middle) begin += counts[middle];
+  // Only points in this bin are compared with one another.
+  const auto order = [axis](const Point& a, const Point& b) { return comes_before(a, b, axis); };
+  const auto select = [&](std::span<Point> in_middle) {
+    const auto found = in_middle.begin() + static_cast<std::ptrdiff_t>(first - begin);
+    std::nth_element(in_middle.begin(), found, in_middle.end(), order);
+    return *found;
+  };
+  if constexpr (std::is_same_v<Coordinate, double>) {
+    // The order on both sides counts where a window is thinned, so it depends on the ranks alone.
+    std::vector<Point> in_middle;
+    in_middle.reserve(counts[middle]);
+    for (const Point& point : points) {
+      if (bins.of(point.place[axis]) == middle) in_middle.push_back(point);
+    }
+    const Point at_plane = select(in_middle);
+    part(points, [&](const Point& point, std::size_t) { return order(point, at_plane); });
+    return {axis, at_plane.place[axis]};
+  } else {
+    // One pass less: all up to the bin go before the others, then those in it to their end.
+    std::vector<std::size_t> in_middle(counts[middle] + 1);
+    std::size_t found = 0;
+    std::size_t end = part(points, [&](const Point& point, std::size_t at) {
+      const std::size_t bin = bins.of(point.place[axis]);
+      in_middle[found] = at;
+      found += bin == middle ? 1 : 0;
+      return bin <= middle;
+    });
+    while (found > 0) exchange(points[in_middle[--found]], points[--end]);
+    return {axis, static_cast<double>(select(points.subspan(begin, counts[middle])).place[axis])};
   }
-  return {axis, static_cast<double>(middle.value)};
 }
 
 template <class Coordinate>
