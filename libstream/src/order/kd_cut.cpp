@@ -84,8 +84,7 @@ void exchange(Value& a, Value& b) {
 /// By the coordinate, then by number.
 template <class Point>
 bool comes_before(const Point& a, const Point& b, std::size_t axis) {
-  return (a.place[axis] < b.place[axis]) |
-         ((a.place[axis] == b.place[axis]) & (a.number < b.number));
+  return a.place[axis] != b.place[axis] ? a.place[axis] < b.place[axis] : a.number < b.number;
 }
 
 /// Puts the points for which `is_before` holds before the others; returns how many they are.

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <future>
+#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -218,26 +219,33 @@ class SpatialSource final : public OrderedSource {
       window_.pop_front();
       return true;
     };
-    std::vector<Share> shares;
+    std::deque<Share> shares;
+    std::mutex reading;
     total_ = delivered_;
     for (bool more = true; more;) {
       if (options_.stop.stop_requested()) throw Stopped();
       std::size_t count = 0, points = 0;
-      while (more && points < kSharedPoints) {
-        if (count == shares.size()) shares.emplace_back();
-        more = next_block(shares[count].block);
-        points += shares[count].block.size();
-        if (more) ++count;
-      }
-      total_ += points;
+      // Who reads a block sorts it, while it is in a near cache and another reads the next.
       // Done before more is read: a full disk is told even if the input's producer idles.
-      team_.run(count, [&](std::size_t i, std::size_t) {
-        Share& share = shares[i];
-        find_leaves(share, share.block.positions.size(),
-                    [&](std::size_t p) -> const Point3& { return share.block.positions[p]; });
-        packed_->sort(share.block, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+      team_.run(team_.threads(), [&](std::size_t, std::size_t) {
+        std::unique_lock lock(reading);
+        while (more && points < kSharedPoints) {
+          if (count == shares.size()) shares.emplace_back();
+          Share& share = shares[count];
+          more = false;  // should this fail, no other is to read
+          if (!next_block(share.block)) return;
+          more = true;
+          ++count;
+          points += share.block.size();
+          lock.unlock();
+          find_leaves(share, share.block.size(),
+                      [&](std::size_t p) -> const Point3& { return share.block.positions[p]; });
+          packed_->sort(share.block, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+          lock.lock();
+        }
       });
-      distribute(std::span(shares).first(count), buckets);
+      total_ += points;
+      distribute(shares, count, buckets);
       if (options_.reading) options_.reading(source_->progress());
     }
     push(std::move(buckets), total_);
@@ -301,12 +309,14 @@ class SpatialSource final : public OrderedSource {
     });
   }
 
-  /// Adds the shares' records to the buckets, in order.
-  void distribute(std::span<const Share> shares, std::vector<Bucket>& buckets) {
+  /// Adds the records of the first `count` shares to the buckets, in order.
+  void distribute(const std::deque<Share>& shares, std::size_t count,
+                  std::vector<Bucket>& buckets) {
     while (packers_.size() < team_.threads()) packers_.emplace_back(packed_->record_bytes());
     team_.run(buckets.size() / kBucketsATime, [&](std::size_t i, std::size_t worker) {
       for (std::size_t b = i * kBucketsATime; b < (i + 1) * kBucketsATime; ++b) {
-        for (const Share& share : shares) {
+        for (std::size_t s = 0; s < count; ++s) {
+          const Share& share = shares[s];
           const std::size_t bytes = packed_->record_bytes(), first = share.begins[b] * bytes;
           file_->append(
               buckets[b],
@@ -438,7 +448,7 @@ class SpatialSource final : public OrderedSource {
     planes_ = kd_planes(places, kDepth, lengths_);
     places = {};
     std::vector<Bucket> buckets(planes_.size() + 1);
-    std::vector<Share> shares(kSharesOfBucket);
+    std::deque<Share> shares(kSharesOfBucket);
     while (file_->records(bucket) > 0) {
       std::size_t taken = 0;
       for (; taken < shares.size() && file_->records(bucket) > 0; ++taken) {
@@ -451,7 +461,7 @@ class SpatialSource final : public OrderedSource {
                     [&](std::size_t p) -> const Point3& { return share.places[p].place; });
         packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
       });
-      distribute(std::span(shares).first(taken), buckets);
+      distribute(shares, taken, buckets);
     }
     push(std::move(buckets), count / 2);
     report_.temporary_bytes = file_->bytes();
