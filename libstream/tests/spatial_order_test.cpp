@@ -15,6 +15,7 @@
 
 #include <gtest/gtest.h>
 
+#include "order/kd_cut.hpp"
 #include "order/record_packer.hpp"
 #include "temp_folder.hpp"
 #include "terrace/stream/error.hpp"
@@ -331,6 +332,44 @@ TEST(SpatialOrderTest, AFolderThatIsNotThereIsNamed) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("none"), std::string::npos) << error.what();
+  }
+}
+
+TEST(KdCutTest, IntegersAreCutAsDoublesAre) {
+  const auto seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  const std::array<double, 3> lengths{1, 1, 0.5};
+  for (int round = 0; round < 300; ++round) {
+    // From a single place, over many that are the same, to the ends of the type.
+    const auto bits = static_cast<unsigned>(random() % 33);
+    std::vector<NumberedIntegers> integers(1 + random() % 3000);
+    std::vector<NumberedPoint> doubles;
+    for (std::uint32_t i = 0; i < integers.size(); ++i) {
+      for (std::int32_t& value : integers[i].place) {
+        value = static_cast<std::int32_t>(bits == 0
+                                              ? 7
+                                              : static_cast<std::int64_t>(random() >> (32 - bits)) -
+                                                    (std::int64_t{1} << (bits - 1)));
+      }
+      integers[i].number = i;
+      const auto& [x, y, z] = integers[i].place;
+      doubles.push_back(
+          {Point3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}, i});
+    }
+    const std::size_t pieces = 1 + random() % std::min<std::size_t>(integers.size(), 40);
+    const auto begins = cut_in_pieces(std::span(integers), pieces, lengths);
+    ASSERT_EQ(begins, cut_in_pieces(std::span(doubles), pieces, lengths));
+    const auto pieces_of = [&](const auto& points) {
+      std::vector<std::size_t> piece_of(points.size());
+      for (std::size_t piece = 0; piece < pieces; ++piece) {
+        for (std::size_t i = begins[piece]; i < begins[piece + 1]; ++i) {
+          piece_of[points[i].number] = piece;
+        }
+      }
+      return piece_of;
+    };
+    ASSERT_EQ(pieces_of(integers), pieces_of(doubles));
   }
 }
 

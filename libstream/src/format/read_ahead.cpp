@@ -46,7 +46,6 @@ class ReadAhead final : public PointSource {
   }
 
   bool next(PointBlock& block) override {
-    block.clear();
     if (!started_) start();
     if (!thread_.joinable()) {
       const bool more = source_->next(block);
@@ -56,12 +55,14 @@ class ReadAhead final : public PointSource {
     std::unique_lock lock(mutex_);
     news_.wait(lock, [this] { return !ready_.empty() || ended_; });
     if (ready_.empty()) {
+      block.clear();
       if (error_) std::rethrow_exception(error_);
       progress_ = last_progress_;
       return false;
     }
     progress_ = ready_.front().progress;
-    // The caller's buffers go back to the reading thread: nothing is allocated in the long run.
+    // The caller's buffers go back to the reading thread as they are: nothing is allocated, nor set
+    // to zero, in the long run.
     if (spare_.size() < most_) {
       spare_.push_back(std::exchange(block, std::move(ready_.front().block)));
     } else {

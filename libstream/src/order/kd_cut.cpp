@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cassert>
-#include <utility>
+#include <cstring>
+#include <limits>
 
 namespace terrace::stream {
 namespace {
@@ -11,71 +12,152 @@ namespace {
 /// Parts of a box in which coordinates are counted to find one of a given rank.
 constexpr std::size_t kRankBins = 1024;
 
-struct RankedPlace {
-  double value;
-  std::uint64_t number;
+template <class Coordinate>
+struct Extent {
+  using Limits = std::numeric_limits<Coordinate>;
+  static constexpr Coordinate kMost = Limits::has_infinity ? Limits::infinity() : Limits::max();
+  static constexpr Coordinate kLeast = Limits::has_infinity ? -Limits::infinity() : Limits::min();
 
-  friend bool operator<(const RankedPlace& a, const RankedPlace& b) {
-    return a.value != b.value ? a.value < b.value : a.number < b.number;
+  std::array<Coordinate, 3> min{kMost, kMost, kMost}, max{kLeast, kLeast, kLeast};
+
+  explicit Extent(std::span<const Numbered<Coordinate>> points) {
+    for (const Numbered<Coordinate>& point : points) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Coordinate value = point.place[axis];
+        min[axis] = value < min[axis] ? value : min[axis];
+        max[axis] = value > max[axis] ? value : max[axis];
+      }
+    }
+  }
+  [[nodiscard]] double width(std::size_t axis) const {
+    return static_cast<double>(max[axis]) - static_cast<double>(min[axis]);
   }
 };
 
-/// The part of [low, ...] in which a value lies; not a number, which infinities make: the last.
-std::size_t rank_bin(double value, double low, double bins_per_unit) {
-  const double bin = (value - low) * bins_per_unit;
-  return bin < kRankBins ? static_cast<std::size_t>(bin) : kRankBins - 1;
+/// Parts of an axis, in ascending order.
+template <class Coordinate>
+class RankBins {
+ public:
+  RankBins(const Extent<Coordinate>& extent, std::size_t axis) : low_(extent.min[axis]) {
+    if (extent.width(axis) > 0) bins_per_unit_ = kRankBins / extent.width(axis);
+  }
+
+  /// Not a number, which infinities make, is in the last.
+  [[nodiscard]] std::size_t of(Coordinate value) const {
+    const double bin = (value - low_) * bins_per_unit_;
+    return bin < kRankBins ? static_cast<std::size_t>(bin) : kRankBins - 1;
+  }
+
+ private:
+  double low_, bins_per_unit_ = 0;
+};
+
+template <>
+class RankBins<std::int32_t> {
+ public:
+  RankBins(const Extent<std::int32_t>& extent, std::size_t axis)
+      : low_(static_cast<std::uint32_t>(extent.min[axis])),
+        bins_per_unit_((std::uint64_t{kRankBins} << 32) /
+                       (static_cast<std::uint64_t>(extent.width(axis)) + 1)) {}
+
+  [[nodiscard]] std::size_t of(std::int32_t value) const {
+    return (static_cast<std::uint32_t>(value) - low_) * bins_per_unit_ >> 32;
+  }
+
+ private:
+  std::uint32_t low_;
+  std::uint64_t bins_per_unit_;  ///< times 2^32
+};
+
+/// By words: parts that are stored one by one would be waited for when they are loaded as a whole.
+template <class Value>
+void exchange(Value& a, Value& b) {
+  using Words = std::array<std::uint64_t, sizeof(Value) / sizeof(std::uint64_t)>;
+  static_assert(sizeof(Words) == sizeof(Value));
+  Words of_a, of_b;
+  std::memcpy(&of_a, &a, sizeof a);
+  std::memcpy(&of_b, &b, sizeof b);
+  std::memcpy(&a, &of_b, sizeof a);
+  std::memcpy(&b, &of_a, sizeof b);
 }
 
-/// The place that `first` others come before along the axis. Only those that share its part of the
-/// extent are sorted.
-RankedPlace place_of_rank(std::span<const NumberedPoint> points, std::size_t first,
-                          std::size_t axis, double low, double high) {
-  const double bins_per_unit = high > low ? kRankBins / (high - low) : 0;
-  std::array<std::uint32_t, kRankBins> counts{};
-  for (const NumberedPoint& p : points) ++counts[rank_bin(p.place[axis], low, bins_per_unit)];
-  std::size_t bin = 0;
-  for (; first >= counts[bin]; ++bin) first -= counts[bin];
-  std::vector<RankedPlace> places;
-  places.reserve(counts[bin]);
-  for (const NumberedPoint& p : points) {
-    if (rank_bin(p.place[axis], low, bins_per_unit) == bin) {
-      places.push_back({p.place[axis], p.number});
-    }
+/// By the coordinate, then by number.
+template <class Point>
+bool comes_before(const Point& a, const Point& b, std::size_t axis) {
+  return a.place[axis] != b.place[axis] ? a.place[axis] < b.place[axis] : a.number < b.number;
+}
+
+/// Puts the points for which `is_before` holds before the others; returns how many they are.
+template <class Point, class IsBefore>
+std::size_t part(std::span<Point> points, const IsBefore& is_before) {
+  std::size_t before = 0;
+  for (Point& point : points) {
+    // Exchanged always: a branch would be a coin toss.
+    const bool first = is_before(point, before);
+    exchange(point, points[before]);
+    before += first ? 1 : 0;
   }
-  const auto found = places.begin() + static_cast<std::ptrdiff_t>(first);
-  std::nth_element(places.begin(), found, places.end());
-  return *found;
+  return before;
 }
 
 /// Puts the `first` points that come first along the widest axis before the others, which begin at
 /// the plane returned. Requires first < points.size(), unless there are no points.
-KdPlane divide(std::span<NumberedPoint> points, std::size_t first,
+template <class Coordinate>
+KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
                const std::array<double, 3>& lengths) {
+  using Point = Numbered<Coordinate>;
   if (points.empty()) return {};
-  Box3 box;
-  for (const NumberedPoint& point : points) box.include(point.place);
+  const Extent<Coordinate> extent(points);
   std::size_t axis = 0;
   double most = -1;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double width = (box.max[a] - box.min[a]) * lengths[a];
+    const double width = extent.width(a) * lengths[a];
     if (width > most) {
       most = width;
       axis = a;
     }
   }
-  const RankedPlace middle = place_of_rank(points, first, axis, box.min[axis], box.max[axis]);
-  std::size_t before = 0;
-  for (NumberedPoint& point : points) {
-    // Exchanged always: a branch would be a coin toss.
-    const bool is_before = RankedPlace{point.place[axis], point.number} < middle;
-    std::swap(point, points[before]);
-    before += is_before ? 1 : 0;
+  const RankBins<Coordinate> bins(extent, axis);
+  std::array<std::uint32_t, kRankBins> counts{};
+  for (const Point& point : points) ++counts[bins.of(point.place[axis])];
+  std::size_t middle = 0, begin = 0;
+  for (; begin + counts[middle] <= first; ++middle) begin += counts[middle];
+  // Only points in this bin are compared with one another.
+  const auto order = [axis](const Point& a, const Point& b) { return comes_before(a, b, axis); };
+  const auto select = [&](std::span<Point> in_middle) {
+    const auto found = in_middle.begin() + static_cast<std::ptrdiff_t>(first - begin);
+    std::nth_element(in_middle.begin(), found, in_middle.end(), order);
+    return *found;
+  };
+  if constexpr (std::is_same_v<Coordinate, double>) {
+    // The order on both sides counts where a window is thinned, so it depends on the ranks alone.
+    std::vector<Point> in_middle;
+    in_middle.reserve(counts[middle]);
+    for (const Point& point : points) {
+      if (bins.of(point.place[axis]) == middle) in_middle.push_back(point);
+    }
+    const Point at_plane = select(in_middle);
+    part(points, [&](const Point& point, std::size_t) { return order(point, at_plane); });
+    return {axis, at_plane.place[axis]};
+  } else {
+    // One pass less: all up to the bin go before the others, then those in it to their end.
+    std::vector<std::size_t> in_middle(counts[middle] + 1);
+    std::size_t found = 0;
+    std::size_t end = part(points, [&](const Point& point, std::size_t at) {
+      const std::size_t bin = bins.of(point.place[axis]);
+      in_middle[found] = at;
+      found += bin == middle ? 1 : 0;
+      return bin <= middle;
+    });
+    while (found > 0) exchange(points[in_middle[--found]], points[--end]);
+    return {axis, static_cast<double>(select(points.subspan(begin, counts[middle])).place[axis])};
   }
-  return {axis, middle.value};
 }
 
-void cut(std::span<NumberedPoint> points, std::size_t pieces, const std::array<double, 3>& lengths,
-         std::vector<std::size_t>& begins, std::size_t begin) {
+template <class Coordinate>
+void cut(std::span<Numbered<Coordinate>> points, std::size_t pieces,
+         const std::array<double, 3>& lengths, std::vector<std::size_t>& begins,
+         std::size_t begin) {
   if (pieces < 2) {
     begins.push_back(begin);
     return;
@@ -98,7 +180,8 @@ void plant(std::span<NumberedPoint> points, std::size_t node, const std::array<d
 
 }  // namespace
 
-std::vector<std::size_t> cut_in_pieces(std::span<NumberedPoint> points, std::size_t pieces,
+template <class Coordinate>
+std::vector<std::size_t> cut_in_pieces(std::span<Numbered<Coordinate>> points, std::size_t pieces,
                                        const std::array<double, 3>& lengths) {
   assert(pieces >= 1);
   std::vector<std::size_t> begins;
@@ -107,6 +190,10 @@ std::vector<std::size_t> cut_in_pieces(std::span<NumberedPoint> points, std::siz
   begins.push_back(points.size());
   return begins;
 }
+template std::vector<std::size_t> cut_in_pieces(std::span<NumberedPoint>, std::size_t,
+                                                const std::array<double, 3>&);
+template std::vector<std::size_t> cut_in_pieces(std::span<NumberedIntegers>, std::size_t,
+                                                const std::array<double, 3>&);
 
 std::vector<KdPlane> kd_planes(std::span<NumberedPoint> points, unsigned depth,
                                const std::array<double, 3>& lengths) {

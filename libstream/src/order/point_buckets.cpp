@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cstring>
 #include <numeric>
+#include <type_traits>
+#include <utility>
 
 #include "terrace/stream/error.hpp"
 #include "with_type.hpp"
@@ -36,83 +38,147 @@ PackedPoints::PackedPoints(const Schema& schema) {
     types_[axis] = schema.coordinates[axis].type;
     offsets_[axis] = bytes;
     bytes += size_of(types_[axis]);
+    integers_ = integers_ && with_type(types_[axis], [](auto type) {
+                  return std::is_integral_v<decltype(type)> &&
+                         (sizeof type < 4 || std::is_same_v<decltype(type), std::int32_t>);
+                });
   }
   payload_offset_ = bytes;
   record_bytes_ = bytes + schema.payload_size();
 }
 
-void PackedPoints::pack(const PointBlock& block, std::vector<std::byte>& records) const {
-  records.resize(block.size() * record_bytes_);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    with_type(types_[axis], [&](auto type) {
-      using T = decltype(type);
-      std::byte* to = records.data() + offsets_[axis];
-      for (const Point3& p : block.positions) {
-        const T value = static_cast<T>(p[axis]);
-        assert(static_cast<double>(value) == p[axis]);
-        std::memcpy(to, &value, sizeof value);
-        to += record_bytes_;
+template <class Write>
+void PackedPoints::with_packing(const PointBlock& block, const Write& write) const {
+  const std::size_t payload = payload_bytes();
+  const auto with_coordinates = [&](const auto& pack_coordinates) {
+    write([&](std::size_t i, std::byte* to) {
+      pack_coordinates(block.positions[i], to);
+      copy_short(block.payload.data() + i * payload, to + payload_offset_, payload);
+    });
+  };
+  const auto pack_coordinate = [](double coordinate, std::byte* to, auto type) {
+    type = static_cast<decltype(type)>(coordinate);
+    assert(static_cast<double>(type) == coordinate);
+    std::memcpy(to, &type, sizeof type);
+  };
+  if (types_[0] == types_[1] && types_[1] == types_[2]) {
+    with_type(types_[0], [&](auto type) {
+      with_coordinates([&](const Point3& p, std::byte* to) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          pack_coordinate(p[axis], to + axis * sizeof type, type);
+        }
+      });
+    });
+  } else {
+    with_coordinates([&](const Point3& p, std::byte* to) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        with_type(types_[axis],
+                  [&](auto type) { pack_coordinate(p[axis], to + offsets_[axis], type); });
       }
     });
-  }
-  const std::size_t payload = payload_bytes();
-  if (payload == 0) return;
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    copy_short(block.payload.data() + i * payload,
-               records.data() + i * record_bytes_ + payload_offset_, payload);
   }
 }
 
-void PackedPoints::unpack(std::span<const std::byte> records,
-                          std::vector<NumberedPoint>& points) const {
-  points.resize(records.size() / record_bytes_);
-  for (std::size_t i = 0; i < points.size(); ++i) points[i].number = i;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    with_type(types_[axis], [&](auto type) {
-      const std::byte* from = records.data() + offsets_[axis];
-      for (NumberedPoint& point : points) {
-        std::memcpy(&type, from, sizeof type);
-        point.place[axis] = static_cast<double>(type);
-        from += record_bytes_;
+template <class Coordinate, class Read>
+void PackedPoints::with_unpacking(const Read& read) const {
+  const auto unpack_coordinate = [](const std::byte* from, auto type) {
+    std::memcpy(&type, from, sizeof type);
+    return static_cast<Coordinate>(type);
+  };
+  if (types_[0] == types_[1] && types_[1] == types_[2]) {
+    with_type(types_[0], [&](auto type) {
+      read([&](const std::byte* from) {
+        return std::array{unpack_coordinate(from, type),
+                          unpack_coordinate(from + sizeof type, type),
+                          unpack_coordinate(from + 2 * sizeof type, type)};
+      });
+    });
+  } else {
+    read([&](const std::byte* from) {
+      std::array<Coordinate, 3> place;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        place[axis] = with_type(types_[axis], [&](auto type) {
+          return unpack_coordinate(from + offsets_[axis], type);
+        });
       }
+      return place;
     });
   }
 }
+
+void PackedPoints::pack(const PointBlock& block, std::vector<std::byte>& records) const {
+  records.resize(block.size() * record_bytes_);
+  with_packing(block, [&](const auto& pack) {
+    std::byte* to = records.data();
+    for (std::size_t i = 0; i < block.size(); ++i, to += record_bytes_) pack(i, to);
+  });
+}
+
+template <class Coordinate>
+void PackedPoints::unpack(std::span<const std::byte> records,
+                          std::vector<Numbered<Coordinate>>& points) const {
+  points.resize(records.size() / record_bytes_);
+  with_unpacking<Coordinate>([&](const auto& unpack) {
+    const std::byte* from = records.data();
+    std::uint32_t number = 0;
+    for (Numbered<Coordinate>& point : points) {
+      point.place = unpack(from);
+      point.number = number++;
+      from += record_bytes_;
+    }
+  });
+}
+template void PackedPoints::unpack(std::span<const std::byte>, std::vector<NumberedPoint>&) const;
+template void PackedPoints::unpack(std::span<const std::byte>,
+                                   std::vector<NumberedIntegers>&) const;
+
+/// Records that are fetched while others before them are unpacked.
+constexpr std::size_t kRecordsAhead = 24;
 
 void PackedPoints::unpack(std::span<const std::byte> records,
                           std::span<const std::uint32_t> numbers, PointBlock& block) const {
-  block.positions.resize(numbers.size());
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    with_type(types_[axis], [&](auto type) {
-      const std::byte* const from = records.data() + offsets_[axis];
-      for (std::size_t i = 0; i < numbers.size(); ++i) {
-        std::memcpy(&type, from + numbers[i] * record_bytes_, sizeof type);
-        block.positions[i][axis] = static_cast<double>(type);
-      }
-    });
-  }
   const std::size_t payload = payload_bytes();
+  block.positions.resize(numbers.size());
   block.payload.resize(numbers.size() * payload);
-  if (payload == 0) return;
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    copy_short(records.data() + numbers[i] * record_bytes_ + payload_offset_,
-               block.payload.data() + i * payload, payload);
+  with_unpacking<double>([&](const auto& unpack) {
+    std::byte* to = block.payload.data();
+    for (std::size_t i = 0; i < numbers.size(); ++i, to += payload) {
+      const std::size_t ahead = numbers[std::min(i + kRecordsAhead, numbers.size() - 1)];
+      __builtin_prefetch(records.data() + ahead * record_bytes_);
+      __builtin_prefetch(records.data() + (ahead + 1) * record_bytes_ - 1);
+      const std::byte* const from = records.data() + numbers[i] * record_bytes_;
+      block.positions[i] = unpack(from);
+      copy_short(from + payload_offset_, to, payload);
+    }
+  });
+}
+
+template <class Put>
+void PackedPoints::sort_by(std::span<const std::uint16_t> keys, std::size_t keys_end,
+                           std::vector<std::byte>& sorted, std::vector<std::size_t>& begins,
+                           const Put& put) const {
+  begins.assign(keys_end + 1, 0);
+  for (const std::uint16_t key : keys) ++begins[key + 1U];
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  std::vector<std::size_t> next(begins.begin(), begins.end() - 1);
+  sorted.resize(keys.size() * record_bytes_);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    put(i, sorted.data() + next[keys[i]]++ * record_bytes_);
   }
 }
 
 void PackedPoints::sort(std::span<const std::byte> records, std::span<const std::uint16_t> keys,
                         std::size_t keys_end, std::vector<std::byte>& sorted,
                         std::vector<std::size_t>& begins) const {
-  begins.assign(keys_end + 1, 0);
-  for (const std::uint16_t key : keys) ++begins[key + 1U];
-  std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  std::vector<std::size_t> next(begins.begin(), begins.end() - 1);
-  sorted.resize(records.size());
-  const std::byte* from = records.data();
-  for (const std::uint16_t key : keys) {
-    copy_short(from, sorted.data() + next[key]++ * record_bytes_, record_bytes_);
-    from += record_bytes_;
-  }
+  sort_by(keys, keys_end, sorted, begins, [&](std::size_t i, std::byte* to) {
+    copy_short(records.data() + i * record_bytes_, to, record_bytes_);
+  });
+}
+
+void PackedPoints::sort(const PointBlock& block, std::span<const std::uint16_t> keys,
+                        std::size_t keys_end, std::vector<std::byte>& sorted,
+                        std::vector<std::size_t>& begins) const {
+  with_packing(block, [&](const auto& pack) { sort_by(keys, keys_end, sorted, begins, pack); });
 }
 
 void Bucket::append(Bucket&& next) {
@@ -144,15 +210,35 @@ void BucketFile::append(Bucket& bucket, std::span<const std::byte> records, Reco
 void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
   std::span<const std::byte> bytes = packer.pack(bucket.tail);
   if (bytes.size() >= chunk_bytes_) bytes = bucket.tail;
+  std::vector<std::byte> full;
+  std::unique_lock lock(mutex_);
+  const std::uint64_t end = pages_;
   const Bucket::Chunk chunk = room_for(bytes.size());
-  file_.write(chunk.page * kPageBytes, bytes);
+  std::uint64_t page = chunk.page;
+  if (page == end) {
+    coming_.insert(coming_.end(), bytes.begin(), bytes.end());
+    coming_.resize((pages_ - coming_page_) * kPageBytes);
+    bytes = {};
+    if (coming_.size() >= kWrittenBytes) {
+      full.swap(spare_);
+      full.swap(coming_);
+      page = std::exchange(coming_page_, pages_);
+      bytes = full;
+    }
+  }
+  lock.unlock();
+  if (!bytes.empty()) file_.write(page * kPageBytes, bytes);
+  if (!full.empty()) {
+    full.clear();
+    lock.lock();
+    spare_.swap(full);
+  }
   bucket.chunks.push_back(chunk);
   bucket.tail.clear();
 }
 
 /// The smallest place that is free and large enough, or one at the end of the file.
 Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
-  const std::lock_guard lock(mutex_);
   const auto pages = static_cast<std::uint32_t>((bytes + kPageBytes - 1) / kPageBytes);
   Bucket::Chunk chunk{.page = pages_, .pages = pages, .bytes = static_cast<std::uint32_t>(bytes)};
   const auto place = free_.lower_bound(pages);
@@ -174,6 +260,11 @@ Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
 }
 
 void BucketFile::read(const Bucket::Chunk& chunk, std::span<std::byte> records) {
+  if (chunk.page >= coming_page_) {
+    file_.write(coming_page_ * kPageBytes, coming_);
+    coming_page_ = pages_;
+    coming_.clear();
+  }
   const bool packed = chunk.bytes < chunk_bytes_;
   packed_.resize(packed ? chunk.bytes : 0);
   file_.read(chunk.page * kPageBytes, packed ? std::span(packed_) : records);

@@ -2,26 +2,36 @@
 #include "order/record_packer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #include "differing_bits.hpp"
 
 namespace terrace::stream {
 namespace {
 
-/// Runs are copied as words of this many bytes. What a word brings along is written over by the
-/// next one; only so many of the last records could bring along bytes beyond their ends.
-constexpr std::size_t kWordBytes = sizeof(std::uint64_t);
 /// Fewer bytes that are the same are written with those around them.
 constexpr std::size_t kLeastGap = 3;
+/// Records that are walked through once per run: they stay in the nearest cache.
+constexpr std::size_t kRecordsAtOnce = 256;
 
-void copy_word(const std::byte* from, std::byte* to) {
-  std::uint64_t word;
-  std::memcpy(&word, from, sizeof word);
-  std::memcpy(to, &word, sizeof word);
+/// Copies bytes of records, or of one if `from_stride` is 0. The compiler knows how many.
+template <std::size_t kBytes>
+void copy_run(const std::byte* from, std::size_t from_stride, std::byte* to, std::size_t to_stride,
+              std::size_t count) {
+  for (; count > 0; --count, from += from_stride, to += to_stride) std::memcpy(to, from, kBytes);
 }
+
+template <std::size_t... kBytes>
+constexpr auto copies_of_runs(std::index_sequence<kBytes...>) {
+  return std::array{&copy_run<kBytes + 1>...};
+}
+constexpr std::size_t kMostInRun = 16;
+/// By the number of bytes less 1.
+constexpr auto kCopyRun = copies_of_runs(std::make_index_sequence<kMostInRun>{});
 
 }  // namespace
 
@@ -36,8 +46,8 @@ std::size_t RecordPacker::find_runs(std::span<const std::byte> differing) {
   };
   std::size_t written = 0;
   const auto add = [&](std::size_t from, std::size_t to, bool same) {
-    for (std::size_t at = from; at < to; at += kWordBytes) {
-      const std::size_t bytes = std::min(kWordBytes, to - at);
+    for (std::size_t at = from; at < to; at += kMostInRun) {
+      const std::size_t bytes = std::min(kMostInRun, to - at);
       runs_.push_back({.in_record = at, .written = written, .bytes = bytes, .same = same});
       if (!same) written += bytes;
     }
@@ -63,14 +73,15 @@ std::span<const std::byte> RecordPacker::pack(std::span<const std::byte> records
   std::memcpy(bytes_.data() + record_bytes_, differing_.data(), record_bytes_);
   const std::byte* record = records.data();
   std::byte* to = bytes_.data() + 2 * record_bytes_;
-  for (std::size_t left = count; left > 0; --left, record += record_bytes_, to += written) {
-    if (left > kWordBytes) {
-      for (const Run& run : runs_) copy_word(record + run.in_record, to + run.written);
-    } else {
-      for (const Run& run : runs_) {
-        std::memcpy(to + run.written, record + run.in_record, run.bytes);
-      }
+  for (std::size_t left = count; left > 0;) {
+    const std::size_t some = std::min(left, kRecordsAtOnce);
+    for (const Run& run : runs_) {
+      kCopyRun[run.bytes - 1](record + run.in_record, record_bytes_, to + run.written, written,
+                              some);
     }
+    record += some * record_bytes_;
+    to += some * written;
+    left -= some;
   }
   return bytes_;
 }
@@ -79,21 +90,18 @@ void RecordPacker::unpack(std::span<const std::byte> packed, std::span<std::byte
   const std::size_t count = records.size() / record_bytes_;
   const std::size_t written = find_runs(packed.subspan(record_bytes_, record_bytes_));
   assert(packed.size() == 2 * record_bytes_ + count * written);
-  // All records begin as the first one, of which bytes in between are written over.
   const std::byte* const first = packed.data();
   const std::byte* from = packed.data() + 2 * record_bytes_;
   std::byte* record = records.data();
-  for (std::size_t left = count; left > 0; --left, record += record_bytes_, from += written) {
-    if (left > kWordBytes && written >= 1) {
-      for (const Run& run : runs_) {
-        copy_word(run.same ? first + run.in_record : from + run.written, record + run.in_record);
-      }
-    } else {
-      for (const Run& run : runs_) {
-        std::memcpy(record + run.in_record, run.same ? first + run.in_record : from + run.written,
-                    run.bytes);
-      }
+  for (std::size_t left = count; left > 0;) {
+    const std::size_t some = std::min(left, kRecordsAtOnce);
+    for (const Run& run : runs_) {
+      kCopyRun[run.bytes - 1](run.same ? first + run.in_record : from + run.written,
+                              run.same ? 0 : written, record + run.in_record, record_bytes_, some);
     }
+    record += some * record_bytes_;
+    from += some * written;
+    left -= some;
   }
 }
 

@@ -20,7 +20,7 @@ class RecordPacker {
   void unpack(std::span<const std::byte> packed, std::span<std::byte> records);
 
  private:
-  /// Bytes of a record, at most eight, that are the same in all records or written for each.
+  /// Bytes of a record, at most 16, that are the same in all records or written for each.
   struct Run {
     std::size_t in_record, written, bytes;
     bool same;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <future>
+#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -97,7 +98,6 @@ class SpatialSource final : public OrderedSource {
 
   bool next(PointBlock& block) override {
     if (options_.stop.stop_requested()) throw Stopped();
-    block.clear();
     if (state_ == State::opening) open();
     if (state_ == State::gathering) gather();
     if (state_ == State::delivering) {
@@ -172,7 +172,8 @@ class SpatialSource final : public OrderedSource {
     for (std::size_t b = 0; b <= blocks; ++b) begins.push_back(b * places_.size() / blocks);
     measure_units();
     const double as_read = widths_of(places_, begins, lengths_);
-    const double compact = widths_of(places_, cut_in_pieces(places_, blocks, lengths_), lengths_);
+    const double compact =
+        widths_of(places_, cut_in_pieces(std::span(places_), blocks, lengths_), lengths_);
     const double spread = compact > 0 ? as_read / compact : 1.0;
     report_.spread = std::max(report_.spread, spread);
     return spread;
@@ -218,26 +219,33 @@ class SpatialSource final : public OrderedSource {
       window_.pop_front();
       return true;
     };
-    std::vector<Share> shares;
+    std::deque<Share> shares;
+    std::mutex reading;
     total_ = delivered_;
     for (bool more = true; more;) {
       if (options_.stop.stop_requested()) throw Stopped();
       std::size_t count = 0, points = 0;
-      while (more && points < kSharedPoints) {
-        if (count == shares.size()) shares.emplace_back();
-        more = next_block(shares[count].block);
-        points += shares[count].block.size();
-        if (more) ++count;
-      }
-      total_ += points;
+      // Who reads a block sorts it, while it is in a near cache and another reads the next.
       // Done before more is read: a full disk is told even if the input's producer idles.
-      team_.run(count, [&](std::size_t i, std::size_t) {
-        Share& share = shares[i];
-        packed_->pack(share.block, share.records);
-        const auto& places = share.block.positions;
-        sort_by_leaf(share, places.size(), [&](std::size_t p) { return places[p]; });
+      team_.run(team_.threads(), [&](std::size_t, std::size_t) {
+        std::unique_lock lock(reading);
+        while (more && points < kSharedPoints) {
+          if (count == shares.size()) shares.emplace_back();
+          Share& share = shares[count];
+          more = false;  // should this fail, no other is to read
+          if (!next_block(share.block)) return;
+          more = true;
+          ++count;
+          points += share.block.size();
+          lock.unlock();
+          find_leaves(share, share.block.size(),
+                      [&](std::size_t p) -> const Point3& { return share.block.positions[p]; });
+          packed_->sort(share.block, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+          lock.lock();
+        }
       });
-      distribute(std::span(shares).first(count), buckets);
+      total_ += points;
+      distribute(shares, count, buckets);
       if (options_.reading) options_.reading(source_->progress());
     }
     push(std::move(buckets), total_);
@@ -285,29 +293,30 @@ class SpatialSource final : public OrderedSource {
 
   /// Points on their way to the buckets.
   struct Share {
-    PointBlock block;
-    std::vector<NumberedPoint> places;
-    std::vector<std::byte> records;
+    PointBlock block;                   ///< from the source
+    std::vector<std::byte> records;     ///< from another bucket
+    std::vector<NumberedPoint> places;  ///< of these
     std::vector<std::uint16_t> leaves;  ///< by record
     std::vector<std::byte> by_leaf;     ///< the records
     std::vector<std::size_t> begins;    ///< of each leaf's, and the end
   };
 
   template <class PlaceOf>
-  void sort_by_leaf(Share& share, std::size_t count, const PlaceOf& place_of) const {
+  void find_leaves(Share& share, std::size_t count, const PlaceOf& place_of) const {
     share.leaves.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      share.leaves[i] = static_cast<std::uint16_t>(kd_leaf(planes_, place_of(i)));
-    }
-    packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+    kd_leaves(planes_, count, place_of, [&](std::size_t i, std::size_t leaf) {
+      share.leaves[i] = static_cast<std::uint16_t>(leaf);
+    });
   }
 
-  /// Adds the shares' records to the buckets, in order.
-  void distribute(std::span<const Share> shares, std::vector<Bucket>& buckets) {
+  /// Adds the records of the first `count` shares to the buckets, in order.
+  void distribute(const std::deque<Share>& shares, std::size_t count,
+                  std::vector<Bucket>& buckets) {
     while (packers_.size() < team_.threads()) packers_.emplace_back(packed_->record_bytes());
     team_.run(buckets.size() / kBucketsATime, [&](std::size_t i, std::size_t worker) {
       for (std::size_t b = i * kBucketsATime; b < (i + 1) * kBucketsATime; ++b) {
-        for (const Share& share : shares) {
+        for (std::size_t s = 0; s < count; ++s) {
+          const Share& share = shares[s];
           const std::size_t bytes = packed_->record_bytes(), first = share.begins[b] * bytes;
           file_->append(
               buckets[b],
@@ -345,11 +354,16 @@ class SpatialSource final : public OrderedSource {
     joined.push_back(std::move(all));
   }
 
+  /// Fills the block with the next points; it is empty once there are no more.
   void deliver(PointBlock& block) {
     while (next_piece_ + 1 >= region_.pieces.size()) {
+      if (!region_.records.empty()) spare_.push_back(std::exchange(region_, {}));
       prepare_ahead();
-      if (coming_.empty()) return;
-      spare_.push_back(std::exchange(region_, coming_.front().get()));
+      if (coming_.empty()) {
+        file_.reset();
+        return block.clear();
+      }
+      region_ = coming_.front().get();
       coming_.pop_front();
       next_piece_ = 0;
       if (options_.parts_ahead > 0) prepare_ahead();
@@ -365,8 +379,9 @@ class SpatialSource final : public OrderedSource {
     std::vector<std::byte> records;
     std::vector<std::size_t> pieces;      ///< where each begins, and the end
     std::vector<std::uint32_t> in_order;  ///< records of the pieces
-    // Needed only while it is being prepared:
+    // Needed only while it is being prepared, the places in one form:
     std::vector<NumberedPoint> places;
+    std::vector<NumberedIntegers> integers;
     std::vector<std::uint32_t> piece_of;  ///< by record
   };
 
@@ -393,10 +408,19 @@ class SpatialSource final : public OrderedSource {
   }
 
   [[nodiscard]] Region cut_region(Region region) const {
-    std::vector<NumberedPoint>& places = region.places;
+    if (packed_->integers()) {
+      cut_region(region, region.integers);
+    } else {
+      cut_region(region, region.places);
+    }
+    return region;
+  }
+
+  template <class Coordinate>
+  void cut_region(Region& region, std::vector<Numbered<Coordinate>>& places) const {
     packed_->unpack(region.records, places);
     region.pieces =
-        cut_in_pieces(places, blocks_of(places.size(), options_.block_points), lengths_);
+        cut_in_pieces(std::span(places), blocks_of(places.size(), options_.block_points), lengths_);
     // Within a piece in the order of the source: neighbours in it are often alike.
     region.piece_of.resize(places.size());
     for (std::uint32_t piece = 0; piece + 1 < region.pieces.size(); ++piece) {
@@ -409,7 +433,6 @@ class SpatialSource final : public OrderedSource {
     for (std::uint32_t number = 0; number < places.size(); ++number) {
       region.in_order[next[region.piece_of[number]]++] = number;
     }
-    return region;
   }
 
   /// Puts smaller buckets in place of the next one.
@@ -425,7 +448,7 @@ class SpatialSource final : public OrderedSource {
     planes_ = kd_planes(places, kDepth, lengths_);
     places = {};
     std::vector<Bucket> buckets(planes_.size() + 1);
-    std::vector<Share> shares(kSharesOfBucket);
+    std::deque<Share> shares(kSharesOfBucket);
     while (file_->records(bucket) > 0) {
       std::size_t taken = 0;
       for (; taken < shares.size() && file_->records(bucket) > 0; ++taken) {
@@ -434,10 +457,11 @@ class SpatialSource final : public OrderedSource {
       team_.run(taken, [&](std::size_t i, std::size_t) {
         Share& share = shares[i];
         packed_->unpack(share.records, share.places);
-        sort_by_leaf(share, share.places.size(),
-                     [&](std::size_t p) { return share.places[p].place; });
+        find_leaves(share, share.places.size(),
+                    [&](std::size_t p) -> const Point3& { return share.places[p].place; });
+        packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
       });
-      distribute(std::span(shares).first(taken), buckets);
+      distribute(shares, taken, buckets);
     }
     push(std::move(buckets), count / 2);
     report_.temporary_bytes = file_->bytes();

@@ -226,7 +226,6 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   source_options.heights_of_colour = request.heights_of_colour;
   source_options.cell = request.cell.value_or(0);
   source_options.crs = request.crs;
-  source_options.blocks_ahead = kBlocksAhead;
   source_options.threads = std::max(1U, context.threads);
   DamageReport damage;
   if (request.skip_damaged) source_options.on_damage = damage.taker();
@@ -240,7 +239,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   if (request.most_points > 0) {
     source = std::make_unique<FirstPoints>(std::move(source), request.most_points);
   }
-  const stream::SourceInfo& info = source->info();
+  const stream::SourceInfo info = source->info();
   // Found by whoever asks first. PROJ takes tens of milliseconds to open its database, in which the
   // first points are read.
   const std::shared_future<Located> located =
@@ -273,10 +272,9 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
          .reading = set_aside});
     in_order = ordered.get();
     points = std::move(ordered);
-    if (request.order != stream::Order::stream) {
-      points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
-    }
   }
+  // At once, but for a raster: not before it is known what a cell measures (see below).
+  points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
   const auto& [crs, ground] = located.get();
   BuildOutcome outcome;
   const std::uint64_t source_bytes = std::max(kSourceMemory, points->reading_bytes());
@@ -288,8 +286,6 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.
     points->refine(cell_aspect(ground, info),
                    memory_bytes - memory_beside_source(request, payload_bytes, threads));
-  } else if (request.order != stream::Order::stream) {
-    points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
   }
 
   stream::StoreWriter writer(request.store, schema, request.replace, threads);

@@ -63,10 +63,10 @@ class OrderedSource : public PointSource {
 ///
 /// The order depends on nothing but the points, their order, the stated box and the options.
 /// Memory, which reading_bytes() states with the source's: 262,144 points, of the window or of what
-/// comes next, with 32 bytes more each, a quarter as many on their way to the buckets or as many
-/// for each part ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and read
-/// once, twice beyond some 60 million. Throws in next(): Error (of the source, or of the temporary
-/// file: a full disk); Stopped.
+/// comes next, with at most 32 bytes more each, a quarter as many on their way to the buckets or as
+/// many for each part ahead, and 8 MiB for the buckets. Cost: O(n log n); points are written and
+/// read once, twice beyond some 60 million. Throws in next(): Error (of the source, or of the
+/// temporary file: a full disk); Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,
                                                               SpatialOrderOptions options);
 
