@@ -44,12 +44,6 @@ constexpr std::uint32_t uncentred(std::uint32_t code, std::uint32_t n) {
   return static_cast<std::uint32_t>(unzigzag(code) + n / 2);
 }
 
-/// Bits that stand for a number.
-struct RawBits {
-  std::uint64_t value = 0;
-  unsigned bits = 0;
-};
-
 /// A number below `size` (>= 1), every value costing the same but for a bit (truncated binary).
 TERRACE_STORE_INLINE RawBits uniform_bits(std::uint64_t value, std::uint64_t size) {
   const unsigned bits = static_cast<unsigned>(std::bit_width(size | 1)) - 1;  // size is not 0

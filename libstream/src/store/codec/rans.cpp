@@ -96,13 +96,24 @@ void SymbolEncoder::numbers(unsigned first, std::span<const std::uint64_t> numbe
   used_ += n;
   if (any < 16 && !escape) return;    // no open bits
   BitWriter bits = std::move(bits_);  // a copy, which the compiler keeps in registers
-  for (std::size_t i = 0; i < n; ++i) {
-    const unsigned number_class = classes[i];
-    if (out[i] == 0) [[unlikely]] {
-      out[i] = entries[slots[i] - number_class + kEscape];
-      bits.put(number_class, kEscapeBits);
+  const auto open_bits = [&](std::size_t i) -> RawBits {
+    const ClassRange& range = kClassRange[classes[i]];
+    return {numbers[i] - range.base, range.bits};
+  };
+  std::size_t i = 0;
+  if (any >> 17 == 0 && !escape) {
+    for (; i + 1 < n; i += 2) {  // two have at most 32
+      const RawBits one = open_bits(i), other = open_bits(i + 1);
+      bits.put_short(one.value << other.bits | other.value, one.bits + other.bits);
     }
-    bits.put(numbers[i] - kClassRange[number_class].base, kClassRange[number_class].bits);
+  }
+  for (; i < n; ++i) {
+    if (out[i] == 0) [[unlikely]] {
+      out[i] = entries[slots[i] - classes[i] + kEscape];
+      bits.put(classes[i], kEscapeBits);
+    }
+    const RawBits coded = open_bits(i);
+    bits.put(coded.value, coded.bits);
   }
   bits_ = std::move(bits);
 }

@@ -60,6 +60,12 @@ struct DecodeTable {
 
 void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
 
+/// Bits that stand for a number.
+struct RawBits {
+  std::uint64_t value = 0;
+  unsigned bits = 0;
+};
+
 /// Bits, most significant first; `append_reversed` puts them so that the first is in the last byte.
 class BitWriter {
  public:
@@ -79,10 +85,8 @@ class BitWriter {
   }
   void append_reversed(Bytes& out) const;
   [[nodiscard]] bool empty() const { return used_ == 0 && held_ == 0; }
-
- private:
-  /// Requires bits <= 32. The next word is written whether it is full or not: a branch upon that is
-  /// close to a coin toss.
+  /// put() that requires bits <= 32. The next word is written whether it is full or not: a branch
+  /// upon that is close to a coin toss.
   TERRACE_STORE_INLINE void put_short(std::uint64_t value, unsigned bits) {
     if (used_ == words_.size()) words_.resize(2 * used_ + 64);
     hold_ = hold_ << bits | value;
@@ -92,6 +96,7 @@ class BitWriter {
     held_ &= 31;
   }
 
+ private:
   std::vector<std::uint32_t> words_;  ///< the first used_
   std::size_t used_ = 0;
   std::uint64_t hold_ = 0;  ///< the lower held_ (< 32) bits are still to go
