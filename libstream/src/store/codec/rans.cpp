@@ -163,19 +163,18 @@ class SymbolEncoder::Words {
   std::uint32_t state_;
 };
 
-/// Until one has no symbols left, and so on with the others.
+/// Until one has no symbols left, and so on with the others while there are two.
 template <std::size_t kLanes>
 void SymbolEncoder::finish_lanes(std::array<Words*, kTogether>& lanes) {
   std::sort(lanes.begin(), lanes.begin() + kLanes,
             [](const Words* a, const Words* b) { return a->left > b->left; });
-  // Copies, which the compiler keeps in registers.
-  [&]<std::size_t... kLane>(std::index_sequence<kLane...>) {
-    std::array<Words, kLanes> words{*lanes[kLane]...};
+  const auto finish_shortest = [&]<std::size_t... kLane>(std::index_sequence<kLane...>) {
+    std::array<Words, kLanes> words{*lanes[kLane]...};  // which the compiler keeps in registers
     for (std::size_t steps = words.back().left; steps > 0; --steps) (words[kLane].step(), ...);
     ((*lanes[kLane] = words[kLane]), ...);
-  }
-  (std::make_index_sequence<kLanes>());
-  if constexpr (kLanes > 1) finish_lanes<kLanes - 1>(lanes);
+  };
+  finish_shortest(std::make_index_sequence<kLanes>());
+  if constexpr (kLanes > 2) finish_lanes<kLanes - 1>(lanes);
 }
 
 void SymbolEncoder::finish(std::span<SymbolEncoder> coders, std::span<std::uint32_t> last,
@@ -184,12 +183,9 @@ void SymbolEncoder::finish(std::span<SymbolEncoder> coders, std::span<std::uint3
   std::array<std::optional<Words>, kTogether> words;
   std::array<Words*, kTogether> lanes{};
   for (std::size_t i = 0; i < coders.size(); ++i) lanes[i] = &words[i].emplace(coders[i], last[i]);
-  if (coders.size() == kTogether) {
-    finish_lanes<kTogether>(lanes);
-  } else {
-    for (std::size_t i = 0; i < coders.size(); ++i) {
-      while (words[i]->left > 0) words[i]->step();
-    }
+  if (coders.size() == kTogether) finish_lanes<kTogether>(lanes);
+  for (std::size_t i = 0; i < coders.size(); ++i) {
+    while (words[i]->left > 0) words[i]->step();
   }
   for (std::size_t i = 0; i < coders.size(); ++i) {
     const std::size_t start = out.size();
