@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <span>
 
-/// Passes over the values of a column before they are coded, one after the other: each is as many
-/// values at once as the processor has room for.
+/// Passes over the values of a column before they are coded. Each takes as many values at once as
+/// the processor has room for.
 
 namespace terrace::stream::store {
 
