@@ -6,8 +6,8 @@
 #include "store/codec/bytes.hpp"
 #include "store/codec/symbols.hpp"
 
-/// Compiled for AVX2 as well, which takes half the time; the loader chooses by the processor. Not by
-/// Clang, with which sanitizers are built: their run-time starts after that choice.
+/// Compiled for AVX2 as well, which takes half the time; the loader chooses by the processor. Not
+/// by Clang, with which sanitizers are built: their run-time starts after that choice.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
 #define TERRACE_STORE_AVX2_TOO [[gnu::target_clones("default", "avx2")]]
 #else
