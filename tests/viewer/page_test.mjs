@@ -327,7 +327,11 @@ describe('pages side by side', {concurrency: 3}, () => {
       await wanted;
       await route.continue();
     });
+    await page.addInitScript(() => addEventListener('DOMContentLoaded', () => {
+      window.atFirst = getComputedStyle(document.getElementById('head')).visibility;
+    }));
     await page.goto(`${site.url}#s=alps&q=8`);
+    assert.equal(await page.evaluate(() => window.atFirst), 'hidden');
     await page.waitForSelector('#progress');  // to be seen
     assert.ok(await page.isVisible('#head'));
     assert.equal(await page.evaluate(() => window.terrace?.state.points ?? 0), 0);

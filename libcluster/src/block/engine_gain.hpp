@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "block/engine_facilities.hpp"
+#include "block/engine_segments.hpp"
 
 namespace terrace::cluster {
 
@@ -105,22 +106,12 @@ class Gain {
         }
         const V p = V::load(s_.pp + i);
         if (bits != 0) {
-          compress(s_.px + out, moves, x);
-          compress(s_.py + out, moves, y);
-          compress(s_.pz + out, moves, z);
-          compress(s_.pw + out, moves, w);
-          compress(s_.pd + out, moves, d);
-          compress(s_.pp + out, moves, p);
+          compress_points(s_, out, moves, x, y, z, w, d, p);
           out += static_cast<std::uint32_t>(__builtin_popcount(bits));
         }
         if (!closes) {
           const Mask stays = client & ~moves;
-          compress(s_.px + kept, stays, x);
-          compress(s_.py + kept, stays, y);
-          compress(s_.pz + kept, stays, z);
-          compress(s_.pw + kept, stays, w);
-          compress(s_.pd + kept, stays, old);
-          compress(s_.pp + kept, stays, p);
+          compress_points(s_, kept, stays, x, y, z, w, old, p);
           kept += static_cast<std::uint32_t>(__builtin_popcount(stays.bits()));
           changed = true;
         }

@@ -7,6 +7,20 @@
 
 namespace terrace::cluster {
 
+/// Stores points of the mask densely in the pool, from a place on, and what else up to sixteen
+/// lanes.
+template <class V>
+[[gnu::always_inline]] inline void compress_points(BlockState& s, std::uint32_t place,
+                                                   typename V::Mask mask, V x, V y, V z, V w, V d,
+                                                   V p) {
+  compress(s.px + place, mask, x);
+  compress(s.py + place, mask, y);
+  compress(s.pz + place, mask, z);
+  compress(s.pw + place, mask, w);
+  compress(s.pd + place, mask, d);
+  compress(s.pp + place, mask, p);
+}
+
 /// Makes the segments of all facilities anew from the last assignment. Sixteen points of the curve
 /// belong to few facilities: what each of them takes moves by one compression a column.
 template <class V>
@@ -32,12 +46,7 @@ class Segments {
       each_facility(i, [&](std::uint32_t j, Mask mask, std::uint32_t clients) {
         // Lanes beyond the clients are overwritten by those to come or lie behind the segment.
         const std::uint32_t place = s_.closes[j];
-        compress(s_.px + place, mask, x);
-        compress(s_.py + place, mask, y);
-        compress(s_.pz + place, mask, z);
-        compress(s_.pw + place, mask, w);
-        compress(s_.pd + place, mask, d);
-        compress(s_.pp + place, mask, p);
+        compress_points(s_, place, mask, x, y, z, w, d, p);
         s_.closes[j] = place + clients;
       });
     }
