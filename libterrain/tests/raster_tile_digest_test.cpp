@@ -59,7 +59,7 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
     explicit Tiled(const fs::path& path)
         : store(stream::Store::open(path)),
           raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
-                 EllipsoidalHeights(store.schema(), HeightReference::ellipsoidal, "", 0)),
+                 EllipsoidalHeights(store.schema(), HeightReference::ellipsoidal, "", 0), 2),
           surface(raster) {}
   };
   std::unique_ptr<Tiled> tiled(const std::string& name, std::uint64_t block_points = 3000) {

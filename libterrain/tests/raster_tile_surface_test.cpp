@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,7 +20,9 @@
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
+#include "tile/format/quantized_mesh.hpp"
 #include "tile/make/height_cache.hpp"
+#include "tile/make/tile_mesher.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -37,10 +40,12 @@ class RasterOfDegrees : public ::testing::Test {
   }
 
   template <class T>
-  stream::Store make(stream::ScalarType type, const std::array<double, 6>& world, int epsg) {
+  stream::Store make(stream::ScalarType type, const std::array<double, 6>& world, int epsg,
+                     double gaps = 0.1) {
     std::vector<T> heights;
     for (std::int64_t i = 0; i < kColumns * kRows; ++i) {
-      heights.push_back(static_cast<T>(random() < 0.1 ? kNodata : 3000 * random()));
+      const double slope = 2800.0 * static_cast<double>(i) / (kColumns * kRows);
+      heights.push_back(static_cast<T>(random() < gaps ? kNodata : slope + 200 * random()));
     }
     stream::GeoTiffOptions tiff;
     tiff.columns = kColumns;
@@ -103,7 +108,7 @@ TEST_F(RasterOfDegrees, RowsAreTheSamples) {
   for (const auto& world : worlds) {
     const stream::Store store = make<float>(stream::ScalarType::f32, world, 4326);
     TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
-                       {store.schema(), HeightReference::ignore, "", 1 << 20});
+                       {store.schema(), HeightReference::ignore, "", 1 << 20}, 2);
     for (const bool flat : {false, true}) {
       if (flat) raster.flat_fill = 12.0;
       RasterTileSurface surface(raster), other(raster);
@@ -131,13 +136,93 @@ TEST_F(RasterOfDegrees, RowsAreTheSamples) {
   }
 }
 
+/// A surface that does not know its range.
+class WithoutRange final : public RasterTileSurface {
+ public:
+  using RasterTileSurface::RasterTileSurface;
+  std::optional<HeightRange> surface_range(const GeographicBox& /*box*/) override { return {}; }
+};
+
+TEST_F(RasterOfDegrees, TheSurfaceIsWithinItsRange) {
+  for (const auto& [world, epsg] :
+       {std::pair{std::array<double, 6>{0.01, 0, 10, 0, -0.01, 47}, 4326},
+        std::pair{std::array<double, 6>{0.01, 0, 176, 0, -0.01, -20}, 4326},
+        std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632},
+        std::pair{std::array<double, 6>{21, 21, 400000, 21, -21, 5200000}, 32632}}) {
+    for (const double gaps : {0.0, 0.001}) {
+      const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg, gaps);
+      TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                         {store.schema(), HeightReference::ignore, "", 1 << 20}, 2);
+      for (const bool flat : {false, true}) {
+        if (flat) raster.flat_fill = -50.0;
+        RasterTileSurface surface(raster);
+        const GeographicBox all = surface.bounds();
+        const double low = raster.everywhere.low, high = raster.everywhere.high;
+        unsigned narrower = 0;
+        for (int round = 0; round < 100; ++round) {
+          const double west = all.west + (all.east - all.west) * (1.2 * random() - 0.1);
+          const double south = all.south + (all.north - all.south) * (1.2 * random() - 0.1);
+          const double size = surface.spacing() * (1 + 90 * random() * random());
+          const GeographicBox box{west, south, west + size, south + size};
+          SCOPED_TRACE(testing::Message() << "EPSG:" << epsg << ", gaps " << gaps << ", round "
+                                          << round << ": " << west << "," << south);
+          const HeightRange range = surface.surface_range(box).value();
+          narrower += range.low > low || range.high < high ? 1 : 0;
+          std::vector<double> longitude, latitude;
+          for (int k = 0; k < 50; ++k) {
+            longitude.push_back(wrapped_longitude(west + size * random()));
+            latitude.push_back(south + size * random());
+          }
+          std::vector<double> heights(longitude.size());
+          surface.heights(longitude, latitude, heights);
+          for (const auto& [place, height] : sampled(surface, box)) heights.push_back(height);
+          for (const double height : heights) {
+            EXPECT_GE(height, range.low - 1e-9);
+            EXPECT_LE(height, range.high + 1e-9);
+          }
+        }
+        // Across 180 degrees bounds go around the globe.
+        if (gaps == 0.0 && all.east - all.west < 180.0) {
+          EXPECT_GT(narrower, 20U);
+        }
+      }
+    }
+  }
+}
+
+TEST_F(RasterOfDegrees, TilesDoNotDependOnWhetherTheRangeIsKnown) {
+  for (const auto& [world, epsg] :
+       {std::pair{std::array<double, 6>{0.01, 0, 10, 0, -0.01, 47}, 4326},
+        std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632}}) {
+    for (const double gaps : {0.0, 0.001}) {
+      const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg, gaps);
+      const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                               {store.schema(), HeightReference::ignore, "", 1 << 20}, 2);
+      RasterTileSurface known(raster);
+      WithoutRange unknown(raster);
+      for (const unsigned zoom : {2U, 5U, 7U, 9U, 10U}) {
+        for (const double bound : {30000.0, 4200.0, 900.0}) {
+          const ZoomPlan plan = plan_zoom(zoom, bound, 3000, known);
+          const TileRange tiles = tiles_in(known.bounds(), zoom);
+          const TileAddress tile{zoom, (tiles.x0 + tiles.x1) / 2, (tiles.y0 + tiles.y1) / 2};
+          SCOPED_TRACE(testing::Message() << tile_path(tile) << ", bound " << bound);
+          const MadeTile made = make_tile(tile, plan, known, {});
+          const MadeTile same = make_tile(tile, plan, unknown, {});
+          EXPECT_EQ(encode_tile(made.mesh, made.header), encode_tile(same.mesh, same.header));
+          EXPECT_EQ(made.max_error, same.max_error);
+        }
+      }
+    }
+  }
+}
+
 TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
   for (const auto& [world, epsg] :
        {std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632},
         std::pair{std::array<double, 6>{0.01, 0.001, 10, -0.001, 0.01, 44}, 4326}}) {
     const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg);
     const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
-                             {store.schema(), HeightReference::ignore, "", 1 << 20});
+                             {store.schema(), HeightReference::ignore, "", 1 << 20}, 2);
     RasterTileSurface surface(raster);
     EXPECT_TRUE(std::holds_alternative<SurfaceGrid>(surface.part(surface.bounds())));
   }

@@ -92,7 +92,7 @@ class HeightBlocksOfAStore : public ::testing::Test {
 };
 
 TEST_F(HeightBlocksOfAStore, RangesAreThoseOfTheBlocks) {
-  const HeightBlocks blocks(store());
+  const HeightBlocks blocks(store(), 2);
   int empty = 0;
   for (int round = 0; round < 3000; ++round) {
     const LatticeWindow asked = window();
@@ -120,7 +120,7 @@ TEST_F(HeightBlocksOfAStore, RangesAreThoseOfTheBlocks) {
 }
 
 TEST_F(HeightBlocksOfAStore, ABlockWithinAWindowHasData) {
-  const HeightBlocks blocks(store());
+  const HeightBlocks blocks(store(), 2);
   int found = 0, none = 0;
   for (int round = 0; round < 3000; ++round) {
     const LatticeWindow asked = window();

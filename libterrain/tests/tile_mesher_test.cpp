@@ -272,7 +272,7 @@ TEST(SharedSides, ForgetTheOldest) {
   const std::vector<TileSideVertex> side(1000);
   for (std::uint32_t line = 0; line < 2000; ++line) shared.keep({true, 0, line, 0}, side);
   EXPECT_TRUE(shared.find({true, 0, 1999, 0}));
-  EXPECT_TRUE(shared.find({true, 0, 1800, 0}));
+  EXPECT_TRUE(shared.find({true, 0, 1950, 0}));
   EXPECT_FALSE(shared.find({true, 0, 0, 0}));
 }
 

@@ -184,6 +184,18 @@ class TileSet:
         assert set(self.files()) == {f'{z}/{x}/{y}.terrain' for z, x, y in self.tiles}
         self.check_sides()
 
+    def check_metadata(self):
+        """Each tile names those of the next zoom below it that there are."""
+        for (zoom, x, y), tile in self.tiles.items():
+            text = tile.extensions[4]
+            assert struct.unpack_from('<I', text)[0] == len(text) - 4
+            ranges = json.loads(text[4:])['available']
+            below = {(zoom + 1, i, j) for r in (ranges[0] if ranges else ())
+                     for i in range(r['startX'], r['endX'] + 1)
+                     for j in range(r['startY'], r['endY'] + 1)}
+            children = {(zoom + 1, 2 * x + i, 2 * y + j) for i in (0, 1) for j in (0, 1)}
+            assert below == children & set(self.tiles), (zoom, x, y)
+
     def check_sides(self):
         for (zoom, x, y), tile in self.tiles.items():
             for there, own, other in (((zoom, (x + 1) % 2 ** (zoom + 1), y), 'east', 'west'),

@@ -13,6 +13,7 @@ import tempfile
 import unittest
 
 import small_tiff
+from quantized_mesh import TileSet
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 NODATA = -9999.0
@@ -63,6 +64,27 @@ class TileVoidTest(unittest.TestCase):
                     self.assertEqual([zoom['zoom'] for zoom in zooms], [10, 11, 12])
                     for zoom in zooms:
                         self.assertLessEqual(zoom['max_error'], error * 2 ** (12 - zoom['zoom']))
+
+    def test_fill_may_leave_the_heights_of_all_samples_of_a_tile(self):
+        """Plateaus apart: tiles are written anew with larger steps of height, and still know which
+        are below them."""
+        heights = [0.0 if c < 40 else 3000.0 if c > 80 else NODATA
+                   for r in range(COUNT) for c in range(COUNT)]
+        with tempfile.TemporaryDirectory() as folder:
+            dem, store = f'{folder}/dem.tif', f'{folder}/dem.terrace'
+            write_tiff(dem, heights)
+            self.assertEqual(terrace('build', dem, '-o', store, '-q').returncode, 0)
+            sets = []
+            for threads in (1, 3):
+                tiles = f'{folder}/tiles{threads}'
+                run = terrace('tile', store, '-o', tiles, '--vertical', 'ignore', '--zoom', '0-12',
+                              '--metadata', '--threads', threads)
+                self.assertEqual(run.returncode, 0, run.stderr)
+                sets.append(TileSet(tiles))
+                sets[-1].check()
+                sets[-1].check_metadata()
+            self.assertEqual(sets[0].files(), sets[1].files())
+            self.assertGreater(len(sets[0].tiles), 40)
 
 
 if __name__ == '__main__':

@@ -24,6 +24,17 @@ void need_level(const stream::Store& store, unsigned level) {
                    std::to_string(store.top()));
 }
 
+void need_all_points(const stream::Store& store, unsigned level, std::uint64_t points) {
+  const std::uint64_t expected = store.levels()[level].points;
+  if (points == expected) return;
+  throw stream::Error({.file = store.path().string(),
+                       .where = "level " + std::to_string(level),
+                       .cause = "the clusters have " + std::to_string(points) +
+                                " points and not the " + std::to_string(expected) +
+                                " that the manifest tells",
+                       .remedy = "restore the files or build the store anew"});
+}
+
 void throw_region_outside(const stream::Store& store) {
   throw stream::Error(
       {.file = store.path().string(),

@@ -10,8 +10,8 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kPatch = 64;    // samples along a side at first
-constexpr std::size_t kSmallest = 8;  // below it polynomials cost more than they spare
+constexpr std::size_t kPatch = 256;  // samples along a side at first
+constexpr std::size_t kFewest = 64;  // samples: for fewer, polynomials cost more than they spare
 
 }  // namespace
 
@@ -93,7 +93,10 @@ bool GridGeography::interpolated(const Patch& patch, const Output& output) const
 }
 
 void GridGeography::fill(const Patch& patch, const Output& output) const {
-  if (patch.columns < kSmallest || patch.rows < kSmallest) return exact(patch, output);
+  // A single row or column has no rectangle.
+  if (patch.columns * patch.rows < kFewest || patch.columns == 1 || patch.rows == 1) {
+    return exact(patch, output);
+  }
   if (interpolated(patch, output)) return;
   const std::size_t left = patch.columns / 2, upper = patch.rows / 2;
   fill({patch.column, patch.row, left, upper}, output);

@@ -8,6 +8,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/parallel.hpp"
+#include "base/store_checks.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -84,15 +85,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
     piece.begin = count;
     count += piece.points;
   }
-  const std::uint64_t expected = store.levels()[level].points;
-  if (count != expected) {
-    throw stream::Error({.file = store.path().string(),
-                         .where = "level " + std::to_string(level),
-                         .cause = "the clusters have " + std::to_string(count) +
-                                  " points and not the " + std::to_string(expected) +
-                                  " that the manifest tells",
-                         .remedy = "restore the files or build the store anew"});
-  }
+  need_all_points(store, level, count);
   const auto places = large_array<Point2>(count);
   const auto heights = large_array<double>(count);
   parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <compare>
 #include <cstdint>
 #include <optional>
@@ -20,6 +21,20 @@ struct TileAddress {
 
   friend auto operator<=>(const TileAddress&, const TileAddress&) = default;
 };
+
+/// By row, then column, of tiles of one zoom.
+inline bool by_row(const TileAddress& a, const TileAddress& b) {
+  return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
+/// The tiles of the next zoom that a tile is cut into, by rows.
+inline std::array<TileAddress, 4> children_of(const TileAddress& tile) {
+  std::array<TileAddress, 4> children;
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    children[k] = {tile.zoom + 1, 2 * tile.x + (k & 1), 2 * tile.y + (k >> 1)};
+  }
+  return children;
+}
 
 /// "9/543/380.terrain", the path under the folder of a tile set.
 std::string tile_path(const TileAddress& tile);

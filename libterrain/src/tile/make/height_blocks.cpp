@@ -2,15 +2,23 @@
 #include "tile/make/height_blocks.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "base/digest.hpp"
+#include "base/parallel.hpp"
+#include "base/store_checks.hpp"
 
 namespace terrace::terrain {
 namespace {
 
 constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;
+/// That a thread reads at a time.
+constexpr std::uint64_t kClustersAtOnce = 64;
+constexpr std::size_t kMutexes = 64;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Outward, where a float cannot hold the height.
@@ -32,7 +40,7 @@ std::uint64_t sample_digest(std::uint64_t place, double height) {
 
 }  // namespace
 
-HeightBlocks::HeightBlocks(const stream::Store& store)
+HeightBlocks::HeightBlocks(const stream::Store& store, unsigned threads)
     : columns_(static_cast<std::int64_t>(store.schema().columns)),
       rows_(static_cast<std::int64_t>(store.schema().rows)) {
   const auto count = [this](std::int64_t samples) { return (samples + side_ - 1) / side_; };
@@ -43,25 +51,63 @@ HeightBlocks::HeightBlocks(const stream::Store& store)
   blocks_.assign(blocks, {kInfinity, -kInfinity});
   digests_.assign(blocks, 0);
   samples_.assign(blocks, 0);
-  const stream::Channel& channel = store.schema().coordinates[2];
+  std::array<std::mutex, kMutexes> mutexes;
+  std::atomic<std::uint64_t> points = 0;
   for (unsigned level = 0; level <= store.top(); ++level) {
-    store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
-                              const stream::ClusterPoints& cluster) {
-      for (std::size_t i = 0; i < cluster.size(); ++i) {
-        if (!cluster.match(i)) continue;
-        const stream::Point3& p = cluster.positions[i];
-        const auto column = static_cast<std::int64_t>(p[0]), row = static_cast<std::int64_t>(p[1]);
-        const auto at = static_cast<std::size_t>(row / side_ * across_ + column / side_);
-        Block& block = blocks_[at];
-        const double height = p[2] * channel.scale + channel.offset;
-        block.low = std::min(block.low, rounded_down(height));
-        block.high = std::max(block.high, rounded_up(height));
-        // A sum: samples come in the order of their clusters.
-        digests_[at] += sample_digest(static_cast<std::uint64_t>(row * columns_ + column), height);
-        ++samples_[at];
+    const std::uint64_t clusters = store.levels()[level].clusters;
+    const std::uint64_t pieces = (clusters + kClustersAtOnce - 1) / kClustersAtOnce;
+    parallel_for(pieces, threads, [&](unsigned, std::size_t piece) {
+      const std::uint64_t end = std::min((piece + 1) * kClustersAtOnce, clusters);
+      stream::ClusterPoints cluster;
+      for (std::uint64_t k = piece * kClustersAtOnce; k < end; ++k) {
+        const stream::ClusterId id = stream::cluster_id(level, k);
+        points += store.record(id).points;
+        if (!store.may_match(id)) continue;
+        store.read(id, cluster);
+        add(store.schema().coordinates[2], cluster, mutexes);
       }
     });
   }
+  need_all_points(store, 0, points);
+}
+
+void HeightBlocks::add(const stream::Channel& channel, const stream::ClusterPoints& cluster,
+                       std::span<std::mutex> mutexes) {
+  const auto shift = std::countr_zero(static_cast<std::uint64_t>(side_));
+  // What lies in one block, as the samples before the next ones of another block do.
+  std::int64_t x = -1, y = -1;
+  Block range{kInfinity, -kInfinity};
+  std::uint64_t digest = 0;
+  std::uint32_t samples = 0;
+  const auto put = [&] {
+    if (samples == 0) return;
+    const auto at = static_cast<std::size_t>(y * across_ + x);
+    const std::lock_guard lock(mutexes[static_cast<std::size_t>(y) % mutexes.size()]);
+    blocks_[at].low = std::min(blocks_[at].low, range.low);
+    blocks_[at].high = std::max(blocks_[at].high, range.high);
+    // A sum: samples come in the order of their clusters.
+    digests_[at] += digest;
+    samples_[at] += samples;
+  };
+  for (std::size_t i = 0; i < cluster.size(); ++i) {
+    if (!cluster.match(i)) continue;
+    const stream::Point3& p = cluster.positions[i];
+    const auto column = static_cast<std::int64_t>(p[0]), row = static_cast<std::int64_t>(p[1]);
+    if (column >> shift != x || row >> shift != y) {
+      put();
+      x = column >> shift;
+      y = row >> shift;
+      range = {kInfinity, -kInfinity};
+      digest = 0;
+      samples = 0;
+    }
+    const double height = p[2] * channel.scale + channel.offset;
+    range.low = std::min(range.low, rounded_down(height));
+    range.high = std::max(range.high, rounded_up(height));
+    digest += sample_digest(static_cast<std::uint64_t>(row * columns_ + column), height);
+    ++samples;
+  }
+  put();
 }
 
 HeightBlocks::Blocks HeightBlocks::blocks_of(const LatticeWindow& window) const {

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
@@ -16,8 +18,9 @@ namespace terrace::terrain {
 /// be read, and a hash of each, so that tiles of unchanged blocks are kept.
 class HeightBlocks {
  public:
-  /// Reads the store once. Memory: 20 bytes per block, at most 20 MiB. Throws: stream::Error.
-  explicit HeightBlocks(const stream::Store& store);
+  /// Reads the store once, with all threads. Memory: 20 bytes per block, at most 20 MiB. Throws:
+  /// stream::Error.
+  HeightBlocks(const stream::Store& store, unsigned threads);
 
   struct Range {
     double low = 0.0, high = 0.0;  ///< in the vertical unit of the store
@@ -57,6 +60,9 @@ class HeightBlocks {
   [[nodiscard]] bool is_complete(std::int64_t x, std::int64_t y) const {
     return samples_[static_cast<std::size_t>(y * across_ + x)] == rectangle(x, y).size();
   }
+  /// Adds the samples of a cluster. The mutexes guard rows of blocks.
+  void add(const stream::Channel& channel, const stream::ClusterPoints& cluster,
+           std::span<std::mutex> mutexes);
   [[nodiscard]] LatticeWindow rectangle(std::int64_t x, std::int64_t y) const {
     return {x * side_, y * side_, std::min(side_, columns_ - x * side_),
             std::min(side_, rows_ - y * side_)};

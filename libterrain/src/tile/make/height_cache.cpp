@@ -51,8 +51,22 @@ const HeightCache::Square& HeightCache::square(std::int64_t across, std::int64_t
   return made;
 }
 
+bool HeightCache::has_all(const LatticeWindow& window) const {
+  for (std::int64_t down = window.row / kSide; down * kSide < window.row + window.rows; ++down) {
+    for (std::int64_t across = window.column / kSide;
+         across * kSide < window.column + window.columns; ++across) {
+      if (!by_number_.contains(down * across_ + across)) return false;
+    }
+  }
+  return true;
+}
+
 void HeightCache::heights(const LatticeWindow& window, std::span<double> out) {
   assert(out.size() == window.size());
+  if (window.size() <= kFew && !has_all(window)) {
+    reader_.heights(window, out);
+    return;
+  }
   const std::int64_t left = std::max<std::int64_t>(window.column, 0);
   const std::int64_t top = std::max<std::int64_t>(window.row, 0);
   const std::int64_t right = std::min(window.column + window.columns, columns_);

@@ -27,6 +27,8 @@ class HeightCache {
 
  private:
   static constexpr std::int64_t kSide = 256;
+  /// Samples: so small a window is read alone, unless its squares are there.
+  static constexpr std::size_t kFew = 64;
   /// One of the two is empty.
   struct Square {
     std::int64_t number = 0;
@@ -35,6 +37,7 @@ class HeightCache {
   };
   using Squares = std::list<Square>;
 
+  [[nodiscard]] bool has_all(const LatticeWindow& window) const;
   const Square& square(std::int64_t across, std::int64_t down);
 
   StoreWindow reader_;

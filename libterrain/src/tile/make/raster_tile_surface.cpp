@@ -74,17 +74,14 @@ void RasterTileSurface::expect(const GeographicBox& box) {
   view(window);
 }
 
-std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
-  const LatticeWindow window = raster_.window_around(box);
-  if (window.size() == 0) return std::nullopt;
-  const auto range = raster_.blocks.range(window);
-  if (!range) return std::nullopt;
+HeightRange RasterTileSurface::above_ellipsoid(const HeightBlocks::Range& range,
+                                               bool filled) const {
   HeightRange out;
-  const double low = range->low * raster_.vertical.metres_per_unit();
-  const double high = range->high * raster_.vertical.metres_per_unit();
+  const double low = range.low * raster_.vertical.metres_per_unit();
+  const double high = range.high * raster_.vertical.metres_per_unit();
   out.low = std::min(low, high);
   out.high = std::max(low, high);
-  if (raster_.flat_fill) {
+  if (filled && raster_.flat_fill) {
     out.low = std::min(out.low, *raster_.flat_fill);
     out.high = std::max(out.high, *raster_.flat_fill);
   }
@@ -92,6 +89,15 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
     out.low += kLowestGeoid;
     out.high += kHighestGeoid;
   }
+  return out;
+}
+
+std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
+  const LatticeWindow window = raster_.window_around(box);
+  if (window.size() == 0) return std::nullopt;
+  const auto range = raster_.blocks.range(window);
+  if (!range) return std::nullopt;
+  HeightRange out = above_ellipsoid(*range, true);
   // A block of the lattice all of whose corners are inside.
   if (const auto block = raster_.blocks.some_block_within(window)) {
     std::array<Point2, 4> corners;
@@ -109,11 +115,29 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
   return out;
 }
 
+std::optional<HeightRange> RasterTileSurface::surface_range(const GeographicBox& box) {
+  const GeographicBox all = bounds();
+  if (box.west >= all.west && box.east <= all.east && box.south >= all.south &&
+      box.north <= all.north) {
+    const LatticeWindow window = raster_.window_around(box);
+    const auto [last_column, last_row] = raster_.places.stored_bounds().max;
+    const bool inside = window.column > 0 && window.row > 0 &&
+                        static_cast<double>(window.column + window.columns) <= last_column &&
+                        static_cast<double>(window.row + window.rows) <= last_row;
+    if (inside && raster_.blocks.is_complete(window)) {
+      if (const auto range = raster_.blocks.range(window)) return above_ellipsoid(*range, false);
+    }
+  }
+  // Fill is between the heights of samples, but these may be anywhere.
+  return above_ellipsoid(raster_.everywhere, true);
+}
+
 template <class Visit>
 void RasterTileSurface::visit_places(std::span<const double> longitude,
                                      std::span<const double> latitude, const Visit& visit) {
   constexpr std::int64_t kBlock = 128;           // places are taken block by block of the lattice
-  constexpr std::int64_t kMostInWindow = 32768;  // of a window that is read for a run of them
+  constexpr std::int64_t kMostInWindow = 32768;  // of a window that is read for a run of them,
+  constexpr std::int64_t kMostForEach = 64;      // and for each place in it
   std::vector<Point2> places(longitude.size());
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = {longitude[i], latitude[i]};
   raster_.places.to_stored(places);
@@ -146,7 +170,9 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
       const std::int64_t nr0 = first ? row : std::min(r0, row);
       const std::int64_t nc1 = first ? column + 1 : std::max(c1, column + 1);
       const std::int64_t nr1 = first ? row + 1 : std::max(r1, row + 1);
-      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > kMostInWindow) break;
+      const std::int64_t most =
+          std::min(kMostInWindow, kMostForEach * static_cast<std::int64_t>(to + 1 - from));
+      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > most) break;
       c0 = nc0;
       r0 = nr0;
       c1 = nc1;

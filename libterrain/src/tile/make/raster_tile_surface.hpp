@@ -15,7 +15,7 @@ namespace terrace::terrain {
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
 /// Memory: 36 MiB, and 8 bytes per sample of the largest box that was asked for, 24 for samples().
-class RasterTileSurface final : public TileSurface {
+class RasterTileSurface : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
 
@@ -25,6 +25,7 @@ class RasterTileSurface final : public TileSurface {
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
   SurfacePart part(const GeographicBox& box) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
+  std::optional<HeightRange> surface_range(const GeographicBox& box) override;
   void heights(std::span<const double> longitude, std::span<const double> latitude,
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
@@ -32,6 +33,7 @@ class RasterTileSurface final : public TileSurface {
   std::uint64_t digest(const GeographicBox& box) override { return raster_.digest(box); }
 
  private:
+  [[nodiscard]] HeightRange above_ellipsoid(const HeightBlocks::Range& range, bool filled) const;
   /// False where the samples are not in rows along parallels.
   bool rows(const GeographicBox& box, SurfaceRows& out);
   void grid(const GeographicBox& box, SurfaceGrid& out);

@@ -83,13 +83,9 @@ std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom,
       found.push_back(tile);
       continue;
     }
-    for (unsigned quarter = 0; quarter < 4; ++quarter) {
-      open.push_back({tile.zoom + 1, 2 * tile.x + (quarter & 1), 2 * tile.y + (quarter >> 1)});
-    }
+    for (const TileAddress& child : children_of(tile)) open.push_back(child);
   }
-  std::sort(found.begin(), found.end(), [](const TileAddress& a, const TileAddress& b) {
-    return std::pair{a.y, a.x} < std::pair{b.y, b.x};
-  });
+  std::sort(found.begin(), found.end(), by_row);
   return found;
 }
 

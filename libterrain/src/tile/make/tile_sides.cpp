@@ -21,7 +21,7 @@ constexpr double kMostSidePlaces = 4096.0;
 /// between have what the side has.
 constexpr double kSideShare = 0.75;
 /// That SharedSides keeps twice, at 16 bytes each.
-constexpr std::size_t kMostSideVertices = std::size_t{1} << 18;
+constexpr std::size_t kMostSideVertices = std::size_t{1} << 16;
 
 /// The width of a tile's part at a depth; exact.
 double width_at(unsigned zoom, unsigned depth) {
@@ -186,6 +186,24 @@ bool TileSides::is_near_data(const Side& side, double reach) const {
   return boxes_meet(box, data_);
 }
 
+GeographicBox TileSides::band_around(const Side& side) const {
+  const double from = leaf_unit(side.k, side.depth), to = leaf_unit(side.k + 1, side.depth);
+  const double line = leaf_unit(side.line, side.depth);
+  const double unit = tile_width(tile_.zoom) / kTileUnits;
+  if (side.along_parallel) {
+    const double latitude = latitude_at(tile_, line);
+    return {longitude_at(tile_, from), latitude - unit, longitude_at(tile_, to), latitude + unit};
+  }
+  const double longitude = longitude_at(tile_, line);
+  return {longitude - unit, latitude_at(tile_, from), longitude + unit, latitude_at(tile_, to)};
+}
+
+bool TileSides::is_flat(const GeographicBox& band) const {
+  const std::optional<HeightRange> range = surface_.surface_range(band);
+  // Heights of the ends are rounded to steps.
+  return range && range->high - range->low + plan_.height_step <= kSideShare * plan_.max_error;
+}
+
 std::vector<TileSideVertex> TileSides::settle(const Side& side) {
   if (is_cut(side)) {
     const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
@@ -200,12 +218,14 @@ std::vector<TileSideVertex> TileSides::settle(const Side& side) {
   const std::uint32_t to = leaf_unit(side.k + 1, side.depth);
   const std::uint32_t across = leaf_unit(side.line, side.depth);
 
-  // Two places per sample, at equal distances; away from all samples the ends will do.
+  // Two places per sample, at equal distances; away from all samples, and where heights are nearly
+  // equal, the ends will do.
   const double length = width_at(tile_.zoom, side.depth);
   const double unit = tile_width(tile_.zoom) / kTileUnits;
-  const bool near_data = is_near_data(side, 2.0 * (unit + surface_.spacing()));
+  const bool looked_at =
+      is_near_data(side, 2.0 * (unit + surface_.spacing())) && !is_flat(band_around(side));
   const double wanted =
-      near_data ? std::min(2.0 * length / surface_.spacing(), kMostSidePlaces) : 1.0;
+      looked_at ? std::min(2.0 * length / surface_.spacing(), kMostSidePlaces) : 1.0;
   const auto parts =
       static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
   std::vector<double> t, longitude, latitude, height;
@@ -217,7 +237,7 @@ std::vector<TileSideVertex> TileSides::settle(const Side& side) {
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
   SamplesAt samples;
-  if (near_data) samples = add_samples(side, t, longitude, latitude);
+  if (looked_at) samples = add_samples(side, t, longitude, latitude);
   for (const std::size_t end : {std::size_t{0}, t.size() - 1}) {
     if (const auto corner = samples_at_corner(longitude[end], latitude[end])) {
       samples[t[end]] = *corner;
@@ -293,15 +313,10 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
   // both.
   const bool on_180 = !side.along_parallel && std::abs(longitude.front()) == 180.0;
   if (on_180 && !surface_.sides_take_samples()) return found;
-  // From what both tiles beside the side share: its ends, and a unit to either side.
   const double unit = tile_width(tile_.zoom) / kTileUnits;
-  const double reach_longitude = side.along_parallel ? 0.0 : unit;
-  const double reach_latitude = side.along_parallel ? unit : 0.0;
-  const GeographicBox band{longitude.front() - reach_longitude, latitude.front() - reach_latitude,
-                           longitude.back() + reach_longitude, latitude.back() + reach_latitude};
   const std::size_t before = t.size();
   const double from = t.front(), to = t.back();
-  const std::optional<SurfaceSamples> near = samples_near(band);
+  const std::optional<SurfaceSamples> near = samples_near(band_around(side));
   if (!near) {
     // The smallest leaves have few places.
     for (double at = from + 1.0; at < to; at += 1.0) t.push_back(at);

@@ -122,6 +122,10 @@ class TileSides {
   std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
   /// The samples at the end of a side: the same for all sides and tiles that meet there.
   std::optional<Samples> samples_at_corner(double longitude, double latitude);
+  /// What both tiles beside a side know of it: its ends, and a unit to either side.
+  [[nodiscard]] GeographicBox band_around(const Side& side) const;
+  /// Whether heights in a band differ by so little that the ends of the side will do.
+  [[nodiscard]] bool is_flat(const GeographicBox& band) const;
   [[nodiscard]] bool is_cut(const Side& side) const;
   /// Whether a leaf beside a side has too many samples; the same for both tiles.
   [[nodiscard]] bool is_crowded(const Side& side) const;

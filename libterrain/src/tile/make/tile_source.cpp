@@ -88,7 +88,8 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
     tiled.water_height = request.water_height;
   };
   if (store.schema().grid) {
-    auto raster = std::make_unique<TiledRaster>(store, system, std::move(heights));
+    auto raster =
+        std::make_unique<TiledRaster>(store, system, std::move(heights), resources.threads);
     with_options(*raster);
     return std::make_unique<SourceOf<TiledRaster, RasterTileSurface>>(std::move(raster),
                                                                       resources.threads);

@@ -27,7 +27,7 @@ const stream::Store& checked(const stream::Store& store) {
 
 /// A projected raster's places are looked at in so many steps along a box. Wider boxes than this
 /// (degrees) may hold places outside the raster that its projection tears apart.
-constexpr unsigned kDigestSteps = 24;
+constexpr unsigned kDigestSteps = 8;
 constexpr double kSmooth = 1.0;
 /// Samples around a place: those it lies between, and what rounding moves.
 constexpr double kDigestMargin = 2.0;
@@ -142,10 +142,14 @@ void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double
 }  // namespace
 
 TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
-                         EllipsoidalHeights heights)
+                         EllipsoidalHeights heights, unsigned threads)
     : TiledStore(checked(tiled), std::move(system), std::move(heights)),
       geography(places.crs(), tiled.schema().world),
-      blocks(tiled) {
+      blocks(tiled, threads) {
+  const auto columns = static_cast<std::int64_t>(tiled.schema().columns);
+  const auto rows = static_cast<std::int64_t>(tiled.schema().rows);
+  // TiledStore has seen a sample with data.
+  everywhere = blocks.range({0, 0, columns, rows}).value();
   const std::array<double, 6>& world = tiled.schema().world.xy;
   const CoordinateSystem& crs = places.crs();
   upright = crs.is_geographic() && crs.counts_as_wgs84() && world[1] == 0.0 && world[3] == 0.0;

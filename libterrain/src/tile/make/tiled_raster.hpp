@@ -16,11 +16,13 @@ namespace terrace::terrain {
 struct TiledRaster : TiledStore {
   GridGeography geography;
   HeightBlocks blocks;
+  HeightBlocks::Range everywhere;  ///< of all samples
   /// Columns run along meridians, rows along parallels, at equal distances.
   bool upright = false;
 
   /// Reads the store twice. Throws: stream::Error if no place of it has a longitude and latitude.
-  TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights);
+  TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
+              unsigned threads);
 
   /// The window of the lattice that has all samples in the box; empty if there is none.
   [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -11,7 +13,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/gzip.hpp>
 
-#include "base/ordered_work.hpp"
+#include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "tile/format/tile_layer.hpp"
 #include "tile/make/sample_parts.hpp"
@@ -22,6 +24,8 @@ namespace terrace::terrain {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kFamiliesPerThread = 8;
 
 /// Tiles that may have data, sorted by row, then column. The two of zoom 0 always count.
 std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface, const Context& context) {
@@ -40,20 +44,12 @@ double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface)
   return widest;
 }
 
-/// The tiles of the next zoom below a tile, as its metadata tells them.
-std::string children_json(const TileAddress& tile, const std::set<TileAddress>& deeper) {
-  std::vector<TileAddress> there;
-  for (std::uint32_t y = 2 * tile.y; y <= 2 * tile.y + 1; ++y) {
-    for (std::uint32_t x = 2 * tile.x; x <= 2 * tile.x + 1; ++x) {
-      if (deeper.contains({tile.zoom + 1, x, y})) there.push_back({tile.zoom + 1, x, y});
-    }
-  }
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const TileRange& range : ranges_of(there)) {
-    list.push_back(
-        {{"startX", range.x0}, {"startY", range.y0}, {"endX", range.x1}, {"endY", range.y1}});
-  }
-  return nlohmann::ordered_json{{"available", {list}}}.dump();
+/// The number of a tile among some sorted by row.
+std::optional<std::size_t> number_of(const TileAddress& tile,
+                                     const std::vector<TileAddress>& tiles) {
+  const auto found = std::lower_bound(tiles.begin(), tiles.end(), tile, by_row);
+  if (found == tiles.end() || *found != tile) return std::nullopt;
+  return static_cast<std::size_t>(found - tiles.begin());
 }
 
 }  // namespace
@@ -68,12 +64,30 @@ void TileSetWriter::begin_change() {
   });
 }
 
-TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const ZoomPlan& plan,
-                                                 TileSurface& surface, SharedSides& sides) {
+std::string TileSetWriter::children_json(const TileAddress& tile) const {
+  std::vector<TileAddress> there;
+  // Metadata begin at zoom 0, so zooms have their own numbers.
+  if (tile.zoom + 1 < zooms_.size()) {
+    const Zoom& below = *zooms_[tile.zoom + 1];
+    for (const TileAddress& child : children_of(tile)) {
+      const auto number = number_of(child, below.tiles);
+      if (number && below.written[*number].finished.bytes > 0) there.push_back(child);
+    }
+  }
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const TileRange& range : ranges_of(there)) {
+    list.push_back(
+        {{"startX", range.x0}, {"startY", range.y0}, {"endX", range.x1}, {"endY", range.y1}});
+  }
+  return nlohmann::ordered_json{{"available", {list}}}.dump();
+}
+
+TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, Zoom& zoom,
+                                                 TileSurface& surface) {
   context_.check_stop();
   TileInputs inputs{options_.mesh(), options_.request.gzip, options_.source_options, {}};
-  if (options_.request.metadata) inputs.metadata = children_json(tile, deeper_);
-  const std::uint64_t digest = digest_of(tile, plan, inputs, surface);
+  if (options_.request.metadata) inputs.metadata = children_json(tile);
+  const std::uint64_t digest = digest_of(tile, zoom.plan, inputs, surface);
   const std::string path = options_.folder + "/" + tile_path(tile);
   std::vector<std::byte> before;
   if (const FinishedTile* earlier = journal_.find(tile);
@@ -84,7 +98,7 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const 
       return {false, true, *earlier};
     }
   }
-  MadeTile made = make_tile(tile, plan, surface, options_.mesh(), &sides);
+  MadeTile made = make_tile(tile, zoom.plan, surface, options_.mesh(), &zoom.sides);
   if (!made.has_data && tile.zoom > 0) return {true, true, {.inputs = digest}};
   made.mesh.metadata = std::move(inputs.metadata);
   std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
@@ -99,60 +113,98 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const 
   return written;
 }
 
-void TileSetWriter::write_zooms() {
+void TileSetWriter::begin_zooms() {
   TileSurface& surface = *surfaces_.front();
-  std::vector<std::unique_ptr<Zoom>> zooms;
-  for (unsigned zoom = options_.last_zoom + 1; zoom-- > options_.request.first_zoom;) {
+  for (unsigned zoom = options_.request.first_zoom; zoom <= options_.last_zoom; ++zoom) {
     auto begun = std::make_unique<Zoom>();
     begun->tiles = candidates(zoom, surface, context_);
     // A quarter more, for what is filled beside the samples.
     begun->range = 1.25 * widest_range(begun->tiles, surface);
     begun->plan = plan_zoom(zoom, options_.max_error(zoom), begun->range, surface);
-    zooms.push_back(std::move(begun));
-  }
-  // Metadata of a tile needs those of the next zoom below finished. Else all zooms are one queue:
-  // the upper ones have fewer tiles than there may be threads.
-  const std::size_t together = options_.request.metadata ? 1 : zooms.size();
-  for (std::size_t first = 0; first < zooms.size(); first += together) {
-    std::vector<Zoom*> open;
-    for (std::size_t i = 0; i < together; ++i) open.push_back(zooms[first + i].get());
-    while (!open.empty()) {
-      write_tiles(open);
-      std::erase_if(open, [](const Zoom* zoom) { return !zoom->too_far; });
-      for (Zoom* zoom : open) take_larger_steps(*zoom);
-    }
-    for (std::size_t i = 0; i < together; ++i) conclude(*zooms[first + i]);
+    zooms_.push_back(std::move(begun));
   }
 }
 
-void TileSetWriter::write_tiles(const std::vector<Zoom*>& zooms) {
-  std::vector<std::pair<Zoom*, std::size_t>> queue;
-  for (Zoom* zoom : zooms) {
-    zoom->written.clear();
-    for (std::size_t i = 0; i < zoom->tiles.size(); ++i) queue.emplace_back(zoom, i);
+void TileSetWriter::add_to(Family& family, std::size_t zoom, std::size_t number) {
+  if (zoom + 1 < zooms_.size()) {
+    for (const TileAddress& child : children_of(zooms_[zoom]->tiles[number])) {
+      if (const auto below = number_of(child, zooms_[zoom + 1]->tiles)) {
+        add_to(family, zoom + 1, *below);
+      }
+    }
   }
+  if (zooms_[zoom]->open) family.emplace_back(zooms_[zoom].get(), number);
+}
+
+std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
+  // Of the uppermost zoom that has enough for all threads; what is above is written tile by tile.
+  std::size_t zoom = zooms_.size() - 1;
+  while (zoom > 0 && zooms_[zoom - 1]->tiles.size() >= kFamiliesPerThread * surfaces_.size()) {
+    --zoom;
+  }
+  std::vector<std::vector<Family>> stages(1);
+  for (std::size_t i = 0; i < zooms_[zoom]->tiles.size(); ++i) {
+    Family family;
+    add_to(family, zoom, i);
+    stages.back().push_back(std::move(family));
+  }
+  while (zoom-- > 0) {
+    // Metadata of a tile need its children.
+    if (options_.request.metadata) stages.emplace_back();
+    if (!zooms_[zoom]->open) continue;
+    for (std::size_t i = 0; i < zooms_[zoom]->tiles.size(); ++i) {
+      stages.back().push_back({{zooms_[zoom].get(), i}});
+    }
+  }
+  return stages;
+}
+
+void TileSetWriter::write(const Family& family, TileSurface& surface,
+                          const std::function<void(const TileAddress&, const Written&)>& done) {
+  for (const auto& [zoom, number] : family) {
+    if (zoom->too_far) continue;
+    const TileAddress& tile = zoom->tiles[number];
+    try {
+      zoom->written[number] = write_tile(tile, *zoom, surface);
+      done(tile, zoom->written[number]);
+    } catch (const HeightsTooFar&) {
+      zoom->too_far = true;
+    }
+  }
+}
+
+void TileSetWriter::write_zooms() {
+  begin_zooms();
   ProgressReport report(context_, "tiles");
-  in_order(
-      queue.size(), static_cast<unsigned>(surfaces_.size()),
-      [&](unsigned worker, std::size_t i) {
-        const auto& [zoom, number] = queue[i];
-        if (!zoom->too_far) {
-          try {
-            return write_tile(zoom->tiles[number], zoom->plan, *surfaces_[worker], zoom->sides);
-          } catch (const HeightsTooFar&) {
-            zoom->too_far = true;
-          }
-        }
-        return Written{};
-      },
-      [&](std::size_t i, const Written& written) {
-        report.update(result.tiles + i,
-                      static_cast<double>(i + 1) / static_cast<double>(queue.size()));
-        const auto& [zoom, number] = queue[i];
-        if (written.made) journal_.add(zoom->tiles[number], written.finished);
-        zoom->written.push_back(written);
-        if (number + 1 == zoom->tiles.size()) zoom->sides.clear();
-      });
+  for (bool again = true; again;) {
+    std::size_t tiles = 0, finished = 0;
+    for (const auto& zoom : zooms_) {
+      if (!zoom->open) continue;
+      tiles += zoom->tiles.size();
+      zoom->written.assign(zoom->tiles.size(), {});
+    }
+    std::mutex mutex;
+    const auto done = [&](const TileAddress& tile, const Written& written) {
+      const std::lock_guard lock(mutex);
+      if (written.made) journal_.add(tile, written.finished);
+      ++finished;
+      report.update(finished, static_cast<double>(finished) / static_cast<double>(tiles));
+    };
+    for (const std::vector<Family>& stage : stages()) {
+      parallel_for(
+          stage.size(), static_cast<unsigned>(surfaces_.size()),
+          [&](unsigned worker, std::size_t i) { write(stage[i], *surfaces_[worker], done); });
+    }
+    again = false;
+    for (auto zoom = zooms_.rbegin(); zoom != zooms_.rend(); ++zoom) {
+      (*zoom)->sides.clear();
+      // Metadata above tell which of these tiles there are.
+      (*zoom)->open = (*zoom)->too_far || (again && options_.request.metadata);
+      if ((*zoom)->too_far) take_larger_steps(**zoom);
+      again = again || (*zoom)->open;
+    }
+  }
+  for (auto zoom = zooms_.rbegin(); zoom != zooms_.rend(); ++zoom) conclude(**zoom);
 }
 
 void TileSetWriter::take_larger_steps(Zoom& zoom) {
@@ -164,7 +216,6 @@ void TileSetWriter::take_larger_steps(Zoom& zoom) {
   }
   zoom.range = std::max(1.0, 2.0 * zoom.range);
   zoom.plan = plan_zoom(zoom.plan.zoom, zoom.plan.max_error, zoom.range, *surfaces_.front());
-  zoom.sides.clear();
   zoom.too_far = false;
 }
 
@@ -184,7 +235,6 @@ void TileSetWriter::conclude(const Zoom& zoom) {
   summary.tiles = there.size();
   result.tiles += there.size();
   result.zooms.insert(result.zooms.begin(), summary);
-  deeper_ = {there.begin(), there.end()};
 }
 
 void TileSetWriter::remove_others() {
@@ -195,12 +245,7 @@ void TileSetWriter::remove_others() {
     if (is_torn_tile(name)) torn.push_back(entry.path());
     const auto tile = parse_tile_path(name);
     if (!tile) continue;
-    const auto by_row = [](const TileAddress& a, const TileAddress& b) {
-      return a.y != b.y ? a.y < b.y : a.x < b.x;
-    };
-    if (tile->zoom >= present.size() ||
-        !std::binary_search(present[tile->zoom].begin(), present[tile->zoom].end(), *tile,
-                            by_row)) {
+    if (tile->zoom >= present.size() || !number_of(*tile, present[tile->zoom])) {
       gone.push_back(entry.path());
     }
   }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,6 @@ class TileSetWriter {
     present.resize(options.last_zoom + 1);
   }
 
-  /// The deepest zoom first: its tiles are named in the metadata of those above.
   void write_zooms();
   /// After all zooms: removes tiles of an earlier set that this one does not have, and temporary
   /// files of killed runs; completes the journal.
@@ -61,19 +61,30 @@ class TileSetWriter {
     FinishedTile finished;
   };
   struct Zoom {
-    std::vector<TileAddress> tiles;  ///< that may have data
+    std::vector<TileAddress> tiles;  ///< that may have data, sorted by row, then column
     double range = 0.0;              ///< of heights that a tile's steps must have room for
     ZoomPlan plan;
     SharedSides sides;
+    bool open = true;                   ///< its tiles are to be written
     std::atomic<bool> too_far = false;  ///< that room did not suffice
     std::vector<Written> written;       ///< by tile
   };
-  /// Sets too_far of zooms, whose tiles are then to be written again.
-  void write_tiles(const std::vector<Zoom*>& zooms);
+  /// Tiles that a thread writes one after another: one of some zoom and those below it, each after
+  /// its children, so that most of what is decoded for one serves the next.
+  using Family = std::vector<std::pair<Zoom*, std::size_t>>;
+
+  void begin_zooms();
+  /// Families that may be written at once, by stages that wait for the one before.
+  std::vector<std::vector<Family>> stages();
+  /// Adds the tiles of open zooms below a tile, and itself.
+  void add_to(Family& family, std::size_t zoom, std::size_t number);
+  void write(const Family& family, TileSurface& surface,
+             const std::function<void(const TileAddress&, const Written&)>& done);
+  Written write_tile(const TileAddress& tile, Zoom& zoom, TileSurface& surface);
+  /// The tiles of the next zoom below a tile, as its metadata tells them.
+  [[nodiscard]] std::string children_json(const TileAddress& tile) const;
   void take_larger_steps(Zoom& zoom);
   void conclude(const Zoom& zoom);
-  Written write_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
-                     SharedSides& sides);
   void remove_others();
   void begin_change();
 
@@ -83,7 +94,7 @@ class TileSetWriter {
   const std::string& layer_path_;
   TileJournal journal_;
   std::vector<TileJournal::Record> records_;
-  std::set<TileAddress> deeper_;
+  std::vector<std::unique_ptr<Zoom>> zooms_;  ///< from the first one asked for on
   std::once_flag changed_;
 };
 

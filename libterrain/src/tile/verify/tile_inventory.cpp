@@ -20,10 +20,6 @@ namespace fs = std::filesystem;
 /// Missing tiles of a zoom that are named one by one.
 constexpr std::uint64_t kMostNamed = 1000;
 
-bool by_row(const TileAddress& a, const TileAddress& b) {
-  return a.y != b.y ? a.y < b.y : a.x < b.x;
-}
-
 class Inventory {
  public:
   Inventory(const std::string& folder, const TileLayer& layer, const Context& context)
