@@ -89,10 +89,20 @@ void expect_bound(const TileAddress& tile, const MadeTile& made, const ZoomPlan&
             plan.max_error + (16 * unit > surface.spacing() ? kSteepest * unit : 0.0));
   EXPECT_EQ(made.has_data, samples.size() > 0);
   // Part by part it is the same.
-  const TileHeights parts = measure_tile(tile, made.mesh, surface);
+  const TileHeights parts = measure_tile(tile, made.mesh, surface, tile);
   EXPECT_EQ(parts.samples, samples.size());
   EXPECT_EQ(parts.uncovered, 0u);
   EXPECT_DOUBLE_EQ(parts.max_error, errors.largest);
+  // And by the tiles two zooms below.
+  TileHeights sum;
+  for (const TileAddress& child : children_of(tile)) {
+    for (const TileAddress& part : children_of(child)) {
+      sum.add(measure_tile(tile, made.mesh, surface, part));
+    }
+  }
+  EXPECT_EQ(sum.samples, parts.samples);
+  EXPECT_EQ(sum.uncovered, 0u);
+  EXPECT_DOUBLE_EQ(sum.max_error, parts.max_error);
 }
 
 void expect_sound(const TileAddress& tile, const MadeTile& made) {

@@ -36,6 +36,11 @@ inline std::array<TileAddress, 4> children_of(const TileAddress& tile) {
   return children;
 }
 
+/// The tile of a zoom, at most the tile's own, that a tile is part of.
+inline TileAddress ancestor_of(const TileAddress& tile, unsigned zoom) {
+  return {zoom, tile.x >> (tile.zoom - zoom), tile.y >> (tile.zoom - zoom)};
+}
+
 /// "9/543/380.terrain", the path under the folder of a tile set.
 std::string tile_path(const TileAddress& tile);
 /// The address of such a path; nullopt for any other text (leading zeros, too large, another

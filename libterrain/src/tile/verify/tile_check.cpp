@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <mutex>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -14,6 +15,7 @@
 #include <terrace/stream/gzip.hpp>
 
 #include "base/ordered_work.hpp"
+#include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "tile/format/quantized_mesh.hpp"
@@ -91,7 +93,6 @@ struct Checked {
   bool decoded = false;
   std::vector<TileFault> faults;
   TileBorders borders;
-  TileHeights heights;
 };
 
 /// The number in "byte 17" of a message.
@@ -113,7 +114,7 @@ class SetCheck {
         context_(context),
         records_(read_tile_records(request.folder)) {}
 
-  /// Checks the tiles of all zooms together, so that the few large ones share the threads.
+  /// tiles: of all zooms, sorted by zoom, row and column.
   void tiles(const std::vector<TileAddress>& tiles);
   /// tiles: of one zoom.
   void absent(unsigned zoom, const std::vector<TileAddress>& tiles);
@@ -126,7 +127,16 @@ class SetCheck {
   }
   [[nodiscard]] double bound_of(unsigned zoom) const;
   [[nodiscard]] bool is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const;
-  [[nodiscard]] Checked check(const TileAddress& tile, unsigned worker) const;
+  [[nodiscard]] Checked check(const TileAddress& tile, const TileHeights& heights) const;
+  /// A part of the globe that a thread measures in all tiles over it, so that most of what is
+  /// decoded for one serves the others.
+  struct Region {
+    TileAddress tile;
+    std::vector<std::size_t> tiles;  ///< the numbers of this one and of those below it
+  };
+  /// Of each tile. Tiles that cannot be read are left out: check() tells.
+  [[nodiscard]] std::vector<TileHeights> measure(const std::vector<TileAddress>& tiles) const;
+  [[nodiscard]] std::vector<Region> regions_of(const std::vector<TileAddress>& tiles) const;
   void compare(const TileAddress& tile, const char* side, const BorderSide& own,
                const TileAddress& neighbour, const BorderSide& other);
   void add(unsigned zoom, const TileHeights& heights);
@@ -154,17 +164,16 @@ bool SetCheck::is_as_written(const TileAddress& tile, std::span<const std::byte>
   return record->second.bytes == bytes.size() && record->second.checksum == checksum_of(bytes);
 }
 
-Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
+Checked SetCheck::check(const TileAddress& tile, const TileHeights& heights) const {
   context_.check_stop();
   Checked checked;
   DecodedTile decoded;
   try {
-    const std::string path = path_of(tile);
-    const std::vector<std::byte> bytes = read_tile_file(path);
+    const std::vector<std::byte> bytes = read_tile_file(path_of(tile));
     if (!is_as_written(tile, bytes)) {
       checked.faults.push_back({0, "not the bytes that were written: its checksum is another one"});
     }
-    decoded = unpack_tile(bytes, path);
+    decoded = unpack_tile(bytes, path_of(tile));
   } catch (const stream::Error& error) {
     checked.faults.push_back({byte_of(error.parts().where), error.parts().cause});
     return checked;
@@ -174,9 +183,6 @@ Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
     checked.faults.push_back(std::move(fault));
   }
   checked.borders = borders_of(decoded.mesh);
-  if (surfaces_.empty()) return checked;
-  checked.heights = measure_tile(tile, decoded.mesh, *surfaces_[worker]);
-  const TileHeights& heights = checked.heights;
   if (heights.uncovered > 0) {
     checked.faults.push_back(
         {0, with_commas(heights.uncovered) + " samples of the store lie over no triangle"});
@@ -190,6 +196,75 @@ Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
                                      " m"});
   }
   return checked;
+}
+
+std::vector<SetCheck::Region> SetCheck::regions_of(const std::vector<TileAddress>& tiles) const {
+  constexpr std::size_t kRegionsPerThread = 8;
+  const unsigned deepest = tiles.empty() ? 0 : tiles.back().zoom;
+  std::vector<TileAddress> found{{0, 0, 0}, {0, 1, 0}};
+  for (;;) {
+    // Boxes with their borders: samples there may lie in no other region.
+    std::erase_if(found, [&](const TileAddress& tile) {
+      return !may_have_samples(box_of(tile), *surfaces_.front());
+    });
+    const bool enough = found.size() >= kRegionsPerThread * threads_;
+    if (enough || found.empty() || found.front().zoom == deepest) break;
+    std::vector<TileAddress> below;
+    for (const TileAddress& tile : found) {
+      for (const TileAddress& child : children_of(tile)) below.push_back(child);
+    }
+    found = std::move(below);
+  }
+  std::sort(found.begin(), found.end(), by_row);
+  std::vector<Region> regions;
+  for (const TileAddress& tile : found) regions.push_back({tile, {}});
+  for (std::size_t i = 0; i < tiles.size() && !found.empty(); ++i) {
+    if (tiles[i].zoom < found.front().zoom) continue;
+    const TileAddress tile = ancestor_of(tiles[i], found.front().zoom);
+    const auto at = std::lower_bound(found.begin(), found.end(), tile, by_row);
+    if (at == found.end() || *at != tile) continue;  // it has no samples
+    regions[static_cast<std::size_t>(at - found.begin())].tiles.push_back(i);
+  }
+  return regions;
+}
+
+std::vector<TileHeights> SetCheck::measure(const std::vector<TileAddress>& tiles) const {
+  std::vector<TileHeights> heights(tiles.size());
+  const std::vector<Region> regions = regions_of(tiles);
+  std::mutex mutex;
+  std::size_t finished = 0;
+  ProgressReport report(context_, "regions");
+  parallel_for(regions.size(), threads_, [&](unsigned worker, std::size_t i) {
+    const Region& region = regions[i];
+    const auto measure_part = [&](std::size_t number, const TileAddress& part) {
+      context_.check_stop();
+      const TileAddress& tile = tiles[number];
+      DecodedTile decoded;
+      try {
+        decoded = unpack_tile(read_tile_file(path_of(tile)), path_of(tile));
+      } catch (const stream::Error&) {
+        return;
+      }
+      const TileHeights measured = measure_tile(tile, decoded.mesh, *surfaces_[worker], part);
+      const std::lock_guard lock(mutex);
+      heights[number].add(measured);
+    };
+    for (const std::size_t number : region.tiles) measure_part(number, tiles[number]);
+    for (unsigned zoom = region.tile.zoom; zoom-- > 0;) {
+      const TileAddress above = ancestor_of(region.tile, zoom);
+      const auto at = std::lower_bound(tiles.begin(), tiles.end(), above,
+                                       [](const TileAddress& a, const TileAddress& b) {
+                                         return a.zoom != b.zoom ? a.zoom < b.zoom : by_row(a, b);
+                                       });
+      if (at != tiles.end() && *at == above) {
+        measure_part(static_cast<std::size_t>(at - tiles.begin()), region.tile);
+      }
+    }
+    const std::lock_guard lock(mutex);
+    ++finished;
+    report.update(finished, static_cast<double>(finished) / static_cast<double>(regions.size()));
+  });
+  return heights;
 }
 
 void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSide& own,
@@ -207,10 +282,11 @@ void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
   std::map<std::uint32_t, BorderSide> below, row;
   BorderSide before, first;
   std::optional<TileAddress> last;
+  std::vector<TileHeights> heights(tiles.size());
+  if (!surfaces_.empty()) heights = measure(tiles);
   ProgressReport report(context_, "tiles");
   in_order(
-      tiles.size(), threads_,
-      [&](unsigned worker, std::size_t i) { return check(tiles[i], worker); },
+      tiles.size(), threads_, [&](unsigned, std::size_t i) { return check(tiles[i], heights[i]); },
       [&](std::size_t i, Checked&& checked) {
         const TileAddress& tile = tiles[i];
         for (TileFault& fault : checked.faults) {
@@ -239,7 +315,7 @@ void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
         }
         before = std::move(checked.borders.east);
         last = tile;
-        add(tile.zoom, checked.heights);
+        add(tile.zoom, heights[i]);
         report.update(i + 1, static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
       });
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -113,11 +114,25 @@ void Measurement::measure(const GeographicBox& box, const std::vector<std::uint3
 
 }  // namespace
 
-TileHeights measure_tile(const TileAddress& address, const TileMesh& mesh, TileSurface& surface) {
+void TileHeights::add(const TileHeights& part) {
+  samples += part.samples;
+  uncovered += part.uncovered;
+  // The same sample whatever part came first.
+  const auto rank = [](const TileHeights& h) {
+    return std::tuple(h.max_error, -h.longitude, -h.latitude);
+  };
+  if (rank(part) <= rank(*this)) return;
+  max_error = part.max_error;
+  longitude = part.longitude;
+  latitude = part.latitude;
+}
+
+TileHeights measure_tile(const TileAddress& address, const TileMesh& mesh, TileSurface& surface,
+                         const TileAddress& part) {
   std::vector<std::uint32_t> triangles(mesh.triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) triangles[t] = t;
   Measurement measurement(address, mesh, surface);
-  measurement.part(box_of(address), triangles);
+  measurement.part(box_of(part), triangles);
   return measurement.result;
 }
 
