@@ -7,58 +7,6 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kNodes = GeographyPatch::kNodes;
-
-/// Chebyshev's nodes in [0, 1]: the error of the polynomial through them is spread evenly, with
-/// extremes at (1 - cos(k pi / 6)) / 2. C. W. Clenshaw, A. R. Curtis 1960; L. N. Trefethen,
-/// Approximation Theory and Approximation Practice (2013), chapter 2.
-constexpr std::array<double, kNodes> kNode{0.01703708685546585, 0.14644660940672624,
-                                           0.37059047744873963, 0.62940952255126037,
-                                           0.85355339059327376, 0.98296291314453415};
-constexpr double kInner = 0.06698729810778066;
-/// Where the polynomials are checked: each sign of the error along one axis with each of the other.
-constexpr std::array<Point2, 6> kChecks{
-    {{0, 0}, {1, kInner}, {1 - kInner, 1}, {kInner, 1 - kInner}, {0.5, 0.5}, {0, 1}}};
-
-/// Coefficients of the polynomial in t through values at the nodes: row k gives those of t^k.
-using NodeMatrix = std::array<std::array<double, kNodes>, kNodes>;
-NodeMatrix monomials() {
-  NodeMatrix matrix{};
-  for (std::size_t i = 0; i < kNodes; ++i) {
-    // The product of (t - node) over the others, divided by its value at node i.
-    std::array<double, kNodes> product{1};
-    double scale = 1;
-    std::size_t degree = 0;
-    for (std::size_t j = 0; j < kNodes; ++j) {
-      if (j == i) continue;
-      ++degree;
-      for (std::size_t k = degree + 1; k-- > 0;) {
-        product[k] = (k > 0 ? product[k - 1] : 0.0) - kNode[j] * product[k];
-      }
-      scale *= kNode[i] - kNode[j];
-    }
-    for (std::size_t k = 0; k < kNodes; ++k) matrix[k][i] = product[k] / scale;
-  }
-  return matrix;
-}
-
-/// [k][m]: of s^k t^m, through values[j * kNodes + i] at node i of s and j of t.
-std::array<GeographyPatch::Quintic, kNodes> coefficients(
-    const std::array<double, kNodes * kNodes>& values, const NodeMatrix& matrix) {
-  std::array<GeographyPatch::Quintic, kNodes> along{}, both{};
-  for (std::size_t j = 0; j < kNodes; ++j) {
-    for (std::size_t k = 0; k < kNodes; ++k) {
-      for (std::size_t i = 0; i < kNodes; ++i) along[k][j] += matrix[k][i] * values[j * kNodes + i];
-    }
-  }
-  for (std::size_t k = 0; k < kNodes; ++k) {
-    for (std::size_t m = 0; m < kNodes; ++m) {
-      for (std::size_t j = 0; j < kNodes; ++j) both[k][m] += matrix[m][j] * along[k][j];
-    }
-  }
-  return both;
-}
-
 /// Patches along a side of the box, at most.
 constexpr double kMostPatches = 64;
 constexpr double kPatchMetres = 20e3;
@@ -66,56 +14,28 @@ constexpr double kMetresPerDegree = 111e3;
 
 }  // namespace
 
-GeographyPatch::Row GeographyPatch::row(double t) const {
-  Row row{base_};
-  for (std::size_t k = 0; k < kNodes; ++k) {
-    row.a[k] = value(longitude_[k], t);
-    row.b[k] = value(latitude_[k], t);
-  }
-  return row;
-}
-
 std::optional<GeographyPatch> GeographyPatch::fit(
     const Point2& low, const Point2& size, double tolerance,
     const std::function<void(std::span<Point2>)>& exact) {
-  static const NodeMatrix matrix = monomials();
-  std::array<Point2, kNodes * kNodes + kChecks.size()> places{};
-  for (std::size_t j = 0; j < kNodes; ++j) {
-    for (std::size_t i = 0; i < kNodes; ++i) {
-      places[j * kNodes + i] = {low[0] + kNode[i] * size[0], low[1] + kNode[j] * size[1]};
-    }
-  }
-  for (std::size_t k = 0; k < kChecks.size(); ++k) {
-    places[kNodes * kNodes + k] = {low[0] + kChecks[k][0] * size[0],
-                                   low[1] + kChecks[k][1] * size[1]};
-  }
+  std::array<Point2, QuinticSurface::kPlaces> places = QuinticSurface::places();
+  for (Point2& p : places) p = {low[0] + p[0] * size[0], low[1] + p[1] * size[1]};
   exact(places);
   // Longitudes counted on from the first beyond 180, and how far that goes.
   double least = places[0][0], most = places[0][0];
-  for (Point2& p : places) {
+  std::array<double, QuinticSurface::kPlaces> longitudes{}, latitudes{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    Point2& p = places[i];
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) return std::nullopt;
     p[0] += 360.0 * std::round((places[0][0] - p[0]) / 360.0);
     least = std::min(least, p[0]);
     most = std::max(most, p[0]);
+    longitudes[i] = p[0];
+    latitudes[i] = p[1];
   }
-  // Small numbers: powers of t amplify what is rounded.
-  GeographyPatch patch;
-  patch.base_ = places[0];
-  std::array<double, kNodes * kNodes> longitudes{}, latitudes{};
-  for (std::size_t i = 0; i < longitudes.size(); ++i) {
-    longitudes[i] = places[i][0] - patch.base_[0];
-    latitudes[i] = places[i][1] - patch.base_[1];
-  }
-  patch.longitude_ = coefficients(longitudes, matrix);
-  patch.latitude_ = coefficients(latitudes, matrix);
-  for (std::size_t k = 0; k < kChecks.size(); ++k) {
-    const Point2& truth = places[kNodes * kNodes + k];
-    const Row along = patch.row(kChecks[k][1]);
-    const double off = std::max(std::abs(along.longitude(kChecks[k][0]) - truth[0]),
-                                std::abs(along.latitude(kChecks[k][0]) - truth[1]));
-    // Between the places checked the error may be some times larger.
-    if (!(off <= tolerance / 8)) return std::nullopt;
-  }
+  const auto longitude = QuinticSurface::through(longitudes, tolerance);
+  const auto latitude = QuinticSurface::through(latitudes, tolerance);
+  if (!longitude || !latitude) return std::nullopt;
+  GeographyPatch patch(*longitude, *latitude);
   // What the extremes of the places themselves are is not known: a margin for the edges.
   patch.within_turn_ = least - (most - least) >= -180.0 && most + (most - least) <= 180.0;
   return patch;

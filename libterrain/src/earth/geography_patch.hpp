@@ -1,41 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "earth/quintic_surface.hpp"
 #include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 
-/// Longitudes and latitudes in a rectangle of plane coordinates by polynomials of fifth degree in
-/// each direction, through Chebyshev's nodes.
+/// Longitudes and latitudes in a rectangle of plane coordinates by polynomials.
 class GeographyPatch {
  public:
-  static constexpr std::size_t kNodes = 6;
-  using Quintic = std::array<double, kNodes>;
-
   /// The polynomials along a parallel of the rectangle's sides.
   struct Row {
     Point2 base{};
-    Quintic a{}, b{};
-    [[nodiscard]] double longitude(double s) const { return base[0] + value(a, s); }
-    [[nodiscard]] double latitude(double s) const { return base[1] + value(b, s); }
+    QuinticSurface::Quintic a{}, b{};
+    [[nodiscard]] double longitude(double s) const { return base[0] + QuinticSurface::value(a, s); }
+    [[nodiscard]] double latitude(double s) const { return base[1] + QuinticSurface::value(b, s); }
   };
 
   /// exact: turns plane coordinates into longitudes and latitudes in place, NaN where there are
   /// none. Longitudes must lie within one turn. nullopt where a place in the rectangle could be off
-  /// by more than `tolerance` degrees: it is checked where the error of the polynomials has its
-  /// extremes, with a margin of eight. 42 exact places.
+  /// by more than `tolerance` degrees, as QuinticSurface tells. 42 exact places.
   static std::optional<GeographyPatch> fit(const Point2& low, const Point2& size, double tolerance,
                                            const std::function<void(std::span<Point2>)>& exact);
 
   /// t: 0 to 1 along the second side.
-  [[nodiscard]] Row row(double t) const;
+  [[nodiscard]] Row row(double t) const {
+    return {{longitude_.base(), latitude_.base()}, longitude_.along(t), latitude_.along(t)};
+  }
   /// Whether all longitudes lie in [-180, 180] as the polynomials give them.
   [[nodiscard]] bool is_within_turn() const { return within_turn_; }
   static double in_turn(double longitude) {
@@ -43,13 +40,10 @@ class GeographyPatch {
   }
 
  private:
-  static double value(const Quintic& c, double t) {
-    return ((((c[5] * t + c[4]) * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0];
-  }
+  GeographyPatch(const QuinticSurface& longitude, const QuinticSurface& latitude)
+      : longitude_(longitude), latitude_(latitude) {}
 
-  Point2 base_{};
-  /// [k][m]: of s^k t^m, s along the first side.
-  std::array<Quintic, kNodes> longitude_{}, latitude_{};
+  QuinticSurface longitude_, latitude_;
   bool within_turn_ = true;
 };
 

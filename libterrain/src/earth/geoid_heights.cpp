@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "earth/geoid_heights.hpp"
 
-#include <cassert>
 #include <cmath>
 #include <filesystem>
 #include <string_view>
@@ -13,6 +12,7 @@
 #include "earth/crs/operation_choice.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"
+#include "earth/smooth_offsets.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -145,14 +145,17 @@ void EllipsoidalHeights::convert(std::span<const Point2> places, std::span<doubl
 
 void EllipsoidalHeights::add_geoid(std::span<const Point2> places,
                                    std::span<double> heights) const {
-  assert(places.size() == heights.size());
-  if (operation_) {
-    operation_->add_heights(places, heights);
-  } else if (geoid_) {
-    for (std::size_t i = 0; i < heights.size(); ++i) {
-      if (!std::isnan(heights[i])) heights[i] += geoid_->undulation(places[i]);
-    }
-  }
+  if (!has_geoid()) return;
+  add_smooth_offsets(places, heights, kTolerance,
+                     [this](std::span<const Point2> at, std::span<double> out) {
+                       if (operation_) {
+                         operation_->add_heights(at, out);
+                         return;
+                       }
+                       for (std::size_t i = 0; i < out.size(); ++i) {
+                         if (!std::isnan(out[i])) out[i] += geoid_->undulation(at[i]);
+                       }
+                     });
 }
 
 void EllipsoidalHeights::add_to(Digest& digest) const {

@@ -52,11 +52,14 @@ class EllipsoidalHeights {
                      const std::string& geoid, std::uint64_t memory_bytes,
                      const std::optional<GeographicArea>& area = std::nullopt);
 
+  /// Metres: what a height may be off among many.
+  static constexpr double kTolerance = 1e-5;
+
   /// heights in the store's vertical unit at places in WGS 84 degrees, to metres above the
   /// ellipsoid, in place. Sizes are equal.
   void convert(std::span<const Point2> places, std::span<double> heights) const;
   /// The second half of that: heights in metres get what the geoid lies above the ellipsoid. Does
-  /// nothing unless has_geoid(). Ask for many places at once.
+  /// nothing unless has_geoid(). Ask for many places at once: see add_smooth_offsets().
   void add_geoid(std::span<const Point2> places, std::span<double> heights) const;
 
   /// Metres in a unit of the store's heights.
