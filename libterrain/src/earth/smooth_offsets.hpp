@@ -11,9 +11,9 @@ namespace terrace::terrain {
 /// Adds to each height what exact(places, heights) adds to it, to within `tolerance`: something
 /// that is smooth but on some lines, as geoids are on the lines of their grids. By polynomials of
 /// fifth degree in boxes around places, checked as GeographyPatch is; boxes where these do not
-/// suffice are cut in four, on lines of usual grids. Heights that are NaN stay so. Sizes are equal. The same places give the
-/// same heights; one of them among others may get one that differs by the tolerance.
-/// 12 ns per height where most are near each other, against 170 ns by PROJ.
+/// suffice are cut in four, on lines of usual grids. Heights that are NaN stay so. Sizes are equal.
+/// The same places give the same heights; one of them among others may get one that differs by the
+/// tolerance. 12 ns per height where most are near each other, against 170 ns by PROJ.
 void add_smooth_offsets(
     std::span<const Point2> places, std::span<double> heights, double tolerance,
     const std::function<void(std::span<const Point2>, std::span<double>)>& exact);

@@ -314,17 +314,21 @@ bool RasterTileSurface::rows(const GeographicBox& box, SurfaceRows& out) {
     double* const to = out.height.data() + i * across->count;
     for (std::size_t k = 0; k < across->count; ++k) to[k] = from[k] * metres;
     if (across->descending) std::reverse(to, to + across->count);
-    if (raster_.vertical.has_geoid()) {
-      places_.clear();
-      for (const double place : out.longitude) places_.push_back({place, out.latitude[i]});
-      raster_.vertical.add_geoid(places_, {to, across->count});
-    }
-    if (raster_.flat_fill) {
-      for (std::size_t k = 0; k < across->count; ++k) {
-        if (std::isnan(to[k])) to[k] = *raster_.flat_fill;
-      }
+  }
+  filled_.clear();
+  if (raster_.flat_fill) {
+    for (std::size_t i = 0; i < out.height.size(); ++i) {
+      if (std::isnan(out.height[i])) filled_.push_back(i);
     }
   }
+  if (raster_.vertical.has_geoid()) {
+    places_.clear();
+    for (const double north : out.latitude) {
+      for (const double east : out.longitude) places_.push_back({east, north});
+    }
+    raster_.vertical.add_geoid(places_, out.height);
+  }
+  for (const std::size_t i : filled_) out.height[i] = *raster_.flat_fill;
   return true;
 }
 
