@@ -112,12 +112,14 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
     last_longitude_ = all.max[0];
   }
   find_bounds(store.path().string(), store.schema().grid);
-  if (!store.schema().grid) fit_polynomials(store);
+  fit_polynomials(store);
 }
 
 void StoredPlaces::fit_polynomials(const stream::Store& store) {
-  world_bounds_ = world_box(store.schema(), store.bounds());
-  geography_.emplace(crs_, world_bounds_);
+  world_bounds_ = world_box(store.schema(), {{stored_.min[0], stored_.min[1], 0.0},
+                                             {stored_.max[0], stored_.max[1], 0.0}});
+  // Samples of rasters are placed window by window.
+  if (!store.schema().grid) geography_.emplace(crs_, world_bounds_);
   const Point2 size{world_bounds_.max[0] - world_bounds_.min[0],
                     world_bounds_.max[1] - world_bounds_.min[1]};
   const bool turns = bounds_.west == -180.0 || bounds_.east == 180.0;

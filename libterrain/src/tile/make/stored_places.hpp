@@ -50,7 +50,7 @@ class StoredPlaces {
   /// irregular points by BoxGeography, within its tolerance.
   void to_geographic(std::span<Point2> places) const;
   /// Longitude and latitude to stored x, y, in place. -180 and 180 give the same. Places that
-  /// have none get a corner outside stored_bounds(). Of irregular points by polynomials, within a
+  /// have none get a corner outside stored_bounds(). Of projected stores by polynomials, within a
   /// hundredth of a millimetre.
   void to_stored(std::span<Point2> places) const;
 
@@ -63,9 +63,8 @@ class StoredPlaces {
   [[nodiscard]] double in_turn(double longitude) const;
 
   CoordinateSystem crs_;
-  // Fast ways there and back for projected points; none for rasters.
-  std::optional<BoxGeography> geography_;
-  GeographyPatches plane_;  ///< to world x, y as shares of world_bounds_
+  std::optional<BoxGeography> geography_;  ///< of irregular points
+  GeographyPatches plane_;  ///< to world x, y as shares of world_bounds_; of projected stores
   stream::Box3 world_bounds_{};
   stream::Placement placement_;
   StoredBox stored_;
