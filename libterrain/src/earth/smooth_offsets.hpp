@@ -13,7 +13,8 @@ namespace terrace::terrain {
 /// fifth degree in boxes around places, checked as GeographyPatch is; boxes where these do not
 /// suffice are cut in four, on lines of usual grids. Heights that are NaN stay so. Sizes are equal.
 /// The same places give the same heights; one of them among others may get one that differs by the
-/// tolerance. 12 ns per height where most are near each other, against 170 ns by PROJ.
+/// tolerance. 66 to 240 million heights per second and core for EGM96 at places near
+/// each other, against 4 million one by one (tests/bench/geography_bench).
 void add_smooth_offsets(
     std::span<const Point2> places, std::span<double> heights, double tolerance,
     const std::function<void(std::span<const Point2>, std::span<double>)>& exact);
