@@ -29,7 +29,7 @@ class GridGeography {
   /// [-180, 180], but those of a raster in degrees are left as they are. The same for every window
   /// that a sample is part of to within kTolerance, not to the last bit.
   /// 150 to 270 million samples per second and core, by the projection, in windows of 1024 x 1024
-  /// samples (tests/bench/geography_bench); single places are 2.6 to 39 million.
+  /// samples (tests/bench/geography_bench); single places are 0.6 to 21 million.
   void window(std::int64_t first_column, std::int64_t first_row, std::size_t columns,
               std::size_t rows, std::span<double> longitude, std::span<double> latitude) const;
 

@@ -25,6 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// At least, so that threads end at about the same time.
 constexpr std::size_t kFamiliesPerThread = 8;
 
 /// Tiles that may have data, sorted by row, then column. The two of zoom 0 always count.
