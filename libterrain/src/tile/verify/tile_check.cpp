@@ -134,7 +134,7 @@ class SetCheck {
     TileAddress tile;
     std::vector<std::size_t> tiles;  ///< the numbers of this one and of those below it
   };
-  /// Of each tile. Tiles that cannot be read are left out: check() tells.
+  /// The heights of each tile. Tiles that cannot be read are skipped: check() reports them.
   [[nodiscard]] std::vector<TileHeights> measure(const std::vector<TileAddress>& tiles) const;
   [[nodiscard]] std::vector<Region> regions_of(const std::vector<TileAddress>& tiles) const;
   void compare(const TileAddress& tile, const char* side, const BorderSide& own,
