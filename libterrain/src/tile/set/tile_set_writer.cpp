@@ -138,7 +138,8 @@ void TileSetWriter::add_to(Family& family, std::size_t zoom, std::size_t number)
 }
 
 std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
-  // The uppermost zoom that has enough tiles for all threads; those above it are written one by one.
+  // The uppermost zoom that has enough tiles for all threads; those above it are written one by
+  // one.
   std::size_t zoom = zooms_.size() - 1;
   while (zoom > 0 && zooms_[zoom - 1]->tiles.size() >= kFamiliesPerThread * surfaces_.size()) {
     --zoom;
