@@ -7,6 +7,7 @@
 #include <fstream>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -142,6 +143,23 @@ TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
   EXPECT_THROW(EllipsoidalHeights(schema_with("ellipsoidal", "metre"), HeightReference::orthometric,
                                   "", kMemory),
                UsageError);
+}
+
+TEST(EllipsoidalHeightsTest, ManyTogetherGetWhatEachGetsAlone) {
+  const EllipsoidalHeights sea(schema_with("", "metre"), HeightReference::orthometric, "", kMemory);
+  constexpr int kSide = 120;
+  for (const double step : {1.0 / 1200, 0.02, 1.5}) {
+    std::vector<Point2> places;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      places.push_back({7.93 + i % kSide * step, -89.0 + i / kSide * step});
+    }
+    std::vector<double> heights(places.size(), 100.0);
+    sea.convert(places, heights);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      EXPECT_NEAR(heights[i], converted(sea, places[i], 100.0), EllipsoidalHeights::kTolerance)
+          << places[i][0] << "," << places[i][1];
+    }
+  }
 }
 
 TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {

@@ -2,6 +2,7 @@
 #include "tile/set/tile_set_writer.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -197,6 +198,9 @@ void TileSetWriter::write_zooms() {
           stage.size(), static_cast<unsigned>(surfaces_.size()),
           [&](unsigned worker, std::size_t i) { write(stage[i], *surfaces_[worker], done); });
     }
+    // Each tile is below one of the zoom above that may have data, too.
+    assert(finished == tiles ||
+           std::ranges::any_of(zooms_, [](const auto& zoom) { return zoom->too_far.load(); }));
     again = false;
     for (auto zoom = zooms_.rbegin(); zoom != zooms_.rend(); ++zoom) {
       (*zoom)->sides.clear();
