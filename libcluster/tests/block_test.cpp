@@ -30,7 +30,7 @@ std::vector<Block> ordinary_blocks(std::uint64_t seed) {
   for (const std::size_t count : {2u, 3u, 15u, 16u, 17u, 2500u}) {
     blocks.push_back({std::to_string(count) + " points", inputs::cube(count, random)});
   }
-  if (seed == 1) blocks.push_back({"large", inputs::cube(30000, random)});
+  if (seed == 1) blocks.push_back({"large", inputs::cube(30000 / TERRACE_TEST_SHARE, random)});
   Block weighted{"weighted", inputs::cube(4000, random)};
   for (std::size_t i = 0; i < weighted.points.size(); ++i) {
     weighted.weights.push_back(0.01 + 5 * inputs::uniform(random) * inputs::uniform(random));

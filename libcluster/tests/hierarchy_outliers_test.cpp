@@ -204,7 +204,7 @@ TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
   std::mt19937_64 random(73);
   for (const double price : {0.02, 0.05, 0.1}) {
     SCOPED_TRACE("price " + std::to_string(price));
-    std::vector<Point3> points = inputs::scan(2, 50, random);
+    std::vector<Point3> points = inputs::scan(2, 40, random);
     for (std::size_t i = 0; i < points.size(); i += 250) points[i][2] += 3.0;
     points.push_back(points.front());
     HierarchyOptions options;

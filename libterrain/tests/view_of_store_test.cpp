@@ -109,10 +109,9 @@ class ViewOfStore : public testing::Test {
       return 300 + 200 * std::sin(x / 9) * std::cos(y / 7) + x;
     });
     for (const auto& [input, conditions] :
-         {std::pair{cloud,
-                    std::vector<std::string>{"class == 0", "class == 1", "class == 2",
-                                             "class == 4 && z > 5", "class == 6 || class == 2",
-                                             "class == 0 && x < 300400"}},
+         {std::pair{cloud, std::vector<std::string>{"class == 1", "class == 4 && z > 5",
+                                                    "class == 6 || class == 2",
+                                                    "class == 0 && x < 300400"}},
           std::pair{raster, std::vector<std::string>{"z > 250", "z < 400 && x > 500900"}}}) {
       const stream::Store all = build(input, input.stem().string() + ".all", {});
       for (const std::string& condition : conditions) {
