@@ -2,6 +2,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "terrace/stream/source.hpp"
 
@@ -12,5 +14,13 @@ namespace terrace::stream {
 /// condition and for unknown names.
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options);
+
+/// The attributes that are kept or that the condition names: no others need to be read.
+/// Throws: Error for an invalid condition.
+std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted);
+
+/// Throws: Error that names `file` if one of `names` is not an attribute.
+void check_attributes(const std::vector<std::string>& names, const std::vector<Channel>& attributes,
+                      const std::string& file);
 
 }  // namespace terrace::stream
