@@ -32,7 +32,6 @@ std::string difference(const SourceInfo& first, const SourceInfo& other) {
   const std::string& name = first.files.front();
   const std::string more = list_of(other.attributes, first.attributes);
   const std::string less = list_of(first.attributes, other.attributes);
-  if (more.empty() && less.empty()) return "its attributes are in another order than in " + name;
   if (less.empty()) return "it has attributes that " + name + " lacks: " + more;
   if (more.empty()) return "it lacks attributes that " + name + " has: " + less;
   return "it has the attributes " + more + " where " + name + " has " + less;
@@ -55,7 +54,9 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other) {
     refuse(difference(first, other), "`keep` what all files have, or read them on their own");
   }
   if (first.crs != other.crs) {
-    refuse("its coordinate reference system is not that of " + first.files.front());
+    refuse("its coordinate reference system is not that of " + first.files.front(),
+           "name the one that both have (`crs` of build), convert one of them, or read them on "
+           "their own");
   }
 }
 
@@ -162,11 +163,15 @@ class Chain final : public PointSource {
     std::uint64_t bytes = 0;
   };
 
-  /// The source with only the attributes that the selection needs.
+  /// The source with only the attributes that the selection needs, in the order of the first file.
   [[nodiscard]] std::unique_ptr<PointSource> narrowed(std::unique_ptr<PointSource> source) const {
-    SourceOptions options = options_;
-    options.selection = {.keep = needed_attributes(source->info(), options_.selection)};
-    return selection_of(std::move(source), options);
+    const std::vector<std::string> needed = needed_attributes(source->info(), options_.selection);
+    std::vector<std::string> names;
+    for (const Channel& attribute : info_.attributes) names.push_back(attribute.name);
+    for (const std::string& name : needed) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+    return with_attributes(std::move(source), names, options_.block_points);
   }
   /// Files need to agree only in the attributes that the selection needs.
   void narrow_all() {

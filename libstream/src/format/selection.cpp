@@ -28,7 +28,9 @@ bool is_kept(const std::string& name, const Selection& wanted) {
 
 class SelectedSource final : public PointSource {
  public:
-  SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options)
+  /// order: of the attributes; empty: as in the file.
+  SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options,
+                 const std::vector<std::string>& order = {})
       : source_(std::move(source)), block_points_(options.block_points) {
     const SourceInfo& all = source_->info();
     const Selection& wanted = options.selection;
@@ -47,12 +49,21 @@ class SelectedSource final : public PointSource {
     const std::string file = all.files.empty() ? std::string() : all.files.front();
     if (all.files.size() <= 1 || all.grid) check_attributes(wanted.drop, all.attributes, file);
     if (wanted.keep) check_attributes(*wanted.keep, all.attributes, file);
-    info_.attributes.clear();
+    std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < all.attributes.size(); ++i) {
-      const Channel& attribute = all.attributes[i];
-      if (!is_kept(attribute.name, wanted)) continue;
-      info_.attributes.push_back(attribute);
-      const std::size_t from = all.attribute_offset(i), bytes = size_of(attribute.type);
+      if (is_kept(all.attributes[i].name, wanted)) kept.push_back(i);
+    }
+    const auto place = [&](std::size_t i) {
+      return std::find(order.begin(), order.end(), all.attributes[i].name);
+    };
+    if (!order.empty()) {
+      std::stable_sort(kept.begin(), kept.end(),
+                       [&](std::size_t a, std::size_t b) { return place(a) < place(b); });
+    }
+    info_.attributes.clear();
+    for (const std::size_t i : kept) {
+      info_.attributes.push_back(all.attributes[i]);
+      const std::size_t from = all.attribute_offset(i), bytes = size_of(all.attributes[i].type);
       if (!pieces_.empty() && pieces_.back().from + pieces_.back().bytes == from) {
         pieces_.back().bytes += bytes;
       } else {
@@ -155,6 +166,19 @@ class SelectedSource final : public PointSource {
 };
 
 }  // namespace
+
+std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
+                                             const std::vector<std::string>& names,
+                                             std::size_t block_points) {
+  SourceOptions options{.block_points = block_points};
+  for (const Channel& attribute : source->info().attributes) {
+    const std::string& name = attribute.name;
+    if (std::find(names.begin(), names.end(), name) == names.end()) {
+      options.selection.drop.push_back(name);
+    }
+  }
+  return std::make_unique<SelectedSource>(std::move(source), options, names);
+}
 
 std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted) {
   std::optional<Where> where;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +15,11 @@ namespace terrace::stream {
 /// condition and for unknown names.
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options);
+
+/// The source with only those of its attributes that are among `names`, in the order of `names`.
+std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
+                                             const std::vector<std::string>& names,
+                                             std::size_t block_points);
 
 /// The attributes that are kept or that the condition names: no others need to be read.
 /// Throws: Error for an invalid condition.
