@@ -266,6 +266,12 @@ Where::Where(const std::string& text, const Schema& schema) : text_(text), schem
   Parser(*this, schema_).parse();
 }
 
+bool Where::uses(std::size_t attribute) const {
+  return std::any_of(steps_.begin(), steps_.end(), [&](const Step& step) {
+    return step.operation == Operation::attribute && step.index == attribute;
+  });
+}
+
 void Where::test(std::span<const Point3> positions, std::span<const std::byte> records,
                  std::span<std::uint8_t> matches) const {
   assert(matches.size() == positions.size());

@@ -107,6 +107,9 @@ TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
   fs::create_directory(folder_.path() / "void");
   EXPECT_NE(refusal({(folder_.path() / "void").string()}).find("folder without a file"),
             std::string::npos);
+  put("void/manifest.json", "{}");
+  EXPECT_NE(refusal({(folder_.path() / "void").string()}).find("is a store, not a file of points"),
+            std::string::npos);
 }
 
 TEST_F(Source, RefusesWhatItDoesNotKnow) {
@@ -182,12 +185,36 @@ TEST_F(Source, ChainsFilesOfOneFormat) {
 
 TEST_F(Source, ChainedFilesMustAgree) {
   const std::string three = put("3.xyz", "1 2 3\n"), four = put("4.xyz", "1 2 3 4\n");
-  EXPECT_NE(refusal({three, four}).find("4.xyz: its attributes are float64 a3, those of "),
-            std::string::npos);
+  EXPECT_NE(refusal({three, four}).find("4.xyz: it has attributes that "), std::string::npos);
   EXPECT_NE(refusal({three, put("p.ply", kPly)}).find("p.ply: is ply, but "), std::string::npos);
   EXPECT_NE(refusal({three, put("g.csv", "lon,lat,height\n1,2,3\n")}).find("g.csv: "),
             std::string::npos);
   EXPECT_NE(refusal({"-", "-"}, {.format = "xyz"}).find("named twice"), std::string::npos);
+}
+
+TEST_F(Source, ChainedFilesNeedToAgreeInWhatIsKeptOnly) {
+  const std::vector<std::string> files{put("a.csv", "x,y,z,a,b\n1,2,3,4,5\n"),
+                                       put("b.csv", "x,y,z,c,a\n6,7,8,9,10\n"),
+                                       put("c.csv", "x,y,z,b,a\n1,1,1,2,20\n")};
+  EXPECT_NE(refusal(files).find("b.csv: it has the attributes float64 c where "),
+            std::string::npos);
+  const AllPoints swapped = read_all({files[0], files[2]});
+  EXPECT_EQ(swapped.info.attributes[1].name, "b");
+  EXPECT_EQ(swapped.values<double>(0)[1], 20.0);
+  EXPECT_EQ(swapped.values<double>(1)[1], 2.0);
+  for (const Selection& selection : {Selection{.keep = std::vector<std::string>{"a"}},
+                                     Selection{.where = "a != 7", .drop = {"b", "c"}}}) {
+    const AllPoints all = read_all(files, {.selection = selection});
+    ASSERT_EQ(all.info.attributes.size(), 1u);
+    EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1, 2, 3}, {6, 7, 8}, {1, 1, 1}}));
+    EXPECT_EQ(all.values<double>(0)[0], 4.0);
+    EXPECT_EQ(all.values<double>(0)[1], 10.0);
+    EXPECT_EQ(all.values<double>(0)[2], 20.0);
+  }
+  EXPECT_NE(refusal(files, {.selection = {.where = "b > 0", .drop = {"b", "c"}}}).find("no 'b'"),
+            std::string::npos);
+  EXPECT_NE(refusal(files, {.selection = {.drop = {"b", "c", "d"}}}).find("no attribute 'd'"),
+            std::string::npos);
 }
 
 TEST_F(Source, ReadsStandardInputAndPipes) {

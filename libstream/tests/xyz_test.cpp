@@ -46,6 +46,7 @@ TEST_F(Xyz, ReadsEverySeparatorLineEndAndComment) {
            "Easting;Northing;Elevation\n1;2;3\n4.5;-5;6e3\n",
            "first second third\n1 2 3\n4.5 -5 6e3\n",
            "//X Y Z\n1 2 3\n4.5 -5 6e3\n",
+           "\"x\",\"y\",\"z\"\n\"1\",\"2\",\"3\"\n\"4.5\", \"-5\" ,'6e3'\n",
            "\xEF\xBB\xBFx,y,z\n1,2,3\n4.5,-5,6e3\n",
            "\xEF\xBB\xBF"
            "1,2,3\n4.5,-5,6e3\n",
@@ -116,7 +117,8 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
       {"x,x,y,z\n1,2,3,4\n", "line 1: columns 'x' and 'x' name the same coordinate"},
       {"x,y,z\n1,2,3,4\n", "line 2: has 4 columns, but the header in line 1 names 3"},
       {"x,y,z\nabc,y,z\n1,2,3\n", "line 2: column 1, 'abc'"},
-      {"1,5;2,5;3,5\n", "column 1, '1,5'"},
+      {"1,5;2,5;3,5\n", "column 1, '1,5', is not a number that a double holds; write numbers with"},
+      {"x,y,z,\"a, b\"\n1,2,3,\"c, d\"\n", "line 2: column 4, '\"c, d\"'"},
       {std::string_view("1 2 3\n1 2 \0003\n", 13), "line 2: column 3"},
   };
   for (const auto& [text, message] : cases) {
@@ -125,6 +127,31 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
     EXPECT_NE(error.find(message), std::string::npos) << error;
     EXPECT_NE(error.find("points.xyz"), std::string::npos) << error;
   }
+}
+
+TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
+  const std::string_view text =
+      "x,y,z,v,\"place, name\"\n1,2,3,7,\"a, \"\"b\"\"\"\n4,5,6,8,\n7,8,9,9,2020-01-01T00:00\n";
+  const std::string name = "place, name";
+  SourceOptions options{.format = "xyz"};
+  for (const Selection& selection :
+       {Selection{.drop = {name}}, Selection{.keep = std::vector<std::string>{"v"}},
+        Selection{.where = "v >= 7", .drop = {name}}}) {
+    options.selection = selection;
+    const AllPoints all = read(text, options);
+    EXPECT_TRUE(
+        same_bits(all.points.positions, std::vector<Point3>{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));
+    ASSERT_EQ(all.info.attributes.size(), 1u);
+    EXPECT_EQ(all.values<double>(0)[2], 9.0);
+  }
+  // What a condition names is needed.
+  options.selection = {.where = "\"place, name\" > 0", .drop = {name}};
+  EXPECT_NE(error_of([&] { read(text, options); }).find("line 2: column 5"), std::string::npos);
+  options.selection = {.drop = {name}};
+  EXPECT_NE(error_of([&] {
+              read("x,y,z,\"place, name\"\n1,,3,a\n1,2,3,b\n", options);
+            }).find("line 2: column 2 is empty"),
+            std::string::npos);
 }
 
 TEST_F(Xyz, RefusesLinesThatNeverEnd) {

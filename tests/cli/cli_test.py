@@ -535,6 +535,9 @@ class InfoTest(CommandTest):
         self.assertEqual(info['bounds'], {'min': [-1, 0, 1], 'max': [1, 5, 3]})
         self.assertEqual(info['height'], {'min': 1, 'max': 3, 'mean': 2})
         self.assertEqual(info['bytes'], 19)
+        # A pipe has no size.
+        piped = subprocess.run([TERRACE, 'info', '-', '--json'], input=b'0 0 1\n', capture_output=True, check=True)
+        self.assertIsNone(json.loads(piped.stdout)['bytes'])
 
     def test_text_goes_to_standard_output(self):
         open(self.path('a.xyz'), 'w').write('0 0 1\n')

@@ -172,10 +172,19 @@ class TrianglesTest(EntitiesCase):
                      ['raster', self.store, '--cell', 10, '-o', self.path('x.tif')],
                      ['contour', self.store, '--interval', 1, '-o', self.path('x.geojson')],
                      ['profile', self.store, '--line', '0,0,100,100', '-o', self.path('x.csv')],
+                     ['surface', self.store, '-o', self.path('x.ply')],
                      ['tile', self.store, '--zoom', '5', '-o', self.path('tiles')]):
             with self.subTest(args[0]):
                 self.expect_error('holds triangles', *args)
         self.expect_error('without --metric', 'mesh', self.store, '--smooth', 'taubin:2', '-o', self.path('x.ply'))
+
+    def test_pictures_show_the_triangles(self):
+        store = self.path('unplaced.st')
+        self.run_ok('build', self.file, '--entities', 'triangles', '-o', store)
+        for name in (self.store, store):
+            summary = json.loads(self.run_ok('render', name, '-o', self.path('soup.png'), '--force', '--json'))
+            self.assertEqual(summary['triangles'], len(self.faces))
+            self.assertIn('(of the first corners)\n', self.run_ok('info', name))
 
     def test_what_cannot_be_built_says_so(self):
         out = self.path('no.st')

@@ -561,6 +561,8 @@ class LasDataTest(LasCase):
             info = self.info(name)
             self.assertEqual((info['format'], info['points'], info['crs']['epsg']), ('ept', sum(nodes.values()), 26912))
             self.assertEqual(info['octree'], {'spacing': spacing, 'depths': 4, 'nodes': len(nodes)})
+            self.assertEqual(info['bytes'], sum(os.path.getsize(os.path.join(at, file))
+                                                for at, _, files in os.walk(folder) for file in files))
         for deepest in range(4):
             wanted = sum(points for node, points in nodes.items() if int(node[0]) <= deepest)
             summary = json.loads(self.run_ok('convert', folder, '-o', self.path('r.las'), '--force', '--json',

@@ -140,6 +140,9 @@ class ScanTest(unittest.TestCase):
         result = terrace('render', self.path('ball.xyz'), '-o', self.path('none.png'), '--region',
                          '0,0,0,11,11,11')
         self.assertEqual(result.returncode, 2, result.stderr)
+        result = terrace('render', self.store, '-o', self.path('none.png'), '--where', 'z > 99')
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('no point is selected; give another --where', result.stderr)
 
     def test_wires_are_those_of_the_surface(self):
         summary, rows = self.picture('--wire')

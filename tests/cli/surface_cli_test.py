@@ -228,6 +228,17 @@ class SurfaceTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn('--towgs84', result.stderr)
 
+    def test_points_in_a_plane_enclose_nothing(self):
+        with open(self.path('plane.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {x + 2 * y}\n' for x in range(20) for y in range(20))
+        store = self.path('plane.terrace')
+        result = terrace('build', self.path('plane.xyz'), '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name, options in (('plane.ply', []), ('plane.vtk', ['--tetrahedra'])):
+            result = terrace('surface', store, '-o', self.path(name), *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("the points enclose nothing, as if all were in one plane; 'terrace mesh'", result.stderr)
+
     def test_errors_are_one_line(self):
         boxed = self.write_metric('boxed.json', box=[0, 0, 1, 1], semi_axes=[2, 1])
         round_one = self.write_metric('round.json', semi_axes=[1, 1])

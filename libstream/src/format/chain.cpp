@@ -1,34 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/chain.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "format/selection.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 namespace {
 
-std::string list_of(const std::vector<Channel>& channels) {
+/// Those of `channels` that are not among `others`.
+std::string list_of(const std::vector<Channel>& channels, const std::vector<Channel>& others) {
   std::string out;
   for (const Channel& channel : channels) {
+    if (std::find(others.begin(), others.end(), channel) != others.end()) continue;
     if (!out.empty()) out += ", ";
     out.append(name_of(channel.type)).append(" ").append(channel.name);
     if (!channel.unit.empty()) out.append(" (").append(channel.unit).append(")");
   }
-  return out.empty() ? "none" : out;
+  return out;
+}
+
+/// How the attributes of `other` differ from those of `first`.
+std::string difference(const SourceInfo& first, const SourceInfo& other) {
+  const std::string& name = first.files.front();
+  const std::string more = list_of(other.attributes, first.attributes);
+  const std::string less = list_of(first.attributes, other.attributes);
+  if (less.empty()) return "it has attributes that " + name + " lacks: " + more;
+  if (more.empty()) return "it lacks attributes that " + name + " has: " + less;
+  return "it has the attributes " + more + " where " + name + " has " + less;
 }
 
 void check_agreement(const SourceInfo& first, const SourceInfo& other) {
-  const auto refuse = [&](std::string cause) {
+  const auto refuse = [&](std::string cause,
+                          std::string remedy = "convert one of them, or read them on their own") {
     throw Error({.file = other.files.front(),
                  .where = {},
                  .cause = std::move(cause),
-                 .remedy = "convert one of them, or read them on their own"});
+                 .remedy = std::move(remedy)});
   };
   if (first.coordinates != other.coordinates) {
     refuse("its coordinates are " + std::string(name_of(other.coordinates[0].type)) +
@@ -36,11 +51,12 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other) {
            std::string(name_of(first.coordinates[0].type)) + ", or their units differ");
   }
   if (first.attributes != other.attributes) {
-    refuse("its attributes are " + list_of(other.attributes) + ", those of " + first.files.front() +
-           " are " + list_of(first.attributes));
+    refuse(difference(first, other), "`keep` what all files have, or read them on their own");
   }
   if (first.crs != other.crs) {
-    refuse("its coordinate reference system is not that of " + first.files.front());
+    refuse("its coordinate reference system is not that of " + first.files.front(),
+           "name the one that both have (`crs` of build), convert one of them, or read them on "
+           "their own");
   }
 }
 
@@ -48,10 +64,18 @@ class Chain final : public PointSource {
  public:
   Chain(std::span<const std::string> files, const SourceOptions& options, OpenOne open_one)
       : options_(options), open_one_(open_one), parts_(files.size()) {
+    std::vector<std::string> unseen = options.selection.drop;
     for (std::size_t i = 0; i < files.size(); ++i) {
       Part& part = parts_[i];
       part.file = files[i];
       auto source = open_one_(part.file, options_, i == 0 ? nullptr : &info_);
+      const std::vector<Channel>& attributes = source->info().attributes;
+      std::erase_if(unseen, [&](const std::string& name) {
+        return std::any_of(attributes.begin(), attributes.end(),
+                           [&](const Channel& attribute) { return attribute.name == name; });
+      });
+      if (i > 0 && attributes != info_.attributes) narrow_all();
+      if (narrowed_) source = narrowed(std::move(source));
       const SourceInfo& info = source->info();
       if (i == 0) {
         info_ = info;
@@ -81,6 +105,7 @@ class Chain final : public PointSource {
         part.source = std::move(source);
       }
     }
+    check_attributes(unseen, info_.attributes, info_.files.front());
   }
 
   const SourceInfo& info() const override { return info_; }
@@ -90,6 +115,7 @@ class Chain final : public PointSource {
       Part& part = parts_[turn_];
       if (!part.source) {
         part.source = open_one_(part.file, options_, turn_ == 0 ? nullptr : &info_);
+        if (narrowed_) part.source = narrowed(std::move(part.source));
         check_agreement(info_, part.source->info());
       }
       if (part.source->next(block)) {
@@ -137,9 +163,33 @@ class Chain final : public PointSource {
     std::uint64_t bytes = 0;
   };
 
+  /// The source with only the attributes that the selection needs, in the order of the first file.
+  [[nodiscard]] std::unique_ptr<PointSource> narrowed(std::unique_ptr<PointSource> source) const {
+    const std::vector<std::string> needed = needed_attributes(source->info(), options_.selection);
+    std::vector<std::string> names;
+    for (const Channel& attribute : info_.attributes) names.push_back(attribute.name);
+    for (const std::string& name : needed) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+    return with_attributes(std::move(source), names, options_.block_points);
+  }
+  /// Files need to agree only in the attributes that the selection needs.
+  void narrow_all() {
+    if (narrowed_) return;
+    narrowed_ = true;
+    const std::vector<std::string> needed = needed_attributes(info_, options_.selection);
+    std::erase_if(info_.attributes, [&](const Channel& attribute) {
+      return std::find(needed.begin(), needed.end(), attribute.name) == needed.end();
+    });
+    for (Part& part : parts_) {
+      if (part.source) part.source = narrowed(std::move(part.source));
+    }
+  }
+
   SourceOptions options_;
   OpenOne open_one_;
   SourceInfo info_;
+  bool narrowed_ = false;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
   std::uint64_t delivered_ = 0, withheld_ = 0, excluded_ = 0, lost_ = 0, done_bytes_ = 0,

@@ -13,6 +13,7 @@
 #include "format/ept/metadata.hpp"
 #include "format/formats.hpp"
 #include "io/line_reader.hpp"
+#include "io/temporary.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
@@ -59,6 +60,10 @@ void add_folder(const std::string& folder, const std::string& format,
   }
   if (error) fail(folder, {}, "cannot be listed: " + error.message(), {});
   if (files.size() == before) {
+    if (exists((fs::path(folder) / kManifestName).string())) {
+      fail(folder, {}, "is a store, not a file of points",
+           "write its points to a file first, as 'terrace points' does");
+    }
     fail(folder, {}, "is a folder without a file that can be read",
          "name one with files that end in .las, .tif and the like");
   }

@@ -19,9 +19,18 @@
 namespace terrace::stream {
 namespace {
 
+bool is_kept(const std::string& name, const Selection& wanted) {
+  const auto among = [&](const std::vector<std::string>& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  return (!wanted.keep || among(*wanted.keep)) && !among(wanted.drop);
+}
+
 class SelectedSource final : public PointSource {
  public:
-  SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options)
+  /// order: of the attributes; empty: as in the file.
+  SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options,
+                 const std::vector<std::string>& order = {})
       : source_(std::move(source)), block_points_(options.block_points) {
     const SourceInfo& all = source_->info();
     const Selection& wanted = options.selection;
@@ -37,19 +46,24 @@ class SelectedSource final : public PointSource {
         }
       }
     }
-    check_names(wanted.drop);
-    if (wanted.keep) check_names(*wanted.keep);
-    const auto has = [](const std::vector<std::string>& names, const std::string& name) {
-      return std::find(names.begin(), names.end(), name) != names.end();
-    };
-    info_.attributes.clear();
+    const std::string file = all.files.empty() ? std::string() : all.files.front();
+    if (all.files.size() <= 1 || all.grid) check_attributes(wanted.drop, all.attributes, file);
+    if (wanted.keep) check_attributes(*wanted.keep, all.attributes, file);
+    std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < all.attributes.size(); ++i) {
-      const Channel& attribute = all.attributes[i];
-      if ((wanted.keep && !has(*wanted.keep, attribute.name)) || has(wanted.drop, attribute.name)) {
-        continue;
-      }
-      info_.attributes.push_back(attribute);
-      const std::size_t from = all.attribute_offset(i), bytes = size_of(attribute.type);
+      if (is_kept(all.attributes[i].name, wanted)) kept.push_back(i);
+    }
+    const auto place = [&](std::size_t i) {
+      return std::find(order.begin(), order.end(), all.attributes[i].name);
+    };
+    if (!order.empty()) {
+      std::stable_sort(kept.begin(), kept.end(),
+                       [&](std::size_t a, std::size_t b) { return place(a) < place(b); });
+    }
+    info_.attributes.clear();
+    for (const std::size_t i : kept) {
+      info_.attributes.push_back(all.attributes[i]);
+      const std::size_t from = all.attribute_offset(i), bytes = size_of(all.attributes[i].type);
       if (!pieces_.empty() && pieces_.back().from + pieces_.back().bytes == from) {
         pieces_.back().bytes += bytes;
       } else {
@@ -102,24 +116,6 @@ class SelectedSource final : public PointSource {
     std::size_t from = 0, bytes = 0;
   };
 
-  void check_names(const std::vector<std::string>& names) const {
-    const SourceInfo& all = source_->info();
-    for (const std::string& name : names) {
-      const bool known = std::any_of(all.attributes.begin(), all.attributes.end(),
-                                     [&](const Channel& c) { return c.name == name; });
-      if (known) continue;
-      std::string list;
-      for (const Channel& attribute : all.attributes) {
-        if (!list.empty()) list += ", ";
-        list += attribute.name;
-      }
-      throw Error({.file = all.files.empty() ? std::string() : all.files.front(),
-                   .where = {},
-                   .cause = "its points have no attribute " + in_quotes(name),
-                   .remedy = list.empty() ? "they have none" : "known are " + list});
-    }
-  }
-
   /// Appends what counts of the block that was read last.
   void append(PointBlock& block) {
     const std::size_t from_bytes = source_->info().payload_size(), to_bytes = info_.payload_size();
@@ -170,6 +166,48 @@ class SelectedSource final : public PointSource {
 };
 
 }  // namespace
+
+std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
+                                             const std::vector<std::string>& names,
+                                             std::size_t block_points) {
+  SourceOptions options{.block_points = block_points};
+  for (const Channel& attribute : source->info().attributes) {
+    const std::string& name = attribute.name;
+    if (std::find(names.begin(), names.end(), name) == names.end()) {
+      options.selection.drop.push_back(name);
+    }
+  }
+  return std::make_unique<SelectedSource>(std::move(source), options, names);
+}
+
+std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted) {
+  std::optional<Where> where;
+  if (!wanted.where.empty()) where.emplace(wanted.where, info);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < info.attributes.size(); ++i) {
+    const std::string& name = info.attributes[i].name;
+    if (is_kept(name, wanted) || (where && where->uses(i))) names.push_back(name);
+  }
+  return names;
+}
+
+void check_attributes(const std::vector<std::string>& names, const std::vector<Channel>& attributes,
+                      const std::string& file) {
+  for (const std::string& name : names) {
+    const bool known = std::any_of(attributes.begin(), attributes.end(),
+                                   [&](const Channel& c) { return c.name == name; });
+    if (known) continue;
+    std::string list;
+    for (const Channel& attribute : attributes) {
+      if (!list.empty()) list += ", ";
+      list += attribute.name;
+    }
+    throw Error({.file = file,
+                 .where = {},
+                 .cause = "its points have no attribute " + in_quotes(name),
+                 .remedy = list.empty() ? "they have none" : "known are " + list});
+  }
+}
 
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options) {

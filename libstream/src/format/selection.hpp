@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "terrace/stream/source.hpp"
 
@@ -12,5 +15,18 @@ namespace terrace::stream {
 /// condition and for unknown names.
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options);
+
+/// The source with only those of its attributes that are among `names`, in the order of `names`.
+std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
+                                             const std::vector<std::string>& names,
+                                             std::size_t block_points);
+
+/// The attributes that are kept or that the condition names: no others need to be read.
+/// Throws: Error for an invalid condition.
+std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted);
+
+/// Throws: Error that names `file` if one of `names` is not an attribute.
+void check_attributes(const std::vector<std::string>& names, const std::vector<Channel>& attributes,
+                      const std::string& file);
 
 }  // namespace terrace::stream

@@ -32,7 +32,9 @@ FileLock::FileLock(const std::filesystem::path& path) : path_(path) {
       descriptor_ = ::open(path.c_str(), kFlags);
       if (descriptor_ < 0 && errno == ENOENT) continue;  // removed meanwhile
     }
-    if (descriptor_ < 0) throw system_error(path.string(), "cannot be created", errno);
+    if (descriptor_ < 0) {
+      throw system_error(path.string(), "cannot be created", errno, "choose a writable folder");
+    }
     const int error = flock_now(descriptor_);
     exclusive_ = error == 0;
     if (error == EWOULDBLOCK) {

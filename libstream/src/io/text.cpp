@@ -23,7 +23,10 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
   line = trim(line);
   if (separator != ' ') {
     for (;;) {
-      const std::size_t end = line.find(separator);
+      line = trim_left(line);
+      // The end of quoted text: where a quote is doubled, the text goes on.
+      const std::size_t quoted = line.starts_with('"') ? line.find('"', 1) : 0;
+      std::size_t end = quoted == line.npos ? line.npos : line.find(separator, quoted);
       fields.push_back(trim(line.substr(0, end)));
       if (end == std::string_view::npos) return fields;
       line.remove_prefix(end + 1);
@@ -35,6 +38,14 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
     line = trim_left(line.substr(end));
   }
   return fields;
+}
+
+std::string_view unquoted(std::string_view field) {
+  if (field.size() >= 2 && (field.front() == '"' || field.front() == '\'') &&
+      field.front() == field.back()) {
+    field = trim(field.substr(1, field.size() - 2));
+  }
+  return field;
 }
 
 std::string in_quotes(std::string_view text) {

@@ -6,6 +6,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
@@ -117,6 +118,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   if (options.tetrahedra && options.method) {
     throw UsageError("a surface by another method has no tetrahedra");
   }
+  need_points(store, "a surface");
   const stream::Store source = store.with_stop(context.stop);
   const bool poles = options.restore.shape.rule == tri::ShapeRule::kPoles;
   check_surface_memory(source, detail,

@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
@@ -194,12 +195,21 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
   return contents;
 }
 
-std::uint64_t bytes_of(const std::vector<std::string>& files) {
+/// Those of EPT are all files of its folder. nullopt for pipes.
+std::optional<std::uint64_t> bytes_of(const stream::SourceInfo& info) {
+  namespace fs = std::filesystem;
   std::uint64_t bytes = 0;
-  for (const std::string& file : files) {
+  for (const std::string& file : info.files) {
     std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(file, error);
-    if (!error) bytes += size;
+    if (!fs::is_regular_file(file, error)) return std::nullopt;
+    if (info.format != "ept") {
+      bytes += fs::file_size(file, error);
+      continue;
+    }
+    fs::recursive_directory_iterator at(fs::absolute(file).parent_path(), error);
+    for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+      if (at->is_regular_file(error)) bytes += at->file_size(error);
+    }
   }
   return bytes;
 }
@@ -287,10 +297,13 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
   json["channels"] = channels_of(info);
   json["parameters"] = Json::object();
   json["comments"] = info.comments;
-  json["bytes"] = bytes_of(info.files);
+  const std::optional<std::uint64_t> bytes = bytes_of(info);
+  json["bytes"] = bytes ? Json(*bytes) : Json(nullptr);
 
   std::string& text = summary.text;
-  text += "format:    " + info.format + ", " + readable_bytes(bytes_of(info.files)) + '\n';
+  text += "format:    " + info.format;
+  if (bytes) text += ", " + readable_bytes(*bytes);
+  text += '\n';
   if (info.grid) {
     text += raster_line(info);
     text += "cell:      " + readable_number(info.world.xy[0], 10) + ' ' +
@@ -354,7 +367,9 @@ Summary info_of_store(const std::string& path) {
   text += "crs:       " + printable_line(text_of(schema.crs, bounds)) + '\n';
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
-  text += "bounds:    " + text_of(bounds) + '\n';
+  text += "bounds:    " + text_of(bounds);
+  if (entities_of(schema) != stream::Entities::points) text += " (of the first corners)";
+  text += '\n';
   text += heights_line(bounds.min[2], bounds.max[2], mean);
   text += channels_line(schema);
   for (const auto& [name, value] : schema.parameters)

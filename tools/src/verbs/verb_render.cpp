@@ -14,6 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/tri/interpolation.hpp>
 
+#include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
@@ -200,14 +201,16 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   world.coordinates[0].unit = stored.coordinates[0].unit;
   world.coordinates[2].unit = stored.coordinates[2].unit;
   const Ground ground(world);
-  if (!store.schema().grid && !selection.triangles) {
+  // Those of a mesh are drawn as they are.
+  const bool stored_triangles = entities_of(store.schema()) == stream::Entities::triangles;
+  if (!store.schema().grid && !selection.triangles && !stored_triangles) {
     input.mesh = detail_points(store, detail);
     put_on_ground(input, world, ground);
     return input;
   }
   input.mesh = detail_mesh(store, detail, {}, common.context());
   put_on_ground(input, world, ground);
-  if (input.terrain || !mostly_steep(input.mesh)) return input;
+  if (input.terrain || stored_triangles || !mostly_steep(input.mesh)) return input;
   input = {};
   input.mesh = scan_surface(store, detail, {}, common.context()).mesh;
   input.guess = "no height field: the surface is that of 'terrace surface'";
@@ -330,10 +333,11 @@ class RenderCommand : public Command {
     check_interrupt();
     TriangleMesh& mesh = input.mesh;
     if (mesh.positions.empty()) {
-      throw stream::Error({.file = input_,
-                           .where = {},
-                           .cause = "holds no points",
-                           .remedy = "there is nothing to draw"});
+      throw stream::Error(
+          {.file = input_,
+           .where = {},
+           .cause = "there is nothing to draw: no point is selected",
+           .remedy = selection_.where.empty() ? "check the file" : "give another --where"});
     }
     const bool terrain = input.terrain || is_height_field(mesh);
     const std::vector<Rgb> colours = colours_of(mesh, input.heights, terrain);

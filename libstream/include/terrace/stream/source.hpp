@@ -165,12 +165,13 @@ struct SourceOptions {
 
 /// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;
 /// where they overlap the valid sample last named wins), other formats follow one another and must
-/// agree in channels and CRS. "-" is standard input (streaming formats only). A folder stands for
-/// all files in it, recursively, whose names have an ending of a format (SourceOptions::format, if
-/// given), in the order of their paths; a folder with an ept.json for that dataset. "@LIST" stands
-/// for the names on the lines of LIST, relative to its folder, without blank lines and those that
-/// begin with #; a name with *, ? or [...] that is not an existing file for the files that match
-/// the pattern. Throws: Error, Stopped; std::invalid_argument for a format that is not known.
+/// agree in CRS and in the attributes that the selection keeps or its condition names. "-" is
+/// standard input (streaming formats only). A folder stands for all files in it, recursively, whose
+/// names have an ending of a format (SourceOptions::format, if given), in the order of their paths;
+/// a folder with an ept.json for that dataset. "@LIST" stands for the names on the lines of LIST,
+/// relative to its folder, without blank lines and those that begin with #; a name with *, ? or
+/// [...] that is not an existing file for the files that match the pattern. Throws: Error, Stopped;
+/// std::invalid_argument for a format that is not known.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 

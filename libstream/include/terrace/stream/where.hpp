@@ -28,6 +28,8 @@ class Where {
   Where(const std::string& text, const Schema& schema);
 
   [[nodiscard]] const std::string& text() const { return text_; }
+  /// Whether the condition names this attribute of the schema.
+  [[nodiscard]] bool uses(std::size_t attribute) const;
 
   /// Sets matches[i] to 1 for points that meet the condition, otherwise to 0. positions: in stored
   /// coordinates; records: packed, one per point. About 1 ns per operand and point.

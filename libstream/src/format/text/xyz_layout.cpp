@@ -17,6 +17,7 @@ constexpr std::size_t kMaxComments = 1000;
 
 /// True for a number, and for what begins like one ("1,5", "12m"): a damaged number is no name.
 bool is_number(std::string_view field) {
+  field = unquoted(field);
   const std::size_t first = std::min(field.find_first_not_of("+-."), field.size());
   if (first < field.size() && field[first] >= '0' && field[first] <= '9') return true;
   double value = 0;
@@ -30,14 +31,6 @@ std::string lower(std::string_view text) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   return out;
-}
-
-std::string_view unquoted(std::string_view field) {
-  if (field.size() >= 2 && (field.front() == '"' || field.front() == '\'') &&
-      field.front() == field.back()) {
-    field = trim(field.substr(1, field.size() - 2));
-  }
-  return field;
 }
 
 /// What a column's name says: an axis by its letter or by a word for it, an angle of the earth.

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 
 #include "format/chain.hpp"
 #include "format/formats.hpp"
+#include "format/selection.hpp"
 #include "format/text/xyz_layout.hpp"
 #include "io/line_reader.hpp"
 #include "io/number.hpp"
@@ -79,6 +81,12 @@ class XyzSource final : public PointSource {
       info_.attributes.push_back({.name = name, .type = ScalarType::f64});
     }
     info_.comments = layout_.comments;
+    const std::vector<std::string> needed = needed_attributes(info_, options.selection);
+    optional_.resize(layout_.columns);
+    for (std::size_t i = 0; i < layout_.attributes.size(); ++i) {
+      optional_[layout_.attributes[i]] =
+          std::find(needed.begin(), needed.end(), layout_.names[i]) == needed.end();
+    }
   }
 
   const SourceInfo& info() const override { return info_; }
@@ -97,7 +105,7 @@ class XyzSource final : public PointSource {
       if (!parse_row_(begin, end, layout_.columns, row_.data())) {
         line = trim_left(line);
         if (line.empty() || is_comment(line)) continue;
-        refuse(line);
+        if (!parse_fields(line)) refuse(line);
       }
       const Point3 point{row_[ix], row_[iy], row_[iz]};
       // Infinities and NaN are what remains when a number less itself is not zero.
@@ -128,6 +136,23 @@ class XyzSource final : public PointSource {
   }
 
  private:
+  /// Reads a line of fields of which some are in quotes, or text that nobody needs.
+  bool parse_fields(std::string_view line) {
+    const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
+    if (fields.size() != layout_.columns) return false;
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      if (parse_field(fields[i], row_[i])) continue;
+      if (!optional_[i]) return false;
+      row_[i] = std::numeric_limits<double>::quiet_NaN();
+    }
+    return true;
+  }
+  static bool parse_field(std::string_view field, double& value) {
+    field = unquoted(field);
+    const char* const end = field.data() + field.size();
+    return parse_real(field.data(), end, value) == end;
+  }
+
   /// Says what is wrong with a line that is no point.
   [[noreturn]] void refuse(std::string_view line) const {
     const auto fail = [&](std::string cause, std::string remedy) {
@@ -145,15 +170,18 @@ class XyzSource final : public PointSource {
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const std::string_view field = fields[i];
       const std::string column = "column " + std::to_string(i + 1);
-      if (field.empty()) fail(column + " is empty", "every column needs a number");
-      double value = 0;
-      const char* const end = field.data() + field.size();
-      if (parse_real(field.data(), end, value) != end) {
-        fail(column + ", " + in_quotes(field) + ", is no number of a double's range",
-             "leave the column out, or correct it");
-      }
       const bool coordinate =
           std::find(layout_.xyz.begin(), layout_.xyz.end(), i) != layout_.xyz.end();
+      double value = 0;
+      if (!parse_field(field, value) && !optional_[i]) {
+        const bool comma = field.find(',') != field.npos;
+        fail(column + (field.empty()
+                           ? " is empty"
+                           : ", " + in_quotes(field) + ", is not a number that a double holds"),
+             comma        ? "write numbers with a decimal point"
+             : coordinate ? "every point needs x, y and z"
+                          : "correct it, or leave the column out (`drop` of build and convert)");
+      }
       if (coordinate && !std::isfinite(value)) {
         fail(column + " is " + std::string(field) + ", but a coordinate must be finite",
              "leave the line out");
@@ -169,6 +197,7 @@ class XyzSource final : public PointSource {
   TextLayout layout_;
   ParseRow parse_row_ = nullptr;
   std::vector<double> row_;
+  std::vector<bool> optional_;  ///< columns that may hold anything
   SourceInfo info_;
   std::uint64_t delivered_ = 0;
 };
