@@ -81,7 +81,8 @@ TEST(CoordinateSystem, HeightsOfTheCodes) {
   EXPECT_EQ(heights("EPSG:4979"), Heights::ellipsoidal);
   EXPECT_EQ(heights("EPSG:32632+5773"), Heights::orthometric);
   EXPECT_EQ(heights("EPSG:4326+5030"), Heights::ellipsoidal);
-  EXPECT_EQ(heights("EPSG:5555"), Heights::orthometric);  // compound: UTM 32 and DHHN92
+  EXPECT_EQ(heights("EPSG:4326+4979"), Heights::ellipsoidal);  // as GeoTIFF 1.1 has EPSG:4979
+  EXPECT_EQ(heights("EPSG:5555"), Heights::orthometric);       // compound: UTM 32 and DHHN92
   EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().epsg, 25832);
   EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().vertical_epsg, 5783);
   EXPECT_EQ(CoordinateSystem::parse("EPSG:4326+6360").crs().vertical_unit, "US survey foot");
@@ -542,6 +543,26 @@ TEST(GeoKeys, ThePlaneOfAMapStandsOnAGeographicSystem) {
                                   {3087, {400000}, ""}});
     EXPECT_THROW(CoordinateSystem::of(crs, "file"), stream::Error) << base;
   }
+}
+
+/// GDAL writes both without a model of GeoTIFF's.
+TEST(GeoKeys, ADefinitionOfEsriIsReadAndALocalSystemIsNone) {
+  stream::Crs crs;
+  crs.geo_keys = {{1024, {32767}, ""}, {2048, {4326}, ""}, {3076, {9001}, ""}};
+  crs.name =
+      "ESRI PE String = PROJCS[\"unknown\",GEOGCS[\"GCS_unknown\",DATUM[\"D_WGS_1984\","
+      "SPHEROID[\"WGS_1984\",6378137.0,298.257223563]],PRIMEM[\"Greenwich\",0.0],"
+      "UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Mollweide\"],"
+      "PARAMETER[\"False_Easting\",0.0],PARAMETER[\"False_Northing\",0.0],"
+      "PARAMETER[\"Central_Meridian\",0.0],UNIT[\"Meter\",1.0]]";
+  const auto system = CoordinateSystem::of(crs, "dem.tif");
+  ASSERT_TRUE(system);
+  EXPECT_FALSE(system->definition().geographic);
+  EXPECT_NEAR(system->from_geographic({10, 0})[0], 1002227.54, 0.01);
+
+  crs.geo_keys = {{3076, {9003}, ""}};
+  crs.name = "site";
+  EXPECT_FALSE(CoordinateSystem::of(crs, "dem.tif"));
 }
 
 TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
