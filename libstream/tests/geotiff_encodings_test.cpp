@@ -251,6 +251,59 @@ TEST(GeoTiffEncodings, ATileLargerThanMemoryIsRefusedWithItsNeeds) {
   EXPECT_NO_THROW(open_geotiff(path));
 }
 
+/// Cells without data, where `hidden` is 1 for the cells that a mask leaves out.
+void expect_hidden(const std::string& path, const std::vector<std::uint8_t>& hidden) {
+  const WholeRaster whole = read_whole(*open_geotiff(path));
+  ASSERT_EQ(whole.cells(), hidden.size());
+  for (std::size_t i = 0; i < hidden.size(); ++i) {
+    EXPECT_EQ(whole.valid[i], 1 - hidden[i]) << i;
+    EXPECT_EQ(whole.value(i), hidden[i] != 0 ? 0 : static_cast<double>(i)) << i;
+  }
+}
+
+TEST(GeoTiffEncodings, AMaskLeavesCellsOut) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  TiffSpec spec;
+  spec.columns = 40;
+  spec.rows = 30;
+  spec.type = ScalarType::u16;
+  spec.tile_columns = spec.tile_rows = 16;
+  std::vector<std::uint16_t> heights(1200);
+  std::vector<std::uint8_t> hidden(1200), mask(1200);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    heights[i] = static_cast<std::uint16_t>(i);
+    hidden[i] = i % 7 < 2 || i > 1100 ? 1 : 0;
+    mask[i] = hidden[i] != 0 ? 0 : 255;
+  }
+
+  TiffSpec mask_spec = spec;
+  mask_spec.type = ScalarType::u8;
+  mask_spec.tile_columns = mask_spec.tile_rows = 32;
+  write_tiff(path, spec, as_samples(heights));
+  write_tiff(path + ".msk", mask_spec, as_samples(mask));
+  expect_hidden(path, hidden);
+  std::filesystem::remove(path + ".msk");
+  expect_hidden(path, std::vector<std::uint8_t>(1200));
+
+  mask_spec.mode = "a";
+  mask_spec.compression = COMPRESSION_ADOBE_DEFLATE;
+  mask_spec.more = [](TIFF* tiff) { TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, FILETYPE_MASK); };
+  write_tiff(path, mask_spec, as_samples(mask));
+  expect_hidden(path, hidden);
+}
+
+TEST(GeoTiffEncodings, AMaskOfAnotherSizeIsRefused) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  TiffSpec spec;
+  spec.columns = spec.rows = 4;
+  write_tiff(path, spec, std::vector<std::byte>(32));
+  spec.rows = 3;
+  write_tiff(path + ".msk", spec, std::vector<std::byte>(24));
+  EXPECT_THROW(open_geotiff(path), Error);
+}
+
 /// Packs unsigned numbers of `bits` bits, each row starting at a byte, from the highest bit on.
 std::vector<std::uint8_t> packed(const std::vector<std::uint32_t>& values, std::size_t columns,
                                  unsigned bits) {

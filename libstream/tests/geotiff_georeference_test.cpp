@@ -115,6 +115,20 @@ TEST(GeoReference, GeographicKeysAndUserDefinedOnes) {
   });
   EXPECT_EQ(own.crs.epsg, 0);
   EXPECT_EQ(own.crs.name, "my grid");
+  // As GDAL writes projections that GeoTIFF has no keys for.
+  const RasterInfo esri = info_with([](TIFF* tiff) {
+    set_keys(tiff, {1024, 0, 1, 32767, 2048, 0, 1, 4326, 3073, 34737, 13, 0, 3076, 0, 1, 9001},
+             "ESRI PE = X |");
+  });
+  EXPECT_FALSE(esri.crs.geographic);
+  EXPECT_EQ(esri.crs.epsg, 0);
+  EXPECT_EQ(esri.crs.name, "ESRI PE = X ");
+  EXPECT_EQ(esri.crs.horizontal_unit, "metre");
+  const RasterInfo site = info_with([](TIFF* tiff) {
+    set_keys(tiff, {1026, 34737, 5, 0, 3076, 0, 1, 9003}, "site|");
+  });
+  EXPECT_EQ(site.crs.name, "site");
+  EXPECT_EQ(site.crs.horizontal_unit, "US survey foot");
 }
 
 TEST(GeoReference, KeysOfTheCrsAreDeliveredAsTheyStand) {

@@ -81,7 +81,8 @@ TEST(CoordinateSystem, HeightsOfTheCodes) {
   EXPECT_EQ(heights("EPSG:4979"), Heights::ellipsoidal);
   EXPECT_EQ(heights("EPSG:32632+5773"), Heights::orthometric);
   EXPECT_EQ(heights("EPSG:4326+5030"), Heights::ellipsoidal);
-  EXPECT_EQ(heights("EPSG:5555"), Heights::orthometric);  // compound: UTM 32 and DHHN92
+  EXPECT_EQ(heights("EPSG:4326+4979"), Heights::ellipsoidal);  // as GeoTIFF 1.1 has EPSG:4979
+  EXPECT_EQ(heights("EPSG:5555"), Heights::orthometric);       // compound: UTM 32 and DHHN92
   EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().epsg, 25832);
   EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().vertical_epsg, 5783);
   EXPECT_EQ(CoordinateSystem::parse("EPSG:4326+6360").crs().vertical_unit, "US survey foot");
@@ -544,6 +545,73 @@ TEST(GeoKeys, ThePlaneOfAMapStandsOnAGeographicSystem) {
   }
 }
 
+/// GDAL writes both without a model of GeoTIFF's.
+TEST(GeoKeys, ADefinitionOfEsriIsReadAndALocalSystemIsNone) {
+  stream::Crs crs;
+  crs.geo_keys = {{1024, {32767}, ""}, {2048, {4326}, ""}, {3076, {9001}, ""}};
+  crs.name =
+      "ESRI PE String = PROJCS[\"unknown\",GEOGCS[\"GCS_unknown\",DATUM[\"D_WGS_1984\","
+      "SPHEROID[\"WGS_1984\",6378137.0,298.257223563]],PRIMEM[\"Greenwich\",0.0],"
+      "UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Mollweide\"],"
+      "PARAMETER[\"False_Easting\",0.0],PARAMETER[\"False_Northing\",0.0],"
+      "PARAMETER[\"Central_Meridian\",0.0],UNIT[\"Meter\",1.0]]";
+  const auto system = CoordinateSystem::of(crs, "dem.tif");
+  ASSERT_TRUE(system);
+  EXPECT_FALSE(system->definition().geographic);
+  EXPECT_NEAR(system->from_geographic({10, 0})[0], 1002227.54, 0.01);
+
+  crs.geo_keys = {{3076, {9003}, ""}};
+  crs.name = "site";
+  EXPECT_FALSE(CoordinateSystem::of(crs, "dem.tif"));
+}
+
+TEST(GeoKeys, MethodsThatEpsgDoesNotNumberAreThoseOfProj) {
+  const std::vector<std::pair<int, std::string>> methods{
+      {12, "aeqd +lat_0=46"},  {13, "eqdc +lat_0=46 +lat_1=40 +lat_2=50"},
+      {14, "stere +lat_0=46"}, {17, "eqc +lat_ts=40"},
+      {19, "gnom +lat_0=46"},  {20, "mill +R_A"},
+      {21, "ortho +lat_0=46"}, {22, "poly +lat_0=46"},
+      {23, "robin"},           {24, "sinu"},
+      {25, "vandg +R_A"},      {28, "cea +lat_ts=40"}};
+  for (const auto& [number, text] : methods) {
+    SCOPED_TRACE(text);
+    stream::Crs crs = keys({{1024, {1}, ""},
+                            {2048, {4326}, ""},
+                            {3072, {32767}, ""},
+                            {3074, {32767}, ""},
+                            {3075, {static_cast<double>(number)}, ""},
+                            {3076, {9001}, ""},
+                            {3082, {1000}, ""},
+                            {3083, {-2000}, ""},
+                            {3088, {8}, ""}});
+    const auto number_behind = [&text](const std::string& name) {
+      const std::size_t at = text.find("+" + name + "=");
+      return at == text.npos ? std::nullopt
+                             : std::optional(std::stod(text.substr(at + name.size() + 2)));
+    };
+    const auto add = [&](int key, const std::string& name) {
+      if (const auto value = number_behind(name)) {
+        crs.geo_keys.push_back({static_cast<std::uint16_t>(key), {*value}, ""});
+      }
+    };
+    add(3089, "lat_0");
+    add(3078, "lat_ts");
+    add(3078, "lat_1");
+    add(3079, "lat_2");
+    crs.epsg = 0;
+    const auto system = CoordinateSystem::of(crs, "dem.tif");
+    ASSERT_TRUE(system);
+    const ProjObject pipeline(proj_create(
+        proj_context(), ("+proj=" + text + " +lon_0=8 +x_0=1000 +y_0=-2000 +ellps=WGS84").c_str()));
+    ASSERT_NE(pipeline, nullptr);
+    const PJ_COORD expected =
+        proj_trans(pipeline.get(), PJ_FWD, proj_coord(proj_torad(9.5), proj_torad(44), 0, 0));
+    const Point2 place = system->from_geographic({9.5, 44});
+    EXPECT_NEAR(place[0], expected.xy.x, 1e-6);
+    EXPECT_NEAR(place[1], expected.xy.y, 1e-6);
+  }
+}
+
 TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
   for (const double code : {4326.5, -4326.0, 1e300}) {
     stream::Crs crs;
@@ -609,7 +677,7 @@ TEST(GeoKeys, WhatIsMissingIsNamed) {
       {{1024, {1}, ""},
        {2048, {4326}, ""},
        {3072, {32767}, ""},
-       {3075, {22}, ""},
+       {3075, {2}, ""},
        {3076, {9001}, ""}},
       {{1024, {1}, ""},
        {2048, {4326}, ""},

@@ -17,6 +17,13 @@ namespace {
 constexpr std::uint64_t kMostMosaicCells = 1u << 30;
 constexpr double kPhase = 1e-3;  // cells
 
+std::string shown(double value) {
+  std::ostringstream out;
+  out.precision(3);
+  out << value;
+  return out.str();
+}
+
 std::string all_digits(double value) {
   std::ostringstream out;
   out.precision(17);
@@ -70,8 +77,8 @@ Member placed(const RasterInfo& first, const RasterInfo& other) {
   }
   if (!(std::abs(origin[0] - column) <= kPhase && std::abs(origin[1] - row) <= kPhase)) {
     differ(a, b,
-           "its cells are shifted by " + all_digits(origin[0] - column) + ", " +
-               all_digits(origin[1] - row) + " of a cell",
+           "its cells are shifted by " + shown(origin[0] - column) + ", " + shown(origin[1] - row) +
+               " of a cell",
            align);
   }
   if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
@@ -83,6 +90,10 @@ Member placed(const RasterInfo& first, const RasterInfo& other) {
           .columns = other.columns,
           .rows = other.rows,
           .held_bytes = other.held_bytes};
+}
+
+std::string named(const std::string& unit) {
+  return unit.empty() ? "an unknown unit" : '"' + unit + '"';
 }
 
 void check_samples(const RasterInfo& first, const RasterInfo& other) {
@@ -102,8 +113,8 @@ void check_samples(const RasterInfo& first, const RasterInfo& other) {
   }
   if (first.sample.unit != other.sample.unit) {
     differ(a, b,
-           "heights are in \"" + other.sample.unit + "\", there in \"" + first.sample.unit + "\"",
-           "convert one of them, or name the CRS of all");
+           "heights are in " + named(other.sample.unit) + ", there in " + named(first.sample.unit),
+           "give both the same unit (gdal_edit.py -units), or convert one (gdal_calc.py)");
   }
 }
 
@@ -113,7 +124,7 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
     if (crs.epsg != 0) {
       text << "EPSG:" << crs.epsg;
     } else {
-      text << '"' << crs.name << '"';
+      text << (crs.name.empty() ? "unknown" : '"' + crs.name + '"');
     }
     if (crs.vertical_epsg != 0) text << '+' << crs.vertical_epsg;
     return text.str();

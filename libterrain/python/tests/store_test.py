@@ -436,6 +436,28 @@ class Sources(StoreCase):
         self.assertAlmostEqual(store.bounds[0], 500005, delta=10000)
         self.assertEqual(store.info['nodata'], int((of_xarray.values == 2000).sum()))
 
+    def test_datasets_have_the_heights_of_their_file(self):
+        """Also where it has a scale and offset, or a mask instead of a nodata value."""
+        try:
+            import rasterio
+            from osgeo import gdal
+        except ImportError:
+            self.skipTest('needs rasterio and gdal')
+        file = self.path('heights.tif')
+        values = np.arange(12, dtype=np.int16).reshape(3, 4)
+        with rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True), rasterio.open(
+                file, 'w', driver='GTiff', width=4, height=3, count=1, dtype='int16',
+                transform=rasterio.Affine(2, 0, 100, 0, -2, 200)) as dataset:
+            dataset.scales, dataset.offsets = (0.5,), (100.0,)
+            dataset.write(values, 1)
+            dataset.write_mask(values % 5 != 0)
+        expected = 100 + 0.5 * values[values % 5 != 0]
+        gdal.UseExceptions()
+        with rasterio.open(file) as of_rasterio:
+            for i, source in enumerate((file, of_rasterio, gdal.Open(file))):
+                with self.subTest(type(source)), terrace.build(source, self.path(f'{i}.terrace')) as store:
+                    np.testing.assert_array_equal(np.sort(terrace.xyz(store.points())[:, 2]), expected)
+
     def test_xarray(self):
         try:
             import xarray

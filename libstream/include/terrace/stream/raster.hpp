@@ -48,7 +48,8 @@ struct CellBuffer {
 /// A raster that can be read by windows. Not thread-safe.
 ///
 /// Cells without data are those that equal the file's nodata value, those in blocks that a file
-/// with a nodata value omits, and those that are NaN or infinite.
+/// with a nodata value omits, those that are NaN or infinite, and those of a GeoTIFF whose
+/// transparency mask is 0.
 class Raster {
  public:
   virtual ~Raster() = default;

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "format/geotiff/unpack.hpp"
-#include "raster/overlay.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -265,12 +264,13 @@ bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
 /// A block the file leaves out has no data; where the file knows no such thing, it is zero.
 bool GeoTiffBlocks::fill_sparse(const Part& part, const CellBuffer& out) {
   if (nodata_.value) return false;
-  const std::size_t size = size_of(layout_.type);
-  for (std::size_t row = 0; row < part.rows; ++row) {
-    std::memset(part.samples + row * out.stride * size, 0, part.columns * size);
-    std::memset(part.valid + row * out.stride, 1, part.columns);
+  wide_.assign(part.columns * size_of(layout_.type), std::byte{0});
+  bool any = false;
+  for (std::uint32_t row = 0; row < part.rows; ++row) {
+    any |=
+        overlay_cells(part, {.samples = wide_.data(), .step = 1, .cells = part.columns}, row, out);
   }
-  return true;
+  return any;
 }
 
 /// Row `row` of the part; its first cell is number `column` of `stored`.
@@ -287,8 +287,35 @@ bool GeoTiffBlocks::overlay_part_row(const Part& part, const std::byte* stored,
     unpack_samples(packed, stored, first, step, part.columns, wide_.data());
     samples = {.samples = wide_.data(), .step = 1, .cells = part.columns};
   }
-  return overlay_row(layout_.type, samples, nodata_, part.samples + row * out.stride * size,
-                     part.valid + row * out.stride);
+  return overlay_cells(part, samples, row, out);
+}
+
+bool GeoTiffBlocks::overlay_cells(const Part& part, const SampleRow& samples, std::uint32_t row,
+                                  const CellBuffer& out) {
+  const std::size_t size = size_of(layout_.type);
+  std::byte* const to = part.samples + row * out.stride * size;
+  std::uint8_t* const valid = part.valid + row * out.stride;
+  if (mask_ == nullptr) return overlay_row(layout_.type, samples, nodata_, to, valid);
+  mask_samples_.resize(part.columns * size_of(mask_->layout_.type));
+  unmasked_.assign(part.columns, 0);
+  mask_->read_over(
+      {.column = std::uint64_t{part.across} * layout_.block_columns + part.column,
+       .row = std::uint64_t{part.down} * layout_.block_rows + part.row + row,
+       .columns = part.columns,
+       .rows = 1},
+      {.samples = mask_samples_.data(), .valid = unmasked_.data(), .stride = part.columns});
+  bool any = false;
+  for (auto begin = unmasked_.begin(); begin != unmasked_.end();) {
+    begin = std::find(begin, unmasked_.end(), 1);
+    const auto end = std::find(begin, unmasked_.end(), 0);
+    const auto first = static_cast<std::size_t>(begin - unmasked_.begin());
+    const SampleRow run{.samples = samples.samples + first * samples.step * size,
+                        .step = samples.step,
+                        .cells = static_cast<std::size_t>(end - begin)};
+    any |= overlay_row(layout_.type, run, nodata_, to + first * size, valid + first);
+    begin = end;
+  }
+  return any;
 }
 
 const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint64_t offset,

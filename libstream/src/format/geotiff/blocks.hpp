@@ -12,6 +12,7 @@
 #include "format/geotiff/handle.hpp"
 #include "format/geotiff/layout.hpp"
 #include "raster/nodata.hpp"
+#include "raster/overlay.hpp"
 #include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
@@ -24,6 +25,9 @@ class GeoTiffBlocks {
   GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout, NodataRule nodata,
                 std::uint64_t memory_bytes, std::uint64_t cache_bytes);
 
+  /// From now on cells without data in `mask`, of the same size, have none here. It must outlive
+  /// this.
+  void set_mask(GeoTiffBlocks& mask) { mask_ = &mask; }
   /// Maximum bytes held between windows: see RasterInfo::held_bytes.
   [[nodiscard]] std::uint64_t held_bytes() const;
 
@@ -51,6 +55,8 @@ class GeoTiffBlocks {
   bool fill_sparse(const Part& part, const CellBuffer& out);
   bool overlay_part_row(const Part& part, const std::byte* stored, std::uint32_t column,
                         std::uint32_t row, const CellBuffer& out);
+  bool overlay_cells(const Part& part, const SampleRow& samples, std::uint32_t row,
+                     const CellBuffer& out);
   const std::vector<std::byte>& decoded(const Part& part, std::uint64_t offset,
                                         std::uint64_t bytes);
   void decode(const Part& part, std::uint64_t offset, std::uint64_t bytes);
@@ -68,6 +74,9 @@ class GeoTiffBlocks {
   std::vector<std::byte> block_;          // decoded, native byte order
   std::optional<std::uint32_t> decoded_;  // the block in block_
   std::vector<std::byte> wide_;           // an unpacked row of packed samples
+  GeoTiffBlocks* mask_ = nullptr;
+  std::vector<std::byte> mask_samples_;  // of a row
+  std::vector<std::uint8_t> unmasked_;
 
   struct Cached {
     std::uint32_t block;

@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "format/formats.hpp"
@@ -19,13 +21,63 @@
 namespace terrace::stream {
 namespace {
 
+/// The transparency mask of a raster, in its file or beside it (FILE.msk, as GDAL writes it): where
+/// it is 0 there is no data.
+class GeoTiffMask {
+ public:
+  /// Null if there is none.
+  static std::unique_ptr<GeoTiffMask> find(const GeoTiffHandle& raster, const GeoTiffLayout& layout,
+                                           const RasterOptions& options) {
+    const auto open = [&options](const std::string& file) {
+      return std::make_unique<GeoTiffHandle>(file, options.memory_bytes);
+    };
+    std::unique_ptr<GeoTiffHandle> handle;
+    std::uint32_t band = 0;
+    std::error_code ignored;
+    if (TIFFLastDirectory(raster.tiff()) == 0) {
+      handle = open(raster.file());
+      if (!handle->go_to_mask()) handle.reset();
+    }
+    const std::string beside = raster.file() + ".msk";
+    if (handle == nullptr && std::filesystem::is_regular_file(beside, ignored)) {
+      handle = open(beside);
+      if (handle->value_or<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1) > layout.band) {
+        band = layout.band;
+      }
+    }
+    if (handle == nullptr) return nullptr;
+    std::unique_ptr<GeoTiffMask> mask(new GeoTiffMask(std::move(handle), band, options));
+    if (mask->layout_.columns != layout.columns || mask->layout_.rows != layout.rows) {
+      mask->handle_->fail("mask", "is not as large as its raster",
+                          "write both anew: gdal_translate");
+    }
+    return mask;
+  }
+
+  GeoTiffBlocks& blocks() { return blocks_; }
+
+ private:
+  GeoTiffMask(std::unique_ptr<GeoTiffHandle> handle, std::uint32_t band,
+              const RasterOptions& options)
+      : handle_(std::move(handle)),
+        layout_(geotiff_layout(*handle_, static_cast<int>(band) + 1)),
+        blocks_(*handle_, layout_, NodataRule::parse("0", layout_.type), options.memory_bytes,
+                options.cache_bytes) {}
+
+  std::unique_ptr<GeoTiffHandle> handle_;
+  GeoTiffLayout layout_;
+  GeoTiffBlocks blocks_;
+};
+
 class GeoTiffRaster final : public Raster {
  public:
   GeoTiffRaster(const std::string& file, const RasterOptions& options)
       : handle_(file, options.memory_bytes),
         layout_(geotiff_layout(handle_, options.band)),
         nodata_(NodataRule::parse(handle_.text(kGdalNodata), layout_.type)),
-        blocks_(handle_, layout_, nodata_, options.memory_bytes, options.cache_bytes) {
+        blocks_(handle_, layout_, nodata_, options.memory_bytes, options.cache_bytes),
+        mask_(GeoTiffMask::find(handle_, layout_, options)) {
+    if (mask_ != nullptr) blocks_.set_mask(mask_->blocks());
     describe();
   }
 
@@ -42,13 +94,21 @@ class GeoTiffRaster final : public Raster {
     info_.rows = layout_.rows;
     info_.block_columns = std::min(layout_.block_columns, layout_.columns);
     info_.block_rows = std::min(layout_.block_rows, layout_.rows);
-    info_.held_bytes = blocks_.held_bytes();
+    info_.held_bytes = blocks_.held_bytes() + (mask_ ? mask_->blocks().held_bytes() : 0);
     const GeoKeys keys(handle_.shorts(kGeoKeyDirectory), handle_.doubles(kGeoDoubleParams),
                        handle_.text(kGeoAsciiParams));
     info_.crs = crs_of(keys);
     info_.world = geotiff_transform(handle_, keys, info_.comments);
     info_.nodata = nodata_.value;
     describe_sample();
+    std::uint16_t extra = 0;
+    const std::uint16_t* kinds = nullptr;
+    if (TIFFGetField(handle_.tiff(), TIFFTAG_EXTRASAMPLES, &extra, &kinds) == 1 && extra > 0 &&
+        kinds[extra - 1] != EXTRASAMPLE_UNSPECIFIED) {
+      info_.comments.push_back("band " + std::to_string(layout_.bands) +
+                               " is alpha, which leaves no cell out; where it means no data, write "
+                               "a nodata value: gdalwarp -dstnodata");
+    }
     if (nodata_.unmatched) {
       info_.comments.push_back("nodata " + handle_.text(kGdalNodata) + " is no value of type " +
                                std::string(name_of(layout_.type)));
@@ -77,6 +137,7 @@ class GeoTiffRaster final : public Raster {
   GeoTiffLayout layout_;
   NodataRule nodata_;
   GeoTiffBlocks blocks_;
+  std::unique_ptr<GeoTiffMask> mask_;
   RasterInfo info_;
 };
 

@@ -161,6 +161,18 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
 
 GeoTiffHandle::~GeoTiffHandle() { TIFFClose(tiff_); }
 
+bool GeoTiffHandle::go_to_mask() {
+  bool found = false, ours = true;
+  // A damaged directory behind the image is no reason not to read the image.
+  while (!found && ours && TIFFLastDirectory(tiff_) == 0 && TIFFReadDirectory(tiff_) == 1) {
+    const auto kind = value_or<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
+    found = (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == FILETYPE_MASK;
+    ours = kind != 0;
+  }
+  take_complaint();
+  return found;
+}
+
 bool GeoTiffHandle::read(std::uint64_t offset, std::span<std::byte> out) const {
   if (offset > file_bytes_ || out.size() > file_bytes_ - offset) return false;
   const std::int64_t n = io_->read_some(offset, out.data(), out.size());

@@ -114,7 +114,9 @@ Crs crs_of(const GeoKeys& keys) {
   const auto projected = keys.number(kProjectedCrs), geodetic = keys.number(kGeodeticCrs);
   std::uint16_t model = keys.number(kGTModelType).value_or(0);
   if (model != kModelProjected && model != kModelGeographic && model != kModelGeocentric) {
-    model = projected ? kModelProjected : geodetic ? kModelGeographic : 0;
+    // Under a user-defined model, the name of a projected CRS may be its whole definition.
+    const bool named = !keys.text(kProjectedCitation).empty();
+    model = projected || named ? kModelProjected : geodetic ? kModelGeographic : 0;
   }
   crs.geographic = model == kModelGeographic;
   crs.epsg = epsg_of(model == kModelProjected ? projected : geodetic);
@@ -126,7 +128,7 @@ Crs crs_of(const GeoKeys& keys) {
   }
   if (crs.geographic) {
     crs.horizontal_unit = unit_name(keys.number(kAngularUnit).value_or(9102));
-  } else if (model != 0) {
+  } else {
     crs.horizontal_unit = unit_name(keys.number(kLinearUnit).value_or(0));
   }
   crs.vertical_unit = unit_name(keys.number(kVerticalUnit).value_or(0));

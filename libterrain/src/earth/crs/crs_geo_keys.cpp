@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/portable_math.hpp"
+#include "base/units.hpp"
 #include "earth/crs/crs_reading.hpp"
 #include "earth/crs/projection_names.hpp"
 
@@ -133,6 +134,26 @@ constexpr std::array<MethodOfKey, 15> kMethods{{
     {27, 9808, {8801, 8802, 8805, 8806, 8807}},
     {1024, 1024, {8801, 8802, 8806, 8807}},
     {9815, 9815, {8811, 8812, 8813, 8814, 8815, 8816, 8817}},
+}};
+
+/// Those that EPSG does not number, or not in every release: PROJ's names.
+struct NamedMethod {
+  int number;
+  const char* name;
+};
+constexpr std::array<NamedMethod, 12> kNamedMethods{{
+    {12, "aeqd"},
+    {13, "eqdc"},
+    {14, "stere"},
+    {17, "eqc"},
+    {19, "gnom"},
+    {20, "mill"},
+    {21, "ortho"},
+    {22, "poly"},
+    {23, "robin"},
+    {24, "sinu"},
+    {25, "vandg"},
+    {28, "cea"},
 }};
 
 /// Degrees, metres or a factor; nothing if no key has the role.
@@ -261,6 +282,27 @@ void read_shift(const GeoKeyValues& keys, CrsDefinition& definition) {
   if (definition.base_epsg == 0 || values != DatumShift{}) definition.shift = values;
 }
 
+ProjObject conversion_by_name(const std::string& name, const GeoKeyValues& keys, double degrees,
+                              double metres) {
+  std::string text = "+proj=" + name;
+  const auto add = [&](const char* parameter, Role role) {
+    const auto value = value_of(keys, role, degrees, metres);
+    if (value && *value != (kind_of(role) == ParameterKind::scale ? 1 : 0)) {
+      text += std::string(" +") + parameter + "=" + number_text(*value);
+    }
+  };
+  add("lat_0", Role::latitude);
+  add("lon_0", Role::longitude);
+  add(name == "eqdc" ? "lat_1" : "lat_ts", Role::parallel1);
+  add("lat_2", Role::parallel2);
+  add("k_0", Role::scale);
+  add("x_0", Role::false_easting);
+  add("y_0", Role::false_northing);
+  const ProjObject crs = proj_crs_of_text(text + " +type=crs");
+  return required(ProjObject(proj_crs_get_coordoperation(proj_context(), crs.get())),
+                  "its projection is impossible");
+}
+
 ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres) {
   if (const int code = keys.known_code(3074); code != 0) {
     return required(object_of_code(code, PJ_CATEGORY_COORDINATE_OPERATION),
@@ -275,6 +317,9 @@ ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres
       kMethods.begin(), kMethods.end(),
       [&](const MethodOfKey& row) { return row.number == (other ? -number : number); });
   if (method == kMethods.end()) {
+    for (const NamedMethod& row : kNamedMethods) {
+      if (row.number == number) return conversion_by_name(row.name, keys, degrees, metres);
+    }
     fail_geo_keys("its projection method " + std::to_string(number) +
                   " (GeoKey 3075) is not known");
   }

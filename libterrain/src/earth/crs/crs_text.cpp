@@ -114,9 +114,12 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
   if (code >= kFirstDatum && code < kFirstDatum + static_cast<int>(kOfDatums.size())) {
     code = kOfDatums[static_cast<std::size_t>(code - kFirstDatum)];
   }
-  // GeoTIFF 1.0 numbered heights above ellipsoids so; 5030 is WGS 84's.
+  const ProjObject vertical = proj_crs_of_code("EPSG", std::to_string(code));
+  const PJ_TYPE type = vertical == nullptr ? PJ_TYPE_UNKNOWN : proj_get_type(vertical.get());
+  // GeoTIFF 1.0 numbered heights above ellipsoids so; 5030 is WGS 84's. GeoTIFF 1.1 names the
+  // geographic system whose third axis they are: 4979.
   constexpr int kFirstEllipsoid = 5001, kLastEllipsoid = 5033;
-  if (code >= kFirstEllipsoid && code <= kLastEllipsoid) {
+  if ((code >= kFirstEllipsoid && code <= kLastEllipsoid) || type == PJ_TYPE_GEOGRAPHIC_3D_CRS) {
     forget_heights(definition);
     definition.heights = Heights::ellipsoidal;
     definition.vertical_epsg = code;
@@ -124,8 +127,7 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
     definition.metres_per_height = 1;
     return;
   }
-  const ProjObject vertical = proj_crs_of_code("EPSG", std::to_string(code));
-  if (vertical == nullptr || proj_get_type(vertical.get()) != PJ_TYPE_VERTICAL_CRS) {
+  if (type != PJ_TYPE_VERTICAL_CRS) {
     throw CrsError("the vertical CRS EPSG:" + std::to_string(code) + " is not known",
                    "name one that is, or say what heights refer to with `vertical`");
   }
@@ -194,9 +196,12 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
   const std::string wkt = !crs.wkt.empty()              ? crs.wkt
                           : crs.name.starts_with(kEsri) ? crs.name.substr(kEsri.size())
                                                         : std::string();
+  // Units alone are those of a local system, which has no place on the earth.
+  constexpr std::array<int, 3> kUnits{2052, 2054, 3076};
   const bool has_keys =
-      std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [](const stream::GeoKey& key) {
-        return key.key >= 2048 && key.key < 4096 && !key.values.empty();
+      std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [&](const stream::GeoKey& key) {
+        return key.key >= 2048 && key.key < 4096 && !key.values.empty() &&
+               std::find(kUnits.begin(), kUnits.end(), key.key) == kUnits.end();
       });
   if (!wkt.empty()) {
     definition = definition_of_wkt(wkt);
