@@ -131,7 +131,7 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
 
 TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
   const std::string_view text =
-      "x,y,z,v,\"place, name\"\n1,2,3,7,\"a, \"\"b\"\"\"\n4,5,6,8,\n7,8,9,9,2020-01-01T00:00\n";
+      "x,y,z,v,\"place, name\"\n1,2,3,7,\"a \"\"b\"\", c\"\n4,5,6,8,\n7,8,9,9,2020-01-01T00:00\n";
   const std::string name = "place, name";
   SourceOptions options{.format = "xyz"};
   for (const Selection& selection :

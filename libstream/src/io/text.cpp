@@ -24,9 +24,14 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
   if (separator != ' ') {
     for (;;) {
       line = trim_left(line);
-      // The end of quoted text: where a quote is doubled, the text goes on.
-      const std::size_t quoted = line.starts_with('"') ? line.find('"', 1) : 0;
-      std::size_t end = quoted == line.npos ? line.npos : line.find(separator, quoted);
+      std::size_t from = 0;
+      if (line.starts_with('"')) {
+        // Where a quote is doubled, the quoted text goes on.
+        from = line.find('"', 1);
+        while (from != line.npos && line.substr(from + 1).starts_with('"'))
+          from = line.find('"', from + 2);
+      }
+      const std::size_t end = from == line.npos ? line.npos : line.find(separator, from);
       fields.push_back(trim(line.substr(0, end)));
       if (end == std::string_view::npos) return fields;
       line.remove_prefix(end + 1);
