@@ -584,7 +584,7 @@ TEST(GeoKeys, MethodsThatEpsgDoesNotNumberAreThoseOfProj) {
                             {3082, {1000}, ""},
                             {3083, {-2000}, ""},
                             {3088, {8}, ""}});
-    const auto number_behind = [&text](const std::string& name) {
+    const auto number_behind = [&text = text](const std::string& name) {
       const std::size_t at = text.find("+" + name + "=");
       return at == text.npos ? std::nullopt
                              : std::optional(std::stod(text.substr(at + name.size() + 2)));

@@ -59,8 +59,8 @@ export class Sites {
     this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
     // A scan: a ball with bumps; and one that lacks a cap in the east.
     let ball = 'x,y,z\n', bowl = ball;
-    for (let i = 0; i < 7_000; ++i) {
-      const z = 1 - (2 * i + 1) / 7_000, turn = i * 2.399963229728653, r = Math.sqrt(1 - z * z);
+    for (let i = 0; i < 12_000; ++i) {
+      const z = 1 - (2 * i + 1) / 12_000, turn = i * 2.399963229728653, r = Math.sqrt(1 - z * z);
       const size = 10 + 0.5 * Math.sin(5 * z) + 0.4 * Math.sin(6 * r * Math.cos(turn));
       const point = `${size * r * Math.cos(turn)},${size * r * Math.sin(turn)},${size * z}\n`;
       ball += point;
