@@ -278,7 +278,7 @@ TEST(SpatialOrderTest, ThreadsDoNotChangeTheOrder) {
 
 TEST(SpatialOrderTest, AStatedBoxSparesDividingTheOutermostBuckets) {
   // The first window is one corner of the square: without a box nearly all points are beyond.
-  constexpr std::uint64_t kCount = 2'000'000;
+  constexpr std::uint64_t kCount = 3'000'000;
   const auto place = squares(512);
   Box3 box;
   for (std::uint64_t i = 0; i < kCount; i += 511) box.include(place(i));
