@@ -28,9 +28,9 @@ bool is_kept(const std::string& name, const Selection& wanted) {
 
 class SelectedSource final : public PointSource {
  public:
-  /// order: of the attributes; empty: as in the file.
+  /// kept: attributes by number, in the order in which they are delivered.
   SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options,
-                 const std::vector<std::string>& order = {})
+                 const std::vector<std::size_t>& kept)
       : source_(std::move(source)), block_points_(options.block_points) {
     const SourceInfo& all = source_->info();
     const Selection& wanted = options.selection;
@@ -45,20 +45,6 @@ class SelectedSource final : public PointSource {
           withheld_attribute_ = i;
         }
       }
-    }
-    const std::string file = all.files.empty() ? std::string() : all.files.front();
-    if (all.files.size() <= 1 || all.grid) check_attributes(wanted.drop, all.attributes, file);
-    if (wanted.keep) check_attributes(*wanted.keep, all.attributes, file);
-    std::vector<std::size_t> kept;
-    for (std::size_t i = 0; i < all.attributes.size(); ++i) {
-      if (is_kept(all.attributes[i].name, wanted)) kept.push_back(i);
-    }
-    const auto place = [&](std::size_t i) {
-      return std::find(order.begin(), order.end(), all.attributes[i].name);
-    };
-    if (!order.empty()) {
-      std::stable_sort(kept.begin(), kept.end(),
-                       [&](std::size_t a, std::size_t b) { return place(a) < place(b); });
     }
     info_.attributes.clear();
     for (const std::size_t i : kept) {
@@ -170,14 +156,15 @@ class SelectedSource final : public PointSource {
 std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
                                              const std::vector<std::string>& names,
                                              std::size_t block_points) {
-  SourceOptions options{.block_points = block_points};
-  for (const Channel& attribute : source->info().attributes) {
-    const std::string& name = attribute.name;
-    if (std::find(names.begin(), names.end(), name) == names.end()) {
-      options.selection.drop.push_back(name);
+  std::vector<std::size_t> kept;
+  const std::vector<Channel>& attributes = source->info().attributes;
+  for (const std::string& name : names) {
+    for (std::size_t i = 0; i < attributes.size(); ++i) {
+      if (attributes[i].name == name) kept.push_back(i);
     }
   }
-  return std::make_unique<SelectedSource>(std::move(source), options, names);
+  return std::make_unique<SelectedSource>(std::move(source),
+                                          SourceOptions{.block_points = block_points}, kept);
 }
 
 std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted) {
@@ -213,7 +200,16 @@ std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options) {
   const Selection& wanted = options.selection;
   if (wanted.where.empty() && !wanted.keep && wanted.drop.empty() && !wanted.region) return source;
-  return std::make_unique<SelectedSource>(std::move(source), options);
+  const SourceInfo& all = source->info();
+  const std::string file = all.files.empty() ? std::string() : all.files.front();
+  // Files that follow one another are without what is left out, and have checked it.
+  if (all.files.size() <= 1 || all.grid) check_attributes(wanted.drop, all.attributes, file);
+  if (wanted.keep) check_attributes(*wanted.keep, all.attributes, file);
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < all.attributes.size(); ++i) {
+    if (is_kept(all.attributes[i].name, wanted)) kept.push_back(i);
+  }
+  return std::make_unique<SelectedSource>(std::move(source), options, kept);
 }
 
 }  // namespace terrace::stream
