@@ -27,6 +27,7 @@ struct LasParts {
   std::uint32_t vlr_count = 0;
   std::uint16_t encoding = 0;
   Point3 scale{0.01, 0.01, 0.01}, offset{};
+  Box3 bounds{.min = {}, .max = {}};
 
   void add_vlr(std::string_view user, std::uint16_t id, std::string_view data) {
     std::string head(54, '\0');
@@ -52,6 +53,8 @@ struct LasParts {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       put(out, 131 + 8 * axis, scale[axis]);
       put(out, 155 + 8 * axis, offset[axis]);
+      put(out, 179 + 16 * axis, bounds.max[axis]);
+      put(out, 187 + 16 * axis, bounds.min[axis]);
     }
     if (minor == 4) put(out, 247, points);
     return out + vlrs + records;

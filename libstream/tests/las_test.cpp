@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -146,11 +147,93 @@ TEST_F(Las, LatticesOfSeveralFilesMeet) {
   second.offset = {1.25, -3, 0};
   const AllPoints both = read_all({put_file("1.las", first), put_file("2.las", second)});
   EXPECT_EQ(both.points.positions, (std::vector<Point3>{{0, 0, 0}, {125, -300, 0}}));
+}
+
+// Whatever the scales and offsets: each coordinate stays what it is in its own file.
+TEST_F(Las, FilesOfAnyScaleAndOffsetComeTogether) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    const auto pick = [&](const std::vector<double>& values) {
+      return values[random() % values.size()];
+    };
+    const std::size_t count = 2 + random() % 4;
+    std::vector<std::string> files;
+    std::vector<Point3> world;
+    for (std::size_t i = 0; i < count; ++i) {
+      LasParts parts{.points = 3, .records = std::string(3 * 28, '\0')};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        parts.scale[axis] = pick({0.01, 0.001, 0.00025, 0.005});
+        parts.offset[axis] = pick({0, 5e4, 6.5e4 + 0.37, 6.5e4 + 0.0125, -7e4 - 0.0005});
+        for (std::size_t k = 0; k < 3; ++k) {
+          put(parts.records, 28 * k + 4 * axis, static_cast<std::int32_t>(random() % 20'000'001));
+        }
+      }
+      files.push_back(put_file(std::to_string(i) + ".las", parts));
+      const AllPoints one = read_file(files.back());
+      for (const Point3& p : one.points.positions) world.push_back(world_point(one.info, p));
+    }
+    const AllPoints all = read_all(files);
+    ASSERT_EQ(all.points.size(), world.size());
+    EXPECT_TRUE(lattice_of(all.info)) << "all of these lie on a lattice";
+    for (std::size_t i = 0; i < world.size(); ++i) {
+      const Point3 place = world_point(all.info, all.points.positions[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(all.points.positions[i][axis], std::round(all.points.positions[i][axis]));
+        EXPECT_NEAR(place[axis], world[i][axis], 1e-8) << i << ", "
+                                                       << "xyz"[axis];
+      }
+    }
+  }
+}
+
+TEST_F(Las, ACommonLatticeIsAsCoarseAsItCanBe) {
+  LasParts first{.points = 1, .records = std::string(28, '\0')}, second = first;
+  const auto together = [&] {
+    return read_all({put_file("1.las", first), put_file("2.las", second)});
+  };
+  second.scale = {0.001, 0.001, 0.00025};
+  second.offset = {1, 1, 0.25};
+  EXPECT_EQ(lattice_of(together().info), (Lattice{.scale = second.scale, .offset = {}}));
+  // Steps of one size in x and y stay so, though only one axis asks for finer ones.
+  second.scale = first.scale;
   second.offset = {1.255, 0, 0};
-  EXPECT_NE(error_of([&] {
-              read_all({put_file("1.las", first), put_file("2.las", second)});
-            }).find("another lattice"),
-            std::string::npos);
+  const AllPoints finer = together();
+  EXPECT_EQ(lattice_of(finer.info), (Lattice{.scale = {0.005, 0.005, 0.01}, .offset = {}}));
+  EXPECT_EQ(finer.points.positions, (std::vector<Point3>{{0, 0, 0}, {251, 0, 0}}));
+  EXPECT_EQ(finer.info.note, "");
+}
+
+TEST_F(Las, DoublesHoldWhatNoLatticeDoes) {
+  LasParts first{.points = 1, .records = std::string(28, '\0')}, second = first;
+  first.offset = {1e5, 0, 0};
+  put(second.records, 0, std::int32_t{12345});
+  const auto together = [&] {
+    return read_all({put_file("1.las", first), put_file("2.las", second)});
+  };
+  second.scale = {0.0123456789, 0.01, 0.01};  // as of a range cut into 2^32 steps
+  AllPoints all = together();
+  EXPECT_EQ(all.info.coordinates[0].type, ScalarType::f64);
+  EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1e5, 0, 0}, {12345 * 0.0123456789, 0, 0}}));
+  EXPECT_NE(all.info.note.find("kept as doubles"), std::string::npos);
+  // On a lattice, but further apart than its steps reach.
+  second.scale = first.scale;
+  second.offset = {1e8, 0, 0};
+  second.bounds = {{1e8, 0, 0}, {1e8 + 1000, 0, 0}};
+  first.bounds = {{1e5, 0, 0}, {1e5 + 1000, 0, 0}};
+  all = together();
+  EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1e5, 0, 0}, {1e8 + 123.45, 0, 0}}));
+  ASSERT_TRUE(all.info.stated_bounds);
+  EXPECT_EQ(all.info.stated_bounds->max[0], 1e8 + 1000);
+  // The offset moves where that is enough.
+  second.offset = {3e7, 0, 0};
+  second.bounds = {{3e7, 0, 0}, {3e7 + 1000, 0, 0}};
+  all = together();
+  ASSERT_TRUE(lattice_of(all.info));
+  EXPECT_NEAR(world_point(all.info, all.points.positions[1])[0], 3e7 + 123.45, 1e-8);
+  // Headers without bounds leave it to the points.
+  first.bounds = second.bounds = {.min = {}, .max = {}};
+  EXPECT_NE(error_of(together).find("out of reach"), std::string::npos);
 }
 
 TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {

@@ -240,16 +240,22 @@ class LasSurveyTest(LasCase):
             return struct.pack('<iii', x + 1234, y - 100000, z - 700) + record[12:]
         self.assertEqual(sorted(copy.records), sorted(first + [moved(record) for record in second]))
 
-    def test_files_whose_lattices_do_not_meet_are_refused(self):
+    def test_files_of_any_scale_and_offset_make_a_store(self):
         records = random_records(1, 50)
         first = self.put('a.las', las(1, records))
-        for name, more in (('b.las', {'offset': (0, 0.005, 0)}), ('c.las', {'scale': (0.01, 0.01, 0.001)})):
-            error = self.refused('build', first, self.put(name, las(1, records, **more)), '-o', self.path('x.st'))
-            self.assertIn(name, error)
-            self.assertIn('another lattice', error)
-        far = self.put('far.las', las(1, records, offset=(3e7, 0, 0)))
-        self.assertIn('out of reach', self.refused('build', first, far, '-o', self.path('x.st')))
-        self.assertFalse(os.path.exists(self.path('x.st')))
+        for name, more, scale in (('b.las', {'offset': (0, 0.005, 0)}, (0.005, 0.005, 0.01)),
+                                  ('c.las', {'scale': (0.01, 0.01, 0.001)}, (0.01, 0.01, 0.001))):
+            second = self.put(name, las(1, records, **more))
+            copy = self.through_store(first, second)
+            self.assertEqual(copy.scale, scale)
+            self.assertEqual(copy.places(), sorted(Las(first).places() + Las(second).places()))
+        odd = self.put('odd.las', las(1, records, scale=(0.0123456789, 0.01, 0.01)))
+        run = terrace('build', first, odd, '-o', self.path('odd.st'))
+        self.assertIn('kept as doubles', run.stderr.decode())
+        self.run_ok('points', self.path('odd.st'), '-o', self.path('odd.csv'))
+        with open(self.path('odd.csv')) as file:
+            rows = sorted(tuple(round(float(value), 6) for value in line.split(',')[:3]) for line in list(file)[1:])
+        self.assertEqual(rows, sorted(Las(first).places() + Las(odd).places()))
 
     def test_text_becomes_las_with_as_many_decimals_as_it_has(self):
         with open(self.path('p.csv'), 'w') as file:

@@ -154,3 +154,9 @@ class Las:
         self.records = [data[first + i * self.record_bytes:first + (i + 1) * self.record_bytes]
                         for i in range(count)]
         assert len(data) >= first + count * self.record_bytes
+
+    def places(self):
+        """The places of the records, in the CRS, to a millionth, sorted."""
+        return sorted(tuple(round(step * scale + offset, 6) for step, scale, offset
+                            in zip(struct.unpack_from('<iii', record), self.scale, self.offset))
+                      for record in self.records)

@@ -62,13 +62,13 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other) {
 
 class Chain final : public PointSource {
  public:
-  Chain(std::span<const std::string> files, const SourceOptions& options, OpenOne open_one)
+  Chain(std::span<const std::string> files, const SourceOptions& options, const OpenOne& open_one)
       : options_(options), open_one_(open_one), parts_(files.size()) {
     std::vector<std::string> unseen = options.selection.drop;
     for (std::size_t i = 0; i < files.size(); ++i) {
       Part& part = parts_[i];
       part.file = files[i];
-      auto source = open_one_(part.file, options_, i == 0 ? nullptr : &info_);
+      auto source = open_one_(part.file, options_);
       const std::vector<Channel>& attributes = source->info().attributes;
       std::erase_if(unseen, [&](const std::string& name) {
         return std::any_of(attributes.begin(), attributes.end(),
@@ -114,7 +114,7 @@ class Chain final : public PointSource {
     for (; turn_ < parts_.size(); ++turn_) {
       Part& part = parts_[turn_];
       if (!part.source) {
-        part.source = open_one_(part.file, options_, turn_ == 0 ? nullptr : &info_);
+        part.source = open_one_(part.file, options_);
         if (narrowed_) part.source = narrowed(std::move(part.source));
         check_agreement(info_, part.source->info());
       }
@@ -200,8 +200,8 @@ class Chain final : public PointSource {
 }  // namespace
 
 std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
-                                          const SourceOptions& options, OpenOne open_one) {
-  if (files.size() == 1) return open_one(files.front(), options, nullptr);
+                                          const SourceOptions& options, const OpenOne& open_one) {
+  if (files.size() == 1) return open_one(files.front(), options);
   return std::make_unique<Chain>(files, options, open_one);
 }
 

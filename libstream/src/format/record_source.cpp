@@ -8,9 +8,11 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 
+#include "format/common_placement.hpp"
 #include "format/packed_column.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -127,7 +129,7 @@ class PayloadUnpacker {
 
 class RecordSource final : public PointSource {
  public:
-  RecordSource(RecordStream stream, std::size_t block_points)
+  RecordSource(RecordStream stream, std::size_t block_points, const Placement* onto)
       : stream_(std::move(stream)),
         block_points_(block_points),
         payload_bytes_(stream_.info.payload_size()),
@@ -140,6 +142,7 @@ class RecordSource final : public PointSource {
       // Coordinates are doubles in memory; what these cannot hold is refused.
       if (is_wide_integer(type)) type = ScalarType::f64;
     }
+    if (onto != nullptr) move_onto(*onto);
     for (std::size_t i = 0; i < stream_.fields.size(); ++i) {
       const Channel& channel = stream_.fields[i].channel;
       if (channel.name == "withheld" && channel.type == ScalarType::u8) withheld_attribute_ = i;
@@ -161,7 +164,7 @@ class RecordSource final : public PointSource {
     block.payload.resize(done * payload_bytes_);
     if (withheld_attribute_) count_withheld(block);
     if (checked_) check(block);
-    if (stream_.moved) move(block);
+    if (move_) move(block);
     delivered_ += done;
     return done > 0;
   }
@@ -226,16 +229,50 @@ class RecordSource final : public PointSource {
     }
   }
 
+  void move_onto(const Placement& placement) {
+    SourceInfo& info = stream_.info;
+    if (info.world == placement.world && info.coordinates == placement.coordinates) return;
+    try {
+      move_ = move_between(info, placement);
+    } catch (const std::domain_error& axis) {
+      throw Error({.file = stream_.input ? stream_.input->name() : info.files.front(),
+                   .where = {},
+                   .cause = std::string(axis.what()) + " is on another lattice than that of the " +
+                            "other files: its scale or the fraction of its offset differs",
+                   .remedy = "name files instead of pipes, or read it on its own"});
+    }
+    info.world = placement.world;
+    info.coordinates = placement.coordinates;
+    if (placement.coordinates[0].type == ScalarType::f64) {
+      info.note =
+          "the files' steps of coordinates have no common lattice of 32 bits: coordinates "
+          "are kept as doubles";
+    }
+    if (!info.stated_bounds) return;
+    Box3 box;
+    box.include(moved(info.stated_bounds->min));
+    box.include(moved(info.stated_bounds->max));
+    info.stated_bounds = box;
+  }
+  [[nodiscard]] Point3 moved(const Point3& stored) const {
+    Point3 point;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      point[axis] = stored[axis] * move_->factor[axis] + move_->shift[axis];
+    }
+    return point;
+  }
   void move(PointBlock& block) const {
-    constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
-                     kMost = std::numeric_limits<std::int32_t>::max();
+    constexpr double kInt = std::numeric_limits<std::int32_t>::max();
+    const double most = stream_.info.coordinates[0].type == ScalarType::i32
+                            ? kInt
+                            : std::numeric_limits<double>::max();
     for (std::size_t i = 0; i < block.size(); ++i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        double& value = block.positions[i][axis];
-        value += stream_.shift[axis];
-        if (value < kLeast || value > kMost) {
-          fail(i, "is out of reach for the scale and offset of the first file",
-               "name a file in the middle of all first, or read them on their own");
+      Point3& point = block.positions[i];
+      point = moved(point);
+      for (const double value : point) {
+        if (value < -most - 1 || value > most) {
+          fail(i, "is out of reach of the lattice that the headers of all files ask for",
+               "its header states a wrong box: write the file anew, or read it on its own");
         }
       }
     }
@@ -245,6 +282,7 @@ class RecordSource final : public PointSource {
   std::size_t block_points_, payload_bytes_;
   PayloadUnpacker payload_;
   std::array<ScalarType, 3> types_{};  ///< of the coordinates in the records
+  std::optional<Move> move_;           ///< to the placement of all files
   bool checked_ = false;               ///< coordinates could be out of reach
   std::optional<std::size_t> withheld_attribute_;
   std::uint64_t wanted_points_ = 0, delivered_ = 0, withheld_ = 0;
@@ -252,42 +290,9 @@ class RecordSource final : public PointSource {
 
 }  // namespace
 
-void move_onto(const SourceInfo& first, RecordStream& stream) {
-  const auto refuse = [&](std::string cause, std::string remedy) {
-    throw Error({.file = stream.info.files.front(),
-                 .where = {},
-                 .cause = std::move(cause),
-                 .remedy = std::move(remedy)});
-  };
-  if (first.world == stream.info.world && first.coordinates == stream.info.coordinates) return;
-  const std::optional<Lattice> to = lattice_of(first), from = lattice_of(stream.info);
-  const auto fits = [](const Channel& channel) { return channel.type == ScalarType::i32; };
-  const auto& a = first.coordinates;
-  const auto& b = stream.info.coordinates;
-  if (!to || !from || !std::all_of(a.begin(), a.end(), fits) ||
-      !std::all_of(b.begin(), b.end(), fits)) {
-    refuse("its coordinates are stored in another way than those of " + first.files.front(),
-           "convert one of them, or read them on their own");
-  }
-  // Offsets are doubles, which resolve a millimetre of projected coordinates to a millionth.
-  constexpr double kSameStep = 1e-4;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double steps = (from->offset[axis] - to->offset[axis]) / to->scale[axis];
-    stream.shift[axis] = std::round(steps);
-    if (to->scale[axis] != from->scale[axis] ||
-        !(std::abs(steps - stream.shift[axis]) <= kSameStep)) {
-      refuse(std::string("its ") + "xyz"[axis] + " lies on another lattice than that of " +
-                 first.files.front() + ": its scale or the fraction of its offset differs",
-             "write it anew with that scale and offset, e.g. with las2las -rescale -reoffset");
-    }
-  }
-  stream.moved = true;
-  stream.info.world = first.world;
-  stream.info.coordinates = first.coordinates;
-}
-
-std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points) {
-  return std::make_unique<RecordSource>(std::move(stream), block_points);
+std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points,
+                                               const Placement* onto) {
+  return std::make_unique<RecordSource>(std::move(stream), block_points, onto);
 }
 
 }  // namespace terrace::stream

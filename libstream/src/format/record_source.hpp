@@ -25,16 +25,12 @@ struct RecordStream {
   std::unique_ptr<Input> input{};  ///< the input of `records`, unless they have their own file
   std::unique_ptr<RecordReader> records{};
   std::uint64_t points = 0;  ///< number in the file, wanted or not
-  bool moved = false;
-  Point3 shift{};  ///< if moved: added to coordinates
 };
 
-/// Moves coordinates onto the lattice of the first of several files. Throws: Error unless the
-/// scales are equal and the offsets differ by integer steps.
-void move_onto(const SourceInfo& first, RecordStream& stream);
-
-/// Blocks of these points. Throws in next(): Error as the RecordReader, and for coordinates that
-/// are not finite or out of range once moved.
-std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points);
+/// Blocks of these points. onto: the common_placement() of several files, onto which they are
+/// moved; null for a single file. Throws: Error if they are not on its lattice; in next(): Error as
+/// the RecordReader, and for coordinates that are not finite or out of range once moved.
+std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points,
+                                               const Placement* onto);
 
 }  // namespace terrace::stream

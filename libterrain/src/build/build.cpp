@@ -354,6 +354,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
                 " points are marked as withheld in their file; they are kept, with the mark");
   }
   tell_spooled(info, context);
+  if (!info.note.empty()) context.say(info.note);
   damage.tell(context);
   tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);

@@ -35,6 +35,7 @@ struct SourceInfo : Schema {
   std::optional<double> nodata;         ///< of the (first) raster, in raw units
   std::optional<OctreeInfo> octree;     ///< of a single input organised as an octree
   std::vector<std::string> comments;
+  std::string note;  ///< for people: how several files were brought together; empty if as they are
   /// Bytes in temporary files that hold input from pipes or gzip for random access.
   std::uint64_t spooled_bytes = 0;
 };

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "format/chain.hpp"
+#include "format/common_placement.hpp"
 #include "format/ept/hierarchy.hpp"
 #include "format/ept/metadata.hpp"
 #include "format/ept/nodes.hpp"
@@ -41,8 +43,7 @@ LasHeader read_node_header(const std::filesystem::path& file, EptMetadata& metad
 }
 
 std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* first) {
-  assert(options.block_points > 0);
+                                          const Placement* onto) {
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
   EptMetadata metadata = read_ept_metadata(file);
   Octree& octree = metadata.octree;
@@ -68,13 +69,23 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   RecordParts parts = ept_parts(folder, metadata, header);
   stream.records = parts_ahead(parts, options);
   if (!stream.records) stream.records = parts_in_turn(std::move(parts));
-  if (first != nullptr) move_onto(*first, stream);
-  return source_of_records(std::move(stream), options.block_points);
+  return source_of_records(std::move(stream), options.block_points, onto);
 }
 
 std::unique_ptr<PointSource> open_ept(std::span<const std::string> files,
                                       const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_ept);
+  assert(options.block_points > 0);
+  std::optional<Placement> common;
+  if (files.size() > 1) {
+    std::vector<Placement> placements;
+    for (const std::string& file : files) {
+      placements.push_back(open_one_ept(file, options, nullptr)->info());
+    }
+    common = common_placement(placements, {});
+  }
+  return open_in_turn(files, options, [common](const std::string& file, const SourceOptions& one) {
+    return open_one_ept(file, one, common ? &*common : nullptr);
+  });
 }
 
 /// An object that has what no other JSON has, near its beginning as its names are in order.

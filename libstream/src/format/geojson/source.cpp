@@ -211,8 +211,8 @@ bool recognise_geojson(std::span<const std::byte> head) {
                      [&](const char* mark) { return text.find(mark) != std::string_view::npos; });
 }
 
-std::unique_ptr<PointSource> open_one_geojson(const std::string& file, const SourceOptions& options,
-                                              const SourceInfo* /*first*/) {
+std::unique_ptr<PointSource> open_one_geojson(const std::string& file,
+                                              const SourceOptions& options) {
   assert(options.block_points > 0);
   return std::make_unique<GeoJsonSource>(file, options);
 }

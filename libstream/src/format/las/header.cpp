@@ -155,6 +155,30 @@ Crs crs_of_key_records(const LasHeader& header, std::vector<std::string>& commen
   return crs_of(keys);
 }
 
+void read_lattice(const char* head, LasHeader& header) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    header.scale[axis] = load_little_endian<double>(head + 131 + 8 * axis);
+    header.offset[axis] = load_little_endian<double>(head + 155 + 8 * axis);
+    header.bounds.max[axis] = load_little_endian<double>(head + 179 + 16 * axis);
+    header.bounds.min[axis] = load_little_endian<double>(head + 187 + 16 * axis);
+  }
+  // Writers leave the box at 0 if they do not fill it in.
+  const auto& [low, high] = header.bounds;
+  const bool is_finite = std::isfinite(low[0] + low[1] + low[2] + high[0] + high[1] + high[2]);
+  if (!is_finite || low == high) header.bounds = {};
+}
+
+bool has_lattice(const LasHeader& header) {
+  // The product of two is the determinant of the transform.
+  const double cell = header.scale[0] * header.scale[1];
+  bool is_sound = cell > 0 && std::isfinite(cell);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    is_sound = is_sound && header.scale[axis] > 0 && std::isfinite(header.scale[axis]) &&
+               std::isfinite(header.offset[axis]);
+  }
+  return is_sound;
+}
+
 /// Whether keys name a system at all.
 bool names_something(const Crs& crs) {
   return crs.epsg != 0 || crs.vertical_epsg != 0 || !crs.geo_keys.empty() || !crs.name.empty();
@@ -164,12 +188,11 @@ bool names_something(const Crs& crs) {
 
 LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
                           const OnDamage& on_damage) {
-  constexpr std::size_t kFirstBytes = 227;  // of LAS 1.0 to 1.2, the beginning of all
-  std::string_view head = input.fill(kFirstBytes);
+  std::string_view head = input.fill(kLasFirstBytes);
   if (!head.starts_with("LASF")) {
     fail(input, "header", "does not begin with 'LASF'", "this is no LAS file");
   }
-  if (head.size() < kFirstBytes) fail(input, "header", "the file ends in its header");
+  if (head.size() < kLasFirstBytes) fail(input, "header", "the file ends in its header");
   LasHeader header;
   const auto major = static_cast<unsigned char>(head[24]);
   header.minor = static_cast<unsigned char>(head[25]);
@@ -182,7 +205,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   const std::size_t header_bytes = load_little_endian<std::uint16_t>(head.data() + 94);
   const std::size_t least = header.minor == 4   ? kLas14HeaderBytes
                             : header.minor == 3 ? std::size_t{235}
-                                                : kFirstBytes;
+                                                : kLasFirstBytes;
   if (header_bytes < least) {
     fail(input, "header",
          "says that it has " + std::to_string(header_bytes) + " bytes; LAS 1." +
@@ -202,12 +225,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   header.point_format = type & 0x3FU;
   header.record_bytes = load_little_endian<std::uint16_t>(at + 105);
   header.points = load_little_endian<std::uint32_t>(at + 107);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    header.scale[axis] = load_little_endian<double>(at + 131 + 8 * axis);
-    header.offset[axis] = load_little_endian<double>(at + 155 + 8 * axis);
-    header.bounds.max[axis] = load_little_endian<double>(at + 179 + 16 * axis);
-    header.bounds.min[axis] = load_little_endian<double>(at + 187 + 16 * axis);
-  }
+  read_lattice(at, header);
   std::uint64_t evlr_offset = 0;
   std::uint32_t evlrs = 0;
   if (header.minor == 4) {
@@ -235,13 +253,8 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   if (header.points_offset < header_bytes) {
     fail(input, "header", "the points begin inside of the header");
   }
-  // The product of two is the determinant of the transform.
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!(header.scale[axis] > 0) || !std::isfinite(header.scale[axis]) ||
-        !std::isfinite(header.offset[axis]) || header.scale[0] * header.scale[1] == 0 ||
-        !std::isfinite(header.scale[0] * header.scale[1])) {
-      fail(input, "header", "the scale is not positive, or scale or offset are not finite");
-    }
+  if (!has_lattice(header)) {
+    fail(input, "header", "the scale is not positive, or scale or offset are not finite");
   }
   if (header.scale[0] != header.scale[1]) {
     comments.emplace_back(
@@ -272,6 +285,13 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
     fail(input, "byte " + std::to_string(input.offset()), "the file ends before its points");
   }
   return header;
+}
+
+std::optional<LasHeader> peek_las_header(std::string_view head) {
+  if (head.size() < kLasFirstBytes || !head.starts_with("LASF")) return std::nullopt;
+  LasHeader header;
+  read_lattice(head.data(), header);
+  return has_lattice(header) ? std::optional(header) : std::nullopt;
 }
 
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments) {

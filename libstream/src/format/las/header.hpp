@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,6 +35,7 @@ inline constexpr std::uint16_t kLasExtraBytes = 4;
 
 inline constexpr std::size_t kLasVlrHeaderBytes = 54, kLasEvlrHeaderBytes = 60;
 inline constexpr std::size_t kLas14HeaderBytes = 375;
+inline constexpr std::size_t kLasFirstBytes = 227;  ///< of LAS 1.0 to 1.2, the beginning of all
 
 struct LasHeader {
   unsigned minor = 0;          ///< of the version 1.minor
@@ -44,7 +46,7 @@ struct LasHeader {
   std::size_t record_bytes = 0;
   std::uint64_t points = 0, points_offset = 0;
   std::array<double, 3> scale{}, offset{};
-  Box3 bounds;               ///< in the CRS, as stated by the writer
+  Box3 bounds;               ///< in the CRS, as stated; empty if not filled in or not finite
   std::vector<LasVlr> vlrs;  ///< those used here, including EVLRs that can be reached
   /// There are EVLRs, but the input is a pipe.
   bool unread_evlrs = false;
@@ -55,6 +57,10 @@ struct LasHeader {
 /// is not LAS, or if the points exceed the rest of a regular file.
 LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
                           const OnDamage& on_damage = {});
+
+/// Scale, offset and bounds as told by the first kLasFirstBytes of a file; nullopt if it has fewer,
+/// is not LAS, or its scale or offset cannot be.
+std::optional<LasHeader> peek_las_header(std::string_view head);
 
 /// The coordinate reference system named by the records. Throws: Error if it cannot be reached in a
 /// pipe.

@@ -2,13 +2,16 @@
 #include <cassert>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "format/chain.hpp"
+#include "format/common_placement.hpp"
 #include "format/copc/hierarchy.hpp"
 #include "format/formats.hpp"
 #include "format/las/header.hpp"
@@ -29,8 +32,7 @@ class LasOpener {
   LasOpener(const std::string& file, const SourceOptions& options)
       : file_(file), options_(options) {}
 
-  /// first: what the first of several files says; coordinates are moved onto its lattice.
-  RecordStream open(const SourceInfo* first) {
+  RecordStream open() {
     auto input = std::make_unique<Input>(file_, options_.stop);
     std::vector<std::string> comments;
     header_ = read_las_header(*input, file_, comments, options_.on_damage);
@@ -41,30 +43,22 @@ class LasOpener {
     info.files = {file_};
     info.crs =
         options_.crs ? *options_.crs : las_crs(header_, stream_.input->name(), info.comments);
-    if (first != nullptr) move_onto(*first, stream_);
     state_bounds();
     open_records();
     return std::move(stream_);
   }
 
  private:
-  /// Points may have been moved onto the lattice of the first of several files.
   void state_bounds() {
-    const std::optional<Lattice> lattice = lattice_of(stream_.info);
-    if (!lattice || !has_bounds()) return;
+    if (header_.bounds.empty()) return;
     Box3& box = stream_.info.stated_bounds.emplace();
     for (const Point3& corner : {header_.bounds.min, header_.bounds.max}) {
       Point3 stored;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        stored[axis] = (corner[axis] - lattice->offset[axis]) / lattice->scale[axis];
+        stored[axis] = (corner[axis] - header_.offset[axis]) / header_.scale[axis];
       }
       box.include(stored);
     }
-  }
-
-  /// Writers leave the header's box at 0 if they do not fill it in.
-  [[nodiscard]] bool has_bounds() const {
-    return !header_.bounds.empty() && header_.bounds.min != header_.bounds.max;
   }
 
   /// Those that the selection needs, as far as the file can tell.
@@ -114,7 +108,7 @@ class LasOpener {
   /// rounding of its box.
   [[nodiscard]] bool lies_outside(const Box3& region) const {
     const Box3& box = header_.bounds;
-    if (!has_bounds()) return false;
+    if (box.empty()) return false;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (box.min[axis] - header_.scale[axis] > region.max[axis] ||
           box.max[axis] + header_.scale[axis] < region.min[axis]) {
@@ -135,15 +129,32 @@ bool recognise_las(std::span<const std::byte> head) {
       .starts_with("LASF");
 }
 
-std::unique_ptr<PointSource> open_one_las(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* first) {
-  assert(options.block_points > 0);
-  return source_of_records(LasOpener(file, options).open(first), options.block_points);
+/// As the heads of the files tell, pipes included; nullopt for a single one. Heads that cannot be
+/// are left out here and refused when their files are opened.
+std::optional<Placement> placement_of_all(std::span<const std::string> files,
+                                          const std::stop_token& stop) {
+  if (files.size() == 1) return std::nullopt;
+  std::vector<Placement> placements;
+  Box3 bounds;
+  for (const std::string& file : files) {
+    const std::vector<char> head = peek_head(file, kLasFirstBytes, stop);
+    const std::optional<LasHeader> header = peek_las_header({head.data(), head.size()});
+    if (!header) continue;
+    placements.push_back(las_placement(*header));
+    bounds.include(header->bounds);
+  }
+  if (placements.empty()) return std::nullopt;
+  return common_placement(placements, bounds);
 }
 
 std::unique_ptr<PointSource> open_las(std::span<const std::string> files,
                                       const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_las);
+  assert(options.block_points > 0);
+  const std::optional<Placement> common = placement_of_all(files, options.stop);
+  return open_in_turn(files, options, [common](const std::string& file, const SourceOptions& one) {
+    return source_of_records(LasOpener(file, one).open(), one.block_points,
+                             common ? &*common : nullptr);
+  });
 }
 
 }  // namespace

@@ -16,6 +16,16 @@ constexpr std::size_t kMostExtraBytes = 2048;
 
 }  // namespace
 
+Placement las_placement(const LasHeader& header) {
+  const Point3 &scale = header.scale, &offset = header.offset;
+  return {.world = {.xy = {scale[0], 0, offset[0], 0, scale[1], offset[1]}},
+          .coordinates =
+              {Channel{.name = "x", .type = ScalarType::i32},
+               {.name = "y", .type = ScalarType::i32},
+               {.name = "z", .type = ScalarType::i32, .scale = scale[2], .offset = offset[2]}},
+          .crs = {}};
+}
+
 RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments) {
   const std::size_t standard = las_record_bytes(header.point_format);
@@ -29,13 +39,7 @@ RecordStream las_stream(const LasHeader& header, const std::string& name,
   RecordStream stream{.record_bytes = header.record_bytes, .points = header.points};
   SourceInfo& info = stream.info;
   info.comments = std::move(comments);
-  constexpr std::array kNames{"x", "y", "z"};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    info.coordinates[axis] = {.name = kNames[axis], .type = ScalarType::i32};
-  }
-  info.world.xy = {header.scale[0], 0, header.offset[0], 0, header.scale[1], header.offset[1]};
-  info.coordinates[2].scale = header.scale[2];
-  info.coordinates[2].offset = header.offset[2];
+  static_cast<Placement&>(info) = las_placement(header);
 
   stream.fields = las_fields(header.point_format, header.adjusted_time);
   std::string descriptions;

@@ -67,8 +67,7 @@ class MeshPoints final : public PointSource {
 };
 
 template <MakeParser kMake>
-std::unique_ptr<PointSource> open_one_mesh(const std::string& file, const SourceOptions& options,
-                                           const SourceInfo* /*first*/) {
+std::unique_ptr<PointSource> open_one_mesh(const std::string& file, const SourceOptions& options) {
   if (options.entities == Entities::points) {
     return std::make_unique<MeshPoints>(file, options, kMake);
   }

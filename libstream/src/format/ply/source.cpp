@@ -481,8 +481,7 @@ bool recognise_ply(std::span<const std::byte> head) {
   return text.starts_with("ply\n") || text.starts_with("ply\r") || text.starts_with("ply ");
 }
 
-std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* /*first*/) {
+std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options) {
   assert(options.block_points > 0);
   if (options.entities == Entities::points) return std::make_unique<PlySource>(file, options);
   return triangles_of({nullptr, std::make_unique<PlyParser>(file, options)}, options);

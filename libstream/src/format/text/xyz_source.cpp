@@ -231,8 +231,7 @@ bool recognise_xyz(std::span<const std::byte> head) {
   return false;
 }
 
-std::unique_ptr<PointSource> open_one_xyz(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* /*first*/) {
+std::unique_ptr<PointSource> open_one_xyz(const std::string& file, const SourceOptions& options) {
   assert(options.block_points > 0);
   return std::make_unique<XyzSource>(file, options);
 }

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/common_placement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace terrace::stream {
+namespace {
+
+/// Relative error of a quotient of scales: less than a ten-thousandth of a step over 32 bits.
+constexpr double kSameRatio = 1e-14;
+constexpr double kSameStep = 1e-4;
+/// A step is cut into this many at most.
+constexpr std::uint64_t kMostParts = 10'000;
+
+bool is_whole(double steps) { return std::abs(steps - std::round(steps)) <= kSameStep; }
+
+/// The least number of parts of a step whose multiples are near `steps`; nullopt if it is large.
+template <class Near>
+std::optional<std::uint64_t> parts_of(double steps, const Near& near) {
+  for (std::uint64_t parts = 1; parts <= kMostParts; ++parts) {
+    if (near(steps * static_cast<double>(parts))) return parts;
+  }
+  return std::nullopt;
+}
+
+/// One axis of lattices: values k * scale + offset.
+struct Axis {
+  double scale = 1, offset = 0;
+};
+
+/// The number of parts into which the first scale is to be cut for all values to be multiples of
+/// the result from the first offset on.
+std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
+  const Axis& first = axes.front();
+  std::uint64_t parts = 1;
+  const auto cut = [&](std::optional<std::uint64_t> more) {
+    if (more) parts *= *more;
+    return more && parts <= kMostParts;
+  };
+  for (const Axis& axis : axes) {
+    const auto step = [&] { return first.scale / static_cast<double>(parts); };
+    if (!cut(parts_of(axis.scale / step(), [](double ratio) {
+          return ratio >= 0.5 && std::abs(ratio - std::round(ratio)) <= kSameRatio * ratio;
+        }))) {
+      return std::nullopt;
+    }
+    if (!cut(parts_of((axis.offset - first.offset) / step(), is_whole))) return std::nullopt;
+  }
+  return parts;
+}
+
+/// The first axis with its scale cut into parts: as one of them has it, if one has, as quotients
+/// are rounded.
+Axis cut(std::span<const Axis> axes, std::uint64_t parts) {
+  Axis cut = axes.front();
+  cut.scale /= static_cast<double>(parts);
+  for (const Axis& axis : axes) {
+    if (std::abs(axis.scale / cut.scale - 1) <= kSameRatio) return {axis.scale, cut.offset};
+  }
+  return cut;
+}
+
+/// Moves the offset by whole steps, if need be, for 32 bits to reach from `low` to `high`. False if
+/// they cannot.
+bool reach(double low, double high, Axis& axis) {
+  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+  const auto reaches = [&] {
+    return (low - axis.offset) / axis.scale >= -kMost && (high - axis.offset) / axis.scale <= kMost;
+  };
+  if (!(low <= high) || reaches()) return true;
+  axis.offset += std::round((0.5 * low + 0.5 * high - axis.offset) / axis.scale) * axis.scale;
+  return reaches();
+}
+
+std::optional<Lattice> common_lattice(std::span<const Lattice> lattices, const Box3& bounds) {
+  std::array<std::vector<Axis>, 3> axes;
+  std::array<std::uint64_t, 3> parts{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (const Lattice& lattice : lattices)
+      axes[i].push_back({lattice.scale[i], lattice.offset[i]});
+    const std::optional<std::uint64_t> found = common_parts(axes[i]);
+    if (!found) return std::nullopt;
+    parts[i] = *found;
+  }
+  // Steps of one size in x and y stay so: triangulations are Delaunay in steps.
+  if (lattices.front().scale[0] == lattices.front().scale[1]) {
+    parts[0] = parts[1] = std::lcm(parts[0], parts[1]);
+  }
+  Lattice common;
+  for (std::size_t i = 0; i < 3; ++i) {
+    Axis axis = cut(axes[i], parts[i]);
+    if (!reach(bounds.min[i], bounds.max[i], axis)) return std::nullopt;
+    common.scale[i] = axis.scale;
+    common.offset[i] = axis.offset;
+  }
+  return common;
+}
+
+/// The lattice of integers that can be moved; nullopt for others.
+std::optional<Lattice> movable_lattice(const Placement& placement) {
+  for (const Channel& coordinate : placement.coordinates) {
+    if (coordinate.type != ScalarType::i32) return std::nullopt;
+  }
+  return lattice_of(placement);
+}
+
+void place(const Lattice& lattice, Placement& placement) {
+  placement.world.xy = {lattice.scale[0], 0, lattice.offset[0], 0, lattice.scale[1],
+                        lattice.offset[1]};
+  placement.coordinates[2].scale = lattice.scale[2];
+  placement.coordinates[2].offset = lattice.offset[2];
+}
+
+}  // namespace
+
+Placement common_placement(std::span<const Placement> placements, const Box3& bounds) {
+  const Placement& first = placements.front();
+  const auto is_first = [&](const Placement& placement) {
+    return placement.world == first.world && placement.coordinates == first.coordinates;
+  };
+  if (std::all_of(placements.begin(), placements.end(), is_first)) return first;
+  Placement common = first;
+  std::vector<Lattice> lattices;
+  for (const Placement& placement : placements) {
+    if (const auto lattice = movable_lattice(placement)) lattices.push_back(*lattice);
+  }
+  if (lattices.size() == placements.size()) {
+    if (const auto lattice = common_lattice(lattices, bounds)) {
+      place(*lattice, common);
+      return common;
+    }
+  }
+  for (Channel& coordinate : common.coordinates) coordinate.type = ScalarType::f64;
+  place({}, common);
+  return common;
+}
+
+Move move_between(const Placement& from, const Placement& to) {
+  const auto axes_of = [](const Placement& placement) {
+    const auto& [world, coordinates, crs] = placement;
+    return std::array<Axis, 3>{Axis{world.xy[0], world.xy[2]}, Axis{world.xy[4], world.xy[5]},
+                               Axis{coordinates[2].scale, coordinates[2].offset}};
+  };
+  const std::array<Axis, 3> a = axes_of(from), b = axes_of(to);
+  const bool in_steps = to.coordinates[0].type != ScalarType::f64;
+  Move move;
+  for (std::size_t i = 0; i < 3; ++i) {
+    move.factor[i] = a[i].scale / b[i].scale;
+    move.shift[i] = (a[i].offset - b[i].offset) / b[i].scale;
+    if (!in_steps) continue;
+    const double factor = std::round(move.factor[i]), shift = std::round(move.shift[i]);
+    if (!(std::abs(move.factor[i] - factor) <= kSameRatio * factor) || !is_whole(move.shift[i])) {
+      throw std::domain_error(std::string("its ") + "xyz"[i]);
+    }
+    move.factor[i] = factor;
+    move.shift[i] = shift;
+  }
+  return move;
+}
+
+}  // namespace terrace::stream
