@@ -58,6 +58,10 @@ constexpr std::uint32_t ghost_index(const std::array<std::uint32_t, 4>& corner) 
 constexpr bool has_ghost(const std::array<std::uint32_t, 4>& corner) {
   return corner[0] == kGhost || corner[1] == kGhost || corner[2] == kGhost || corner[3] == kGhost;
 }
+/// A ghost in use.
+constexpr bool is_ghost(const std::array<std::uint32_t, 4>& corner) {
+  return corner[0] != kFreeCorner && has_ghost(corner);
+}
 /// A finite tetrahedron in use.
 constexpr bool is_finite(const std::array<std::uint32_t, 4>& corner) {
   return corner[0] != kFreeCorner && !has_ghost(corner);

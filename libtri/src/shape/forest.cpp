@@ -111,20 +111,16 @@ class PoleFinder {
     };
     std::vector<Normal> normals;
     const auto tetrahedra = spheres_.tetrahedra();
-    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-      if (!spheres_.finite(t)) continue;
-      for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
-        if (spheres_.finite(spatial::tetrahedron_of(tetrahedra[t].mate[i]))) continue;
-        const spatial::Side side = spatial::make_side(t, i);
-        const auto facet = spatial::facet_of(tetrahedra[t], i);
-        if (!part_.whole.empty() && std::none_of(facet.begin(), facet.end(), [&](std::uint32_t v) {
-              return part_.whole[v] != 0;
-            }))
-          continue;
-        const Vector3 normal = spheres_.hull_normal(side);
-        for (const std::uint32_t v : facet)
-          normals.push_back({v, spheres_.facet_ranks(side), normal});
-      }
+    for (const spatial::Tetrahedron& ghost : tetrahedra) {
+      if (!spatial::is_ghost(ghost.corner)) continue;
+      const std::uint32_t i = spatial::ghost_index(ghost.corner);
+      const auto facet = spatial::facet_of(ghost, i);
+      if (std::none_of(facet.begin(), facet.end(), [&](std::uint32_t v) { return whole(v); }))
+        continue;
+      const spatial::Side side = ghost.mate[i];
+      const Vector3 normal = spheres_.hull_normal(side);
+      for (const std::uint32_t v : facet)
+        normals.push_back({v, spheres_.facet_ranks(side), normal});
     }
     std::sort(normals.begin(), normals.end(), [](const Normal& a, const Normal& b) {
       return a.vertex != b.vertex ? a.vertex < b.vertex : a.facet < b.facet;
@@ -212,8 +208,7 @@ class Forest {
   /// new.
   [[nodiscard]] bool stands(std::uint32_t t, spatial::Side mate) const {
     const std::uint32_t other = spatial::tetrahedron_of(mate);
-    if (!(t < other || !spheres_.finite(other))) return false;
-    return part_.label.empty() || node(t) >> 1 != node(other) >> 1;
+    return t < other || !spheres_.finite(other);
   }
 
   /// `other` may be kNone: beyond the hull.
@@ -225,10 +220,11 @@ class Forest {
 
   void state_all() {
     const auto tetrahedra = spheres_.tetrahedra();
-    const std::size_t blocks = (tetrahedra.size() + kForestBlock - 1) / kForestBlock;
+    const std::size_t unlabelled = part_.label.empty() ? tetrahedra.size() : part_.unlabelled;
+    const std::size_t blocks = (unlabelled + kForestBlock - 1) / kForestBlock;
     std::vector<std::size_t> start(blocks + 1);
     const auto none = [] { return 0; };
-    for_blocks(tetrahedra.size(), kForestBlock, threads_, none,
+    for_blocks(unlabelled, kForestBlock, threads_, none,
                [&](std::size_t begin, std::size_t end, int) {
                  std::size_t count = 0;
                  for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
@@ -242,7 +238,7 @@ class Forest {
         std::count_if(poles_.begin(), poles_.end(),
                       [](const Poles& poles) { return poles.second != spatial::kNone; }));
     list_.resize(start.back() + at_vertices);
-    for_blocks(tetrahedra.size(), kForestBlock, threads_, none,
+    for_blocks(unlabelled, kForestBlock, threads_, none,
                [&](std::size_t begin, std::size_t end, int) {
                  const std::span to{list_.data() + start[begin / kForestBlock],
                                     list_.data() + start[begin / kForestBlock + 1]};

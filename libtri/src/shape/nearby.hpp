@@ -56,7 +56,7 @@ class Nearby {
     std::vector<std::uint8_t> known(tetrahedra.size());
     for (std::size_t i = sought_; i < slots_.size(); ++i)
       known[i] = static_cast<std::uint8_t>(1 + state_.forest[slots_[i]]);
-    const Part part{known, whole_};
+    const Part part{known, sought_, whole_};
     std::vector<std::uint8_t> inside = signed_forest(spheres, 1, part);
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
       if (i < sought_) state_.forest[slots_[i]] = inside[i];

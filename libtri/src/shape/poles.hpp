@@ -17,6 +17,7 @@ inline constexpr double kPoleWeight = 2.0;
 /// What is known where the tetrahedra are a part of all, by slot.
 struct Part {
   std::span<const std::uint8_t> label;  ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
+  std::size_t unlabelled = 0;           ///< the number of unknown ones, which come first
   std::span<const std::uint8_t> whole;  ///< of vertices: whether all tetrahedra at them are here
 };
 

@@ -16,12 +16,11 @@ class Labels {
       : spheres_(spheres), inside_(inside), whole_(whole), count_(spheres.places().size()) {
     const auto tetrahedra = spheres.tetrahedra();
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-      if (!spheres.finite(t)) continue;
-      for (std::size_t i = 0; i < 4; ++i) {
-        ++count_[tetrahedra[t].corner[i]][inside_[t]];
-        if (spheres.finite(spatial::tetrahedron_of(tetrahedra[t].mate[i]))) continue;
-        for (const std::uint32_t v : spatial::facet_of(tetrahedra[t], static_cast<unsigned>(i)))
-          ++count_[v][0];
+      const auto& corner = tetrahedra[t].corner;
+      if (spheres.finite(t)) {
+        for (const std::uint32_t v : corner) ++count_[v][inside_[t]];
+      } else if (spatial::is_ghost(corner)) {
+        for (const std::uint32_t v : corner) ++count_[v][0];
       }
     }
   }
@@ -29,8 +28,15 @@ class Labels {
   [[nodiscard]] std::uint32_t count(std::uint32_t vertex, std::uint8_t label) const {
     return count_[vertex][label];
   }
-  [[nodiscard]] std::uint32_t vertex_slots() const {
-    return static_cast<std::uint32_t>(count_.size());
+  [[nodiscard]] bool buried(std::uint32_t v) const {
+    return count_[v][0] == 0 || count_[v][1] == 0;
+  }
+  /// Whether a vertex is buried whose tetrahedra may change.
+  [[nodiscard]] bool any_buried() const {
+    for (std::uint32_t v = 1; v < count_.size(); ++v)
+      if (count_[v][0] + count_[v][1] > 0 && buried(v) && (whole_.empty() || whole_[v] != 0))
+        return true;
+    return false;
   }
   /// Whether t is finite and all tetrahedra at its corners are there.
   [[nodiscard]] bool changeable(std::uint32_t t) const {
@@ -123,18 +129,16 @@ void sculpt(const Spheres& spheres, Labels& labels) {
   const auto vertex_of = [&](spatial::Side side) {
     return tetrahedra[spatial::tetrahedron_of(side)].corner[spatial::index_of(side)];
   };
-  const auto buried = [&](std::uint32_t v) {
-    return labels.count(v, 0) == 0 || labels.count(v, 1) == 0;
-  };
   std::priority_queue<Candidate> next;
   const auto consider = [&](spatial::Side side) {
     const std::uint32_t t = spatial::tetrahedron_of(side);
-    if (!spheres.finite(t) || !buried(vertex_of(side)) || !labels.changeable(t)) return;
+    if (!spheres.finite(t) || !labels.buried(vertex_of(side)) || !labels.changeable(t)) return;
     const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
     if (labels.at(spatial::tetrahedron_of(mate)) == labels.at(t)) return;
     next.push({spheres.facet_defect(side), spheres.places()[vertex_of(side)].rank,
                spheres.facet_ranks(side), side});
   };
+  if (!labels.any_buried()) return;
   for (std::uint32_t t = 0; t < tetrahedra.size(); ++t)
     for (const std::uint32_t i : {0u, 1u, 2u, 3u}) consider(spatial::make_side(t, i));
   while (!next.empty()) {
@@ -142,7 +146,7 @@ void sculpt(const Spheres& spheres, Labels& labels) {
     next.pop();
     const std::uint32_t t = spatial::tetrahedron_of(side);
     const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
-    if (!buried(vertex_of(side)) || labels.at(spatial::tetrahedron_of(mate)) == labels.at(t))
+    if (!labels.buried(vertex_of(side)) || labels.at(spatial::tetrahedron_of(mate)) == labels.at(t))
       continue;
     labels.flip(t);
     for (const spatial::Side beyond : tetrahedra[t].mate) consider(beyond);

@@ -15,7 +15,11 @@ constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 Spheres::Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
                  unsigned threads)
-    : tetrahedra_(tetrahedra), places_(std::move(places)), sphere_(tetrahedra.size()) {
+    : tetrahedra_(tetrahedra),
+      places_(std::move(places)),
+      sphere_(tetrahedra.size()),
+      ranks_(places_.size()) {
+  for (std::size_t v = 0; v < places_.size(); ++v) ranks_[v] = places_[v].rank;
   for_blocks(
       tetrahedra.size(), kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
@@ -74,7 +78,7 @@ double Spheres::facet_defect(Side side) const {
   const std::uint32_t other = spatial::tetrahedron_of(tetrahedra_[t].mate[spatial::index_of(side)]);
   const auto f = spatial::facet_of(tetrahedra_[t], spatial::index_of(side));
   // No branches that the processor could not predict.
-  const std::uint32_t r0 = places_[f[0]].rank, r1 = places_[f[1]].rank, r2 = places_[f[2]].rank;
+  const std::uint32_t r0 = ranks_[f[0]], r1 = ranks_[f[1]], r2 = ranks_[f[2]];
   std::uint32_t first = r1 < r0 ? f[1] : f[0];
   first = r2 < std::min(r0, r1) ? f[2] : first;
   const Vector3 u = to_centre(t, first);

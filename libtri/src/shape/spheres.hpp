@@ -158,8 +158,9 @@ class Spheres {
   [[nodiscard]] Sphere sphere_of(const spatial::Tetrahedron& t) const;
 
   std::span<const spatial::Tetrahedron> tetrahedra_;
-  std::vector<Place> places_;   ///< by vertex slot
-  std::vector<Sphere> sphere_;  ///< by tetrahedron slot
+  std::vector<Place> places_;         ///< by vertex slot
+  std::vector<Sphere> sphere_;        ///< by tetrahedron slot
+  std::vector<std::uint32_t> ranks_;  ///< of places_, close together
 };
 
 /// 1 - cos of the angle between two vectors, in 0 .. 2; 1 where rounding leaves no angle.
