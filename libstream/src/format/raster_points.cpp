@@ -63,8 +63,8 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
   const RasterOpener opener = [raster, open_one](const std::string& file) {
     return open_one(file, raster);
   };
-  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs.has_value(),
-                               kOpenAtOnce, options.memory_bytes - window),
+  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs, kOpenAtOnce,
+                               options.memory_bytes - window),
                    options);
 }
 
