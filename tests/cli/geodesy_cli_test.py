@@ -14,7 +14,7 @@ import subprocess
 import tempfile
 import unittest
 
-from small_tiff import write_tiff
+from small_tiff import GEOGRAPHIC, write_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 ESRI_UTM = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",'
@@ -402,6 +402,27 @@ class GeodesyTest(unittest.TestCase):
         box = self.points(store, '--region', '179.45,-21,180.45,-10', '--region-crs', 'EPSG:4326')
         self.assertEqual(len(box), 100)
         self.assertEqual({x > 0 for x, _, _ in box}, {True, False})
+
+    def test_rasters_joined_at_the_antimeridian_answer_for_both_longitudes(self):
+        west, east = self.path('west.tif'), self.path('east.tif')
+        for path, left in (west, 179), (east, -180):
+            write_tiff(path, 10, 10, [left + i % 10 for i in range(100)], corner=(left, -17), cell=0.1,
+                       keys=GEOGRAPHIC)
+        store = self.build(west, east)
+        self.assertAlmostEqual(self.info(store)['bounds']['max'][0], 180.95)
+        places = self.path('places.csv')
+        with open(places, 'w', encoding='utf-8') as file:
+            file.write('179.75,-17.5\n-179.75,-17.5\n180.25,-17.5\n')
+        lines = self.ok('sample', store, '--points', places).splitlines()
+        self.assertEqual([float(line.split(',')[2]) for line in lines], [186, -178, -178])
+        for box in '-180,-17.5,-179.5,-17.3', '180,-17.5,180.5,-17.3':
+            self.assertEqual(len(self.points(store, f'--region={box}')), 10)
+        self.assertEqual(self.points(store, '--near=-179.95,-17.05', '-k', 1)[0][2], -180)
+        line = self.ok('profile', store, '--line=179.5,-17.5,-179.5,-17.5', '-o', '-').splitlines()
+        self.assertAlmostEqual(float(line[-1].split(',')[1]), 180.5)
+        self.assertNotIn('', [row.split(',')[3] for row in line])
+        error = self.refused(2, 'points', store, '--region=179,-18,-179,-17', '-o', '-')
+        self.assertIn('170 to 190', error)
 
     def test_a_point_that_has_no_place_there_is_named(self):
         cloud = self.cloud([(10, 10), (20, 20), (30, 90), (40, 40)])

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -117,25 +118,30 @@ Region region_in(const Region& region, const Transformation& change, const strea
     if (there.empty()) fail(to, "the region has no area in");
     polygons = std::move(there);
   }
-  if (to.is_geographic()) {
-    const double turn = 360.0 / to.definition().degrees_per_unit;
-    std::vector<Polygon> there;
-    for (const Polygon& polygon : polygons) {
-      for (const double shift : {-turn, 0.0, turn}) {
-        Polygon copy = polygon;
-        stream::Box3 box;
-        for (std::vector<Point2>& ring : copy) {
-          for (Point2& p : ring) {
-            p[0] += shift;
-            box.include(stream::Point3{p[0], p[1], 0});
-          }
+  const Region there =
+      Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
+  if (!to.is_geographic()) return there;
+  return with_turns(there, 360.0 / to.definition().degrees_per_unit, bounds);
+}
+
+Region with_turns(const Region& region, double turn, const stream::Box3& bounds) {
+  std::vector<Polygon> polygons = outlines(region);
+  const std::size_t count = polygons.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const double shift : {-turn, turn}) {
+      Polygon copy = polygons[i];
+      double west = std::numeric_limits<double>::infinity(), east = -west;
+      for (std::vector<Point2>& ring : copy) {
+        for (Point2& p : ring) {
+          p[0] += shift;
+          west = std::min(west, p[0]);
+          east = std::max(east, p[0]);
         }
-        const bool meets = box.min[0] <= bounds.max[0] && box.max[0] >= bounds.min[0];
-        if (shift == 0 || meets) there.push_back(std::move(copy));
       }
+      if (west <= bounds.max[0] && east >= bounds.min[0]) polygons.push_back(std::move(copy));
     }
-    polygons = std::move(there);
   }
+  if (polygons.size() == count) return region;
   return Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
 }
 

@@ -9,6 +9,7 @@
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
+#include "earth/whole_turns.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -38,6 +39,10 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
   return {own, other};
 }
 
+RegionConversion::RegionConversion(const stream::Store& store)
+    : bounds_(world_box(store.schema(), store.bounds())),
+      turn_(WholeTurns(store.schema(), store.bounds()).turn()) {}
+
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
     : to_regions_(std::move(to_regions)), bounds_(world_box(store.schema(), store.bounds())) {}
 
@@ -55,7 +60,7 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const Coord
 }
 
 Region RegionConversion::operator()(Region region) const {
-  if (!to_regions_) return region;
+  if (!to_regions_) return turn_ > 0 ? with_turns(region, turn_, bounds_) : region;
   return region_in(region, *to_regions_, bounds_);
 }
 

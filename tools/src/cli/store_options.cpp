@@ -23,7 +23,7 @@ std::optional<Transformation> CrsOptions::given(const stream::Store& store,
 RegionConversion CrsOptions::regions(const stream::Store& store,
                                      const CommonOptions& common) const {
   std::optional<Transformation> change = given(store, common);
-  return change ? RegionConversion(store, std::move(*change)) : RegionConversion();
+  return change ? RegionConversion(store, std::move(*change)) : RegionConversion(store);
 }
 
 PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {

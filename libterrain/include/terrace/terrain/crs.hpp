@@ -161,6 +161,8 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 class RegionConversion {
  public:
   RegionConversion() = default;
+  /// Regions in the store's own CRS; longitudes may be off by whole turns.
+  explicit RegionConversion(const stream::Store& store);
   /// to_regions: from the store's CRS to that of the regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
   /// From the CRS of a source, `system`, to that of the regions, `named` as for
@@ -177,6 +179,7 @@ class RegionConversion {
  private:
   std::optional<Transformation> to_regions_;
   stream::Box3 bounds_;
+  double turn_ = 0;  ///< of longitudes; 0: none
 };
 
 /// Places of the store's CRS in another; made by default, it leaves them as they are. Heights stay.
