@@ -21,8 +21,9 @@ constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
 /// Steps across a box in which its image is looked at.
 constexpr unsigned kPlaceSteps = 24;
-/// Fewer steps do across boxes up to this size (degrees): second differences bound the bulge.
-constexpr double kSmall = 1.0;
+/// Fewer steps do across boxes up to this size (degrees), where second differences bound the bulge;
+/// and across those up to the other one if that is below what the many steps would allow.
+constexpr double kSmall = 1.0, kMayBeSmooth = 8.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
 /// The length of a patch whose polynomials stand for a projection, and their largest error in
@@ -267,29 +268,33 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   }
   const Point2 size{high[0] - low[0], high[1] - low[1]};
   const double longest = std::max(size[0], size[1]);
-  const bool small = longest <= kSmall;
-  // Steps of about one length, and two at least, between which there is a second difference.
-  const auto steps = [&](double length) {
-    if (length == 0.0) return 1U;
-    const double share = std::ceil((small ? kSmallSteps : kPlaceSteps) * length / longest);
-    return std::max(2U, static_cast<unsigned>(share));
-  };
-  const PlaceGrid grid{low, high, {steps(size[0]), steps(size[1])}};
-  std::vector<Point2> places = grid.places();
-  from_geographic(places);
-  StoredBox around = nothing();
-  for (Point2& p : places) {
-    p = stored_place(placement_, p);
-    if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, p);
+  for (const bool few : {true, false}) {
+    if (few && longest > kMayBeSmooth) continue;
+    // Steps of about one length, and two at least, between which there is a second difference.
+    const auto steps = [&](double length) {
+      if (length == 0.0) return 1U;
+      const double share = std::ceil((few ? kSmallSteps : kPlaceSteps) * length / longest);
+      return std::max(2U, static_cast<unsigned>(share));
+    };
+    const PlaceGrid grid{low, high, {steps(size[0]), steps(size[1])}};
+    std::vector<Point2> places = grid.places();
+    from_geographic(places);
+    StoredBox around = nothing();
+    for (Point2& p : places) {
+      p = stored_place(placement_, p);
+      if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, p);
+    }
+    const Point2 range{around.max[0] - around.min[0], around.max[1] - around.min[1]};
+    // What bulges between the places looked at.
+    Point2 bulge{range[0] / kPlaceSteps, range[1] / kPlaceSteps};
+    if (few) {
+      const double most = longest <= kSmall ? kFarPlace : std::max(bulge[0], bulge[1]);
+      bulge = {2.0 * grid.second_difference(places, 0), 2.0 * grid.second_difference(places, 1)};
+      if (!(std::max(bulge[0], bulge[1]) <= most)) continue;
+    }
+    if (around.min[0] <= around.max[0]) add(around, bulge);
+    break;
   }
-  if (!(around.min[0] <= around.max[0])) return windows;
-  // What bulges between the places looked at.
-  Point2 bulge;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    bulge[axis] = small ? 2.0 * grid.second_difference(places, axis)
-                        : (around.max[axis] - around.min[axis]) / kPlaceSteps;
-  }
-  add(around, bulge);
   return windows;
 }
 
