@@ -260,6 +260,19 @@ class TileTest(TileTestCase):
         self.tile(store, 'once')
         self.refuse(1, '--force', 'tile', store, '-o', self.path('once'), *vertical)
 
+    def test_heights_that_are_none_on_a_globe_are_refused(self):
+        dem = Dem(20, 20, 10, 46, 0.01, height=lambda c, r: -3e38 if c == r else 300.0)
+        store = self.build(dem, 'far')
+        result = terrace('tile', store, '--vertical', 'ellipsoidal', '-o', self.path('far'))
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('10,000 km', result.stderr)
+        self.assertIn('nodata', result.stderr)
+        self.assertFalse(os.path.exists(self.path('far')))
+        self.tile(store, 'near', '--where', 'z > -9000')
+        result = terrace('tile', store, '--vertical', 'ellipsoidal', '--where', 'z > -9000', '--fill',
+                         'flat:1e300', '-o', self.path('far'))
+        self.assertEqual(result.returncode, 2, result.stderr)
+
     def test_deeper_than_the_data_is_said(self):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('deep'), '--vertical',
                          'ellipsoidal', '--zoom', '10-10')
