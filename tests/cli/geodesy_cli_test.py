@@ -137,6 +137,35 @@ class GeodesyTest(unittest.TestCase):
             file.write(ESRI_UTM[:60])
         self.assertIn('points.prj', self.refused(1, 'build', places, '-o', self.path('none')))
 
+    def test_a_local_system_has_a_unit_and_no_place(self):
+        local = 'LOCAL_CS["site",UNIT["foot",0.3048]]'
+        raster = self.raster({1025: 1})
+        stores = [self.build(raster, '--crs', local)]
+        with open(self.path('dem.prj'), 'w', encoding='utf-8') as file:
+            file.write(local)
+        stores.append(self.build(raster))
+        os.remove(self.path('dem.prj'))
+        with open(self.path('dem.vrt'), 'w', encoding='utf-8') as file:
+            file.write(f'<VRTDataset rasterXSize="6" rasterYSize="6"><SRS>{local}</SRS><GeoTransform>0,1,0,0,0,-1'
+                       '</GeoTransform><VRTRasterBand dataType="Float32" band="1"><SimpleSource>'
+                       '<SourceFilename relativeToVRT="1">dem.tif</SourceFilename></SimpleSource>'
+                       '</VRTRasterBand></VRTDataset>')
+        stores.append(self.build(self.path('dem.vrt')))
+        written = self.path('written.tif')
+        self.ok('raster', stores[-1], '-o', written)
+        stores.append(self.build(written))
+        for store in stores:
+            self.assertEqual(self.info(store)['crs']['name'], 'site')
+            line = self.info(store)['bounds']
+            west, south = line['min'][:2]
+            profile = self.ok('profile', store, f'--line={west},{south},{line["max"][0]},{south}', '-o', '-')
+            self.assertAlmostEqual(float(profile.splitlines()[-1].split(',')[0]),
+                                   (line['max'][0] - west) * 0.3048, delta=1e-3)
+            error = self.refused(1, 'tile', store, '-o', self.path('tiles'), '--vertical', 'ellipsoidal')
+            self.assertIn('no CRS', error)
+        degrees = self.build(self.cloud([(10, 10), (20, 20)]), '--crs', 'EPSG:4326')
+        self.assertIn('local', self.refused(2, 'points', degrees, '-o', '-', '--to-crs', local))
+
     def test_contradictory_keys_are_an_error_that_names_them(self):
         for keys, words in (
                 ({1024: 1, 3072: 32632, 3076: 9002}, ['EPSG:32632', 'metres', '--crs']),

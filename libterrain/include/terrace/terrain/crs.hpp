@@ -121,6 +121,10 @@ class CoordinateSystem {
   std::shared_ptr<LazyChange> wgs84_;
 };
 
+/// What is named as for CoordinateSystem::parse, or a local (engineering) system, as stores and
+/// files record it. Throws: UsageError.
+stream::Crs crs_named(const std::string& text);
+
 /// From one system to another, by one operation between their datums.
 class Transformation {
  public:

@@ -18,7 +18,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-namespace {
 
 std::string unit_name(double metres) {
   if (metres == 1) return "metre";
@@ -27,6 +26,8 @@ std::string unit_name(double metres) {
   if (metres == 1000) return "kilometre";
   return {};
 }
+
+namespace {
 
 std::string angle_name(double degrees) {
   if (degrees == 1) return "degree";
@@ -91,6 +92,11 @@ Heights CoordinateSystem::heights() const { return definition().heights; }
 bool CoordinateSystem::reaches_wgs84() const { return to_wgs84().possible(); }
 bool CoordinateSystem::counts_as_wgs84() const {
   return to_wgs84().possible() && to_wgs84().identity();
+}
+
+stream::Crs crs_named(const std::string& text) {
+  if (const auto local = local_crs_named(text)) return *local;
+  return CoordinateSystem::parse(text).crs();
 }
 
 CoordinateSystem CoordinateSystem::parse(const std::string& text,
