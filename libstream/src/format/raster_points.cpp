@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "format/aux_xml.hpp"
 #include "raster/order.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
@@ -53,7 +54,7 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
   raster.cache_bytes = window / 6;
   const auto open_one = [open, cell = options.cell](const std::string& file,
                                                     const RasterOptions& how) {
-    std::unique_ptr<Raster> found = open(file, how);
+    std::unique_ptr<Raster> found = with_aux_xml(open(file, how), file, how);
     if (cell > 0) found = std::make_unique<WithCells>(std::move(found), cell);
     return found;
   };

@@ -124,13 +124,19 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
     if (crs.epsg != 0) {
       text << "EPSG:" << crs.epsg;
     } else {
-      text << (crs.name.empty() ? "unknown" : '"' + crs.name + '"');
+      // The name is the first thing that WKT puts in quotes.
+      const std::size_t quote = crs.name.empty() ? crs.wkt.find('"') : crs.wkt.npos;
+      const std::string name =
+          quote == crs.wkt.npos
+              ? crs.name
+              : crs.wkt.substr(quote + 1, crs.wkt.find('"', quote + 1) - quote - 1);
+      text << (name.empty() ? "unknown" : '"' + name + '"');
     }
     if (crs.vertical_epsg != 0) text << '+' << crs.vertical_epsg;
     return text.str();
   };
   const Crs &a = first.crs, &b = other.crs;
-  const bool same_name = a.epsg != 0 || a.name == b.name;
+  const bool same_name = a.epsg != 0 || (a.name == b.name && a.wkt == b.wkt);
   if (a.epsg == b.epsg && same_name && a.vertical_epsg == b.vertical_epsg &&
       a.geographic == b.geographic && a.horizontal_unit == b.horizontal_unit &&
       (a.epsg != 0 || a.geo_keys == b.geo_keys)) {
@@ -145,7 +151,10 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
 std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
   const auto& m = world.xy;
   const bool degrees = crs.horizontal_unit.empty() || crs.horizontal_unit == "degree";
-  if (!crs.geographic || !degrees || m[1] != 0 || m[3] != 0 || !(m[0] > 0)) return 0;
+  // Whoever reads WKT comes later; a degree in radians tells enough.
+  const bool geographic =
+      crs.geographic || (crs.wkt.starts_with("GEOG") && crs.wkt.find("0.01745329") != crs.wkt.npos);
+  if (!geographic || !degrees || m[1] != 0 || m[3] != 0 || !(m[0] > 0)) return 0;
   const double columns = 360 / m[0];
   const bool whole = columns < 0x1p31 && std::abs(columns - std::round(columns)) <= kPhase;
   return whole ? static_cast<std::int64_t>(std::round(columns)) : 0;
