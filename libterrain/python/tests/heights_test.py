@@ -76,6 +76,13 @@ class Heights(StoreCase):
         np.testing.assert_allclose(self.raster.heights(lonlat, crs='EPSG:4326'), there['z'][:200], rtol=0, atol=1e-4)
         self.assertFalse(np.isnan(self.raster.heights(here)).any())
 
+    def test_masked_places_have_no_height(self):
+        xy = np.ma.array(places(5))
+        xy[2, 0] = np.ma.masked
+        got = self.raster.heights(xy)
+        np.testing.assert_array_equal(np.isnan(got), [False, False, True, False, False])
+        np.testing.assert_array_equal(got[[0, 1, 3, 4]], self.raster.heights(places(5)[[0, 1, 3, 4]]))
+
     def test_threads_and_memory_change_nothing(self):
         xy = places(2000)
         expected = self.raster.heights(xy)
