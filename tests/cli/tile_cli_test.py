@@ -319,6 +319,12 @@ class TileTest(TileTestCase):
                 self.assertFalse(self.verify(out, '--store', store, '--geoid', other)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--vertical', 'ignore')['ok'])
 
+    def test_normals_at_the_poles_point_upward(self):
+        result = terrace('tile', self.stores['degrees'], '-o', self.path('poles'), '--vertical', 'orthometric',
+                         '--normals', '--zoom', '0-2')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(self.verify('poles')['problems'], [])
+
     def test_orthometric_heights_go_to_the_ellipsoid_by_egm96(self):
         if not shutil.which('cs2cs'):
             self.skipTest('cs2cs is not installed')
