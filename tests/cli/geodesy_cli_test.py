@@ -453,6 +453,14 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(2, 'points', store, '--region=179,-18,-179,-17', '-o', '-')
         self.assertIn('170 to 190', error)
 
+    def test_beside_the_area_of_all_operations_one_without_a_grid_is_taken(self):
+        # South of Germany, where the grid of DHDN ends.
+        store = self.build(self.cloud([(500000 + i, 5100000 + i * i) for i in range(9)]), '--crs', 'EPSG:32632')
+        x, y, _ = self.points(store, '--to-crs', 'EPSG:31467')[0]
+        self.assertAlmostEqual(x, 3500000, delta=200)
+        self.assertAlmostEqual(y, 5100000 / 0.9996, delta=1200)
+        self.assertIn('geocentric', self.refused(2, 'points', store, '--to-crs', 'EPSG:4978', '-o', '-'))
+
     def test_a_point_that_has_no_place_there_is_named(self):
         cloud = self.cloud([(10, 10), (20, 20), (30, 90), (40, 40)])
         store = self.build(cloud, '--crs', 'EPSG:4326')

@@ -193,6 +193,11 @@ void read_horizontal(const PJ* crs, CrsDefinition& definition) {
     throw LocalCrs(local);
   }
   const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
+  if (type == PJ_TYPE_GEOCENTRIC_CRS) {
+    throw CrsError("the CRS \"" + definition.name +
+                       "\" is geocentric, with x, y and z from the middle of the earth",
+                   "take a geographic or projected one; cs2cs converts points");
+  }
   if (!geographic && type != PJ_TYPE_PROJECTED_CRS) {
     throw CrsError("the CRS \"" + definition.name + "\" is neither geographic nor projected",
                    kByCode);
