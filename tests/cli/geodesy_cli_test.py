@@ -453,6 +453,33 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(2, 'points', store, '--region=179,-18,-179,-17', '-o', '-')
         self.assertIn('170 to 190', error)
 
+    def test_what_is_written_across_the_antimeridian_stays_together(self):
+        dem = self.path('fiji.tif')
+        write_tiff(dem, 40, 40, [(i % 40) * (i // 40) for i in range(1600)], corner=(800000, 8240000), cell=1000.0,
+                   keys={1024: 1, 1025: 1, 3072: 32760})
+        store = self.build(dem)
+        self.ok('contour', store, '--interval', 300, '-o', self.path('lines.geojson'))
+        with open(self.path('lines.geojson'), encoding='utf-8') as file:
+            lines = [line['geometry']['coordinates'] for line in json.load(file)['features']]
+        longitudes = [place[0] for line in lines for place in line]
+        self.assertTrue(min(longitudes) < 180 < max(longitudes) < 181)
+        mesh = self.path('mesh.ply')
+        self.ok('mesh', store, '--to-crs', 'EPSG:4326', '-o', mesh, '--format', 'ply-ascii')
+        with open(mesh, encoding='utf-8') as file:
+            vertices = file.read().split('end_header\n')[1].splitlines()[:1600]
+        longitudes = [float(line.split()[0]) for line in vertices]
+        self.assertTrue(min(longitudes) < 180 < max(longitudes) < 181)
+        for crs, most in ('EPSG:4326', 60), ('EPSG:3857', 50000):
+            raster = self.path('raster.tif')
+            self.ok('raster', store, '--to-crs', crs, '-o', raster, '--force')
+            info = self.info(raster)
+            self.assertLess(info['columns'], most)
+            self.assertGreater(info['rows'], 30)
+            self.assertGreater(info['points'], 1200)
+        self.ok('raster', store, '--to-crs', 'EPSG:4326', '-o', raster, '--region', '179.9,-17,180.1,-15',
+                '--region-crs', 'EPSG:4326', '--force')
+        self.assertGreater(self.info(raster)['points'], 300)
+
     def test_beside_the_area_of_all_operations_one_without_a_grid_is_taken(self):
         # South of Germany, where the grid of DHDN ends.
         store = self.build(self.cloud([(500000 + i, 5100000 + i * i) for i in range(9)]), '--crs', 'EPSG:32632')

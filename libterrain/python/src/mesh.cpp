@@ -70,7 +70,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
     terrain::TriangleMesh made = detail_mesh(store, detail, options, context);
     if (writer) writer->finish();
     if (const auto to = change_to(store, crs)) {
-      const terrain::PlaceConversion places(*to);
+      const terrain::PlaceConversion places(*to, store);
       places(made.positions);
     }
     return made;

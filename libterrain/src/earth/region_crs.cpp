@@ -124,6 +124,12 @@ Region region_in(const Region& region, const Transformation& change, const strea
   return with_turns(there, 360.0 / to.definition().degrees_per_unit, bounds);
 }
 
+Point2 middle_in(const Transformation& change, const stream::Box3& box) {
+  Point2 middle{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
+  change.forward({&middle, 1});
+  return middle;
+}
+
 Region with_turns(const Region& region, double turn, const stream::Box3& bounds) {
   std::vector<Polygon> polygons = outlines(region);
   const std::size_t count = polygons.size();

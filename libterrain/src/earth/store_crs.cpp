@@ -68,6 +68,13 @@ PlaceConversion::PlaceConversion(Transformation change) {
   if (!change.identity()) change_.emplace(std::move(change));
 }
 
+PlaceConversion::PlaceConversion(Transformation change, const stream::Store& store)
+    : PlaceConversion(std::move(change)) {
+  if (!change_ || !change_->to().is_geographic()) return;
+  turn_ = 360.0 / change_->to().definition().degrees_per_unit;
+  middle_ = middle_in(*change_, world_box(store.schema(), store.bounds()))[0];
+}
+
 void PlaceConversion::operator()(std::span<stream::Point3> points) const {
   if (!change_) return;
   std::array<Point2, 1024> places{};
@@ -76,6 +83,10 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
     for (std::size_t i = 0; i < count; ++i)
       places[i] = {points[first + i][0], points[first + i][1]};
     change_->forward(std::span(places).first(count));
+    if (turn_ > 0) {
+      const WholeTurns turns(middle_, turn_);
+      for (std::size_t i = 0; i < count; ++i) places[i] = turns(places[i]);
+    }
     for (std::size_t i = 0; i < count; ++i) {
       stream::Point3& p = points[first + i];
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {

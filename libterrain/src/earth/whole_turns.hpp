@@ -10,32 +10,33 @@
 
 namespace terrace::terrain {
 
-/// Places asked for in a geographic store, moved by whole turns to where it lies: across the
-/// antimeridian, or with longitudes from 0 to 360, one place has two longitudes.
+/// Longitudes moved by whole turns to where the data lie: across the antimeridian, or counted from
+/// 0 to 360, one place has two.
 class WholeTurns {
  public:
   WholeTurns() = default;
+  /// To half a turn on either side of the middle, which may be NaN: nothing is moved then.
+  WholeTurns(double middle, double turn) : turn_(turn), middle_(middle), reach_(0.5 * turn) {}
   /// stored: the store's bounds.
   WholeTurns(const stream::Placement& placement, const stream::Box3& stored) {
     const stream::Crs& crs = placement.crs;
     if (!crs.geographic || crs.horizontal_unit != "degree" || stored.empty()) return;
     const stream::Box3 box = world_box(placement, stored);
+    turn_ = 360;
     middle_ = 0.5 * (box.min[0] + box.max[0]);
-    reach_ = std::max(0.5 * kTurn, box.max[0] - middle_);
+    reach_ = std::max(0.5 * turn_, box.max[0] - middle_);
   }
 
   /// 0 where longitudes have no turns.
-  [[nodiscard]] double turn() const { return reach_ > 0 ? kTurn : 0; }
+  [[nodiscard]] double turn() const { return turn_; }
   [[nodiscard]] Point2 operator()(Point2 place) const {
     const double off = middle_ - place[0];
-    if (reach_ > 0 && std::abs(off) > reach_) place[0] += kTurn * std::round(off / kTurn);
+    if (turn_ > 0 && std::abs(off) > reach_) place[0] += turn_ * std::round(off / turn_);
     return place;
   }
 
  private:
-  static constexpr double kTurn = 360;
-
-  double middle_ = 0, reach_ = 0;
+  double turn_ = 0, middle_ = 0, reach_ = 0;
 };
 
 }  // namespace terrace::terrain

@@ -28,7 +28,7 @@ RegionConversion CrsOptions::regions(const stream::Store& store,
 
 PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {
   std::optional<Transformation> change = to(store, common);
-  return change ? PlaceConversion(std::move(*change)) : PlaceConversion();
+  return change ? PlaceConversion(std::move(*change), store) : PlaceConversion();
 }
 
 std::optional<Transformation> CrsOptions::written(

@@ -191,12 +191,16 @@ class PlaceConversion {
  public:
   PlaceConversion() = default;
   explicit PlaceConversion(Transformation change);
+  /// Longitudes go on beyond 180 degrees where the store lies across the antimeridian, so that
+  /// neighbours stay together.
+  PlaceConversion(Transformation change, const stream::Store& store);
   /// x and y in place. Throws: stream::Error for a point that has no place there.
   void operator()(std::span<stream::Point3> points) const;
   [[nodiscard]] bool has_effect() const { return change_.has_value(); }
 
  private:
   std::optional<Transformation> change_;
+  double turn_ = 0, middle_ = 0;  ///< of longitudes that stay together; 0: they need not
 };
 
 /// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nothing if the text is empty. Throws: UsageError.
