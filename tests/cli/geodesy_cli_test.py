@@ -469,11 +469,11 @@ class GeodesyTest(unittest.TestCase):
             vertices = file.read().split('end_header\n')[1].splitlines()[:1600]
         longitudes = [float(line.split()[0]) for line in vertices]
         self.assertTrue(min(longitudes) < 180 < max(longitudes) < 181)
-        for crs, most in ('EPSG:4326', 60), ('EPSG:3857', 50000):
+        for crs in 'EPSG:4326', 'EPSG:3857':
             raster = self.path('raster.tif')
             self.ok('raster', store, '--to-crs', crs, '-o', raster, '--force')
             info = self.info(raster)
-            self.assertLess(info['columns'], most)
+            self.assertLess(info['columns'], 60)
             self.assertGreater(info['rows'], 30)
             self.assertGreater(info['points'], 1200)
         self.ok('raster', store, '--to-crs', 'EPSG:4326', '-o', raster, '--region', '179.9,-17,180.1,-15',

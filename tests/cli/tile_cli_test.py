@@ -319,6 +319,26 @@ class TileTest(TileTestCase):
                 self.assertFalse(self.verify(out, '--store', store, '--geoid', other)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--vertical', 'ignore')['ok'])
 
+    def test_beyond_the_edge_of_a_map_the_globe_goes_on(self):
+        side, cell, west, north = 40, 10000.0, 20037508 - 200000, -1.9e6
+        heights = [500 + 200 * math.sin(i % side / 7) * math.cos(i // side / 5) for i in range(side * side)]
+        write_tiff(self.path('edge.tif'), side, side, heights, west, north, cell, {1024: 1, 1025: 1, 3072: 3857})
+        self.assertEqual(terrace('build', self.path('edge.tif'), '-o', self.path('edge.terrace')).returncode, 0)
+        samples = []
+        for i, height in enumerate(heights):
+            x, y = west + cell * (i % side + 0.5), north - cell * (i // side + 0.5)
+            longitude = math.degrees(x / 6378137)
+            samples.append((longitude - 360 if longitude > 180 else longitude,
+                            math.degrees(math.atan(math.sinh(y / 6378137))), height))
+        self.tile(self.path('edge.terrace'), 'edge', '--max-error', 2)
+        tiles = TileSet(self.path('edge'))
+        tiles.check()
+        for zoom, (error, missed) in tiles.errors(samples).items():
+            self.assertEqual(missed, 0)
+            self.assertLessEqual(error, 2 * 2 ** (tiles.layer['maxzoom'] - zoom) * 1.000001)
+        verdict = self.verify('edge', '--store', self.path('edge.terrace'), '--vertical', 'ellipsoidal')
+        self.assertEqual(verdict['problems'], [])
+
     def test_normals_at_the_poles_point_upward(self):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('poles'), '--vertical', 'orthometric',
                          '--normals', '--zoom', '0-2')

@@ -27,9 +27,7 @@ namespace {
 class Outline {
  public:
   explicit Outline(const Transformation& change)
-      : change_(change),
-        to_(change.from()),
-        turn_(to_.is_geographic() ? 360.0 / to_.definition().degrees_per_unit : 0.0) {}
+      : change_(change), to_(change.from()), turn_(to_.turn()) {}
 
   std::vector<Point2> ring(const std::vector<Point2>& corners) const {
     std::vector<Point2> result;
@@ -90,7 +88,7 @@ class Outline {
 
   const Transformation& change_;
   const CoordinateSystem& to_;
-  double turn_;  ///< of a geographic system, in its unit; else 0
+  double turn_;  ///< see CoordinateSystem::turn()
 };
 
 std::vector<Polygon> outlines(const Region& region) {
@@ -120,8 +118,7 @@ Region region_in(const Region& region, const Transformation& change, const strea
   }
   const Region there =
       Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
-  if (!to.is_geographic()) return there;
-  return with_turns(there, 360.0 / to.definition().degrees_per_unit, bounds);
+  return to.turn() > 0 ? with_turns(there, to.turn(), bounds) : there;
 }
 
 Point2 middle_in(const Transformation& change, const stream::Box3& box) {

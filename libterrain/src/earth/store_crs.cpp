@@ -70,8 +70,8 @@ PlaceConversion::PlaceConversion(Transformation change) {
 
 PlaceConversion::PlaceConversion(Transformation change, const stream::Store& store)
     : PlaceConversion(std::move(change)) {
-  if (!change_ || !change_->to().is_geographic()) return;
-  turn_ = 360.0 / change_->to().definition().degrees_per_unit;
+  if (!change_) return;
+  turn_ = change_->to().turn();
   middle_ = middle_in(*change_, world_box(store.schema(), store.bounds()))[0];
 }
 

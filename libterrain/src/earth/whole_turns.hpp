@@ -10,8 +10,8 @@
 
 namespace terrace::terrain {
 
-/// Longitudes moved by whole turns to where the data lie: across the antimeridian, or counted from
-/// 0 to 360, one place has two.
+/// Longitudes (and x of Web Mercator) moved by whole turns to where the data lie: across the
+/// antimeridian, or counted from 0 to 360, one place has two.
 class WholeTurns {
  public:
   WholeTurns() = default;
@@ -20,9 +20,10 @@ class WholeTurns {
   /// stored: the store's bounds.
   WholeTurns(const stream::Placement& placement, const stream::Box3& stored) {
     const stream::Crs& crs = placement.crs;
-    if (!crs.geographic || crs.horizontal_unit != "degree" || stored.empty()) return;
+    const bool degrees = crs.geographic && crs.horizontal_unit == "degree";
+    if (!(degrees || crs.epsg == kWebMercator) || stored.empty()) return;
     const stream::Box3 box = world_box(placement, stored);
-    turn_ = 360;
+    turn_ = degrees ? 360 : kWebMercatorWidth;
     middle_ = 0.5 * (box.min[0] + box.max[0]);
     reach_ = std::max(0.5 * turn_, box.max[0] - middle_);
   }
@@ -36,6 +37,9 @@ class WholeTurns {
   }
 
  private:
+  static constexpr int kWebMercator = 3857;
+  static constexpr double kWebMercatorWidth = 2 * 20037508.342789244;
+
   double turn_ = 0, middle_ = 0, reach_ = 0;
 };
 

@@ -15,7 +15,6 @@
 #include "base/portable_math.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
 #include "earth/whole_turns.hpp"
 #include "terrace/terrain/crs.hpp"
@@ -54,11 +53,8 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
     }
   }
   change.forward(outline);
-  if (change.to().is_geographic()) {
-    const double turn = 360.0 / change.to().definition().degrees_per_unit;
-    const WholeTurns turns(middle_in(change, box)[0], turn);
-    for (Point2& p : outline) p = turns(p);
-  }
+  const WholeTurns turns(middle_in(change, box)[0], change.to().turn());
+  for (Point2& p : outline) p = turns(p);
   stream::Box3 result;
   for (const Point2& p : outline) {
     if (std::isfinite(p[0]) && std::isfinite(p[1])) result.include(stream::Point3{p[0], p[1], 0});

@@ -70,6 +70,9 @@ class CoordinateSystem {
   [[nodiscard]] std::string title() const;
   /// Metres in a unit of x and y; 0 if geographic.
   [[nodiscard]] double metres_per_unit() const;
+  /// What leads once around the earth along x, in its unit: 360 degrees, or the width of a
+  /// Mercator map; 0 if x does not lead around.
+  [[nodiscard]] double turn() const;
   [[nodiscard]] Heights heights() const;
   /// Metres in a unit of heights, if known.
   [[nodiscard]] std::optional<double> metres_per_height() const;

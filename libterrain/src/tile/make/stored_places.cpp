@@ -103,14 +103,18 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
   for (std::size_t axis = 0; axis < 2; ++axis) {
     margin_[axis] = margin / portable_hypot(xy[axis], xy[3 + axis]);
   }
-  if (degrees) {
-    turn_ = 360.0 / crs_.definition().degrees_per_unit;
+  if (crs_.turn() > 0) {
+    turn_ = crs_.turn();
     StoredBox all = nothing();
     for (unsigned k = 0; k < 4; ++k) {
       include(all, world(between(stored_.min, stored_.max, k & 1, k >> 1, 1)));
     }
     first_longitude_ = all.min[0];
     last_longitude_ = all.max[0];
+    for (const double x : {all.min[0], all.max[0]}) {
+      const Point2 back = crs_.from_geographic(crs_.to_geographic(Point2{x, all.min[1]}));
+      goes_around_ = goes_around_ || (!degrees && std::abs(back[0] - x) > 0.5 * turn_);
+    }
   }
   find_bounds(store.path().string(), store.schema().grid);
   fit_polynomials(store);
@@ -292,7 +296,17 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
       bulge = {2.0 * grid.second_difference(places, 0), 2.0 * grid.second_difference(places, 1)};
       if (!(std::max(bulge[0], bulge[1]) <= most)) continue;
     }
-    if (around.min[0] <= around.max[0]) add(around, bulge);
+    if (!(around.min[0] <= around.max[0])) break;
+    const Point2 turned = stored_place(placement_, {turn_, 0}),
+                 origin = stored_place(placement_, {});
+    for (const int turn : goes_around_ ? std::vector{-1, 0, 1} : std::vector{0}) {
+      StoredBox there = around;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        there.min[axis] += turn * (turned[axis] - origin[axis]);
+        there.max[axis] += turn * (turned[axis] - origin[axis]);
+      }
+      add(there, bulge);
+    }
     break;
   }
   return windows;
@@ -316,7 +330,7 @@ void StoredPlaces::to_stored(std::span<Point2> places) const {
   }
   from_geographic(places);
   for (Point2& p : places) {
-    if (crs_.is_geographic()) p[0] = in_turn(p[0]);
+    if (crs_.is_geographic() || goes_around_) p[0] = in_turn(p[0]);
     p = stored_place(placement_, p);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) {
       p = {stored_.min[0] - 1.0, stored_.min[1] - 1.0};
