@@ -115,7 +115,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   set("max_error", options.max_error);
   set("max_points", options.max_points);
   set("replace", options.writer.replace);
-  options.region = region_of(given["region"]);
+  options.region = region_of(given["region"], store);
   options.quality = quality_named(given["quality"].cast<std::string>());
   options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
   options.fill = fill_named(given["fill"].cast<std::string>());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include <terrace/stream/schema.hpp>
@@ -23,9 +22,9 @@ class WholeTurns {
     const bool degrees = crs.geographic && crs.horizontal_unit == "degree";
     if (!(degrees || crs.epsg == kWebMercator) || stored.empty()) return;
     const stream::Box3 box = world_box(placement, stored);
-    turn_ = degrees ? 360 : kWebMercatorWidth;
-    middle_ = 0.5 * (box.min[0] + box.max[0]);
-    reach_ = std::max(0.5 * turn_, box.max[0] - middle_);
+    const double turn = degrees ? 360 : kWebMercatorWidth;
+    // What is wider is no place on the earth.
+    if (box.max[0] - box.min[0] <= turn) *this = {0.5 * (box.min[0] + box.max[0]), turn};
   }
 
   /// 0 where longitudes have no turns.
