@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
+#include <list>
 #include <map>
 #include <memory>
 #include <random>
@@ -86,7 +87,7 @@ TEST(Mosaic, TheLastValidSampleWinsAndEachCellIsOnePoint) {
     options.block_points = 1 + random() % 300;
     options.memory_bytes = 1000 + random() % 100000;
     const auto source =
-        points_of(open_mosaic(files.names(), plain_opener(), false, 1 + random() % 3,
+        points_of(open_mosaic(files.names(), plain_opener(), std::nullopt, 1 + random() % 3,
                               random() % 2 == 0 ? random() % 100000 : std::uint64_t{1} << 30),
                   options);
     const SourceInfo& info = source->info();
@@ -117,9 +118,9 @@ TiffSpec at(double x, double y, double cell = 10) {
 }
 
 /// The error must name both files.
-void expect_misfit(const Files& files, bool ignore_crs = false) {
+void expect_misfit(const Files& files, const std::optional<Crs>& crs = std::nullopt) {
   try {
-    open_mosaic(files.names(), plain_opener(), ignore_crs);
+    open_mosaic(files.names(), plain_opener(), crs);
     ADD_FAILURE() << "fits";
   } catch (const Error& error) {
     for (const std::string& name : files.names()) {
@@ -157,8 +158,8 @@ TEST(Mosaic, KeepsOpenWhatFitsIntoItsMemory) {
       most = std::max(most, open);
       return raster;
     };
-    const auto mosaic =
-        open_mosaic({"0", "1", "2", "3", "4", "5", "6", "7"}, opener, false, 32, 1000 * room + 999);
+    const auto mosaic = open_mosaic({"0", "1", "2", "3", "4", "5", "6", "7"}, opener, std::nullopt,
+                                    32, 1000 * room + 999);
     EXPECT_EQ(mosaic->info().held_bytes, 1000u);
     std::vector<std::byte> samples(64 * 8);
     std::vector<std::uint8_t> valid(64 * 8);
@@ -233,12 +234,46 @@ TEST(Mosaic, TheCrsMustAgreeUnlessTheCallerKnowsIt) {
     files.add(spec, samples);
   }
   expect_misfit(files);
-  EXPECT_NO_THROW(open_mosaic(files.names(), plain_opener(), true));
+  EXPECT_NO_THROW(open_mosaic(files.names(), plain_opener(), Crs{}));
   SourceOptions options;
   EXPECT_THROW(geotiff_format().open(files.names(), options), Error);
   options.crs = Crs{};
   options.crs->epsg = 32632;
   EXPECT_EQ(geotiff_format().open(files.names(), options)->info().crs.epsg, 32632);
+}
+
+TEST(Mosaic, FilesOnBothSidesOfTheAntimeridianAreJoinedThere) {
+  std::list<Files> kept;
+  const auto joined = [&kept](const std::vector<double>& wests, bool degrees) {
+    Files& files = kept.emplace_back();
+    for (const double west : wests) {
+      TiffSpec spec = at(west, 20, 0.125);
+      spec.more = [=](TIFF* tiff) {
+        placed_at(west, 20, 0.125)(tiff);
+        const std::vector<std::uint16_t> keys{1, 1, 0, 2, 1024, 0, 1, 2, 2048, 0, 1, 4326};
+        TIFFSetField(tiff, 34735, static_cast<int>(keys.size()), keys.data());
+      };
+      files.add(spec, as_samples(std::vector<std::int16_t>(64, static_cast<std::int16_t>(west))));
+    }
+    Crs plane;
+    plane.name = "plane";
+    return open_mosaic(files.names(), plain_opener(),
+                       degrees ? std::nullopt : std::optional(plane));
+  };
+  for (const std::vector<double>& wests : {std::vector<double>{179, -180}, {-180, 179}}) {
+    const auto raster = joined(wests, true);
+    EXPECT_EQ(raster->info().columns, 16u);
+    EXPECT_EQ(raster->info().world.xy[2], 179.0625);
+    const WholeRaster read = read_whole(*raster);
+    EXPECT_EQ(read.value(7), 179);
+    EXPECT_EQ(read.value(8), -180);
+  }
+  // Of longitudes from 0 to 360 the same is true at Greenwich.
+  EXPECT_EQ(joined({0, 359}, true)->info().world.xy[2], -0.9375);
+  EXPECT_EQ(joined({-179, 100, 170}, true)->info().columns, 82u * 8);
+  // All around the earth, or not of the earth: as the files say.
+  EXPECT_EQ(joined({-180, -90, 0, 90, 179}, true)->info().columns, 360u * 8);
+  EXPECT_EQ(joined({-180, 179}, false)->info().columns, 360u * 8);
 }
 
 /// Two real tiles of one survey; both hold the row they share.

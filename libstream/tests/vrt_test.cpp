@@ -126,7 +126,7 @@ TEST_F(Vrt, MayTakePartsAndHaveScaleAndOffset) {
   const AllPoints all = read_file(file);
   EXPECT_EQ(all.info.coordinates[2].scale, 0.5);
   EXPECT_EQ(all.info.coordinates[2].offset, 100);
-  EXPECT_EQ(all.info.coordinates[2].unit, "m");
+  EXPECT_EQ(all.info.coordinates[2].unit, "metre");
   EXPECT_EQ(all.info.nodata, 5);
   std::vector<Point3> wanted;
   for (const Point3& p : whole) {

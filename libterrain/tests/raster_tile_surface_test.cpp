@@ -228,6 +228,38 @@ TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
   }
 }
 
+TEST_F(RasterOfDegrees, BoxesOfProjectedRastersHaveAllTheirSamples) {
+  const double around = 2 * 20037508.342789244 / kColumns;
+  for (const auto& [world, epsg] :
+       {std::pair{std::array<double, 6>{30000, 0, -1e7, 0, -30000, 8e6}, 32632},
+        std::pair{std::array<double, 6>{10000, 500, 3e6, 500, -10000, 4e6}, 3035},
+        std::pair{std::array<double, 6>{around, 0, -20037508, 0, -around, 8e6}, 3857}}) {
+    const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg, 0.0);
+    const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                             {store.schema(), HeightReference::ignore, "", 1 << 20}, 2);
+    std::vector<Point2> places;
+    for (std::int64_t i = 0; i < kColumns * kRows; ++i) {
+      places.push_back({static_cast<double>(i % kColumns), static_cast<double>(i / kColumns)});
+    }
+    raster.places.to_geographic(places);
+    RasterTileSurface surface(raster);
+    const GeographicBox all = surface.bounds();
+    for (int round = 0; round < 60; ++round) {
+      const double west = all.west + (all.east - all.west) * random();
+      const double south = all.south + (all.north - all.south) * random();
+      const double size = 9 * random();
+      const GeographicBox box{west, south, west + size, south + size * (0.01 + random())};
+      SurfaceSamples found;
+      surface.samples(box, found);
+      const auto inside = [&](const Point2& p) {
+        return p[0] >= box.west && p[0] <= box.east && p[1] >= box.south && p[1] <= box.north;
+      };
+      EXPECT_EQ(found.size(), std::count_if(places.begin(), places.end(), inside))
+          << epsg << ": " << box.west << "," << box.south << " of " << size;
+    }
+  }
+}
+
 TEST_F(RasterOfDegrees, CachedHeightsAreThoseOfTheStore) {
   const auto check = [&](const stream::Store& store) {
     // None, a few of the nine squares, all.

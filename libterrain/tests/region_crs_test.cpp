@@ -77,12 +77,24 @@ TEST(RegionCrs, RefusesWhatTheSystemDoesNotShow) {
       stream::Error);
   // Cut in two by the projection: one side of the antimeridian lies at the left, one at the right.
   EXPECT_THROW(
-      region_in(Region::parse("170,0,190,10"), Transformation(mercator, degrees), kEverywhere),
+      region_in(Region::parse("170,0,190,10"),
+                Transformation(CoordinateSystem::parse("EPSG:8857"), degrees), kEverywhere),
       stream::Error);
   EXPECT_THROW(
       region_in(Region::parse("-1000000,-1000000,900000,900000"),
                 Transformation(degrees, CoordinateSystem::parse("EPSG:3413")), kEverywhere),
       stream::Error);
+}
+
+TEST(RegionCrs, AMercatorMapGoesOnAtItsEdges) {
+  const CoordinateSystem degrees, mercator = CoordinateSystem::parse("EPSG:3857");
+  const Region region =
+      region_in(Region::parse("170,0,190,10"), Transformation(mercator, degrees), kEverywhere);
+  for (const double x : {19e6, 20037000.0, -20037000.0, -19e6, 20038000.0}) {
+    EXPECT_TRUE(region.covers({x, 5e5})) << x;
+  }
+  EXPECT_FALSE(region.covers({0, 5e5}));
+  EXPECT_FALSE(region.covers({-18.9e6, 5e5}));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ import subprocess
 import tempfile
 import unittest
 
-from small_tiff import write_tiff
+from small_tiff import GEOGRAPHIC, write_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 ESRI_UTM = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",'
@@ -136,6 +136,35 @@ class GeodesyTest(unittest.TestCase):
         with open(self.path('points.prj'), 'w', encoding='utf-8') as file:
             file.write(ESRI_UTM[:60])
         self.assertIn('points.prj', self.refused(1, 'build', places, '-o', self.path('none')))
+
+    def test_a_local_system_has_a_unit_and_no_place(self):
+        local = 'LOCAL_CS["site",UNIT["foot",0.3048]]'
+        raster = self.raster({1025: 1})
+        stores = [self.build(raster, '--crs', local)]
+        with open(self.path('dem.prj'), 'w', encoding='utf-8') as file:
+            file.write(local)
+        stores.append(self.build(raster))
+        os.remove(self.path('dem.prj'))
+        with open(self.path('dem.vrt'), 'w', encoding='utf-8') as file:
+            file.write(f'<VRTDataset rasterXSize="6" rasterYSize="6"><SRS>{local}</SRS><GeoTransform>0,1,0,0,0,-1'
+                       '</GeoTransform><VRTRasterBand dataType="Float32" band="1"><SimpleSource>'
+                       '<SourceFilename relativeToVRT="1">dem.tif</SourceFilename></SimpleSource>'
+                       '</VRTRasterBand></VRTDataset>')
+        stores.append(self.build(self.path('dem.vrt')))
+        written = self.path('written.tif')
+        self.ok('raster', stores[-1], '-o', written)
+        stores.append(self.build(written))
+        for store in stores:
+            self.assertEqual(self.info(store)['crs']['name'], 'site')
+            line = self.info(store)['bounds']
+            west, south = line['min'][:2]
+            profile = self.ok('profile', store, f'--line={west},{south},{line["max"][0]},{south}', '-o', '-')
+            self.assertAlmostEqual(float(profile.splitlines()[-1].split(',')[0]),
+                                   (line['max'][0] - west) * 0.3048, delta=1e-3)
+            error = self.refused(1, 'tile', store, '-o', self.path('tiles'), '--vertical', 'ellipsoidal')
+            self.assertIn('no CRS', error)
+        degrees = self.build(self.cloud([(10, 10), (20, 20)]), '--crs', 'EPSG:4326')
+        self.assertIn('local', self.refused(2, 'points', degrees, '-o', '-', '--to-crs', local))
 
     def test_contradictory_keys_are_an_error_that_names_them(self):
         for keys, words in (
@@ -402,6 +431,62 @@ class GeodesyTest(unittest.TestCase):
         box = self.points(store, '--region', '179.45,-21,180.45,-10', '--region-crs', 'EPSG:4326')
         self.assertEqual(len(box), 100)
         self.assertEqual({x > 0 for x, _, _ in box}, {True, False})
+
+    def test_rasters_joined_at_the_antimeridian_answer_for_both_longitudes(self):
+        west, east = self.path('west.tif'), self.path('east.tif')
+        for path, left in (west, 179), (east, -180):
+            write_tiff(path, 10, 10, [left + i % 10 for i in range(100)], corner=(left, -17), cell=0.1,
+                       keys=GEOGRAPHIC)
+        store = self.build(west, east)
+        self.assertAlmostEqual(self.info(store)['bounds']['max'][0], 180.95)
+        places = self.path('places.csv')
+        with open(places, 'w', encoding='utf-8') as file:
+            file.write('179.75,-17.5\n-179.75,-17.5\n180.25,-17.5\n')
+        lines = self.ok('sample', store, '--points', places).splitlines()
+        self.assertEqual([float(line.split(',')[2]) for line in lines], [186, -178, -178])
+        for box in '-180,-17.5,-179.5,-17.3', '180,-17.5,180.5,-17.3':
+            self.assertEqual(len(self.points(store, f'--region={box}')), 10)
+        self.assertEqual(self.points(store, '--near=-179.95,-17.05', '-k', 1)[0][2], -180)
+        line = self.ok('profile', store, '--line=179.5,-17.5,-179.5,-17.5', '-o', '-').splitlines()
+        self.assertAlmostEqual(float(line[-1].split(',')[1]), 180.5)
+        self.assertNotIn('', [row.split(',')[3] for row in line])
+        error = self.refused(2, 'points', store, '--region=179,-18,-179,-17', '-o', '-')
+        self.assertIn('170 to 190', error)
+
+    def test_what_is_written_across_the_antimeridian_stays_together(self):
+        dem = self.path('fiji.tif')
+        write_tiff(dem, 40, 40, [(i % 40) * (i // 40) for i in range(1600)], corner=(800000, 8240000), cell=1000.0,
+                   keys={1024: 1, 1025: 1, 3072: 32760})
+        store = self.build(dem)
+        self.ok('contour', store, '--interval', 300, '-o', self.path('lines.geojson'))
+        with open(self.path('lines.geojson'), encoding='utf-8') as file:
+            lines = [line['geometry']['coordinates'] for line in json.load(file)['features']]
+        longitudes = [place[0] for line in lines for place in line]
+        self.assertTrue(min(longitudes) < 180 < max(longitudes) < 181)
+        mesh = self.path('mesh.ply')
+        self.ok('mesh', store, '--to-crs', 'EPSG:4326', '-o', mesh, '--format', 'ply-ascii')
+        with open(mesh, encoding='utf-8') as file:
+            vertices = file.read().split('end_header\n')[1].splitlines()[:1600]
+        longitudes = [float(line.split()[0]) for line in vertices]
+        self.assertTrue(min(longitudes) < 180 < max(longitudes) < 181)
+        for crs in 'EPSG:4326', 'EPSG:3857':
+            raster = self.path('raster.tif')
+            self.ok('raster', store, '--to-crs', crs, '-o', raster, '--force')
+            info = self.info(raster)
+            self.assertLess(info['columns'], 60)
+            self.assertGreater(info['rows'], 30)
+            self.assertGreater(info['points'], 1200)
+        self.ok('raster', store, '--to-crs', 'EPSG:4326', '-o', raster, '--region', '179.9,-17,180.1,-15',
+                '--region-crs', 'EPSG:4326', '--force')
+        self.assertGreater(self.info(raster)['points'], 300)
+
+    def test_beside_the_area_of_all_operations_one_without_a_grid_is_taken(self):
+        # South of Germany, where the grid of DHDN ends.
+        store = self.build(self.cloud([(500000 + i, 5100000 + i * i) for i in range(9)]), '--crs', 'EPSG:32632')
+        x, y, _ = self.points(store, '--to-crs', 'EPSG:31467')[0]
+        self.assertAlmostEqual(x, 3500000, delta=200)
+        self.assertAlmostEqual(y, 5100000 / 0.9996, delta=1200)
+        self.assertIn('geocentric', self.refused(2, 'points', store, '--to-crs', 'EPSG:4978', '-o', '-'))
 
     def test_a_point_that_has_no_place_there_is_named(self):
         cloud = self.cloud([(10, 10), (20, 20), (30, 90), (40, 40)])

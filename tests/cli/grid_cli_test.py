@@ -133,6 +133,45 @@ class GridTest(unittest.TestCase):
         shutil.rmtree(self.path('a.png.terrace'))
         self.check(self.path('a.png'), 'png', nodata=False)
 
+    def test_what_gdal_keeps_beside_a_file(self):
+        samples = self.heights('H')
+        if sys.byteorder == 'little':
+            samples.byteswap()
+        half = self.columns // 2
+
+        def side(name, first, zone):
+            lines = [samples[r * self.columns + first:r * self.columns + first + half].tobytes()
+                     for r in range(self.rows)]
+            png(self.path(name), half, self.rows, 16, 0, lines)
+            wkt = PRJ.replace('Zone_32N', f'Zone_{zone}N').replace('",9.0', f'",{zone * 6 - 183}.0')
+            with open(self.path(name + '.aux.xml'), 'w') as file:
+                file.write(f'<PAMDataset><SRS>{wkt}</SRS><GeoTransform>{500000 + 25 * first},25,0,5200750,0,-25'
+                           '</GeoTransform><PAMRasterBand band="1"><NoDataValue>0</NoDataValue><Scale>0.1</Scale>'
+                           '<Offset>5</Offset><UnitType>m</UnitType></PAMRasterBand></PAMDataset>')
+            return self.path(name)
+        left, right = side('left.png', 0, 32), side('right.png', half, 32)
+        store = self.path('both.terrace')
+        built = self.json_of('build', left, right, '-o', store)
+        values = list(self.heights())
+        self.assertEqual(built['points'], sum(v != 0 for v in values))
+        info = self.json_of('info', store)
+        self.assertEqual(info['crs']['epsg'], 32632)
+        self.assertAlmostEqual(info['height']['max'], max(values) / 10 + 5, 6)
+        for found, due in zip(info['transform'], [25, 0, 500012.5, 0, -25, 5200737.5]):
+            self.assertAlmostEqual(found, due, 6)
+        self.assertEqual(info['channels'][2]['unit'], 'metre')
+        # Each has its own CRS.
+        side('right.png', half, 33)
+        result = self.terrace('build', left, right, '-o', self.path('none.terrace'))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(b'33N', result.stderr)
+        # What cannot be read is told of.
+        with open(left + '.aux.xml', 'w') as file:
+            file.write('<PAMDataset><SRS>')
+        told = self.terrace('info', left)
+        self.assertEqual(told.returncode, 0)
+        self.assertIn(b'left.png.aux.xml', told.stdout + told.stderr)
+
     def same_store(self, one, other):
         for name in sorted(os.listdir(self.path(one))):
             with open(self.path(f'{one}/{name}'), 'rb') as a, open(self.path(f'{other}/{name}'), 'rb') as b:

@@ -260,6 +260,19 @@ class TileTest(TileTestCase):
         self.tile(store, 'once')
         self.refuse(1, '--force', 'tile', store, '-o', self.path('once'), *vertical)
 
+    def test_heights_that_are_none_on_a_globe_are_refused(self):
+        dem = Dem(20, 20, 10, 46, 0.01, height=lambda c, r: -3e38 if c == r else 300.0)
+        store = self.build(dem, 'far')
+        result = terrace('tile', store, '--vertical', 'ellipsoidal', '-o', self.path('far'))
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('10,000 km', result.stderr)
+        self.assertIn('nodata', result.stderr)
+        self.assertFalse(os.path.exists(self.path('far')))
+        self.tile(store, 'near', '--where', 'z > -9000')
+        result = terrace('tile', store, '--vertical', 'ellipsoidal', '--where', 'z > -9000', '--fill',
+                         'flat:1e300', '-o', self.path('far'))
+        self.assertEqual(result.returncode, 2, result.stderr)
+
     def test_deeper_than_the_data_is_said(self):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('deep'), '--vertical',
                          'ellipsoidal', '--zoom', '10-10')
@@ -305,6 +318,32 @@ class TileTest(TileTestCase):
                 self.assertTrue(self.verify(out, '--store', store, '--geoid', geoid)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--geoid', other)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--vertical', 'ignore')['ok'])
+
+    def test_beyond_the_edge_of_a_map_the_globe_goes_on(self):
+        side, cell, west, north = 40, 10000.0, 20037508 - 200000, -1.9e6
+        heights = [500 + 200 * math.sin(i % side / 7) * math.cos(i // side / 5) for i in range(side * side)]
+        write_tiff(self.path('edge.tif'), side, side, heights, west, north, cell, {1024: 1, 1025: 1, 3072: 3857})
+        self.assertEqual(terrace('build', self.path('edge.tif'), '-o', self.path('edge.terrace')).returncode, 0)
+        samples = []
+        for i, height in enumerate(heights):
+            x, y = west + cell * (i % side + 0.5), north - cell * (i // side + 0.5)
+            longitude = math.degrees(x / 6378137)
+            samples.append((longitude - 360 if longitude > 180 else longitude,
+                            math.degrees(math.atan(math.sinh(y / 6378137))), height))
+        self.tile(self.path('edge.terrace'), 'edge', '--max-error', 2)
+        tiles = TileSet(self.path('edge'))
+        tiles.check()
+        for zoom, (error, missed) in tiles.errors(samples).items():
+            self.assertEqual(missed, 0)
+            self.assertLessEqual(error, 2 * 2 ** (tiles.layer['maxzoom'] - zoom) * 1.000001)
+        verdict = self.verify('edge', '--store', self.path('edge.terrace'), '--vertical', 'ellipsoidal')
+        self.assertEqual(verdict['problems'], [])
+
+    def test_normals_at_the_poles_point_upward(self):
+        result = terrace('tile', self.stores['degrees'], '-o', self.path('poles'), '--vertical', 'orthometric',
+                         '--normals', '--zoom', '0-2')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(self.verify('poles')['problems'], [])
 
     def test_orthometric_heights_go_to_the_ellipsoid_by_egm96(self):
         if not shutil.which('cs2cs'):

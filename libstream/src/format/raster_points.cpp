@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "format/aux_xml.hpp"
 #include "raster/order.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
@@ -53,7 +54,7 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
   raster.cache_bytes = window / 6;
   const auto open_one = [open, cell = options.cell](const std::string& file,
                                                     const RasterOptions& how) {
-    std::unique_ptr<Raster> found = open(file, how);
+    std::unique_ptr<Raster> found = with_aux_xml(open(file, how), file, how);
     if (cell > 0) found = std::make_unique<WithCells>(std::move(found), cell);
     return found;
   };
@@ -63,8 +64,8 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
   const RasterOpener opener = [raster, open_one](const std::string& file) {
     return open_one(file, raster);
   };
-  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs.has_value(),
-                               kOpenAtOnce, options.memory_bytes - window),
+  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs, kOpenAtOnce,
+                               options.memory_bytes - window),
                    options);
 }
 

@@ -124,13 +124,19 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
     if (crs.epsg != 0) {
       text << "EPSG:" << crs.epsg;
     } else {
-      text << (crs.name.empty() ? "unknown" : '"' + crs.name + '"');
+      // The name is the first thing that WKT puts in quotes.
+      const std::size_t quote = crs.name.empty() ? crs.wkt.find('"') : crs.wkt.npos;
+      const std::string name =
+          quote == crs.wkt.npos
+              ? crs.name
+              : crs.wkt.substr(quote + 1, crs.wkt.find('"', quote + 1) - quote - 1);
+      text << (name.empty() ? "unknown" : '"' + name + '"');
     }
     if (crs.vertical_epsg != 0) text << '+' << crs.vertical_epsg;
     return text.str();
   };
   const Crs &a = first.crs, &b = other.crs;
-  const bool same_name = a.epsg != 0 || a.name == b.name;
+  const bool same_name = a.epsg != 0 || (a.name == b.name && a.wkt == b.wkt);
   if (a.epsg == b.epsg && same_name && a.vertical_epsg == b.vertical_epsg &&
       a.geographic == b.geographic && a.horizontal_unit == b.horizontal_unit &&
       (a.epsg != 0 || a.geo_keys == b.geo_keys)) {
@@ -141,9 +147,61 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
          "reproject one (gdalwarp -t_srs), or name the CRS of all");
 }
 
+/// The columns that lead once around the earth; 0 if that is not a whole number, or not known.
+std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
+  const auto& m = world.xy;
+  const bool degrees = crs.horizontal_unit.empty() || crs.horizontal_unit == "degree";
+  // Whoever reads WKT comes later; a degree in radians tells enough.
+  const bool geographic =
+      crs.geographic || (crs.wkt.starts_with("GEOG") && crs.wkt.find("0.01745329") != crs.wkt.npos);
+  if (!geographic || !degrees || m[1] != 0 || m[3] != 0 || !(m[0] > 0)) return 0;
+  const double columns = 360 / m[0];
+  const bool whole = columns < 0x1p31 && std::abs(columns - std::round(columns)) <= kPhase;
+  return whole ? static_cast<std::int64_t>(std::round(columns)) : 0;
+}
+
+std::int64_t modulo(std::int64_t value, std::int64_t turn) { return (value % turn + turn) % turn; }
+
+/// Moves members by whole turns if they are wider than half a turn and then are not: terrain that
+/// files in longitudes of -180 to 180 cut at the antimeridian. Returns whether it did.
+bool join_around(std::vector<Member>& members, const WorldTransform& world, std::int64_t turn) {
+  const auto end_of = [](std::int64_t column, const Member& member) {
+    return column + static_cast<std::int64_t>(member.columns);
+  };
+  std::int64_t left = INT64_MAX, right = INT64_MIN;
+  std::vector<std::array<std::int64_t, 2>> spans;  // from a column of the first turn
+  for (const Member& member : members) {
+    left = std::min(left, member.column);
+    right = std::max(right, end_of(member.column, member));
+    const std::int64_t column = modulo(member.column, turn);
+    spans.push_back({column, end_of(column, member)});
+  }
+  if (2 * (right - left) <= turn) return false;
+  std::sort(spans.begin(), spans.end());
+  // Begun at each span, the way around ends where the spans before it end one turn later.
+  std::vector<std::int64_t> ends(spans.size());  // the last of the spans from each on
+  for (std::size_t i = spans.size(); i-- > 0;) {
+    ends[i] = i + 1 < spans.size() ? std::max(spans[i][1], ends[i + 1]) : spans[i][1];
+  }
+  std::int64_t first = 0, width = INT64_MAX, before = INT64_MIN;
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    const std::int64_t end = i == 0 ? ends[0] : std::max(ends[i], before + turn);
+    if (end - spans[i][0] < width) {
+      width = end - spans[i][0];
+      first = spans[i][0];
+    }
+    before = std::max(before, spans[i][1]);
+  }
+  if (2 * width > turn) return false;
+  const double west = world.xy[0] * static_cast<double>(first) + world.xy[2];
+  first -= turn * static_cast<std::int64_t>(std::floor((west + 180) / 360 + 1e-9));
+  for (Member& member : members) member.column = first + modulo(member.column - first, turn);
+  return true;
+}
+
 class Mosaic final : public Raster {
  public:
-  Mosaic(const std::vector<std::string>& files, RasterOpener opener, bool ignore_crs,
+  Mosaic(const std::vector<std::string>& files, RasterOpener opener, const std::optional<Crs>& crs,
          std::size_t open_at_once, std::uint64_t open_bytes)
       : opener_(std::move(opener)), open_at_once_(open_at_once), open_bytes_(open_bytes) {
     assert(!files.empty());
@@ -160,7 +218,7 @@ class Mosaic final : public Raster {
         first = info;
       } else {
         check_samples(*first, info);
-        if (!ignore_crs) check_crs(*first, info);
+        if (!crs) check_crs(*first, info);
       }
       members_.push_back(placed(*first, info));
       for (const std::string& comment : info.comments) {
@@ -168,7 +226,7 @@ class Mosaic final : public Raster {
         note(line.append(": ").append(comment));
       }
     }
-    unite(*first);
+    unite(*first, crs.value_or(first->crs));
   }
 
   [[nodiscard]] const RasterInfo& info() const override { return info_; }
@@ -212,8 +270,12 @@ class Mosaic final : public Raster {
   }
 
   /// The union's size and place; members then count from its corner.
-  void unite(const RasterInfo& first) {
-    std::int64_t left = 0, top = 0, right = 0, bottom = 0;
+  void unite(const RasterInfo& first, const Crs& crs) {
+    const std::int64_t turn = columns_around(first.world, crs);
+    if (turn > 0 && join_around(members_, first.world, turn)) {
+      note("the files lie on both sides of the antimeridian: longitudes go on beyond 180 degrees");
+    }
+    std::int64_t left = INT64_MAX, top = 0, right = INT64_MIN, bottom = 0;
     for (const Member& member : members_) {
       left = std::min(left, member.column);
       top = std::min(top, member.row);
@@ -284,9 +346,9 @@ class Mosaic final : public Raster {
 }  // namespace
 
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
-                                    const RasterOpener& opener, bool ignore_crs,
+                                    const RasterOpener& opener, const std::optional<Crs>& crs,
                                     std::size_t open_at_once, std::uint64_t open_bytes) {
-  return std::make_unique<Mosaic>(files, opener, ignore_crs, open_at_once, open_bytes);
+  return std::make_unique<Mosaic>(files, opener, crs, open_at_once, open_bytes);
 }
 
 }  // namespace terrace::stream

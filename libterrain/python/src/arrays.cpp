@@ -4,6 +4,8 @@
 #include <limits>
 #include <optional>
 
+#include <terrace/terrain/crs.hpp>
+
 namespace terrace::python {
 namespace {
 
@@ -97,6 +99,12 @@ std::vector<std::array<double, 3>> points3_of(const Array<double>& given) {
   }
   const auto rows = rows_of<3>(given, "points");
   return {rows.begin(), rows.end()};
+}
+
+std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store) {
+  std::optional<terrain::Region> region = region_of(given);
+  if (region) region = terrain::RegionConversion(store)(*region);
+  return region;
 }
 
 std::optional<terrain::Region> region_of(const py::object& given) {

@@ -15,6 +15,7 @@
 
 #include <pybind11/numpy.h>
 #include <terrace/stream/schema.hpp>
+#include <terrace/stream/store.hpp>
 #include <terrace/terrain/region.hpp>
 
 #include "core.hpp"
@@ -114,5 +115,7 @@ py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type);
 
 /// None; a tuple of six numbers: a box; a list of polygons, each a list of arrays (n, 2).
 std::optional<terrain::Region> region_of(const py::object& given);
+/// The same for a store: longitudes may be off by whole turns.
+std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store);
 
 }  // namespace terrace::python

@@ -38,7 +38,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   set("seed", request.seed);
   set("datum_shift", request.datum_shift);
   if (options.contains("crs")) {
-    request.crs = terrain::CoordinateSystem::parse(options["crs"].cast<std::string>()).crs();
+    request.crs = terrain::crs_named(options["crs"].cast<std::string>());
   }
   if (options.contains("metric")) {
     request.metric = terrain::MetricChoice::parse(options["metric"].cast<std::string>());

@@ -93,7 +93,7 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
   const terrain::ContourRequest request{.interval = interval,
                                         .level = level,
                                         .max_edge = max_edge,
-                                        .region = region_of(region),
+                                        .region = region_of(region, store),
                                         .own_crs = !(lonlat ? *lonlat : reaches_wgs84(store))};
   const std::string text = Job(how).run([&](const terrain::Context& context) {
     std::string lines;
@@ -118,7 +118,7 @@ void write_raster(const OpenStore& open, const std::string& path, const std::str
                                    {"hillshade", RasterValue::hillshade}}),
       .sampler = sampler_of(method, level, max_edge),
       .cell = cell,
-      .region = region_of(region),
+      .region = region_of(region, store),
       .output = path,
       .replace = replace};
   if (cell && !(*cell > 0)) throw py::value_error("`cell` must be above 0");

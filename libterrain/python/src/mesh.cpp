@@ -70,7 +70,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
     terrain::TriangleMesh made = detail_mesh(store, detail, options, context);
     if (writer) writer->finish();
     if (const auto to = change_to(store, crs)) {
-      const terrain::PlaceConversion places(*to);
+      const terrain::PlaceConversion places(*to, store);
       places(made.positions);
     }
     return made;
@@ -115,7 +115,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   set("max_error", options.max_error);
   set("max_points", options.max_points);
   set("replace", options.writer.replace);
-  options.region = region_of(given["region"]);
+  options.region = region_of(given["region"], store);
   options.quality = quality_named(given["quality"].cast<std::string>());
   options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
   options.fill = fill_named(given["fill"].cast<std::string>());

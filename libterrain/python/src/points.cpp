@@ -29,7 +29,7 @@ stream::SourceOptions reading(const py::dict& given, unsigned threads, std::stop
   if (options.block_points < 1) throw py::value_error("`block_points` must be above 0");
   if (options.band < 1) throw py::value_error("`band` counts from 1");
   if (given.contains("crs")) {
-    options.crs = terrain::CoordinateSystem::parse(given["crs"].cast<std::string>()).crs();
+    options.crs = terrain::crs_named(given["crs"].cast<std::string>());
   }
   bool skip_damaged = false;
   set("skip_damaged", skip_damaged);

@@ -195,10 +195,10 @@ terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::
   terrain::Detail detail;
   check(level);
   detail.level = level;
-  detail.region = region_of(region);
+  detail.region = region_of(region, store);
   for (const py::handle focus : focuses) {
     const auto pair = focus.cast<py::tuple>();
-    detail.focuses.push_back({region_of(pair[0]).value(), pair[1].cast<unsigned>()});
+    detail.focuses.push_back({region_of(pair[0], store).value(), pair[1].cast<unsigned>()});
     check(detail.focuses.back().level);
   }
   return detail;

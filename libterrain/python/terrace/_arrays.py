@@ -4,8 +4,21 @@
 import numpy as np
 
 
+def filled(array):
+    """NaN where a masked array is masked; others as they are."""
+    if not isinstance(array, np.ma.MaskedArray) or array.dtype.kind not in 'iuf':
+        return array
+    return (array if array.dtype.kind == 'f' else array.astype(np.float64)).filled(np.nan)
+
+
 def as_array(given, what):
-    """An array of whatever has the array, buffer or DLPack protocol."""
+    """An array of whatever has the array, buffer or DLPack protocol. Floats that are masked are NaN."""
+    if isinstance(given, np.ma.MaskedArray):
+        if given.dtype.kind == 'f':
+            return filled(given)
+        if np.ma.is_masked(given):
+            raise ValueError(f'{what} has masked values, which {given.dtype} cannot mark; leave them out or fill them')
+        return given.data
     if isinstance(given, np.ndarray):
         return given
     if hasattr(given, '__dlpack__') and not hasattr(given, '__array__') and not hasattr(given, '__array_interface__'):
@@ -18,7 +31,7 @@ def as_array(given, what):
 
 def as_numbers(given, what):
     """The same as contiguous doubles. Raises: TypeError for what is not real numbers."""
-    array = as_array(given, what)
+    array = as_array(filled(given), what)
     if array.dtype.kind not in 'iufb':
         raise TypeError(f'{what} has the type {array.dtype}; real numbers are needed')
     return np.ascontiguousarray(array, dtype=np.float64)

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 
-from ._arrays import as_array, as_native
+from ._arrays import as_array, as_native, filled
 from ._job import notes
 
 
@@ -30,13 +30,6 @@ def _centred(transform):
                          'y = d * column + e * row + f')
     a, b, c, d, e, f = numbers
     return (a, b, c + (a + b) / 2, d, e, f + (d + e) / 2)
-
-
-def _filled(array):
-    """NaN where a masked array is masked; other arrays as they are."""
-    if not isinstance(array, np.ma.MaskedArray):
-        return array
-    return (array if array.dtype.kind == 'f' else array.astype(np.float64)).filled(np.nan)
 
 
 def _raster(samples, transform, nodata, name, scale=1.0, offset=0.0):
@@ -127,7 +120,9 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         raise TypeError('`attributes` is a dict of columns')
     if isinstance(given, (str, os.PathLike)):
         given = [given]
-    if isinstance(given, (list, tuple)) and given and all(isinstance(name, (str, os.PathLike)) for name in given):
+    if isinstance(given, (list, tuple)) and not given:
+        raise ValueError('there is no source: name a file, or give an array')
+    if isinstance(given, (list, tuple)) and all(isinstance(name, (str, os.PathLike)) for name in given):
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('`transform`, `nodata` and `attributes` are for arrays: files have their own')
         return [os.fspath(name) for name in given], crs_text(crs)
@@ -143,17 +138,17 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         c, a, b, f, d, e = given.GetGeoTransform()
         samples = band.ReadAsArray()
         if band.GetMaskFlags() == 2:  # gdal.GMF_PER_DATASET: a mask, and no alpha band
-            samples = _filled(np.ma.array(samples, mask=band.GetMaskBand().ReadAsArray() == 0))
+            samples = filled(np.ma.array(samples, mask=band.GetMaskBand().ReadAsArray() == 0))
         return _raster(samples, (a, b, c, d, e, f) if transform is None else transform, band.GetNoDataValue() if nodata is None else nodata,
                        '<gdal>', band.GetScale() or 1.0, band.GetOffset() or 0.0), crs_text(crs or given.GetProjection())
     if hasattr(given, 'transform'):  # a dataset of rasterio's, a Raster, or another array with an affine transform
         samples, scale, offset = given, 1.0, 0.0
         if hasattr(given, 'read'):
             masked = [flag.name for flag in given.mask_flag_enums[0]] == ['per_dataset']
-            samples = _filled(given.read(1, masked=masked))
+            samples = filled(given.read(1, masked=masked))
             scale, offset = given.scales[0], given.offsets[0]
         nodata = getattr(given, 'nodata', None) if nodata is None else nodata
-        return (_raster(as_array(samples, 'the raster'), given.transform if transform is None else transform, nodata, '<raster>', scale, offset),
+        return (_raster(as_array(filled(samples), 'the raster'), given.transform if transform is None else transform, nodata, '<raster>', scale, offset),
                 crs_text(crs or getattr(given, 'crs', None)))
     if isinstance(given, dict):
         wrong = [axis for axis in 'xyz' if axis not in given]
@@ -163,7 +158,7 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         return _points([_column(axis, arrays[axis]) for axis in 'xyz'],
                        [_column(name, column) for name, column in arrays.items() if name not in ('x', 'y', 'z')],
                        '<dict>'), crs_text(crs)
-    array = _filled(as_array(given, 'the source'))
+    array = as_array(filled(given), 'the source')
     if array.dtype.names:
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('`transform`, `nodata` and `attributes` are not for structured arrays')

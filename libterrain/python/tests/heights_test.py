@@ -76,6 +76,22 @@ class Heights(StoreCase):
         np.testing.assert_allclose(self.raster.heights(lonlat, crs='EPSG:4326'), there['z'][:200], rtol=0, atol=1e-4)
         self.assertFalse(np.isnan(self.raster.heights(here)).any())
 
+    def test_masked_places_have_no_height(self):
+        xy = np.ma.array(places(5))
+        xy[2, 0] = np.ma.masked
+        got = self.raster.heights(xy)
+        np.testing.assert_array_equal(np.isnan(got), [False, False, True, False, False])
+        np.testing.assert_array_equal(got[[0, 1, 3, 4]], self.raster.heights(places(5)[[0, 1, 3, 4]]))
+
+    def test_both_longitudes_beyond_the_antimeridian(self):
+        samples = np.arange(400.0).reshape(20, 20)
+        with tempfile.TemporaryDirectory() as folder:
+            with terrace.build(samples, folder + '/fiji', transform=(0.1, 0, 179, 0, -0.1, 0), crs='EPSG:4326') as fiji:
+                np.testing.assert_allclose(fiji.heights([[-179.95, -0.05], [180.05, -0.05]]), 10, atol=1e-9)
+                east = fiji.points(region=(-180, -1, -179.5, 0))
+                self.assertEqual(len(east), 50)
+                self.assertEqual(len(fiji.points(region=(180, -1, 180.5, 0))), 50)
+
     def test_threads_and_memory_change_nothing(self):
         xy = places(2000)
         expected = self.raster.heights(xy)

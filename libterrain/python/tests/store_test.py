@@ -416,6 +416,20 @@ class Sources(StoreCase):
         masked = np.ma.masked_equal(with_holes, -9999)
         self.assertEqual(len(self.built(masked, **options)), self.samples.size - 600)
 
+    def test_masks_are_not_overlooked(self):
+        points = np.ma.array(self.points[:100])
+        points[3, 2] = np.ma.masked
+        with self.assertRaisesRegex(terrace.Error, 'finite'):
+            self.built(points)
+        numbers = np.ma.array(np.arange(100), mask=np.arange(100) == 7)
+        with self.assertRaisesRegex(ValueError, 'masked'):
+            self.built(self.points[:100], attributes={'number': numbers})
+
+    def test_no_source_is_said(self):
+        for nothing in ([], ()):
+            with self.assertRaisesRegex(ValueError, 'no source'):
+                self.built(nothing)
+
     def test_rasters_of_other_packages(self):
         try:
             import rasterio

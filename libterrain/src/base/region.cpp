@@ -118,7 +118,10 @@ Region Region::parse(const std::string& text) {
                        " numbers; write minx,miny,maxx,maxy or minx,miny,minz,maxx,maxy,maxz");
     }
     if (region.box_.empty()) {
-      throw UsageError("the box '" + text + "' has a minimum above its maximum");
+      throw UsageError("the box '" + text + "' has a minimum above its maximum" +
+                       (v[0] > v[v.size() / 2] && std::abs(v[0]) <= 180
+                            ? " (across the antimeridian longitudes go on: 170 to 190)"
+                            : ""));
     }
     return region;
   }

@@ -12,6 +12,7 @@
 #include "base/file_marks.hpp"
 #include "base/parallel.hpp"
 #include "base/units.hpp"
+#include "earth/whole_turns.hpp"
 #include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
@@ -33,8 +34,11 @@ ContourText::ContourText(const stream::Store& store, const ContourRequest& reque
       write_(std::move(write)),
       number_(request.own_crs ? kOwnDecimals : kDecimals) {
   if (!request.own_crs) {
-    geography_.emplace(system_of(store, ", or ask for `own_crs`"),
-                       world_box(store.schema(), store.bounds()));
+    const stream::Box3 box = world_box(store.schema(), store.bounds());
+    geography_.emplace(system_of(store, ", or ask for `own_crs`"), box);
+    Point2 middle{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
+    (*geography_)({&middle, 1});
+    middle_ = middle[0];
   }
   const std::array<double, 6>& m = store.schema().world.xy;
   reverse_ = m[0] * m[4] - m[1] * m[3] > 0;
@@ -54,7 +58,15 @@ void ContourText::append(std::string& text, const ContourLine& line,
   places.clear();
   for (const Point2& p : line.points) places.push_back(ground_.world(p));
   if (reverse_) std::reverse(places.begin(), places.end());
-  if (geography_) (*geography_)(places);
+  if (geography_) {
+    (*geography_)(places);
+    // Across the antimeridian longitudes go on; those of all lines begin on the same side.
+    double near = middle_;
+    for (Point2& p : places) {
+      p = WholeTurns(near, 360)(p);
+      near = p[0];
+    }
+  }
   for (std::size_t i = 0; geography_ && i < places.size(); ++i) {
     if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);

@@ -40,6 +40,7 @@ class ContourText {
   std::string file_;
   GroundSlope ground_;
   std::optional<BoxGeography> geography_;  ///< nothing: places stay in the store's CRS
+  double middle_ = 0;                      ///< longitude of the store's, NaN if it has none
   bool reverse_;                           ///< higher ground is on the left in the CRS
   double interval_;
   unsigned threads_;

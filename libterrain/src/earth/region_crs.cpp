@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,9 +27,7 @@ namespace {
 class Outline {
  public:
   explicit Outline(const Transformation& change)
-      : change_(change),
-        to_(change.from()),
-        turn_(to_.is_geographic() ? 360.0 / to_.definition().degrees_per_unit : 0.0) {}
+      : change_(change), to_(change.from()), turn_(to_.turn()) {}
 
   std::vector<Point2> ring(const std::vector<Point2>& corners) const {
     std::vector<Point2> result;
@@ -89,7 +88,7 @@ class Outline {
 
   const Transformation& change_;
   const CoordinateSystem& to_;
-  double turn_;  ///< of a geographic system, in its unit; else 0
+  double turn_;  ///< see CoordinateSystem::turn()
 };
 
 std::vector<Polygon> outlines(const Region& region) {
@@ -117,25 +116,35 @@ Region region_in(const Region& region, const Transformation& change, const strea
     if (there.empty()) fail(to, "the region has no area in");
     polygons = std::move(there);
   }
-  if (to.is_geographic()) {
-    const double turn = 360.0 / to.definition().degrees_per_unit;
-    std::vector<Polygon> there;
-    for (const Polygon& polygon : polygons) {
-      for (const double shift : {-turn, 0.0, turn}) {
-        Polygon copy = polygon;
-        stream::Box3 box;
-        for (std::vector<Point2>& ring : copy) {
-          for (Point2& p : ring) {
-            p[0] += shift;
-            box.include(stream::Point3{p[0], p[1], 0});
-          }
+  const Region there =
+      Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
+  return to.turn() > 0 ? with_turns(there, to.turn(), bounds) : there;
+}
+
+Point2 middle_in(const Transformation& change, const stream::Box3& box) {
+  Point2 middle{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
+  change.forward({&middle, 1});
+  return middle;
+}
+
+Region with_turns(const Region& region, double turn, const stream::Box3& bounds) {
+  std::vector<Polygon> polygons = outlines(region);
+  const std::size_t count = polygons.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const double shift : {-turn, turn}) {
+      Polygon copy = polygons[i];
+      double west = std::numeric_limits<double>::infinity(), east = -west;
+      for (std::vector<Point2>& ring : copy) {
+        for (Point2& p : ring) {
+          p[0] += shift;
+          west = std::min(west, p[0]);
+          east = std::max(east, p[0]);
         }
-        const bool meets = box.min[0] <= bounds.max[0] && box.max[0] >= bounds.min[0];
-        if (shift == 0 || meets) there.push_back(std::move(copy));
       }
+      if (west <= bounds.max[0] && east >= bounds.min[0]) polygons.push_back(std::move(copy));
     }
-    polygons = std::move(there);
   }
+  if (polygons.size() == count) return region;
   return Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
 }
 

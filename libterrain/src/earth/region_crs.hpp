@@ -14,4 +14,10 @@ namespace terrace::terrain {
 /// CRS shows, or is torn there.
 Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds);
 
+/// The region of a geographic system, and what of it `bounds` holds whole turns away.
+Region with_turns(const Region& region, double turn, const stream::Box3& bounds);
+
+/// The middle of a box in the CRS that `change` leads to; NaN if it has no place there.
+Point2 middle_in(const Transformation& change, const stream::Box3& box);
+
 }  // namespace terrace::terrain

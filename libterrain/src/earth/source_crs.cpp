@@ -36,13 +36,18 @@ CoordinateSystem read_sidecar(const std::string& file) {
   }
 }
 
-/// What the .prj files say, which must be one thing.
+/// What the .prj files say, which must be one thing. local: a system that has no place on earth.
 std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& info,
-                                                   std::string& name) {
+                                                   std::string& name,
+                                                   std::optional<stream::Crs>& local) {
   std::optional<CoordinateSystem> system;
   for (const std::string& file : info.files) {
     const std::string sidecar = sidecar_of(file);
     if (sidecar.empty()) continue;
+    if (const auto own = local_crs_named(sidecar)) {
+      local = own;
+      continue;
+    }
     const CoordinateSystem other = read_sidecar(sidecar);
     if (system && !system->same_places(other)) {
       fail(sidecar, "its CRS is not that of " + name,
@@ -79,11 +84,12 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     return found;
   }
   std::string sidecar;
+  std::optional<stream::Crs> local = local_crs_named(info.crs.wkt);
   if (!found.system) {
-    found.system = system_of_sidecars(info, sidecar);
+    if (!local) found.system = system_of_sidecars(info, sidecar, local);
   } else if (!info.crs.geo_keys.empty()) {
     // A file that tells its own CRS needs no other; one beside it must not say anything else.
-    const std::optional<CoordinateSystem> other = system_of_sidecars(info, sidecar);
+    const std::optional<CoordinateSystem> other = system_of_sidecars(info, sidecar, local);
     if (other && !other->same_places(*found.system)) {
       fail(file,
            "its CRS is " + found.system->title() + ", that of " + sidecar + " is " + other->title(),
@@ -91,6 +97,11 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     }
   }
   if (!found.system) {
+    if (local) {
+      found.crs.name = local->name;
+      found.crs.wkt = local->wkt;
+      if (found.crs.horizontal_unit.empty()) found.crs.horizontal_unit = local->horizontal_unit;
+    }
     if (info.crs.vertical_epsg != 0) {
       CrsDefinition heights;
       try {

@@ -9,6 +9,7 @@
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
+#include "earth/whole_turns.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -38,6 +39,10 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
   return {own, other};
 }
 
+RegionConversion::RegionConversion(const stream::Store& store)
+    : bounds_(world_box(store.schema(), store.bounds())),
+      turn_(WholeTurns(store.schema(), store.bounds()).turn()) {}
+
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
     : to_regions_(std::move(to_regions)), bounds_(world_box(store.schema(), store.bounds())) {}
 
@@ -55,12 +60,19 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const Coord
 }
 
 Region RegionConversion::operator()(Region region) const {
-  if (!to_regions_) return region;
+  if (!to_regions_) return turn_ > 0 ? with_turns(region, turn_, bounds_) : region;
   return region_in(region, *to_regions_, bounds_);
 }
 
 PlaceConversion::PlaceConversion(Transformation change) {
   if (!change.identity()) change_.emplace(std::move(change));
+}
+
+PlaceConversion::PlaceConversion(Transformation change, const stream::Store& store)
+    : PlaceConversion(std::move(change)) {
+  if (!change_) return;
+  turn_ = change_->to().turn();
+  middle_ = middle_in(*change_, world_box(store.schema(), store.bounds()))[0];
 }
 
 void PlaceConversion::operator()(std::span<stream::Point3> points) const {
@@ -71,6 +83,10 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
     for (std::size_t i = 0; i < count; ++i)
       places[i] = {points[first + i][0], points[first + i][1]};
     change_->forward(std::span(places).first(count));
+    if (turn_ > 0) {
+      const WholeTurns turns(middle_, turn_);
+      for (std::size_t i = 0; i < count; ++i) places[i] = turns(places[i]);
+    }
     for (std::size_t i = 0; i < count; ++i) {
       stream::Point3& p = points[first + i];
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {

@@ -38,15 +38,16 @@ class ProfileRun {
         ground_(store),
         distance_(LineDistance::of(store)),
         sampler_(make_sampler(store, request.sampler, context)) {
+    for (const Point2& place : request.line) line_.push_back(ground_.turned(place));
     if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
       crossings_.emplace(store, request.sampler, context.memory_or(0));
     }
   }
 
   ProfileOutcome run() {
-    add(request_.line.front(), 0);
-    for (std::size_t leg = 0; leg + 1 < request_.line.size(); ++leg) {
-      const Point2 &a = request_.line[leg], &b = request_.line[leg + 1];
+    add(line_.front(), 0);
+    for (std::size_t leg = 0; leg + 1 < line_.size(); ++leg) {
+      const Point2 &a = line_[leg], &b = line_[leg + 1];
       if (request_.step) {
         walk(a, b);
       } else if (crossings_) {
@@ -56,7 +57,7 @@ class ProfileRun {
       }
     }
     // The end of the line, unless a step has met it.
-    if (request_.step && outcome_.metres > last_) add(request_.line.back(), outcome_.metres);
+    if (request_.step && outcome_.metres > last_) add(line_.back(), outcome_.metres);
     flush();
     return outcome_;
   }
@@ -180,6 +181,7 @@ class ProfileRun {
   const std::function<void(std::span<const ProfilePoint>)>& take_;
   GroundSlope ground_;
   LineDistance distance_;
+  std::vector<Point2> line_;
   std::unique_ptr<HeightSampler> sampler_;
   ProfileOutcome outcome_;
   double next_step_ = 1, last_ = 0;

@@ -232,6 +232,7 @@ class RasterRun {
       }
       if (request_.to) request_.to->reverse(line);
       for (Point2& p : line) {
+        p = ground_.turned(p);
         const bool wanted =
             !request_.region || request_.region->polygons().empty() || request_.region->covers(p);
         p = wanted ? ground_.stored(p) : Point2{NAN, NAN};

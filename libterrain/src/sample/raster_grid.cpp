@@ -15,6 +15,8 @@
 #include "base/portable_math.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
+#include "earth/region_crs.hpp"
+#include "earth/whole_turns.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -51,6 +53,8 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
     }
   }
   change.forward(outline);
+  const WholeTurns turns(middle_in(change, box)[0], change.to().turn());
+  for (Point2& p : outline) p = turns(p);
   stream::Box3 result;
   for (const Point2& p : outline) {
     if (std::isfinite(p[0]) && std::isfinite(p[1])) result.include(stream::Point3{p[0], p[1], 0});
@@ -140,12 +144,21 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   double cell = request.cell.value_or(spacing_of(store, area, level));
   if (request.to) {
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
-    std::vector<Point2> steps{centre, {centre[0] + cell, centre[1]}, {centre[0], centre[1] + cell}};
+    // Both ways: the new CRS may be torn on one side.
+    std::vector<Point2> steps{centre,
+                              {centre[0] + cell, centre[1]},
+                              {centre[0], centre[1] + cell},
+                              {centre[0] - cell, centre[1]},
+                              {centre[0], centre[1] - cell}};
     box = converted(box, *request.to, store);
     if (!request.cell) {
       request.to->forward(steps);
-      const auto length = [&](std::size_t i) {
+      const auto one_way = [&](std::size_t i) {
         return portable_hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
+      };
+      const auto length = [&](std::size_t i) {
+        const double there = one_way(i), back = one_way(i + 2);
+        return back < 0.5 * there ? back : there;
       };
       cell = std::sqrt(length(1) * length(2));
     }

@@ -43,7 +43,10 @@ struct GroundSlope::Table {
 };
 
 GroundSlope::GroundSlope(const stream::Store& store)
-    : placement_(store.schema()), ground_(placement_), grid_(store.schema().grid) {
+    : placement_(store.schema()),
+      ground_(placement_),
+      turns_(placement_, store.bounds()),
+      grid_(store.schema().grid) {
   if (ground_.same_everywhere()) map_ = ground_.map({});
   if (ground_.projected()) table_ = std::make_shared<Table>(store.bounds());
 }
@@ -56,7 +59,7 @@ GroundMap GroundSlope::map_at(const Point2& stored) const {
 }
 
 Point2 GroundSlope::stored(const Point2& world) const {
-  Point2 place = stored_place(placement_, world);
+  Point2 place = stored_place(placement_, turns_(world));
   if (grid_) {
     for (double& c : place) {
       const double whole = std::nearbyint(c);

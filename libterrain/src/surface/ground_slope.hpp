@@ -8,6 +8,7 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "earth/ground.hpp"
+#include "earth/whole_turns.hpp"
 #include "surface/lattice_surface.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -21,9 +22,12 @@ class GroundSlope {
 
   /// Stored x,y (column and row of a raster). A place within a millionth of a cell of a raster's
   /// column or row is taken to lie on it: coordinates are rounded when they are written.
+  /// Longitudes may be off by whole turns.
   [[nodiscard]] Point2 stored(const Point2& world) const;
   /// Back.
   [[nodiscard]] Point2 world(const Point2& stored) const;
+  /// The place with the longitude that it has in the store.
+  [[nodiscard]] Point2 turned(const Point2& world) const { return turns_(world); }
 
   /// Metres of height per metre on the ground going east and north (of the CRS), at that stored
   /// place. Metres on the ground are those of Ground: at the place's latitude where the CRS is
@@ -40,6 +44,7 @@ class GroundSlope {
  private:
   stream::Placement placement_;
   Ground ground_;
+  WholeTurns turns_;
   bool grid_;
   /// The map at the middle of each of kSide x kSide parts of the store's bounds, made when it is
   /// asked for: a projection's scale costs far more than a gradient.

@@ -9,6 +9,7 @@
 
 #include "base/store_checks.hpp"
 #include "earth/ground.hpp"
+#include "earth/whole_turns.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -27,7 +28,8 @@ Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
     throw UsageError("`near` needs finite coordinates");
   }
   const stream::StoreSchema& schema = store.schema();
-  const std::array<double, 2> xy = stream::stored_place(schema, near.xy);
+  const std::array<double, 2> xy =
+      stream::stored_place(schema, WholeTurns(schema, store.bounds())(near.xy));
   const stream::Channel& height = schema.coordinates[2];
   Local result{.place = {xy[0], xy[1], 0.0}, .metric = {}};
   if (near.z) result.place[2] = (*near.z - height.offset) / height.scale;

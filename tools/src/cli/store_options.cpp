@@ -23,12 +23,12 @@ std::optional<Transformation> CrsOptions::given(const stream::Store& store,
 RegionConversion CrsOptions::regions(const stream::Store& store,
                                      const CommonOptions& common) const {
   std::optional<Transformation> change = given(store, common);
-  return change ? RegionConversion(store, std::move(*change)) : RegionConversion();
+  return change ? RegionConversion(store, std::move(*change)) : RegionConversion(store);
 }
 
 PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {
   std::optional<Transformation> change = to(store, common);
-  return change ? PlaceConversion(std::move(*change)) : PlaceConversion();
+  return change ? PlaceConversion(std::move(*change), store) : PlaceConversion();
 }
 
 std::optional<Transformation> CrsOptions::written(

@@ -111,7 +111,7 @@ class BuildCommand final : public Command {
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
     request_.entities = *stream::entities_named(entities_);  // checked by the option
-    if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
+    if (!crs_.empty()) request_.crs = crs_named(crs_);
     request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {
       throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));

@@ -20,6 +20,7 @@
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
 #include "cli/store_options.hpp"
+#include "earth/whole_turns.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
@@ -219,10 +220,11 @@ class PointsCommand final : public Command {
     const std::vector<double> v = parse_numbers(near_, "--near");
     if (v.size() != 2 && v.size() != 3) throw UsageError("--near needs X,Y or X,Y,Z");
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
-    NearPlace place{.xy = {v[0], v[1]}};
+    NearPlace place{.xy = WholeTurns(store.schema(), store.bounds())({v[0], v[1]})};
     if (v.size() == 3) place.z = v[2];
     const stream::Box3 box = world_box(store.schema(), store.bounds());
-    if (!(v[0] >= box.min[0] && v[0] <= box.max[0] && v[1] >= box.min[1] && v[1] <= box.max[1])) {
+    const auto& [x, y] = place.xy;
+    if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
       common.say(near_ + " lies outside the store: in its CRS X is from " +
                  number_text(box.min[0]) + " to " + number_text(box.max[0]) + ", Y from " +
                  number_text(box.min[1]) + " to " + number_text(box.max[1]));

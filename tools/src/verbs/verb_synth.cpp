@@ -76,7 +76,7 @@ class SynthCommand : public Command {
     const Stopwatch watch;
     if (output_ == "-") throw UsageError("a GeoTIFF cannot be written to standard output");
     dem_.size = parse_size(size_);
-    dem_.crs = CoordinateSystem::parse(crs_).crs();
+    dem_.crs = crs_named(crs_);
     dem_.crs.name.clear();  // the code says it all
     dem_.floats = type_ == "float32";
     dem_.seed = common.seed;

@@ -86,12 +86,15 @@ std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOption
 using RasterOpener = std::function<std::unique_ptr<Raster>(const std::string& file)>;
 
 /// Several rasters as one: where they overlap, the valid sample of the last named wins. They must
-/// agree in sample (type, scale, offset), cell size and phase (to 1/1000 cell) and, unless
-/// `ignore_crs`, in CRS. Keeps at most `open_at_once` of them open, which together hold at most
-/// `open_bytes` (RasterInfo::held_bytes; one may always be open). Throws: Error naming two files
-/// and the difference, or if the union has 2^30 columns or rows.
+/// agree in sample (type, scale, offset), cell size and phase (to 1/1000 cell) and in CRS, unless
+/// `crs` tells that of all. Files on both sides of the antimeridian are joined there, by longitudes
+/// beyond 180, if all together are then at most half a turn wide. Keeps at most `open_at_once` of
+/// them open, which together hold at most `open_bytes` (RasterInfo::held_bytes; one may always be
+/// open). Throws: Error naming two files and the difference, or if the union has 2^30 columns or
+/// rows.
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
-                                    const RasterOpener& opener, bool ignore_crs = false,
+                                    const RasterOpener& opener,
+                                    const std::optional<Crs>& crs = std::nullopt,
                                     std::size_t open_at_once = 32,
                                     std::uint64_t open_bytes = 64u << 20);
 

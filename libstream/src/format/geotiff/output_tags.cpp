@@ -114,7 +114,7 @@ KeyDirectory keys_of(const GeoTiffOptions& options) {
   for (const GeoKey& key : own) {
     if (key.key > kGTCitation && key.key < kVerticalCrs) keys.add(key);
   }
-  if (!own.empty() && !crs.geographic && unit != 0) keys.add(kLinearUnit, unit);
+  if (epsg == 0 && !crs.geographic && unit != 0) keys.add(kLinearUnit, unit);
   if (epsg != 0 && crs.geographic) {
     keys.add(kGeodeticCrs, epsg);
     keys.add(kAngularUnit, unit != 0 ? unit : std::uint16_t{9102});

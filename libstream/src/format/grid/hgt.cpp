@@ -161,7 +161,7 @@ std::unique_ptr<Raster> open_archive(const std::string& file, std::uint64_t memo
       [by_name = std::move(by_name), open_tile](const std::string& name) {
         return open_tile(by_name.at(name));
       },
-      false, kOpenAtOnce, memory_bytes);
+      std::nullopt, kOpenAtOnce, memory_bytes);
 }
 
 std::unique_ptr<PointSource> open_hgt_points(std::span<const std::string> files,

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "format/geotiff/georeference.hpp"
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
@@ -176,7 +177,7 @@ class VrtReader {
     } else if (part.name == "Offset") {
       info_.sample.offset = number(part.text, "Offset");
     } else if (part.name == "UnitType") {
-      info_.sample.unit = info_.crs.vertical_unit = trim(part.text);
+      info_.sample.unit = info_.crs.vertical_unit = canonical_unit(std::string(trim(part.text)));
     }
   }
 

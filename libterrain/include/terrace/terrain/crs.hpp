@@ -70,6 +70,9 @@ class CoordinateSystem {
   [[nodiscard]] std::string title() const;
   /// Metres in a unit of x and y; 0 if geographic.
   [[nodiscard]] double metres_per_unit() const;
+  /// What leads once around the earth along x, in its unit: 360 degrees, or the width of a
+  /// Mercator map; 0 if x does not lead around.
+  [[nodiscard]] double turn() const;
   [[nodiscard]] Heights heights() const;
   /// Metres in a unit of heights, if known.
   [[nodiscard]] std::optional<double> metres_per_height() const;
@@ -121,6 +124,10 @@ class CoordinateSystem {
   std::shared_ptr<LazyChange> wgs84_;
 };
 
+/// What is named as for CoordinateSystem::parse, or a local (engineering) system, as stores and
+/// files record it. Throws: UsageError.
+stream::Crs crs_named(const std::string& text);
+
 /// From one system to another, by one operation between their datums.
 class Transformation {
  public:
@@ -161,6 +168,8 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 class RegionConversion {
  public:
   RegionConversion() = default;
+  /// Regions in the store's own CRS; longitudes may be off by whole turns.
+  explicit RegionConversion(const stream::Store& store);
   /// to_regions: from the store's CRS to that of the regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
   /// From the CRS of a source, `system`, to that of the regions, `named` as for
@@ -177,6 +186,7 @@ class RegionConversion {
  private:
   std::optional<Transformation> to_regions_;
   stream::Box3 bounds_;
+  double turn_ = 0;  ///< of longitudes; 0: none
 };
 
 /// Places of the store's CRS in another; made by default, it leaves them as they are. Heights stay.
@@ -184,12 +194,16 @@ class PlaceConversion {
  public:
   PlaceConversion() = default;
   explicit PlaceConversion(Transformation change);
+  /// Longitudes go on beyond 180 degrees where the store lies across the antimeridian, so that
+  /// neighbours stay together.
+  PlaceConversion(Transformation change, const stream::Store& store);
   /// x and y in place. Throws: stream::Error for a point that has no place there.
   void operator()(std::span<stream::Point3> points) const;
   [[nodiscard]] bool has_effect() const { return change_.has_value(); }
 
  private:
   std::optional<Transformation> change_;
+  double turn_ = 0, middle_ = 0;  ///< of longitudes that stay together; 0: they need not
 };
 
 /// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nothing if the text is empty. Throws: UsageError.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
 #include <utility>
@@ -18,7 +19,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-namespace {
 
 std::string unit_name(double metres) {
   if (metres == 1) return "metre";
@@ -27,6 +27,8 @@ std::string unit_name(double metres) {
   if (metres == 1000) return "kilometre";
   return {};
 }
+
+namespace {
 
 std::string angle_name(double degrees) {
   if (degrees == 1) return "degree";
@@ -93,6 +95,11 @@ bool CoordinateSystem::counts_as_wgs84() const {
   return to_wgs84().possible() && to_wgs84().identity();
 }
 
+stream::Crs crs_named(const std::string& text) {
+  if (const auto local = local_crs_named(text)) return *local;
+  return CoordinateSystem::parse(text).crs();
+}
+
 CoordinateSystem CoordinateSystem::parse(const std::string& text,
                                          const std::optional<DatumShift>& shift) {
   try {
@@ -157,6 +164,19 @@ CoordinateSystem CoordinateSystem::over(const stream::Box3& box) const {
 
 double CoordinateSystem::metres_per_unit() const {
   return is_geographic() ? 0.0 : definition().metres_per_unit;
+}
+
+double CoordinateSystem::turn() const {
+  const CrsDefinition& own = definition();
+  if (is_geographic()) return 360 / own.degrees_per_unit;
+  const bool cylinder = own.method == ProjectionMethod::web_mercator ||
+                        own.method == ProjectionMethod::mercator_a ||
+                        own.method == ProjectionMethod::mercator_b;
+  if (!cylinder) return 0;
+  const double middle = own.prime_meridian + own.parameters.longitude;
+  std::array<Point2, 2> half{{{middle - 90, 0}, {middle + 90, 0}}};
+  from_own_geographic(half);
+  return 2 * (half[1][0] - half[0][0]);
 }
 
 std::optional<double> CoordinateSystem::metres_per_height() const {

@@ -30,6 +30,23 @@ class ContradictoryCrs : public CrsError {
   using CrsError::CrsError;
 };
 
+/// A local (engineering) system, which has a unit but no place on the earth.
+class LocalCrs : public CrsError {
+ public:
+  explicit LocalCrs(const stream::Crs& crs)
+      : CrsError("the CRS \"" + crs.name + "\" is a local one, without a place on the earth",
+                 "name one that has: EPSG:n"),
+        crs_(crs) {}
+  /// As stores record it.
+  [[nodiscard]] const stream::Crs& crs() const { return crs_; }
+
+ private:
+  stream::Crs crs_;
+};
+
+/// "metre", "foot", "US survey foot", "kilometre"; else empty.
+std::string unit_name(double metres);
+
 /// "ellipsoidal", "orthometric", or empty: as stores record it.
 std::string name_of(Heights heights);
 
@@ -71,6 +88,8 @@ struct CrsDefinition {
 /// What the user writes, or a file holds: a code, a name, WKT, PROJJSON, a PROJ string.
 /// Throws: CrsError.
 CrsDefinition definition_of_text(const std::string& text);
+/// The local system that such a text describes; nothing if it is another or none.
+std::optional<stream::Crs> local_crs_named(const std::string& text);
 /// The system of an EPSG code: geographic, projected or compound. Throws: CrsError.
 CrsDefinition definition_of_epsg(int code);
 /// The system that WKT (version 1, OGC's, GDAL's and ESRI's, or 2), PROJJSON or a PROJ string
@@ -85,8 +104,8 @@ std::string wkt_of(const CrsDefinition& definition);
 /// The same as WKT 1, as GDAL writes it; empty where that cannot say it.
 std::string wkt1_of(const CrsDefinition& definition);
 
-/// What a source or a store says, whichever way; nothing if it says nothing of a CRS.
-/// Throws: CrsError.
+/// What a source or a store says, whichever way; nothing if it says nothing of a CRS, or names a
+/// local one. Throws: CrsError.
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
 
 /// The projection of a system that is not geographic: from longitudes (from its prime meridian) and

@@ -184,7 +184,20 @@ void read_horizontal(const PJ* crs, CrsDefinition& definition) {
     read_horizontal(source.get(), definition);
     return read_shift(crs, definition);
   }
+  if (type == PJ_TYPE_ENGINEERING_CRS) {
+    stream::Crs local;
+    local.name = definition.name;
+    local.wkt = wkt_of(crs);
+    const std::vector<Axis> axes = axes_of(crs);
+    if (!axes.empty()) local.horizontal_unit = unit_name(axes[0].unit);
+    throw LocalCrs(local);
+  }
   const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
+  if (type == PJ_TYPE_GEOCENTRIC_CRS) {
+    throw CrsError("the CRS \"" + definition.name +
+                       "\" is geocentric, with x, y and z from the middle of the earth",
+                   "take a geographic or projected one; cs2cs converts points");
+  }
   if (!geographic && type != PJ_TYPE_PROJECTED_CRS) {
     throw CrsError("the CRS \"" + definition.name + "\" is neither geographic nor projected",
                    kByCode);

@@ -190,6 +190,17 @@ CrsDefinition definition_of_text(const std::string& text) {
       "name a file with WKT or PROJJSON (.prj)");
 }
 
+std::optional<stream::Crs> local_crs_named(const std::string& text) {
+  try {
+    definition_of_text(text);
+  } catch (const LocalCrs& local) {
+    return local.crs();
+  } catch (const CrsError&) {
+    // Said by whoever uses the text.
+  }
+  return std::nullopt;
+}
+
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
   CrsDefinition definition;
   constexpr std::string_view kEsri = "ESRI PE String = ";
@@ -204,7 +215,11 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
                std::find(kUnits.begin(), kUnits.end(), key.key) == kUnits.end();
       });
   if (!wkt.empty()) {
-    definition = definition_of_wkt(wkt);
+    try {
+      definition = definition_of_wkt(wkt);
+    } catch (const LocalCrs&) {
+      return std::nullopt;
+    }
     if (crs.epsg != 0 && definition.epsg() != 0 && alias_of(crs.epsg) != definition.epsg()) {
       throw ContradictoryCrs("its CRS is EPSG:" + std::to_string(crs.epsg) + " by code and EPSG:" +
                                  std::to_string(definition.epsg()) + " by WKT",

@@ -63,13 +63,14 @@ bool is_ballpark(const PJ* operation) {
   return proj_coordoperation_has_ballpark_transformation(proj_context(), operation) != 0;
 }
 
-void choose(const List& list, OperationChoice& choice) {
+void choose(const List& list, bool with_grids, OperationChoice& choice) {
   PJ_CONTEXT* const context = proj_context();
   for (int i = 0; i < size_of(list) && !choice.found; ++i) {
     const ProjObject one = candidate(list, i);
     if (is_ballpark(one.get()) || proj_coordoperation_is_instantiable(context, one.get()) == 0) {
       continue;
     }
+    if (!with_grids && proj_coordoperation_get_grid_used_count(context, one.get()) > 0) continue;
     const ProjObject normal(proj_normalize_for_visualization(context, one.get()));
     const char* const text = normal != nullptr
                                  ? proj_as_proj_string(context, normal.get(), PJ_PROJ_5, nullptr)
@@ -89,10 +90,12 @@ OperationChoice choose_operation(const PJ* from, const PJ* to,
   OperationChoice choice;
   if (from == nullptr || to == nullptr) return choice;
   List list = candidates(from, to, area);
-  choose(list, choice);
+  choose(list, true, choice);
   if (!choice.found && area) {
+    // None is meant for the area: a grid has no values there, a formula has.
     list = candidates(from, to, std::nullopt);
-    choose(list, choice);
+    choose(list, false, choice);
+    if (!choice.found) choose(list, true, choice);
   }
   double best = choice.accuracy;
   for (int i = 0; i < size_of(list); ++i) {

@@ -66,8 +66,13 @@ RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
   return {heights_.data(), held_.columns};
 }
 
+const LatticeWindow& RasterTileSurface::window_around(const GeographicBox& box) {
+  if (!around_ || around_->first != box) around_ = {box, raster_.window_around(box)};
+  return around_->second;
+}
+
 void RasterTileSurface::expect(const GeographicBox& box) {
-  LatticeWindow window = raster_.window_around(box);
+  LatticeWindow window = window_around(box);
   if (window.size() == 0) return;
   // What lies around places on the box's sides, outside the raster too.
   window = {window.column - 2, window.row - 2, window.columns + 4, window.rows + 4};
@@ -93,7 +98,7 @@ HeightRange RasterTileSurface::above_ellipsoid(const HeightBlocks::Range& range,
 }
 
 std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
-  const LatticeWindow window = raster_.window_around(box);
+  const LatticeWindow& window = window_around(box);
   if (window.size() == 0) return std::nullopt;
   const auto range = raster_.blocks.range(window);
   if (!range) return std::nullopt;
@@ -237,12 +242,12 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
 SurfacePart RasterTileSurface::part(const GeographicBox& box) {
   if (SurfaceRows in_rows; rows(box, in_rows)) return in_rows;
   SurfaceGrid about;
-  grid(box, about);
+  grid(box, window_around(box), about);
   return about;
 }
 
-void RasterTileSurface::grid(const GeographicBox& box, SurfaceGrid& out) {
-  const LatticeWindow window = raster_.window_around(box);
+void RasterTileSurface::grid(const GeographicBox& box, const LatticeWindow& window,
+                             SurfaceGrid& out) {
   out.columns = static_cast<std::size_t>(window.columns);
   out.longitude.resize(window.size());
   out.latitude.resize(window.size());
@@ -276,7 +281,7 @@ void RasterTileSurface::grid(const GeographicBox& box, SurfaceGrid& out) {
 
 void RasterTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
-  grid(box, grid_);
+  grid(box, raster_.window_around(box), grid_);
   for (std::size_t i = 0; i < grid_.height.size(); ++i) {
     if (std::isnan(grid_.height[i])) continue;
     out.longitude.push_back(grid_.longitude[i]);
@@ -288,7 +293,7 @@ void RasterTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
 bool RasterTileSurface::rows(const GeographicBox& box, SurfaceRows& out) {
   if (!raster_.upright) return false;
   out = {};
-  const LatticeWindow window = raster_.window_around(box);
+  const LatticeWindow& window = window_around(box);
   if (window.size() == 0) return true;
   const auto columns = static_cast<std::size_t>(window.columns);
   const auto rows = static_cast<std::size_t>(window.rows);

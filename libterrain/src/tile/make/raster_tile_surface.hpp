@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "surface/store_window.hpp"
@@ -34,9 +35,12 @@ class RasterTileSurface : public TileSurface {
 
  private:
   [[nodiscard]] HeightRange above_ellipsoid(const HeightBlocks::Range& range, bool filled) const;
+  /// That of the raster. Range, expectation and part of a leaf ask for the same one, and finding it
+  /// may take hundreds of conversions.
+  const LatticeWindow& window_around(const GeographicBox& box);
   /// False where the samples are not in rows along parallels.
   bool rows(const GeographicBox& box, SurfaceRows& out);
-  void grid(const GeographicBox& box, SurfaceGrid& out);
+  void grid(const GeographicBox& box, const LatticeWindow& window, SurfaceGrid& out);
   /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)
   /// for each place, in an order that reads little. The sample's right neighbour follows it.
   template <class Visit>
@@ -51,6 +55,7 @@ class RasterTileSurface : public TileSurface {
 
   const TiledRaster& raster_;
   HeightCache reader_;
+  std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the latest
   LatticeWindow held_{};
   std::vector<double> heights_;  ///< of the held window
   std::vector<Point2> places_;   ///< where the geoid is asked for

@@ -21,8 +21,9 @@ constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
 /// Steps across a box in which its image is looked at.
 constexpr unsigned kPlaceSteps = 24;
-/// Fewer steps do across boxes up to this size (degrees): second differences bound the bulge.
-constexpr double kSmall = 1.0;
+/// Fewer steps do across boxes up to this size (degrees), where second differences bound the bulge;
+/// and across those up to the other one if that is below what the many steps would allow.
+constexpr double kSmall = 1.0, kMayBeSmooth = 8.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
 /// The length of a patch whose polynomials stand for a projection, and their largest error in
@@ -102,14 +103,18 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
   for (std::size_t axis = 0; axis < 2; ++axis) {
     margin_[axis] = margin / portable_hypot(xy[axis], xy[3 + axis]);
   }
-  if (degrees) {
-    turn_ = 360.0 / crs_.definition().degrees_per_unit;
+  if (crs_.turn() > 0) {
+    turn_ = crs_.turn();
     StoredBox all = nothing();
     for (unsigned k = 0; k < 4; ++k) {
       include(all, world(between(stored_.min, stored_.max, k & 1, k >> 1, 1)));
     }
     first_longitude_ = all.min[0];
     last_longitude_ = all.max[0];
+    for (const double x : {all.min[0], all.max[0]}) {
+      const Point2 back = crs_.from_geographic(crs_.to_geographic(Point2{x, all.min[1]}));
+      goes_around_ = goes_around_ || (!degrees && std::abs(back[0] - x) > 0.5 * turn_);
+    }
   }
   find_bounds(store.path().string(), store.schema().grid);
   fit_polynomials(store);
@@ -267,29 +272,43 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   }
   const Point2 size{high[0] - low[0], high[1] - low[1]};
   const double longest = std::max(size[0], size[1]);
-  const bool small = longest <= kSmall;
-  // Steps of about one length, and two at least, between which there is a second difference.
-  const auto steps = [&](double length) {
-    if (length == 0.0) return 1U;
-    const double share = std::ceil((small ? kSmallSteps : kPlaceSteps) * length / longest);
-    return std::max(2U, static_cast<unsigned>(share));
-  };
-  const PlaceGrid grid{low, high, {steps(size[0]), steps(size[1])}};
-  std::vector<Point2> places = grid.places();
-  from_geographic(places);
-  StoredBox around = nothing();
-  for (Point2& p : places) {
-    p = stored_place(placement_, p);
-    if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, p);
+  for (const bool few : {true, false}) {
+    if (few && longest > kMayBeSmooth) continue;
+    // Steps of about one length, and two at least, between which there is a second difference.
+    const auto steps = [&](double length) {
+      if (length == 0.0) return 1U;
+      const double share = std::ceil((few ? kSmallSteps : kPlaceSteps) * length / longest);
+      return std::max(2U, static_cast<unsigned>(share));
+    };
+    const PlaceGrid grid{low, high, {steps(size[0]), steps(size[1])}};
+    std::vector<Point2> places = grid.places();
+    from_geographic(places);
+    StoredBox around = nothing();
+    for (Point2& p : places) {
+      p = stored_place(placement_, p);
+      if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, p);
+    }
+    const Point2 range{around.max[0] - around.min[0], around.max[1] - around.min[1]};
+    // What bulges between the places looked at.
+    Point2 bulge{range[0] / kPlaceSteps, range[1] / kPlaceSteps};
+    if (few) {
+      const double most = longest <= kSmall ? kFarPlace : std::max(bulge[0], bulge[1]);
+      bulge = {2.0 * grid.second_difference(places, 0), 2.0 * grid.second_difference(places, 1)};
+      if (!(std::max(bulge[0], bulge[1]) <= most)) continue;
+    }
+    if (!(around.min[0] <= around.max[0])) break;
+    const Point2 turned = stored_place(placement_, {turn_, 0}),
+                 origin = stored_place(placement_, {});
+    for (const int turn : goes_around_ ? std::vector{-1, 0, 1} : std::vector{0}) {
+      StoredBox there = around;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        there.min[axis] += turn * (turned[axis] - origin[axis]);
+        there.max[axis] += turn * (turned[axis] - origin[axis]);
+      }
+      add(there, bulge);
+    }
+    break;
   }
-  if (!(around.min[0] <= around.max[0])) return windows;
-  // What bulges between the places looked at.
-  Point2 bulge;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    bulge[axis] = small ? 2.0 * grid.second_difference(places, axis)
-                        : (around.max[axis] - around.min[axis]) / kPlaceSteps;
-  }
-  add(around, bulge);
   return windows;
 }
 
@@ -311,7 +330,7 @@ void StoredPlaces::to_stored(std::span<Point2> places) const {
   }
   from_geographic(places);
   for (Point2& p : places) {
-    if (crs_.is_geographic()) p[0] = in_turn(p[0]);
+    if (crs_.is_geographic() || goes_around_) p[0] = in_turn(p[0]);
     p = stored_place(placement_, p);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) {
       p = {stored_.min[0] - 1.0, stored_.min[1] - 1.0};

@@ -38,6 +38,9 @@ class StoredPlaces {
     return {first_longitude_, last_longitude_};
   }
 
+  /// Whether the store is projected and goes on beyond the edge of its map.
+  [[nodiscard]] bool goes_around() const { return goes_around_; }
+
   /// For rasters: the least distance of neighbouring samples in degrees along a parallel or
   /// meridian, estimated at the corners of 64 x 64 parts.
   [[nodiscard]] double lattice_spacing() const;
@@ -69,8 +72,9 @@ class StoredPlaces {
   stream::Placement placement_;
   StoredBox stored_;
   GeographicBox bounds_;
-  /// For a store in degrees: its range of longitudes, and a full turn in its unit.
+  /// For a store in degrees, or beyond the edge of a map: its range of x, and a full turn.
   double first_longitude_ = 0.0, last_longitude_ = 0.0, turn_ = 360.0;
+  bool goes_around_ = false;
   Point2 margin_{};  ///< stored: more than the error of converting there and back
   /// Degrees, along a parallel or meridian: the shortest step of the grid that bounds are found by,
   /// along each stored axis.

@@ -202,7 +202,9 @@ void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) 
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const double lon = longitude_at(tile, mesh.u[i]), lat = latitude_at(tile, mesh.v[i]);
     longitude.insert(longitude.end(), {lon - reach, lon + reach, lon, lon});
-    latitude.insert(latitude.end(), {lat, lat, lat - reach, lat + reach});
+    // Beyond a pole there is no geoid.
+    latitude.insert(latitude.end(),
+                    {lat, lat, std::max(lat - reach, -90.0), std::min(lat + reach, 90.0)});
   }
   std::vector<double> heights(longitude.size());
   surface.heights(longitude, latitude, heights);
@@ -213,8 +215,9 @@ void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) 
     const double east = metres.longitude < 1.0 ? 0.0
                                                : (heights[4 * i + 1] - heights[4 * i]) /
                                                      (2.0 * reach * metres.longitude);
-    const double north =
-        (heights[4 * i + 3] - heights[4 * i + 2]) / (2.0 * reach * metres.latitude);
+    const bool at_pole = std::abs(lat) + reach > 90.0;
+    const double span = at_pole ? latitude[4 * i + 3] - latitude[4 * i + 2] : 2.0 * reach;
+    const double north = (heights[4 * i + 3] - heights[4 * i + 2]) / (span * metres.latitude);
     const LocalFrame frame = local_frame(lon, lat);
     stream::Point3 normal;
     for (std::size_t axis = 0; axis < 3; ++axis) {

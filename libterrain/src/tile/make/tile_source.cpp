@@ -2,12 +2,14 @@
 #include "tile/make/tile_source.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include <terrace/stream/error.hpp>
 
+#include "base/units.hpp"
 #include "earth/geoid_heights.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -23,6 +25,9 @@ constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
 constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
 /// The least memory for the triangles of a part.
 constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
+
+/// Metres above or below the ellipsoid.
+constexpr double kFarthest = 1e7;
 
 template <class Tiled, class Surface>
 class SourceOf final : public TileSource {
@@ -46,9 +51,27 @@ std::optional<double> flat_height(const stream::Store& store, const TilesRequest
                                   double metres_per_unit) {
   if (request.fill == Fill::none) throw UsageError("`fill` none: globes have no holes");
   if (request.fill == Fill::interpolate) return std::nullopt;
+  if (request.flat_height && !(std::abs(*request.flat_height) <= kFarthest)) {
+    throw UsageError("`fill` flat: beyond 10,000 km there is no place on a globe");
+  }
   const stream::Channel& z = store.schema().coordinates[2];
   const double lowest = (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
   return request.flat_height.value_or(lowest);
+}
+
+/// metres: of a unit of the store's heights.
+void check_heights(const stream::Store& store, double metres) {
+  const stream::Channel& z = store.schema().coordinates[2];
+  for (const stream::Point3& end : {store.bounds().min, store.bounds().max}) {
+    const double height = (end[2] * z.scale + z.offset) * metres;
+    if (std::abs(height) <= kFarthest) continue;
+    throw stream::Error({.file = store.path().string(),
+                         .where = {},
+                         .cause = "has heights of " + number_text(height) +
+                                  " m: beyond 10,000 km there is no place on a globe",
+                         .remedy = "look at the unit and the nodata value of the source, or leave "
+                                   "wrong heights out: `where` 'z < 9000'"});
+  }
 }
 
 }  // namespace
@@ -80,6 +103,7 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
   const CoordinateSystem system = system_of(store);
   EllipsoidalHeights heights(store.schema(), request.vertical, request.geoid,
                              resources.memory_bytes / 4, system.area());
+  check_heights(store, heights.metres_per_unit());
   if (!heights.note().empty()) context.say(heights.note());
   if (!system.wgs84_note().empty()) context.say(system.wgs84_note());
   const std::optional<double> flat = flat_height(store, request, heights.metres_per_unit());

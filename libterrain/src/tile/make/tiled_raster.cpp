@@ -186,7 +186,7 @@ std::uint64_t TiledRaster::digest(const GeographicBox& box) const {
       geographic ? crs.degrees_per_unit == 1.0 : inside || box.east - box.west <= kSmooth;
   const unsigned steps = straight ? 1 : kDigestSteps;
   std::vector<Point2> looked_at;
-  if (smooth) looked_at = places_of(*this, box, steps);
+  if (smooth && !places.goes_around()) looked_at = places_of(*this, box, steps);
   if (looked_at.empty()) {
     add_everything(*this, sum);
     return sum.value();

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+#include <terrace/stream/schema.hpp>
+
+#include "terrace/terrain/region.hpp"
+
+namespace terrace::terrain {
+
+/// Longitudes (and x of Web Mercator) moved by whole turns to where the data lie: across the
+/// antimeridian, or counted from 0 to 360, one place has two.
+class WholeTurns {
+ public:
+  WholeTurns() = default;
+  /// To half a turn on either side of the middle, which may be NaN: nothing is moved then.
+  WholeTurns(double middle, double turn) : turn_(turn), middle_(middle), reach_(0.5 * turn) {}
+  /// stored: the store's bounds.
+  WholeTurns(const stream::Placement& placement, const stream::Box3& stored) {
+    const stream::Crs& crs = placement.crs;
+    const bool degrees = crs.geographic && crs.horizontal_unit == "degree";
+    if (!(degrees || crs.epsg == kWebMercator) || stored.empty()) return;
+    const stream::Box3 box = world_box(placement, stored);
+    const double turn = degrees ? 360 : kWebMercatorWidth;
+    // What is wider is no place on the earth.
+    if (box.max[0] - box.min[0] <= turn) *this = {0.5 * (box.min[0] + box.max[0]), turn};
+  }
+
+  /// 0 where longitudes have no turns.
+  [[nodiscard]] double turn() const { return turn_; }
+  [[nodiscard]] Point2 operator()(Point2 place) const {
+    const double off = middle_ - place[0];
+    if (turn_ > 0 && std::abs(off) > reach_) place[0] += turn_ * std::round(off / turn_);
+    return place;
+  }
+
+ private:
+  static constexpr int kWebMercator = 3857;
+  static constexpr double kWebMercatorWidth = 2 * 20037508.342789244;
+
+  double turn_ = 0, middle_ = 0, reach_ = 0;
+};
+
+}  // namespace terrace::terrain
