@@ -14,6 +14,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
@@ -163,6 +164,10 @@ class PointsCommand final : public Command {
     summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(points) + " points in " +
                    readable_seconds(watch.seconds()) + "\n";
+    if (points == 0) {
+      common.say(part_.path + ": no point is selected; all of the store's have " +
+                 extent_text(store.whole()));
+    }
     tell_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = output.replaced();
@@ -221,7 +226,7 @@ class PointsCommand final : public Command {
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
     NearPlace place{.xy = {v[0], v[1]}};
     if (v.size() == 3) place.z = v[2];
-    const stream::Box3 box = world_box(store.schema(), store.bounds());
+    const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
     if (!(v[0] >= box.min[0] && v[0] <= box.max[0] && v[1] >= box.min[1] && v[1] <= box.max[1])) {
       common.say(near_ + " lies outside the store: in its CRS X is from " +
                  number_text(box.min[0]) + " to " + number_text(box.max[0]) + ", Y from " +
