@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <random>
@@ -28,11 +29,50 @@ class Xyz : public ::testing::Test {
   TempFolder folder_;
 };
 
+TEST_F(Xyz, LargeIntegersAreKeptOrRefused) {
+  const AllPoints all = read(
+      "x,y,z,id,hash,time\n1,2,3,-9007199254740993,18446744073709551615,5\n"
+      "4,5,6,\"+1\",0,0.5\n");
+  ASSERT_EQ(all.info.attributes.size(), 3u);
+  EXPECT_EQ(all.info.attributes[0].type, ScalarType::i64);
+  EXPECT_EQ(all.info.attributes[1].type, ScalarType::u64);
+  EXPECT_EQ(all.info.attributes[2].type, ScalarType::f64);
+  std::int64_t ids[2];
+  std::uint64_t hash = 0;
+  std::memcpy(&ids[0], all.points.payload.data(), 8);
+  std::memcpy(&hash, all.points.payload.data() + 8, 8);
+  std::memcpy(&ids[1], all.points.payload.data() + 24, 8);
+  EXPECT_EQ(ids[0], -9007199254740993);
+  EXPECT_EQ(hash, 18446744073709551615u);
+  EXPECT_EQ(ids[1], 1);
+
+  // Reals that happen to have no fraction may be rounded, as all reals.
+  EXPECT_EQ(refusal("1 2 3 0.5\n1 2 3 9007199254740993\n"), "");
+  EXPECT_EQ(refusal("1 2 3 9007199254740993\n1 2 3 0.5\n"), "");
+  std::string late;
+  for (int i = 0; i < 20'000; ++i) late += "1 2 3 4\n";
+  EXPECT_EQ(refusal(late + "1 2 3 9007199254740992\n"), "");
+  EXPECT_NE(refusal(late + "1 2 3 9007199254740993\n")
+                .find("line 20001: column 4, '9007199254740993', is an integer that a double"),
+            std::string::npos);
+  EXPECT_NE(refusal("1 2 3 9007199254740993\n" + late + "1 2 3 0.5\n")
+                .find("'0.5', is not an integer that int64 holds"),
+            std::string::npos);
+}
+
+TEST_F(Xyz, SeparatorsInQuotedNamesDoNotCount) {
+  const AllPoints all = read("x,y,z,\"a;b\",\"c,d\"\n1,2,3,4,5\n");
+  ASSERT_EQ(all.info.attributes.size(), 2u);
+  EXPECT_EQ(all.info.attributes[0].name, "a;b");
+  EXPECT_EQ(all.info.attributes[1].name, "c,d");
+}
+
 TEST_F(Xyz, ReadsEverySeparatorLineEndAndComment) {
   const std::vector<Point3> expected{{1, 2, 3}, {4.5, -5, 6e3}};
   for (const std::string_view text : {
            "1 2 3\n4.5 -5 6e3\n",
            "1 2 3\n4.5 -5 6e3",
+           "x,y,z\r1,2,3\r4.5,-5,6e3\r",
            "1\t2\t3\r\n4.5\t-5\t6e3\r\n",
            "1,2,3\n4.5,-5,6e3\n",
            "1, 2 ,3\n 4.5 , -5,\t6e3 \n",
@@ -109,7 +149,6 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
       {"1 2 3\n1 2 --3\n", "line 2: column 3, '--3'"},
       {"1 2 3\n1 2 +-3\n", "line 2: column 3, '+-3'"},
       {"1 2 3\n1 2 0x10\n", "line 2: column 3, '0x10'"},
-      {"1 2 3\r1 2 3\r", "line 1: "},
       {"1 2\n", "line 1: has 2 columns, but a point needs x, y and z; add"},
       {"5\n1 2 3\n", "line 1: has 1 column,"},
       {"x,y\n1,2\n", "has 2 columns"},

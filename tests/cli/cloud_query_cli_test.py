@@ -291,5 +291,48 @@ class CloudQueryTest(unittest.TestCase):
         self.assertLess(wrong, 15)
 
 
+class NothingSelectedTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def build(self, lines):
+        store, text = self.path('s.terrace'), self.path('s.xyz')
+        with open(text, 'w') as file:
+            file.writelines(lines)
+        result = terrace('build', text, '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return store
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def test_no_points_are_an_answer_but_no_mesh(self):
+        store = self.build(f'{x} {y} {x * y % 7}\n' for x in range(20) for y in range(20))
+        extent = 'have x from 0 to 19, y from 0 to 19, z from 0 to 6'
+        region, where = ['--region', '50,50,60,60'], ['--where', 'z < 0']
+        for options in (region, where, [*where, '--near', '1,1', '-k', '3']):
+            result = terrace('points', store, *options, '-o', self.path('none.csv'), '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('0 points', result.stderr)
+            if '--near' not in options:
+                self.assertIn('no point is selected; all of the store\'s ' + extent, result.stderr)
+        for bound in ([], ['--max-error', '1']):
+            for options, message in ((region, extent), (where, "no point meets the condition 'z < 0'")):
+                result = terrace('mesh', store, *options, *bound, '-o', self.path('none.ply'))
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn(message, result.stderr)
+                self.assertFalse(os.path.exists(self.path('none.ply')))
+
+    def test_a_mesh_without_triangles_says_why(self):
+        for lines, why in ((['1 2 3\n', '1 2 4\n'], 'all points have the same x and y'),
+                           ([f'{i} {2 * i} {i * i}\n' for i in range(9)], 'all points are on one line over x and y')):
+            store = self.build(lines)
+            result = terrace('mesh', store, '-o', self.path('line.ply'), '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('there are no triangles, because ' + why, result.stderr)
+            os.rename(store, store + why.replace(' ', '_'))
+
+
 if __name__ == '__main__':
     unittest.main()

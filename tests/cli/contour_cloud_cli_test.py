@@ -206,7 +206,7 @@ class CloudContourTest(CloudTestCase):
         out = self.path('none.geojson')
         self.assertIn('has no level', self.expect_error(2, 'contour', self.metres, '--interval', 1,
                                                         '--level', 99, '-o', out))
-        self.assertIn('does not meet', self.expect_error(1, 'contour', self.metres, '--interval', 1,
+        self.assertIn('is in the region', self.expect_error(1, 'contour', self.metres, '--interval', 1,
                                                          '--region', '0,0,9,9', '-o', out))
         self.assertFalse(os.path.exists(out))
 
@@ -394,7 +394,7 @@ class CloudRasterTest(CloudTestCase):
         line = self.build('line', [(i, 0, i) for i in range(20)], '--crs', 'EPSG:32632')
         summary = json.loads(self.run_ok('raster', line, '--cell', 1, '--json', '--force', '-o', out))
         self.assertEqual(summary['nodata'], summary['cells'])
-        self.assertIn('does not meet', self.expect_error(1, 'raster', self.metres, '--region', '0,0,9,9',
+        self.assertIn('is in the region', self.expect_error(1, 'raster', self.metres, '--region', '0,0,9,9',
                                                          '--force', '-o', out))
         self.expect_error(2, 'raster', self.metres, '--level', 77, '--force', '-o', out)
 

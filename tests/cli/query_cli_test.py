@@ -264,7 +264,7 @@ class RasterTest(QueryTest):
                                          '-o', self.path('region.tif'), '--json'))
         self.assertEqual((summary['columns'], summary['rows']), (31, 41))
         out = self.path('outside.tif')
-        self.assertIn('does not meet', self.expect_error(1, 'raster', self.store, '--region',
+        self.assertIn('is in the region; the points have x from', self.expect_error(1, 'raster', self.store, '--region',
                                                          '0,0,10,10', '-o', out))
         self.assertFalse(os.path.exists(out))
         self.expect_error(2, 'raster', self.store, '--cell', 0, '-o', out)

@@ -108,6 +108,16 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn('no file has such a name', result.stderr)
 
+    def test_names_with_commas_are_given_in_quotes(self):
+        with open(self.path('names.csv'), 'w') as file:
+            file.write('x,y,z,"c,d",e\r1,2,3,4,5\r6,7,9,8,9\r')
+        for options in (['--keep', '"c,d"'], ['--drop', 'e'], ['--keep', '"c,d",e', '--drop', 'e']):
+            self.run_ok('build', self.path('names.csv'), '-o', self.path('names.st'), '--force', '-q', *options)
+            channels = json.loads(self.run_ok('info', self.path('names.st'), '--json'))['channels']
+            self.assertEqual([c['name'] for c in channels], ['x', 'y', 'z', 'c,d'])
+        result = self.terrace('build', self.path('names.csv'), '-o', self.path('n.st'), '--keep', '"c,d"e')
+        self.assertEqual(result.returncode, 2, result.stderr)
+
     def test_build_takes_the_points_and_attributes_that_are_wanted(self):
         summary = json.loads(self.run_ok(
             'build', self.file, '-o', self.path('ground.st'), '--block', '1000', '--json',

@@ -239,6 +239,23 @@ class SurfaceTest(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn("the points enclose nothing, as if all were in one plane; 'terrace mesh'", result.stderr)
 
+    def test_no_points_are_no_surface(self):
+        store = self.path('plane0.terrace')
+        with open(self.path('plane0.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {x * y % 7}\n' for x in range(20) for y in range(20))
+        result = terrace('build', self.path('plane0.xyz'), '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        out = self.path('nothing.ply')
+        for message, options in (
+                ('no point is in the region; the points have x from 0 to 19, y from 0 to 19, z from 0 to 6',
+                 ['--region', '50,50,60,60']),
+                ("no point meets the condition 'z < 0'", ['--where', 'z < 0'])):
+            for criterion in ('poles', 'advancing-front', 'alpha-wrap'):
+                result = terrace('surface', store, '-o', out, '--criterion', criterion, *options)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn(message, result.stderr)
+                self.assertFalse(os.path.exists(out))
+
     def test_errors_are_one_line(self):
         boxed = self.write_metric('boxed.json', box=[0, 0, 1, 1], semi_axes=[2, 1])
         round_one = self.write_metric('round.json', semi_axes=[1, 1])

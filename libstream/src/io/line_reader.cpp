@@ -10,17 +10,21 @@ namespace terrace::stream {
 bool LineReader::next(std::string_view& line) {
   release();
   std::string_view window = input_->window();
-  std::size_t length = window.find('\n');
+  std::size_t length = window.find(line_end_);
   std::size_t line_end = 1;
   while (length == std::string_view::npos) {
     const std::size_t searched = window.size();
     if (searched <= kMaxLine) window = input_->fill(searched + 1);
     if (window.size() == searched) {  // the last line, or one without an end
       if (searched == 0) return false;
+      if (number_ == 0 && line_end_ == '\n' && window.find('\r') != window.npos) {
+        line_end_ = '\r';
+        return next(line);
+      }
       length = searched;
       line_end = 0;
     } else {
-      length = window.find('\n', searched);
+      length = window.find(line_end_, searched);
     }
   }
   if (length > kMaxLine) {

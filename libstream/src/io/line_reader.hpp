@@ -9,8 +9,8 @@
 
 namespace terrace::stream {
 
-/// The lines of a text, in a window of bounded size. Lines end in LF or CR LF; the last needs no
-/// end.
+/// The lines of a text, in a window of bounded size. Lines end in LF or CR LF, or, if the beginning
+/// of the text has no LF, in CR; the last needs no end.
 class LineReader {
  public:
   /// Maximum length of a line in bytes; a longer one is an Error, as a line is held in memory.
@@ -41,6 +41,7 @@ class LineReader {
   Input* input_;
   std::size_t pending_ = 0;  ///< bytes of the last line, including its end
   std::uint64_t number_ = 0;
+  char line_end_ = '\n';
 };
 
 }  // namespace terrace::stream

@@ -4,6 +4,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/stored_entities.hpp"
+#include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -35,12 +36,22 @@ void need_all_points(const stream::Store& store, unsigned level, std::uint64_t p
                        .remedy = "restore the files or build the store anew"});
 }
 
-void throw_region_outside(const stream::Store& store) {
+std::string extent_text(const stream::Store& store) {
+  const stream::Box3 box = world_box(store.schema(), store.bounds());
+  std::string out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    out += std::string(axis > 0 ? ", " : "") + "xyz"[axis] + " from " + number_text(box.min[axis]) +
+           " to " + number_text(box.max[axis]);
+  }
+  return out;
+}
+
+void throw_none_inside(const stream::Store& store, const std::string& what) {
   throw stream::Error(
       {.file = store.path().string(),
        .where = {},
-       .cause = "the region does not meet the store",
-       .remedy = "look at its bounds, and at the CRS in which the `region` is given"});
+       .cause = "no " + what + " is in the region; the points have " + extent_text(store),
+       .remedy = "look also at the CRS in which the `region` is given"});
 }
 
 }  // namespace terrace::terrain

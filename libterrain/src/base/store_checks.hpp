@@ -17,7 +17,11 @@ void need_level(const stream::Store& store, unsigned level);
 /// Throws: stream::Error if the clusters of a level and of those above do not have as many points
 /// as the manifest tells; for who reads them without Store::for_each().
 void need_all_points(const stream::Store& store, unsigned level, std::uint64_t points);
-/// Throws stream::Error: a region and the store have nothing in common.
-[[noreturn]] void throw_region_outside(const stream::Store& store);
+/// "x from 0 to 10, y from 0 to 5, z from -1 to 1": where the points are, those of a view that meet
+/// its condition. Throws: stream::Error if none does.
+std::string extent_text(const stream::Store& store);
+/// Throws stream::Error that says where the points are: none of `what` is in a region, or no point
+/// meets the condition of a view.
+[[noreturn]] void throw_none_inside(const stream::Store& store, const std::string& what = "point");
 
 }  // namespace terrace::terrain

@@ -32,7 +32,7 @@ LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
       box.max[axis] = std::min(box.max[axis], std::ceil(wanted.max[axis]));
     }
   }
-  if (!(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) throw_region_outside(store);
+  if (!(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) throw_none_inside(store);
   const auto whole = [](double value) { return static_cast<std::int64_t>(value); };
   return {whole(box.min[0]), whole(box.min[1]), whole(box.max[0] - box.min[0]) + 1,
           whole(box.max[1] - box.min[1]) + 1};

@@ -74,7 +74,7 @@ class PointContours {
     };
     const std::optional<Region>& region = request_.region;
     if (region && !widened(box_around(*region, ground_)).meets(bounds_)) {
-      throw_region_outside(parts.store);
+      throw_none_inside(parts.store);
     }
     for (std::size_t part = 0; part < tree_.size(); ++part) {
       if (!region || reaches_into(widened(tree_.box(part)), *region, ground_)) {
@@ -230,7 +230,7 @@ class PointContours {
 
 void draw_point_contours(const ContourParts& parts) {
   if (parts.store.points() == 0) {
-    if (parts.request.region) throw_region_outside(parts.store);
+    if (parts.request.region) throw_none_inside(parts.store);
     return;
   }
   PointContours(parts).draw();

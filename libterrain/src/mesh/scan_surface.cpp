@@ -126,6 +126,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
                                       : kSurfaceBytesPerPoint + (poles ? kPolesBytesPerPoint : 0),
                        context.memory_or(0));
   TriangleMesh points = detail_points(source, detail);
+  if (points.positions.empty()) throw_none_inside(store);
   const std::vector<stream::Point3> ground = on_ground(points.positions, source.schema());
   ScanSurface out;
   tri::RestoreOptions restore = options.restore;

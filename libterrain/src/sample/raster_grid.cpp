@@ -115,7 +115,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     }
   }
   if (store.points() == 0 || !(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) {
-    throw_region_outside(store);
+    throw_none_inside(store);
   }
   const std::array<double, 6>& m = store.schema().world.xy;
   const bool straight = m[1] == 0 && m[3] == 0;
@@ -131,7 +131,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
       if (a > b) std::swap(a, b);
       first[axis] = std::max(0.0, std::ceil(a - 1e-6));
       last[axis] = std::min(size - 1, std::floor(b + 1e-6));
-      if (first[axis] > last[axis]) throw_region_outside(store);
+      if (first[axis] > last[axis]) throw_none_inside(store);
     }
     grid.step_x = m[0];
     grid.step_y = m[4];

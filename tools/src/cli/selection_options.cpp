@@ -2,6 +2,7 @@
 #include "cli/selection_options.hpp"
 
 #include <filesystem>
+#include <iomanip>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -16,12 +17,21 @@
 namespace terrace::tools {
 namespace {
 
-/// "a,b" to names; "none" to no name at all.
+/// "a,b" to names, of which those in double quotes may hold commas; "none" to no name at all.
 std::vector<std::string> names_in(const std::string& text, const std::string& option) {
   std::vector<std::string> names;
   if (text == "none") return names;
   std::istringstream list(text);
-  for (std::string name; std::getline(list, name, ',');) {
+  while (list.peek() != std::istringstream::traits_type::eof()) {
+    std::string name;
+    if (list.peek() == '"') {
+      list >> std::quoted(name);
+      if (list.get() != ',' && !list.eof()) {
+        throw terrain::UsageError(option + ": no comma after " + name + " in '" + text + "'");
+      }
+    } else {
+      std::getline(list, name, ',');
+    }
     if (name.empty()) throw terrain::UsageError(option + ": a name is empty in '" + text + "'");
     names.push_back(name);
   }
@@ -50,7 +60,9 @@ void SelectionOptions::define(CLI::App& app) {
   add_number(app, "--resolution", resolution_,
              "of COPC and EPT only the points down to this spacing, in units of its CRS",
              kAboveZero);
-  app.add_option("--keep", keep_, "only these attributes, or none")->type_name("NAME,NAME");
+  app.add_option("--keep", keep_,
+                 "only these attributes, or none; a name with a comma in double quotes")
+      ->type_name("NAME,NAME");
   app.add_option("--drop", drop_, "all attributes but these")->type_name("NAME,NAME");
 }
 

@@ -4,6 +4,7 @@
 #include <malloc.h>
 #endif
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
@@ -180,6 +182,14 @@ class MeshCommand final : public Command {
                 : "the file's format rounds the border of the mesh";
   }
 
+  static std::string why_flat(const std::vector<stream::Point3>& positions) {
+    const bool one = std::all_of(positions.begin(), positions.end(), [&](const stream::Point3& p) {
+      return p[0] == positions.front()[0] && p[1] == positions.front()[1];
+    });
+    return std::string("there are no triangles, because ") +
+           (one ? "all points have the same x and y" : "all points are on one line over x and y");
+  }
+
   static std::string counting(const std::string& duplicates) {
     return duplicates == "min" ? "lowest" : duplicates == "max" ? "highest" : duplicates;
   }
@@ -210,6 +220,8 @@ class MeshCommand final : public Command {
                           may_replace(save_overlay_, common.force));
     }
     TriangleMesh mesh = detail_mesh(store, detail, options, common.context());
+    if (mesh.positions.empty()) throw_none_inside(store, "triangle");
+    if (mesh.triangles.empty()) common.say(part_.path + ": " + why_flat(mesh.positions));
     places(mesh.positions);
     write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()});
     if (writer) writer->finish();

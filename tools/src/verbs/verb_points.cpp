@@ -14,6 +14,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
@@ -164,6 +165,10 @@ class PointsCommand final : public Command {
     summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(points) + " points in " +
                    readable_seconds(watch.seconds()) + "\n";
+    if (points == 0) {
+      common.say(part_.path + ": no point is selected; all of the store's have " +
+                 extent_text(store.whole()));
+    }
     tell_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = output.replaced();
@@ -220,9 +225,9 @@ class PointsCommand final : public Command {
     const std::vector<double> v = parse_numbers(near_, "--near");
     if (v.size() != 2 && v.size() != 3) throw UsageError("--near needs X,Y or X,Y,Z");
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
-    NearPlace place{.xy = WholeTurns(store.schema(), store.bounds())({v[0], v[1]})};
+    NearPlace place{.xy = WholeTurns(store.schema(), store.whole().bounds())({v[0], v[1]})};
     if (v.size() == 3) place.z = v[2];
-    const stream::Box3 box = world_box(store.schema(), store.bounds());
+    const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
     const auto& [x, y] = place.xy;
     if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
       common.say(near_ + " lies outside the store: in its CRS X is from " +

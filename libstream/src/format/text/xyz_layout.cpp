@@ -139,8 +139,17 @@ std::string_view comment_text(std::string_view comment) {
 bool is_comment(std::string_view line) { return line.starts_with('#') || line.starts_with("//"); }
 
 char separator_of(std::string_view line) {
-  if (line.find(';') != std::string_view::npos) return ';';
-  return line.find(',') != std::string_view::npos ? ',' : ' ';
+  // A quote that no other closes is one of a name's characters.
+  const bool quotes = std::count(line.begin(), line.end(), '"') % 2 == 0;
+  char separator = ' ';
+  bool quoted = false;
+  for (const char c : line) {
+    if (quotes && c == '"') quoted = !quoted;
+    if (quoted) continue;
+    if (c == ';') return c;
+    if (c == ',') separator = c;
+  }
+  return separator;
 }
 
 bool is_header(const std::vector<std::string_view>& fields) {

@@ -25,7 +25,8 @@ struct TextLayout {
   std::vector<std::string> comments;        ///< before the first point
 };
 
-/// ';' if the line has one, else ',' if it has one, else ' '.
+/// ';' if the line has one, else ',' if it has one, else ' '; what is in double quotes does not
+/// count.
 char separator_of(std::string_view line);
 /// True for a line that starts with '#' or "//" (after trim_left).
 bool is_comment(std::string_view line);

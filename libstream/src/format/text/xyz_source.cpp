@@ -2,12 +2,15 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -24,17 +27,83 @@
 namespace terrace::stream {
 namespace {
 
-/// Reads `columns` numbers that fill the line. False if anything is wrong with it.
-/// kSeparator is ',' or ';', or ' ' for runs of blanks.
-template <char kSeparator>
-bool parse_row(const char* at, const char* end, std::size_t columns, double* row) {
+/// Reads a number; `value` has the bits of an integer of 64 bits if the type is one. Null if there
+/// is none.
+const char* parse_number(const char* at, const char* end, ScalarType type, double& value) {
+  if (type == ScalarType::f64) return parse_real(at, end, value);
+  if (at != end && *at == '+') {
+    ++at;
+    if (at != end && *at == '-') return nullptr;
+  }
+  const auto parse = [&](auto number) -> const char* {
+    const auto [rest, error] = std::from_chars(at, end, number);
+    if (error != std::errc{}) return nullptr;
+    value = std::bit_cast<double>(number);
+    return rest;
+  };
+  return type == ScalarType::u64 ? parse(std::uint64_t{}) : parse(std::int64_t{});
+}
+
+/// True for digits, with a sign or without.
+bool is_integer(std::string_view field) {
+  if (field.starts_with('-') || field.starts_with('+')) field.remove_prefix(1);
+  return !field.empty() && field.find_first_not_of("0123456789") == field.npos;
+}
+
+/// True if `value` is the integer in `field`, not one near it.
+bool is_exact(std::string_view field, double value) {
+  field.remove_prefix(std::min(field.find_first_not_of("+-0"), field.size()));
+  char digits[std::numeric_limits<double>::max_exponent10 + 2];
+  const char* const end =
+      std::to_chars(digits, digits + sizeof digits, std::abs(value), std::chars_format::fixed, 0)
+          .ptr;
+  return field == std::string_view(digits, end);
+}
+
+/// Doubles hold every integer up to this one.
+constexpr std::int64_t kMostOfDouble = std::int64_t{1} << 53;
+
+/// A column by its first fields.
+struct ColumnContent {
+  bool whole = true;  ///< all are integers
+  bool large = false, negative = false, unsigned_alone = false;
+
+  void add(std::string_view field) {
+    whole = whole && is_integer(field);
+    if (!whole) return;
+    double bits = 0;
+    const char* const end = field.data() + field.size();
+    if (parse_number(field.data(), end, ScalarType::i64, bits) != nullptr) {
+      const auto value = std::bit_cast<std::int64_t>(bits);
+      large = large || value > kMostOfDouble || value < -kMostOfDouble;
+      negative = negative || value < 0;
+    } else if (parse_number(field.data(), end, ScalarType::u64, bits) != nullptr) {
+      unsigned_alone = true;
+    }
+  }
+  [[nodiscard]] ScalarType type() const {
+    if (!whole || !(large || unsigned_alone) || (unsigned_alone && negative)) {
+      return ScalarType::f64;
+    }
+    return unsigned_alone ? ScalarType::u64 : ScalarType::i64;
+  }
+};
+
+/// Reads numbers of these types that fill the line. False if anything is wrong with it.
+/// kSeparator is ',' or ';', or ' ' for runs of blanks. kReal: all types are f64.
+template <char kSeparator, bool kReal>
+bool parse_row(const char* at, const char* end, std::span<const ScalarType> types, double* row) {
   for (std::size_t i = 0;; ++i) {
     while (at != end && is_blank(*at)) ++at;
-    at = parse_real(at, end, row[i]);
+    if constexpr (kReal) {
+      at = parse_real(at, end, row[i]);
+    } else {
+      at = parse_number(at, end, types[i], row[i]);
+    }
     if (at == nullptr) return false;
     const char* const number_end = at;
     while (at != end && is_blank(*at)) ++at;
-    if (i + 1 == columns) return at == end;
+    if (i + 1 == types.size()) return at == end;
     if constexpr (kSeparator == ' ') {
       if (at == number_end) return false;
     } else {
@@ -44,29 +113,30 @@ bool parse_row(const char* at, const char* end, std::size_t columns, double* row
   }
 }
 
-using ParseRow = bool (*)(const char*, const char*, std::size_t, double*);
+using ParseRow = bool (*)(const char*, const char*, std::span<const ScalarType>, double*);
 
+template <bool kReal>
 ParseRow row_parser(char separator) {
   switch (separator) {
     case ',':
-      return &parse_row<','>;
+      return &parse_row<',', kReal>;
     case ';':
-      return &parse_row<';'>;
+      return &parse_row<';', kReal>;
     default:
-      return &parse_row<' '>;
+      return &parse_row<' ', kReal>;
   }
 }
 
 class XyzSource final : public PointSource {
  public:
-  XyzSource(const std::string& file, const SourceOptions& options)
+  /// first: the attributes of the first of several files, which have those types in all of them.
+  XyzSource(const std::string& file, const SourceOptions& options, std::span<const Channel> first)
       : input_(file, options.stop), lines_(input_), block_points_(options.block_points) {
     constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
     if (input_.fill(kByteOrderMark.size()).starts_with(kByteOrderMark)) {
       input_.consume(kByteOrderMark.size());
     }
     layout_ = read_text_layout(lines_, input_.name());
-    parse_row_ = row_parser(layout_.separator);
     row_.resize(layout_.columns);
     info_.format = "xyz";
     info_.files = {file};
@@ -80,6 +150,8 @@ class XyzSource final : public PointSource {
     for (const std::string& name : layout_.names) {
       info_.attributes.push_back({.name = name, .type = ScalarType::f64});
     }
+    types_.assign(layout_.columns, ScalarType::f64);
+    whole_.resize(layout_.columns);
     info_.comments = layout_.comments;
     const std::vector<std::string> needed = needed_attributes(info_, options.selection);
     optional_.resize(layout_.columns);
@@ -87,6 +159,10 @@ class XyzSource final : public PointSource {
       optional_[layout_.attributes[i]] =
           std::find(needed.begin(), needed.end(), layout_.names[i]) == needed.end();
     }
+    choose_types(first);
+    const bool real = std::all_of(types_.begin(), types_.end(),
+                                  [](ScalarType type) { return type == ScalarType::f64; });
+    parse_row_ = real ? row_parser<true>(layout_.separator) : row_parser<false>(layout_.separator);
   }
 
   const SourceInfo& info() const override { return info_; }
@@ -102,7 +178,7 @@ class XyzSource final : public PointSource {
     while (count < block_points_ && lines_.next(line)) {
       const char* const begin = line.data();
       const char* const end = begin + line.size();
-      if (!parse_row_(begin, end, layout_.columns, row_.data())) {
+      if (!parse_row_(begin, end, types_, row_.data())) {
         line = trim_left(line);
         if (line.empty() || is_comment(line)) continue;
         if (!parse_fields(line)) refuse(line);
@@ -114,6 +190,9 @@ class XyzSource final : public PointSource {
       }
       block.positions[count] = point;
       for (const std::size_t column : layout_.attributes) {
+        if (whole_[column] && std::abs(row_[column]) >= static_cast<double>(kMostOfDouble)) {
+          check_exact(line, column);
+        }
         std::memcpy(record, &row_[column], sizeof(double));
         record += sizeof(double);
       }
@@ -136,21 +215,62 @@ class XyzSource final : public PointSource {
   }
 
  private:
+  /// Integers that doubles do not hold are kept as integers where the first lines have them.
+  void choose_types(std::span<const Channel> first) {
+    constexpr std::size_t kHead = std::size_t{64} << 10;
+    std::string_view head = input_.fill(kHead).substr(0, kHead);
+    if (head.size() == kHead) head = head.substr(0, head.find_last_of("\r\n"));
+    std::vector<ColumnContent> contents(layout_.columns);
+    while (!head.empty()) {
+      const std::size_t end = std::min(head.find_first_of("\r\n"), head.size());
+      const std::string_view line = trim_left(head.substr(0, end));
+      head.remove_prefix(std::min(end + 1, head.size()));
+      if (line.empty() || is_comment(line)) continue;
+      const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
+      if (fields.size() != layout_.columns) break;
+      for (const std::size_t i : layout_.attributes) contents[i].add(unquoted(fields[i]));
+    }
+    for (std::size_t i = 0; i < layout_.attributes.size(); ++i) {
+      const std::size_t column = layout_.attributes[i];
+      if (optional_[column]) continue;
+      Channel& attribute = info_.attributes[i];
+      const auto same = std::find_if(first.begin(), first.end(), [&](const Channel& other) {
+        return other.name == attribute.name;
+      });
+      attribute.type = same != first.end() ? same->type : contents[column].type();
+      types_[column] = attribute.type;
+      whole_[column] = contents[column].whole && attribute.type == ScalarType::f64;
+    }
+  }
+
+  /// Throws: Error if the column has an integer that its double is not.
+  void check_exact(std::string_view line, std::size_t column) const {
+    const std::string_view field = unquoted(split_fields(line, layout_.separator)[column]);
+    if (!is_integer(field) || is_exact(field, row_[column])) return;
+    throw Error({.file = input_.name(),
+                 .where = "line " + std::to_string(lines_.number()),
+                 .cause = "column " + std::to_string(column + 1) + ", " + in_quotes(field) +
+                          ", is an integer that a double does not hold",
+                 .remedy = "columns become integers of 64 bits if all are and one of the first "
+                           "lines of the first file has one so large: let this line come first, "
+                           "or leave the column out (`drop` of build and convert)"});
+  }
+
   /// Reads a line of fields of which some are in quotes, or text that nobody needs.
   bool parse_fields(std::string_view line) {
     const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
     if (fields.size() != layout_.columns) return false;
     for (std::size_t i = 0; i < fields.size(); ++i) {
-      if (parse_field(fields[i], row_[i])) continue;
+      if (parse_field(fields[i], types_[i], row_[i])) continue;
       if (!optional_[i]) return false;
       row_[i] = std::numeric_limits<double>::quiet_NaN();
     }
     return true;
   }
-  static bool parse_field(std::string_view field, double& value) {
+  static bool parse_field(std::string_view field, ScalarType type, double& value) {
     field = unquoted(field);
     const char* const end = field.data() + field.size();
-    return parse_real(field.data(), end, value) == end;
+    return parse_number(field.data(), end, type, value) == end;
   }
 
   /// Says what is wrong with a line that is no point.
@@ -173,8 +293,13 @@ class XyzSource final : public PointSource {
       const bool coordinate =
           std::find(layout_.xyz.begin(), layout_.xyz.end(), i) != layout_.xyz.end();
       double value = 0;
-      if (!parse_field(field, value) && !optional_[i]) {
+      if (!parse_field(field, types_[i], value) && !optional_[i]) {
         const bool comma = field.find(',') != field.npos;
+        if (types_[i] != ScalarType::f64 && !field.empty()) {
+          fail(column + ", " + in_quotes(field) + ", is not an integer that " +
+                   std::string(name_of(types_[i])) + " holds, as those before are",
+               "correct it, or leave the column out (`drop` of build and convert)");
+        }
         fail(column + (field.empty()
                            ? " is empty"
                            : ", " + in_quotes(field) + ", is not a number that a double holds"),
@@ -197,7 +322,9 @@ class XyzSource final : public PointSource {
   TextLayout layout_;
   ParseRow parse_row_ = nullptr;
   std::vector<double> row_;
-  std::vector<bool> optional_;  ///< columns that may hold anything
+  std::vector<bool> optional_;     ///< columns that may hold anything
+  std::vector<ScalarType> types_;  ///< of the columns: f64, i64 or u64
+  std::vector<bool> whole_;        ///< columns of doubles that seem to be integers
   SourceInfo info_;
   std::uint64_t delivered_ = 0;
 };
@@ -231,14 +358,16 @@ bool recognise_xyz(std::span<const std::byte> head) {
   return false;
 }
 
-std::unique_ptr<PointSource> open_one_xyz(const std::string& file, const SourceOptions& options) {
-  assert(options.block_points > 0);
-  return std::make_unique<XyzSource>(file, options);
-}
-
 std::unique_ptr<PointSource> open_xyz(std::span<const std::string> files,
                                       const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_xyz);
+  assert(options.block_points > 0);
+  const auto open_one = [first = std::vector<Channel>()](const std::string& file,
+                                                         const SourceOptions& each) mutable {
+    auto source = std::make_unique<XyzSource>(file, each, first);
+    if (first.empty()) first = source->info().attributes;
+    return source;
+  };
+  return open_in_turn(files, options, open_one);
 }
 
 }  // namespace

@@ -18,8 +18,9 @@ namespace terrace::terrain {
 namespace {
 
 /// remedy: for a mesh that is to have fewer points than its border.
-BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& options,
-                          const char* remedy, const std::stop_token& stop) {
+BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
+                          const BoundedMeshOptions& options, const char* remedy,
+                          const std::stop_token& stop) {
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;
   std::optional<MeshSpool> spool;
@@ -50,6 +51,7 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& opti
            .remedy = remedy});
     }
   }
+  if (result.samples == 0 && options.region) throw_none_inside(store, "sample");
   stream::WriterOptions writer = options.writer;
   writer.stop = stop;
   spool->write(options.path, writer, mesher.bounds());
@@ -68,12 +70,13 @@ BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMe
     const char* const remedy = options.fill == Fill::none
                                    ? "allow more points, or `fill` cells without data"
                                    : "allow more points";
-    return mesh_by(RasterMesher(source, options, context), options, remedy, context.stop);
+    return mesh_by(RasterMesher(source, options, context), store, options, remedy, context.stop);
   }
   if (options.fill != Fill::none) {
     throw UsageError("`fill` is for rasters: irregular points have no cells without data");
   }
-  return mesh_by(PointMesher(source, options, context), options, "allow more points", context.stop);
+  return mesh_by(PointMesher(source, options, context), store, options, "allow more points",
+                 context.stop);
 }
 
 }  // namespace terrace::terrain
