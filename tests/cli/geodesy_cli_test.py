@@ -447,6 +447,10 @@ class GeodesyTest(unittest.TestCase):
         for box in '-180,-17.5,-179.5,-17.3', '180,-17.5,180.5,-17.3':
             self.assertEqual(len(self.points(store, f'--region={box}')), 10)
         self.assertEqual(self.points(store, '--near=-179.95,-17.05', '-k', 1)[0][2], -180)
+        part = self.path('part.terrace')
+        self.ok('build', west, east, '--region=-180,-17.5,-179.5,-17.3', '-o', part)
+        self.assertEqual(sorted(z for _, _, z in self.points(part)),
+                         sorted(z for _, _, z in self.points(store, '--region=-180,-17.5,-179.5,-17.3')))
         line = self.ok('profile', store, '--line=179.5,-17.5,-179.5,-17.5', '-o', '-').splitlines()
         self.assertAlmostEqual(float(line[-1].split(',')[1]), 180.5)
         self.assertNotIn('', [row.split(',')[3] for row in line])

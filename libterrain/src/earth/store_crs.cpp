@@ -46,17 +46,21 @@ RegionConversion::RegionConversion(const stream::Store& store)
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
     : to_regions_(std::move(to_regions)), bounds_(world_box(store.schema(), store.bounds())) {}
 
-RegionConversion::RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,
-                                   const std::string& named) {
+RegionConversion::RegionConversion(const stream::SourceInfo& source,
+                                   const CoordinateSystem& system) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   bounds_ = {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-  CoordinateSystem own = system;
-  if (source.grid) {
-    const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
-    bounds_ = world_box(source, {{0, 0, 0}, {end(source.columns), end(source.rows), 0}});
-    own = own.over(bounds_);
-  }
-  to_regions_.emplace(std::move(own), CoordinateSystem::parse(named));
+  if (!source.grid) return;
+  const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
+  bounds_ = world_box(source, {{0, 0, 0}, {end(source.columns), end(source.rows), 0}});
+  const double turn = system.turn();
+  if (bounds_.max[0] - bounds_.min[0] <= turn) turn_ = turn;
+}
+
+RegionConversion::RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,
+                                   const std::string& named)
+    : RegionConversion(source, system) {
+  to_regions_.emplace(source.grid ? system.over(bounds_) : system, CoordinateSystem::parse(named));
 }
 
 Region RegionConversion::operator()(Region region) const {

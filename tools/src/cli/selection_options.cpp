@@ -38,6 +38,11 @@ std::vector<std::string> names_in(const std::string& text, const std::string& op
   return names;
 }
 
+/// Whether a box may be one of longitudes and latitudes.
+bool is_in_degrees(const stream::Box3& box) {
+  return box.min[0] >= -360 && box.max[0] <= 360 && box.min[1] >= -90 && box.max[1] <= 90;
+}
+
 }  // namespace
 
 void add_where(CLI::App& app, std::string& where) {
@@ -72,12 +77,17 @@ terrain::RegionConversion SelectionOptions::conversion(
   for (const std::string& input : inputs) {
     std::error_code ignored;
     if (input == "-" || std::filesystem::is_fifo(input, ignored)) {
+      if (region_crs_.empty()) return {};
       throw terrain::UsageError("--region-crs looks up the CRS of the input before it is read: " +
                                 input + " can be read only once; name a file");
     }
   }
   const auto source = stream::open_source(inputs, reading);
   const terrain::SourceCrs crs = terrain::crs_of_source(source->info(), shift);
+  if (region_crs_.empty()) {
+    if (!crs.system) return {};
+    return {source->info(), *crs.system};
+  }
   if (!crs.system) {
     throw stream::Error(
         {.file = inputs.front(),
@@ -95,7 +105,8 @@ stream::Selection SelectionOptions::selection(std::span<const std::string> input
   stream::Selection selection{.where = where_, .resolution = resolution_.value_or(0)};
   if (!region_.empty()) {
     terrain::Region region = terrain::Region::parse(region_);
-    if (!region_crs_.empty()) {
+    // Rasters on both sides of the antimeridian are joined there, whichever longitudes they have.
+    if (!region_crs_.empty() || is_in_degrees(region.box())) {
       const terrain::RegionConversion converted = conversion(inputs, reading, shift);
       region = converted(std::move(region));
       if (!converted.note().empty()) common.say(converted.note());

@@ -19,8 +19,8 @@ struct CommonOptions;
 class SelectionOptions {
  public:
   void define(CLI::App& app);
-  /// inputs: what will be read, by `reading`; opened beforehand if their CRS matters. shift: of it.
-  /// Throws: UsageError for a list or a region that makes no sense; stream::Error.
+  /// inputs: what will be read, by `reading`; opened beforehand if their CRS may matter. shift: of
+  /// it. Throws: UsageError for a list or a region that makes no sense; stream::Error.
   [[nodiscard]] stream::Selection selection(std::span<const std::string> inputs,
                                             const stream::SourceOptions& reading,
                                             const std::optional<terrain::DatumShift>& shift,

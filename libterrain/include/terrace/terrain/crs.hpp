@@ -172,6 +172,8 @@ class RegionConversion {
   explicit RegionConversion(const stream::Store& store);
   /// to_regions: from the store's CRS to that of the regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
+  /// Regions in a source's own CRS; longitudes may be off by whole turns. system: the CRS.
+  RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system);
   /// From the CRS of a source, `system`, to that of the regions, `named` as for
   /// CoordinateSystem::parse. Throws: UsageError for an unknown CRS, stream::Error if nothing leads
   /// from one datum to the other.
