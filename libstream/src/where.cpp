@@ -5,10 +5,14 @@
 #include <array>
 #include <cassert>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 #include <cstring>
 #include <initializer_list>
+#include <limits>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "io/number.hpp"
@@ -163,7 +167,12 @@ class Where::Parser {
            text_[at_] == '=' ? "for equality write ==" : "");
     }
     at_ += static_cast<std::size_t>(rest - begin);
-    emit({.operation = Operation::constant, .number = value}, 0);
+    std::uint64_t whole = 0;
+    const auto [end, error] = std::from_chars(begin, rest, whole);
+    const bool is_whole = error == std::errc{} && end == rest;
+    emit({.operation = Operation::constant,
+          .number = is_whole ? static_cast<long double>(whole) : value},
+         0);
   }
 
   void name() {
@@ -215,27 +224,44 @@ namespace {
 
 /// Points that are evaluated together: the operands stay in the first-level cache.
 constexpr std::size_t kLanes = 256;
-using Lanes = std::array<double, kLanes>;
+template <class Number>
+using Lanes = std::array<Number, kLanes>;
 
-bool holds(double value) { return value < 0.0 || value > 0.0; }
+template <class Number>
+bool holds(Number value) {
+  return value < 0 || value > 0;
+}
+
+bool is_wide(const Channel& channel) {
+  return channel.type == ScalarType::i64 || channel.type == ScalarType::u64;
+}
 
 /// The values of an attribute of `count` records from `first` on.
+template <class Number>
 void load(const Channel& channel, const std::byte* first, std::size_t stride, std::size_t count,
-          Lanes& out) {
+          Lanes<Number>& out) {
   with_type(channel.type, [&](auto tag) {
     for (std::size_t i = 0; i < count; ++i) {
       decltype(tag) value;
       std::memcpy(&value, first + i * stride, sizeof value);
-      out[i] = static_cast<double>(value);
+      out[i] = static_cast<Number>(value);
     }
   });
   if (channel.scale == 1.0 && channel.offset == 0.0) return;
   for (std::size_t i = 0; i < count; ++i) out[i] = out[i] * channel.scale + channel.offset;
 }
 
-template <class Function>
-void combine(Lanes& a, const Lanes& b, const Function& function) {
-  for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<double>(function(a[i], b[i]));
+template <class Number, class Function>
+void combine(Lanes<Number>& a, const Lanes<Number>& b, const Function& function) {
+  for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<Number>(function(a[i], b[i]));
+}
+
+/// The range of a 64-bit integer's values, whose ends were rounded to doubles.
+ValueRange before_rounding(ValueRange range) {
+  constexpr double kExact = 0x1p53, kInfinity = std::numeric_limits<double>::infinity();
+  if (std::abs(range.low) >= kExact) range.low = std::nextafter(range.low, -kInfinity);
+  if (std::abs(range.high) >= kExact) range.high = std::nextafter(range.high, kInfinity);
+  return range;
 }
 
 /// Interval arithmetic. Every operation on doubles is monotonic in each operand, including
@@ -264,6 +290,9 @@ ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool 
 
 Where::Where(const std::string& text, const Schema& schema) : text_(text), schema_(schema) {
   Parser(*this, schema_).parse();
+  for (std::size_t i = 0; i < schema_.attributes.size(); ++i) {
+    extended_ = extended_ || (is_wide(schema_.attributes[i]) && uses(i));
+  }
 }
 
 bool Where::uses(std::size_t attribute) const {
@@ -274,17 +303,24 @@ bool Where::uses(std::size_t attribute) const {
 
 void Where::test(std::span<const Point3> positions, std::span<const std::byte> records,
                  std::span<std::uint8_t> matches) const {
+  extended_ ? test_in<long double>(positions, records, matches)
+            : test_in<double>(positions, records, matches);
+}
+
+template <class Number>
+void Where::test_in(std::span<const Point3> positions, std::span<const std::byte> records,
+                    std::span<std::uint8_t> matches) const {
   assert(matches.size() == positions.size());
   const std::size_t stride = schema_.payload_size();
   assert(records.size() == positions.size() * stride);
-  std::vector<Lanes> stack(depth_);
+  std::vector<Lanes<Number>> stack(depth_);
   for (std::size_t begin = 0; begin < positions.size(); begin += kLanes) {
     const std::size_t count = std::min(kLanes, positions.size() - begin);
     std::size_t held = 0;
     for (const Step& step : steps_) {
       switch (step.operation) {
         case Operation::constant:
-          stack[held++].fill(step.number);
+          stack[held++].fill(static_cast<Number>(step.number));
           continue;
         case Operation::axis:
           for (std::size_t i = 0; i < count; ++i) {
@@ -298,53 +334,53 @@ void Where::test(std::span<const Point3> positions, std::span<const std::byte> r
                count, stack[held++]);
           continue;
         case Operation::negate:
-          for (double& value : stack[held - 1]) value = -value;
+          for (Number& value : stack[held - 1]) value = -value;
           continue;
         case Operation::invert:
-          for (double& value : stack[held - 1]) value = holds(value) ? 0.0 : 1.0;
+          for (Number& value : stack[held - 1]) value = holds(value) ? 0 : 1;
           continue;
         default:
           break;
       }
-      Lanes& a = stack[held - 2];
-      const Lanes& b = stack[held - 1];
+      Lanes<Number>& a = stack[held - 2];
+      const Lanes<Number>& b = stack[held - 1];
       --held;
       switch (step.operation) {
         case Operation::multiply:
-          combine(a, b, [](double p, double q) { return p * q; });
+          combine(a, b, [](Number p, Number q) { return p * q; });
           break;
         case Operation::divide:
-          combine(a, b, [](double p, double q) { return p / q; });
+          combine(a, b, [](Number p, Number q) { return p / q; });
           break;
         case Operation::add:
-          combine(a, b, [](double p, double q) { return p + q; });
+          combine(a, b, [](Number p, Number q) { return p + q; });
           break;
         case Operation::subtract:
-          combine(a, b, [](double p, double q) { return p - q; });
+          combine(a, b, [](Number p, Number q) { return p - q; });
           break;
         case Operation::less:
-          combine(a, b, [](double p, double q) { return p < q; });
+          combine(a, b, [](Number p, Number q) { return p < q; });
           break;
         case Operation::less_equal:
-          combine(a, b, [](double p, double q) { return p <= q; });
+          combine(a, b, [](Number p, Number q) { return p <= q; });
           break;
         case Operation::greater:
-          combine(a, b, [](double p, double q) { return p > q; });
+          combine(a, b, [](Number p, Number q) { return p > q; });
           break;
         case Operation::greater_equal:
-          combine(a, b, [](double p, double q) { return p >= q; });
+          combine(a, b, [](Number p, Number q) { return p >= q; });
           break;
         case Operation::equal:
-          combine(a, b, [](double p, double q) { return p == q; });
+          combine(a, b, [](Number p, Number q) { return p == q; });
           break;
         case Operation::not_equal:
-          combine(a, b, [](double p, double q) { return p != q; });
+          combine(a, b, [](Number p, Number q) { return p != q; });
           break;
         case Operation::both:
-          combine(a, b, [](double p, double q) { return holds(p) && holds(q); });
+          combine(a, b, [](Number p, Number q) { return holds(p) && holds(q); });
           break;
         default:
-          combine(a, b, [](double p, double q) { return holds(p) || holds(q); });
+          combine(a, b, [](Number p, Number q) { return holds(p) || holds(q); });
           break;
       }
     }
@@ -358,13 +394,15 @@ bool Where::possible(const Box3& box, std::span<const ValueRange> attributes) co
   for (const Step& step : steps_) {
     switch (step.operation) {
       case Operation::constant:
-        stack.push_back({step.number, step.number, false});
+        stack.push_back(
+            {static_cast<double>(step.number), static_cast<double>(step.number), false});
         continue;
       case Operation::axis:
         stack.push_back(hull({box.min[step.index], box.max[step.index]}, false));
         continue;
       case Operation::attribute:
         stack.push_back(attributes.empty() ? ValueRange{} : attributes[step.index]);
+        if (is_wide(schema_.attributes[step.index])) stack.back() = before_rounding(stack.back());
         continue;
       case Operation::negate:
         stack.back() = {-stack.back().high, -stack.back().low, stack.back().nan};

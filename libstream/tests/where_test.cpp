@@ -325,5 +325,62 @@ TEST(Selection, NamesWhatIsNotThere) {
   EXPECT_FALSE(none->next(block));
 }
 
+// Integers of 64 bits are compared as such, and no cluster that has one is skipped.
+TEST(Where, LargeIntegersAreComparedExactly) {
+  Schema schema;
+  schema.attributes = {{.name = "i", .type = ScalarType::i64},
+                       {.name = "u", .type = ScalarType::u64}};
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    // Within a few units of one another, where doubles lie 1 to 2048 apart.
+    const std::uint64_t base = (std::uint64_t{1} << (52 + random() % 11)) + random() % 3000;
+    const auto near = [&] { return base + random() % 5; };
+    std::vector<std::int64_t> values;
+    std::vector<std::byte> records;
+    for (int k = 0; k < 4; ++k) {
+      const std::uint64_t value = near();
+      values.push_back(-static_cast<std::int64_t>(value));
+      std::array<std::byte, 16> bytes{};
+      std::memcpy(bytes.data(), &values.back(), 8);
+      std::memcpy(bytes.data() + 8, &value, 8);
+      records.insert(records.end(), bytes.begin(), bytes.end());
+    }
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    const ValueRange range{static_cast<double>(*low), static_cast<double>(*high), false};
+    const ValueRange opposite{-range.high, -range.low, false};
+    const std::int64_t number = -static_cast<std::int64_t>(near());
+    const auto check = [&](const std::string& sign, const std::function<bool(std::int64_t)>& holds,
+                           const std::string& turned) {
+      const std::string digits = std::to_string(number).substr(1);
+      for (const std::string& text :
+           {"i " + sign + " -" + digits, "u " + turned + " " + digits, digits + sign + "u"}) {
+        SCOPED_TRACE(text);
+        const Where where(text, schema);
+        std::vector<std::uint8_t> matches(values.size());
+        where.test(std::vector<Point3>(values.size()), records, matches);
+        bool any = false;
+        for (std::size_t k = 0; k < values.size(); ++k) {
+          EXPECT_EQ(matches[k] != 0, holds(values[k])) << values[k];
+          any = any || holds(values[k]);
+        }
+        if (any) {
+          EXPECT_TRUE(where.possible({}, std::array{range, opposite}));
+        }
+      }
+    };
+    check(
+        "<", [&](std::int64_t v) { return v < number; }, ">");
+    check(
+        "<=", [&](std::int64_t v) { return v <= number; }, ">=");
+    check(
+        "==", [&](std::int64_t v) { return v == number; }, "==");
+    check(
+        "!=", [&](std::int64_t v) { return v != number; }, "!=");
+    check(
+        ">", [&](std::int64_t v) { return v > number; }, "<");
+  }
+}
+
 }  // namespace
 }  // namespace terrace::stream

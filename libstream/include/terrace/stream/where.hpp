@@ -16,9 +16,10 @@ namespace terrace::stream {
 /// Operands are numbers, attributes by name (in double quotes if the name is not a plain word), x,
 /// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). Operators, from
 /// tightest to loosest: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||; with
-/// parentheses as usual, and `not`, `and`, `or` as words. Everything is computed in doubles,
-/// attributes with their scale and offset; comparisons give 1 or 0, and a point meets the condition
-/// if its value is a number other than 0.
+/// parentheses as usual, and `not`, `and`, `or` as words. Everything is computed in doubles, or,
+/// where integers of 64 bits are named, in extended precision, which holds them all; attributes
+/// with their scale and offset. Comparisons give 1 or 0, and a point meets the condition if its
+/// value is a number other than 0.
 ///
 /// Const members may be called by several threads at once.
 class Where {
@@ -44,15 +45,19 @@ class Where {
   enum class Operation : std::uint8_t;
   struct Step {
     Operation operation{};
-    double number = 0.0;    ///< for a constant
-    std::size_t index = 0;  ///< for an axis or an attribute
+    long double number = 0.0;  ///< for a constant
+    std::size_t index = 0;     ///< for an axis or an attribute
   };
   class Parser;
+  template <class Number>
+  void test_in(std::span<const Point3> positions, std::span<const std::byte> records,
+               std::span<std::uint8_t> matches) const;
 
   std::string text_;
   Schema schema_;
   std::vector<Step> steps_;  ///< in postfix order
   std::size_t depth_ = 0;    ///< maximum number of operands at a time
+  bool extended_ = false;    ///< doubles do not hold all values
 };
 
 }  // namespace terrace::stream
