@@ -217,7 +217,8 @@ class XyzSource final : public PointSource {
  private:
   /// Integers that doubles do not hold are kept as integers where the first lines have them.
   void choose_types(std::span<const Channel> first) {
-    constexpr std::size_t kHead = std::size_t{64} << 10;
+    // Some hundred lines; a pipe is waited for, as it is when formats are told apart.
+    constexpr std::size_t kHead = std::size_t{4} << 10;
     std::string_view head = input_.fill(kHead).substr(0, kHead);
     if (head.size() == kHead) head = head.substr(0, head.find_last_of("\r\n"));
     std::vector<ColumnContent> contents(layout_.columns);
