@@ -40,11 +40,12 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 }
 
 RegionConversion::RegionConversion(const stream::Store& store)
-    : bounds_(world_box(store.schema(), store.bounds())),
-      turn_(WholeTurns(store.schema(), store.bounds()).turn()) {}
+    : bounds_(world_box(store.schema(), store.whole().bounds())),
+      turn_(WholeTurns(store.schema(), store.whole().bounds()).turn()) {}
 
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
-    : to_regions_(std::move(to_regions)), bounds_(world_box(store.schema(), store.bounds())) {}
+    : to_regions_(std::move(to_regions)),
+      bounds_(world_box(store.schema(), store.whole().bounds())) {}
 
 RegionConversion::RegionConversion(const stream::SourceInfo& source,
                                    const CoordinateSystem& system) {
@@ -76,7 +77,7 @@ PlaceConversion::PlaceConversion(Transformation change, const stream::Store& sto
     : PlaceConversion(std::move(change)) {
   if (!change_) return;
   turn_ = change_->to().turn();
-  middle_ = middle_in(*change_, world_box(store.schema(), store.bounds()))[0];
+  middle_ = middle_in(*change_, world_box(store.schema(), store.whole().bounds()))[0];
 }
 
 void PlaceConversion::operator()(std::span<stream::Point3> points) const {

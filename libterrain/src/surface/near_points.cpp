@@ -29,7 +29,7 @@ Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
   }
   const stream::StoreSchema& schema = store.schema();
   const std::array<double, 2> xy =
-      stream::stored_place(schema, WholeTurns(schema, store.bounds())(near.xy));
+      stream::stored_place(schema, WholeTurns(schema, store.whole().bounds())(near.xy));
   const stream::Channel& height = schema.coordinates[2];
   Local result{.place = {xy[0], xy[1], 0.0}, .metric = {}};
   if (near.z) result.place[2] = (*near.z - height.offset) / height.scale;
