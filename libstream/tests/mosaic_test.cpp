@@ -268,7 +268,7 @@ TEST(Mosaic, FilesOnBothSidesOfTheAntimeridianAreJoinedThere) {
     EXPECT_EQ(read.value(7), 179);
     EXPECT_EQ(read.value(8), -180);
   }
-  // Of longitudes from 0 to 360 the same is true at Greenwich.
+  // Longitudes from 0 to 360 are cut at Greenwich instead, and joined there.
   EXPECT_EQ(joined({0, 359}, true)->info().world.xy[2], -0.9375);
   EXPECT_EQ(joined({-179, 100, 170}, true)->info().columns, 82u * 8);
   // All around the earth, or not of the earth: as the files say.

@@ -40,8 +40,8 @@ std::string extent_text(const stream::Store& store) {
   const stream::Box3 box = world_box(store.schema(), store.bounds());
   std::string out;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    out += std::string(axis > 0 ? ", " : "") + "xyz"[axis] + " from " + number_text(box.min[axis]) +
-           " to " + number_text(box.max[axis]);
+    out += std::string(axis > 0 ? ", " : "") + "xyz"[axis] + " from " +
+           readable_number(box.min[axis], 10) + " to " + readable_number(box.max[axis], 10);
   }
   return out;
 }
