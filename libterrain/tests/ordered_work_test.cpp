@@ -36,6 +36,50 @@ TEST(OrderedWork, CommitsEachResultOnceInOrder) {
   }
 }
 
+TEST(OrderedWork, ItemsAreGivenOneAtATimeAndCommittedInTheirOrder) {
+  for (const unsigned threads : {1U, 2U, 7U}) {
+    for (const std::size_t count : {0U, 1U, 2U, 500U}) {
+      SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
+      std::atomic<int> giving = 0;
+      std::size_t given = 0;
+      std::vector<std::size_t> committed;
+      each_in_order(
+          threads,
+          [&](unsigned) -> std::optional<std::unique_ptr<std::size_t>> {  // need not be copyable
+            EXPECT_EQ(++giving, 1);
+            if (given % 5 == 0) std::this_thread::yield();
+            --giving;
+            if (given == count) return {};
+            return std::make_unique<std::size_t>(given++);
+          },
+          [&](unsigned worker, std::unique_ptr<std::size_t> item) {
+            EXPECT_LT(worker, std::max(1U, threads));
+            if (*item % 3 == 0) std::this_thread::yield();
+            return item;
+          },
+          [&](std::unique_ptr<std::size_t> item) { committed.push_back(*item); });
+      ASSERT_EQ(committed.size(), count);
+      for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(committed[i], i);
+    }
+  }
+}
+
+TEST(OrderedWork, WhatCameBeforeAnItemThatCannotBeGivenIsCommitted) {
+  for (const unsigned threads : {1U, 4U}) {
+    std::size_t given = 0, committed = 0;
+    EXPECT_THROW(each_in_order(
+                     threads,
+                     [&](unsigned) -> std::optional<std::size_t> {
+                       if (given == 40) throw std::runtime_error("damaged");
+                       return given++;
+                     },
+                     [](unsigned, std::size_t i) { return i; },
+                     [&](std::size_t i) { EXPECT_EQ(i, committed++); }),
+                 std::runtime_error);
+    EXPECT_EQ(committed, 40U);
+  }
+}
+
 TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
   std::atomic<int> committing = 0, working = 0, most = 0;
   std::vector<std::atomic<unsigned>> made(3);

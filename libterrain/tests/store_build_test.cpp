@@ -7,8 +7,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -109,6 +111,62 @@ TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
   visit(read, met);
   EXPECT_EQ(read, 0u);
   EXPECT_EQ(met, 0u);
+}
+
+/// Lists the clusters of its part.
+class Listed final : public WantedPart {
+ public:
+  explicit Listed(std::vector<std::pair<stream::ClusterId, std::size_t>>& all) : all_(all) {}
+  void add(stream::ClusterId id, const stream::ClusterRecord&,
+           const stream::ClusterPoints& points) override {
+    EXPECT_FALSE(ended_);
+    part_.emplace_back(id, points.size());
+  }
+  void end() override { ended_ = true; }
+  void take() override {
+    EXPECT_TRUE(ended_);
+    all_.insert(all_.end(), part_.begin(), part_.end());
+  }
+
+ private:
+  std::vector<std::pair<stream::ClusterId, std::size_t>>& all_;
+  std::vector<std::pair<stream::ClusterId, std::size_t>> part_;
+  bool ended_ = false;
+};
+
+TEST(StoreBuild, PartsOfWhatIsWantedComeInOrderWhateverTheThreads) {
+  const tests::TemporaryFolder folder;
+  const fs::path points = folder.path() / "points.csv";
+  {
+    std::ofstream file(points);
+    file << "x,y,z\n";
+    for (int i = 0; i < 100000; ++i) {
+      file << i * 7919LL % 100003 << ',' << i * 104729LL % 100019 << ',' << i % 97 << '\n';
+    }
+  }
+  BuildRequest request;
+  request.inputs = {points.string()};
+  request.store = folder.path() / "store";
+  request.block_points = 500;
+  build_store(request);
+  const stream::Store store = stream::Store::open(request.store);
+  ASSERT_GE(store.top(), 2u);
+  const Region part = Region::of_box({{20000, 10000, 0}, {70000, 90000, 0}});
+  for (const Detail& detail : {Detail{}, Detail{.level = 1}, Detail{.region = part},
+                               Detail{.level = 1, .focuses = {{.region = part, .level = 0}}},
+                               Detail{.cluster = stream::cluster_id(store.top() - 1, 3)}}) {
+    std::vector<std::pair<stream::ClusterId, std::size_t>> expected;
+    for_each_wanted(store, detail,
+                    [&](stream::ClusterId id, const stream::ClusterRecord&,
+                        const stream::ClusterPoints& of) { expected.emplace_back(id, of.size()); });
+    EXPECT_GT(expected.size(), 1u);
+    for (const unsigned threads : {1u, 2u, 5u}) {
+      std::vector<std::pair<stream::ClusterId, std::size_t>> listed;
+      for_each_wanted(store, detail, threads,
+                      [&](unsigned) { return std::make_unique<Listed>(listed); });
+      EXPECT_EQ(listed, expected) << threads << " threads";
+    }
+  }
 }
 
 // Every point of a level and above belongs to one cluster of each level that is not finer.

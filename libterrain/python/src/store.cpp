@@ -96,6 +96,35 @@ void append(std::vector<std::byte>& to, std::span<const double> numbers,
   to.insert(to.end(), bytes.begin(), bytes.end());
 }
 
+/// Appends the wanted points of some clusters to packed records.
+class RecordsPart final : public terrain::WantedPart {
+ public:
+  /// to: the conversion of places, if any.
+  RecordsPart(const terrain::WantedPoints& wanted, std::size_t payload,
+              const terrain::Transformation* to, std::vector<std::byte>& all)
+      : wanted_(wanted), payload_(payload), to_(to), all_(all) {}
+
+  void add(stream::ClusterId, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) override {
+    wanted_(record, points, [&](std::size_t i, stream::Point3 p) {
+      if (to_ != nullptr) {
+        terrain::Point2 there{p[0], p[1]};
+        to_->forward({&there, 1});
+        p = {there[0], there[1], p[2]};
+      }
+      append(part_, p, std::span(points.payload).subspan(i * payload_, payload_));
+    });
+  }
+  void take() override { all_.insert(all_.end(), part_.begin(), part_.end()); }
+
+ private:
+  const terrain::WantedPoints& wanted_;
+  std::size_t payload_;
+  const terrain::Transformation* to_;
+  std::vector<std::byte>& all_;
+  std::vector<std::byte> part_;
+};
+
 py::array points(const OpenStore& open, unsigned level, const py::object& region,
                  const py::list& focuses, const std::string& where,
                  std::optional<std::pair<unsigned, std::uint64_t>> cluster, const std::string& crs,
@@ -114,17 +143,11 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
     if (!detail.region && detail.focuses.empty() && !detail.cluster && where.empty()) {
       bytes.reserve(store.levels()[level].points * (sizeof(stream::Point3) + payload));
     }
-    for_each_wanted_point(store.with_stop(context.stop), detail,
-                          [&](stream::ClusterId, const stream::ClusterPoints& of, std::size_t i,
-                              const stream::Point3& place) {
-                            stream::Point3 p = place;
-                            if (to) {
-                              terrain::Point2 there{p[0], p[1]};
-                              to->forward({&there, 1});
-                              p = {there[0], there[1], p[2]};
-                            }
-                            append(bytes, p, std::span(of.payload).subspan(i * payload, payload));
-                          });
+    const stream::Store stoppable = store.with_stop(context.stop);
+    const terrain::WantedPoints wanted(stoppable, detail);
+    for_each_wanted(stoppable, detail, context.threads, [&](unsigned) {
+      return std::make_unique<RecordsPart>(wanted, payload, to ? &*to : nullptr, bytes);
+    });
     return bytes;
   });
   return to_records(std::move(records), record_type(store.schema()));

@@ -4,10 +4,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "base/ordered_work.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -37,17 +41,20 @@ bool Detail::reaches_into(const Region& there, const stream::Box3& world_box) co
 
 namespace {
 
+/// Points that are read, encoded, and so on at once.
+constexpr std::uint64_t kPointsAtOnce = 16384;
+
 /// Walks down the levels and collects the clusters that the points on the way head. Unlike
 /// stream::StoreQuery it reads whole records, and wanted levels in file order.
 class Descent {
  public:
-  using Visit = std::function<void(stream::ClusterId, const stream::ClusterRecord&,
-                                   const stream::ClusterPoints&)>;
+  using MakePart = std::function<std::unique_ptr<WantedPart>(unsigned)>;
 
-  Descent(const stream::Store& store, const Detail& detail, const Visit& visit)
+  Descent(const stream::Store& store, const Detail& detail, const MakePart& make, unsigned threads)
       : store_(store),
         detail_(detail),
-        visit_(visit),
+        make_(make),
+        threads_(threads),
         placement_(store.schema()),
         finest_(detail.finest()),
         first_(detail.cluster.value_or(store.root())),
@@ -69,6 +76,64 @@ class Descent {
   /// The first and the wanted clusters down to `lowest`; of level 0 those of which points may meet
   /// the condition of a view.
   void run(unsigned lowest) {
+    take(read_first());
+    for (unsigned level = stream::level_of(first_); level-- > lowest;) {
+      if (whole(level)) {
+        run_whole(level);
+      } else {
+        run_heads(level);
+      }
+    }
+  }
+
+  /// A level that is wanted everywhere needs no list of its clusters.
+  [[nodiscard]] bool whole(unsigned level) const {
+    return level >= detail_.level && !detail_.region && !detail_.cluster;
+  }
+
+  /// The wanted clusters among those that points met so far head on `level`, in order.
+  template <class Found>
+  void for_each_head(unsigned level, const Found& found) {
+    for (const std::uint64_t ordinal : take_heads(level)) {
+      const stream::ClusterId id = stream::cluster_id(level, ordinal);
+      if (const auto record = wanted(id)) found(id, *record);
+    }
+  }
+
+ private:
+  /// What was read of some clusters.
+  struct Read {
+    std::unique_ptr<WantedPart> part;
+    std::vector<std::vector<std::uint64_t>> heads;  // as heads_
+    std::uint64_t members = 0;
+  };
+
+  [[nodiscard]] Read begin(unsigned worker) const {
+    return {.part = make_(worker), .heads = std::vector<std::vector<std::uint64_t>>(heads_.size())};
+  }
+
+  void add(Read& to, stream::ClusterId id, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) const {
+    to.part->add(id, record, points);
+    const unsigned level = stream::level_of(id);
+    const stream::Box3 box = world_box(placement_, record.summary.box);
+    for (unsigned below = finest_; below < level; ++below) {
+      // What lies below this cluster lies in its box.
+      if (whole(below) || !detail_.wants(below, box)) continue;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        to.heads[below].push_back(points.children[i * level + below]);
+      }
+    }
+  }
+
+  void take(Read read) {
+    for (std::size_t level = 0; level < heads_.size(); ++level) {
+      heads_[level].insert(heads_[level].end(), read.heads[level].begin(), read.heads[level].end());
+    }
+    read.part->take();
+  }
+
+  [[nodiscard]] Read read_first() const {
     stream::ClusterPoints points;
     store_.read(first_, points);
     if (detail_.cluster && points.has_representative) {
@@ -83,102 +148,158 @@ class Descent {
                         std::span(points.matches).last(1));
       }
     }
-    deliver(first_, store_.record(first_), points);
-    for (unsigned level = stream::level_of(first_); level-- > lowest;) {
-      if (whole(level)) {
-        store_.for_each(level, [this](stream::ClusterId id, const stream::ClusterRecord& record,
-                                      const stream::ClusterPoints& p) { deliver(id, record, p); });
-        continue;
-      }
-      for_each_head(level, [&](stream::ClusterId id, const stream::ClusterRecord& record) {
-        // Those above are read in any case, for the clusters that they head.
-        if (level == 0 && !store_.may_match(id)) return;
-        store_.read(id, points);
-        deliver(id, record, points);
-      });
-    }
+    Read read = begin(0);
+    add(read, first_, store_.record(first_), points);
+    read.part->end();
+    return read;
   }
 
-  /// A level that is wanted everywhere needs no list of its clusters.
-  [[nodiscard]] bool whole(unsigned level) const {
-    return level >= detail_.level && !detail_.region && !detail_.cluster;
+  void run_whole(unsigned level) {
+    const std::uint64_t clusters = store_.levels()[level].clusters;
+    const std::uint64_t members = store_.levels()[level].members;
+    const std::uint64_t each = clusters_per_part(level);
+    std::uint64_t read_so_far = 0;
+    in_order(
+        static_cast<std::size_t>((clusters + each - 1) / each), threads_,
+        [&](unsigned worker, std::size_t i) {
+          Read read = begin(worker);
+          const auto visit = [&](stream::ClusterId id, const stream::ClusterRecord& record,
+                                 const stream::ClusterPoints& points) {
+            add(read, id, record, points);
+          };
+          read.members =
+              store_.for_each(level, i * each, std::min(clusters, (i + 1) * each), visit);
+          read.part->end();
+          return read;
+        },
+        [&](std::size_t, Read&& read) {
+          read_so_far += read.members;
+          if (read_so_far > members) throw store_.miscounted(level);
+          take(std::move(read));
+        });
+    if (read_so_far != members) throw store_.miscounted(level);
   }
 
-  /// The wanted clusters among those that points met so far head on `level`, in order.
-  template <class Found>
-  void for_each_head(unsigned level, const Found& found) {
+  void run_heads(unsigned level) {
+    const std::vector<std::uint64_t> ordinals = take_heads(level);
+    const std::size_t each = static_cast<std::size_t>(clusters_per_part(level));
+    in_order((ordinals.size() + each - 1) / each, threads_,
+             [&](unsigned worker, std::size_t i) {
+               Read read = begin(worker);
+               stream::ClusterPoints points;
+               for (std::size_t k = i * each; k < std::min(ordinals.size(), (i + 1) * each); ++k) {
+                 const stream::ClusterId id = stream::cluster_id(level, ordinals[k]);
+                 const auto record = wanted(id);
+                 // Those above are read in any case, for the clusters that they head.
+                 if (!record || (level == 0 && !store_.may_match(id))) continue;
+                 store_.read(id, points);
+                 add(read, id, *record, points);
+               }
+               read.part->end();
+               return read;
+             },
+             [&](std::size_t, Read&& read) { take(std::move(read)); });
+  }
+
+  [[nodiscard]] std::uint64_t clusters_per_part(unsigned level) const {
+    const stream::LevelInfo& info = store_.levels()[level];
+    return std::max<std::uint64_t>(
+        1, kPointsAtOnce * info.clusters / std::max<std::uint64_t>(1, info.members));
+  }
+
+  [[nodiscard]] std::vector<std::uint64_t> take_heads(unsigned level) {
     std::vector<std::uint64_t> ordinals = std::exchange(heads_[level], {});
     std::sort(ordinals.begin(), ordinals.end());
-    for (const std::uint64_t ordinal : ordinals) {
-      const stream::ClusterId id = stream::cluster_id(level, ordinal);
-      // Most are far away, and so are their pages of the index.
-      if (!detail_.wants(level, world_box(placement_, store_.coarse_box(id)))) continue;
-      if (!detail_.wants(level, world_box(placement_, store_.page_box(id)))) continue;
-      const stream::ClusterRecord record = store_.record(id);
-      if (detail_.wants(level, world_box(placement_, record.summary.box))) found(id, record);
-    }
+    return ordinals;
   }
 
- private:
-  void deliver(stream::ClusterId id, const stream::ClusterRecord& record,
-               const stream::ClusterPoints& points) {
-    visit_(id, record, points);
+  [[nodiscard]] std::optional<stream::ClusterRecord> wanted(stream::ClusterId id) const {
     const unsigned level = stream::level_of(id);
-    const stream::Box3 box = world_box(placement_, record.summary.box);
-    for (unsigned below = finest_; below < level; ++below) {
-      // What lies below this cluster lies in its box.
-      if (whole(below) || !detail_.wants(below, box)) continue;
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        heads_[below].push_back(points.children[i * level + below]);
-      }
-    }
+    // Most are far away, and so are their pages of the index.
+    if (!detail_.wants(level, world_box(placement_, store_.coarse_box(id)))) return {};
+    if (!detail_.wants(level, world_box(placement_, store_.page_box(id)))) return {};
+    const stream::ClusterRecord record = store_.record(id);
+    if (!detail_.wants(level, world_box(placement_, record.summary.box))) return {};
+    return record;
   }
 
   const stream::Store& store_;
   const Detail& detail_;
-  const Visit& visit_;
+  const MakePart& make_;
+  unsigned threads_;
   stream::Placement placement_;
   unsigned finest_;
   stream::ClusterId first_;
   std::vector<std::vector<std::uint64_t>> heads_;  // per level, ordinals met in higher levels
 };
 
+/// Shows clusters as they are read.
+class Shown final : public WantedPart {
+ public:
+  explicit Shown(const stream::Store::VisitCluster& visit) : visit_(visit) {}
+  void add(stream::ClusterId id, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) override {
+    visit_(id, record, points);
+  }
+  void take() override {}
+
+ private:
+  const stream::Store::VisitCluster& visit_;
+};
+
 }  // namespace
 
+void for_each_wanted(const stream::Store& store, const Detail& detail, unsigned threads,
+                     const std::function<std::unique_ptr<WantedPart>(unsigned)>& make) {
+  Descent(store, detail, make, threads).run(detail.finest());
+}
+
 void for_each_wanted(const stream::Store& store, const Detail& detail,
-                     const std::function<void(stream::ClusterId, const stream::ClusterRecord&,
-                                              const stream::ClusterPoints&)>& visit) {
-  Descent(store, detail, visit).run(detail.finest());
+                     const stream::Store::VisitCluster& visit) {
+  for_each_wanted(store, detail, 1, [&](unsigned) { return std::make_unique<Shown>(visit); });
+}
+
+WantedPoints::WantedPoints(const stream::Store& store, const Detail& detail)
+    : detail_(detail), placement_(store.schema()) {}
+
+void WantedPoints::operator()(
+    const stream::ClusterRecord& record, const stream::ClusterPoints& points,
+    const std::function<void(std::size_t, const stream::Point3&)>& visit) const {
+  const auto inside = [&](const stream::Point3& place) {
+    return detail_.region->contains(place) ||
+           std::any_of(detail_.focuses.begin(), detail_.focuses.end(),
+                       [&](const FinerRegion& focus) { return focus.region.contains(place); });
+  };
+  const bool whole = !detail_.region || detail_.region->overlap(world_box(
+                                            placement_, record.summary.box)) == Overlap::whole;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points.match(i)) continue;
+    const stream::Point3 place = world_point(placement_, points.positions[i]);
+    if (whole || inside(place)) visit(i, place);
+  }
 }
 
 void for_each_wanted_point(const stream::Store& store, const Detail& detail,
                            const std::function<void(stream::ClusterId, const stream::ClusterPoints&,
                                                     std::size_t, const stream::Point3&)>& visit) {
-  const stream::Placement& placement = store.schema();
-  const auto inside = [&](const stream::Point3& place) {
-    return detail.region->contains(place) ||
-           std::any_of(detail.focuses.begin(), detail.focuses.end(),
-                       [&](const FinerRegion& focus) { return focus.region.contains(place); });
-  };
-  const auto visit_cluster = [&](stream::ClusterId id, const stream::ClusterRecord& record,
-                                 const stream::ClusterPoints& points) {
-    const bool whole = !detail.region || detail.region->overlap(world_box(
-                                             placement, record.summary.box)) == Overlap::whole;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!points.match(i)) continue;
-      const stream::Point3 place = world_point(placement, points.positions[i]);
-      if (whole || inside(place)) visit(id, points, i, place);
-    }
-  };
-  for_each_wanted(store, detail, visit_cluster);
+  const WantedPoints wanted(store, detail);
+  for_each_wanted(store, detail,
+                  [&](stream::ClusterId id, const stream::ClusterRecord& record,
+                      const stream::ClusterPoints& points) {
+                    wanted(record, points, [&](std::size_t i, const stream::Point3& place) {
+                      visit(id, points, i, place);
+                    });
+                  });
 }
 
 void for_each_wanted_record(
     const stream::Store& store, const Detail& detail,
     const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit) {
-  const Descent::Visit all = [&visit](stream::ClusterId id, const stream::ClusterRecord& record,
-                                      const stream::ClusterPoints&) { visit(id, record); };
-  Descent descent(store, detail, all);
+  const stream::Store::VisitCluster all =
+      [&visit](stream::ClusterId id, const stream::ClusterRecord& record,
+               const stream::ClusterPoints&) { visit(id, record); };
+  const Descent::MakePart make = [&](unsigned) { return std::make_unique<Shown>(all); };
+  Descent descent(store, detail, make, 1);
   const unsigned finest = detail.finest();
   if (finest == stream::level_of(descent.first())) return descent.run(finest);
   // The finest level's clusters need not be read to be counted.

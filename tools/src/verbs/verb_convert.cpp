@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/damage_report.hpp"
+#include "base/ordered_work.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
@@ -68,10 +69,21 @@ class ConvertCommand : public Command {
                                                    .lattice = lattice_of(info)},
                                                   writing);
     writing_within_memory(*writer, output_, memory, held);
-    for_each_block(*source, common, [&](stream::PointBlock& block) {
-      stream::to_world(info, block);
-      writer->append(block);
-    });
+    ProgressMeter meter(common.progress, "points");
+    std::vector<stream::PointBlock> blocks(common.threads);
+    each_in_order(
+        common.threads,
+        [&](unsigned worker) -> std::optional<stream::PointBlock*> {
+          check_interrupt();
+          if (!source->next(blocks[worker])) return {};
+          meter.update(source->progress().points, source->progress().fraction);
+          return &blocks[worker];
+        },
+        [&](unsigned, stream::PointBlock* block) {
+          stream::to_world(info, *block);
+          return writer->encode(*block);
+        },
+        [&](stream::PointWriter::EncodedPtr points) { writer->append(std::move(points)); });
     writer->finish();
     tell_spooled(info, common.context());
     damage.tell(common.context());

@@ -33,59 +33,55 @@
 namespace terrace::tools {
 namespace {
 
-/// Collects points for the writer. An overlay's heights replace the store's, which still decide
-/// what is inside a region.
-class PointOutput {
+/// The wanted points of some clusters, on their way to a file. An overlay's heights replace the
+/// store's, which still decide what is inside a region.
+class PointsPart final : public WantedPart {
  public:
-  PointOutput(const stream::Store& store, PlaceConversion places, stream::Overlay* overlay,
-              stream::PointWriter& writer)
-      : payload_(store.schema().payload_size()),
-        places_(std::move(places)),
-        overlay_(overlay),
-        writer_(writer) {}
+  /// What all parts have in common.
+  struct Job {
+    const stream::Store& store;
+    WantedPoints wanted;
+    PlaceConversion places;
+    stream::PointWriter& writer;
+    stream::Overlay* overlay = nullptr;      ///< for one thread
+    std::uint64_t replaced = 0;              ///< heights from the overlay
+    std::vector<stream::PointBlock> blocks;  ///< memory of each thread
+  };
 
-  void add(stream::ClusterId id, const stream::ClusterPoints& points, std::size_t i,
-           stream::Point3 place) {
-    if (overlay_ != nullptr && replace_height(id, i, place[2])) ++replaced_;
-    block_.positions.push_back(place);
-    const std::byte* values = points.payload.data() + i * payload_;
-    block_.payload.insert(block_.payload.end(), values, values + payload_);
-    if (block_.size() >= kPointsPerBlock) flush();
+  PointsPart(Job& job, unsigned worker) : job_(job), block_(job.blocks[worker]) { block_.clear(); }
+
+  void add(stream::ClusterId id, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) override {
+    const std::size_t payload = job_.store.schema().payload_size();
+    std::span<const stream::OverlayValue> heights;
+    if (job_.overlay != nullptr) heights = job_.overlay->find(id);
+    job_.wanted(record, points, [&](std::size_t i, stream::Point3 place) {
+      while (!heights.empty() && heights.front().index < i) heights = heights.subspan(1);
+      if (!heights.empty() && heights.front().index == i) {
+        place[2] = heights.front().value;
+        ++job_.replaced;
+      }
+      block_.positions.push_back(place);
+      const std::byte* values = points.payload.data() + i * payload;
+      block_.payload.insert(block_.payload.end(), values, values + payload);
+    });
   }
 
-  void flush() {
+  void end() override {
+    if (block_.empty()) return;
+    job_.places(block_.positions);
+    encoded_ = job_.writer.encode(block_);
+  }
+
+  void take() override {
     check_interrupt();
-    places_(block_.positions);
-    if (!block_.empty()) writer_.append(block_);
-    block_.clear();
+    if (encoded_ != nullptr) job_.writer.append(std::move(encoded_));
   }
-
-  /// The number of heights from the overlay.
-  [[nodiscard]] std::uint64_t replaced() const { return replaced_; }
 
  private:
-  static constexpr std::size_t kPointsPerBlock = 65536;
-
-  /// The points of a cluster come one after another in their order.
-  bool replace_height(stream::ClusterId id, std::size_t i, double& height) {
-    if (id != cluster_) {
-      cluster_ = id;
-      heights_ = overlay_->find(id);
-    }
-    while (!heights_.empty() && heights_.front().index < i) heights_ = heights_.subspan(1);
-    if (heights_.empty() || heights_.front().index != i) return false;
-    height = heights_.front().value;
-    return true;
-  }
-
-  std::size_t payload_;
-  PlaceConversion places_;
-  stream::Overlay* overlay_;
-  stream::PointWriter& writer_;
-  stream::PointBlock block_;
-  std::optional<stream::ClusterId> cluster_;
-  std::span<const stream::OverlayValue> heights_;  ///< the remaining ones of `cluster_`
-  std::uint64_t replaced_ = 0;
+  Job& job_;
+  stream::PointBlock& block_;  ///< of this part until end()
+  stream::PointWriter::EncodedPtr encoded_;
 };
 
 /// Writes the points found near a place, in order, with the distance in metres as a further column.
@@ -151,12 +147,14 @@ class PointsCommand final : public Command {
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
-    PointOutput output(store, places(to), overlay ? &*overlay : nullptr, *writer);
-    for_each_wanted_point(
-        store, detail,
-        [&output](stream::ClusterId id, const stream::ClusterPoints& points, std::size_t i,
-                  const stream::Point3& place) { output.add(id, points, i, place); });
-    output.flush();
+    PointsPart::Job job{.store = store,
+                        .wanted = WantedPoints(store, detail),
+                        .places = places(to),
+                        .writer = *writer,
+                        .overlay = overlay ? &*overlay : nullptr,
+                        .blocks = std::vector<stream::PointBlock>(common.threads)};
+    for_each_wanted(store, detail, overlay ? 1 : common.threads,
+                    [&job](unsigned worker) { return std::make_unique<PointsPart>(job, worker); });
     const std::uint64_t points = writer->points();
     writer->finish();
 
@@ -171,8 +169,8 @@ class PointsCommand final : public Command {
     }
     tell_rounding(*writer, summary);
     if (overlay) {
-      summary.json["overlay_values"] = output.replaced();
-      summary.text += with_commas(output.replaced()) + " heights from " + overlay_ + "\n";
+      summary.json["overlay_values"] = job.replaced;
+      summary.text += with_commas(job.replaced) + " heights from " + overlay_ + "\n";
     }
     return summary;
   }

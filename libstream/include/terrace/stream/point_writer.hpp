@@ -41,10 +41,22 @@ class PointWriter {
  public:
   virtual ~PointWriter() = default;
 
-  /// Appends points. `block.positions` are world coordinates and written exactly, as doubles;
-  /// `block.payload` has records of the header's columns. Throws: Error if writing fails, for
-  /// example because the disk is full.
-  virtual void append(const PointBlock& block) = 0;
+  /// Points on their way from encode() to append().
+  struct Encoded {
+    virtual ~Encoded() = default;
+  };
+  using EncodedPtr = std::unique_ptr<Encoded>;
+
+  /// The expensive half of appending points: may be called by several threads at once, also while
+  /// one appends. `block.positions` are world coordinates and written exactly, as doubles;
+  /// `block.payload` has records of the header's columns.
+  [[nodiscard]] virtual EncodedPtr encode(const PointBlock& block) const = 0;
+  /// The ordered half: one thread at a time. Takes what encode() of this writer gave. Throws: Error
+  /// if writing fails, for example because the disk is full, and for points that the format cannot
+  /// hold.
+  virtual void append(EncodedPtr points) = 0;
+  /// Both, in one thread.
+  void append(const PointBlock& block) { append(encode(block)); }
   /// Publishes the file. Nothing may be appended afterwards.
   virtual void finish() = 0;
   /// Points appended so far.

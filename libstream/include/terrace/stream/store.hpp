@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/schema.hpp"
 #include "terrace/stream/where.hpp"
 
@@ -238,11 +239,17 @@ class Store {
   [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
   /// Throws: Error for damage (checksum, counts), never returns a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;
+  using VisitCluster = std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>;
   /// Visits every cluster of `level` in order of ordinals; reads sequentially. In a view, clusters
   /// of level 0 that may_match() excludes are neither read nor visited.
-  void for_each(unsigned level,
-                const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>&
-                    visit) const;
+  void for_each(unsigned level, const VisitCluster& visit) const;
+  /// The same for the clusters from ordinal `first` to before `end`. Returns their members, those
+  /// not visited included, which for all of a level together are to be as many as levels() says.
+  /// Requires first <= end <= the number of clusters.
+  std::uint64_t for_each(unsigned level, std::uint64_t first, std::uint64_t end,
+                         const VisitCluster& visit) const;
+  /// What for_each() throws where a level has not as many members as levels() says.
+  [[nodiscard]] Error miscounted(unsigned level) const;
   /// Checks every byte and invariant and reports each fault, from the calling thread and in the
   /// same order whatever the threads; returns true if there is none.
   bool verify(const std::function<void(const Problem&)>& report, unsigned threads = 1) const;

@@ -11,6 +11,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "format/copc/hierarchy.hpp"
@@ -34,10 +35,10 @@ std::string_view text_of_bytes(std::span<const std::byte> bytes) {
 
 /// The least cube around points in steps of a lattice, at their lowest corner.
 Octree cube_around(const LasRecords& records) {
-  const Lattice lattice = records.lattice();
+  const Lattice& lattice = records.lattice();
   Box3 box;
-  for (const auto& corner : {records.least(), records.most()}) {
-    if (records.points() == 0) continue;
+  for (const auto& corner : {records.sums().least, records.sums().most}) {
+    if (records.sums().points == 0) continue;
     Point3 place{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       place[axis] = corner[axis] * lattice.scale[axis] + lattice.offset[axis];
@@ -117,8 +118,11 @@ class CopcWriter final : public PointWriter {
                 std::string(sizeof(std::uint64_t), '\0'));
   }
 
-  void append(const PointBlock& block) override {
-    const std::string_view records = records_.pack(block);
+  [[nodiscard]] EncodedPtr encode(const PointBlock& block) const override {
+    return records_.encode(block);
+  }
+  void append(EncodedPtr points) override {
+    const std::string_view records = records_.take(std::move(points));
     builder_.add(std::as_bytes(std::span(records)));
     const std::size_t bytes = records_.layout().record_bytes;
     for (std::size_t at = kGpsTimeAt; at < records.size(); at += bytes) {
@@ -157,8 +161,8 @@ class CopcWriter final : public PointWriter {
     sink_.commit();
   }
 
-  std::uint64_t points() const override { return records_.points(); }
-  double rounding() const override { return records_.rounding(); }
+  std::uint64_t points() const override { return records_.sums().points; }
+  double rounding() const override { return records_.sums().rounding; }
   std::uint64_t writing_bytes() const override { return Shares{}.bytes(record_bytes()); }
 
  private:

@@ -42,36 +42,88 @@ bool fits(Value value, const LasField& field) {
 
 }  // namespace
 
+void LasSums::include(const LasSums& other) {
+  points += other.points;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    least[axis] = std::min(least[axis], other.least[axis]);
+    most[axis] = std::max(most[axis], other.most[axis]);
+  }
+  for (std::size_t i = 0; i < kReturns; ++i) returns[i] += other.returns[i];
+  rounding = std::max(rounding, other.rounding);
+}
+
+/// Records with their sums.
+struct LasRecords::Records final : PointWriter::Encoded {
+  std::uint64_t first = 0;  ///< number of the first point, for messages
+  std::string bytes;
+  LasSums sums;
+  /// Points that take() must pack: before there is a lattice, and those that have a fault, which
+  /// tells the number of the point.
+  std::optional<PointBlock> unpacked;
+};
+
 LasRecords::LasRecords(const std::string& path, const PointHeader& header, LasFormats formats)
     : path_(path),
       attributes_(header.attributes),
       layout_(las_layout(header.attributes, path, formats)),
-      lattice_(header.lattice),
-      bounds_(header.bounds) {
+      bounds_(header.bounds),
+      has_lattice_(header.lattice.has_value()),
+      lattice_(header.lattice.value_or(Lattice{})) {
   for (const Channel& channel : attributes_) payload_bytes_ += size_of(channel.type);
-  if (lattice_) {
-    // Columns of a raster may count against the axis; files with such steps are unusual.
-    for (double& step : lattice_->scale) step = std::abs(step);
-  }
+  // Columns of a raster may count against the axis; files with such steps are unusual.
+  for (double& step : lattice_.scale) step = std::abs(step);
 }
 
-std::string_view LasRecords::pack(const PointBlock& block) {
+LasRecords::~LasRecords() = default;
+
+PointWriter::EncodedPtr LasRecords::encode(const PointBlock& block) const {
+  auto out = spares_.take();
+  out->first = 0;
+  out->unpacked.reset();
+  bool packed = false;
+  if (has_lattice_) {
+    try {
+      pack(block, *out);
+      packed = true;
+    } catch (const Error&) {
+    }
+  }
+  if (!packed) out->unpacked = block;
+  return out;
+}
+
+std::string_view LasRecords::take(PointWriter::EncodedPtr points) {
+  if (taken_ != nullptr) spares_.put(std::move(taken_));
+  taken_.reset(static_cast<Records*>(points.release()));
+  Records& records = *taken_;
+  if (records.unpacked) {
+    if (!has_lattice_) {
+      lattice_ = decimal_lattice(records.unpacked->positions, bounds_);
+      has_lattice_ = true;
+    }
+    records.first = sums_.points;
+    pack(*records.unpacked, records);
+  }
+  sums_.include(records.sums);
+  return records.bytes;
+}
+
+void LasRecords::pack(const PointBlock& block, Records& out) const {
   assert(block.payload.size() == block.size() * payload_bytes_);
-  if (!lattice_) lattice_ = decimal_lattice(block.positions, bounds_);
-  records_.assign(block.size() * layout_.record_bytes, '\0');
-  for (std::size_t axis = 0; axis < 3; ++axis) put_coordinate(block, axis);
+  out.bytes.assign(block.size() * layout_.record_bytes, '\0');
+  out.sums = {};
+  out.sums.points = block.size();
+  for (std::size_t axis = 0; axis < 3; ++axis) put_coordinate(block, axis, out);
   bool has_return = false, has_returns = false;
   const std::byte* from = block.payload.data();
   for (std::size_t i = 0; i < attributes_.size(); ++i) {
-    put_attribute(from, block.size(), attributes_[i], layout_.fields[i]);
+    put_attribute(from, attributes_[i], layout_.fields[i], out);
     has_return = has_return || layout_.fields[i].channel.name == "return_number";
     has_returns = has_returns || layout_.fields[i].channel.name == "number_of_returns";
     from += size_of(attributes_[i].type);
   }
-  if (!has_return && !has_returns) set_single_returns();
-  count_returns();
-  points_ += block.size();
-  return records_;
+  if (!has_return && !has_returns) set_single_returns(out.bytes);
+  count_returns(out);
 }
 
 void LasRecords::fail(std::string where, std::string cause, std::string remedy) const {
@@ -81,16 +133,20 @@ void LasRecords::fail(std::string where, std::string cause, std::string remedy) 
                .remedy = std::move(remedy)});
 }
 
-void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis) {
-  const double scale = lattice_->scale[axis], offset = lattice_->offset[axis];
+void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const {
+  const double scale = lattice_.scale[axis], offset = lattice_.offset[axis];
   constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
                    kMost = std::numeric_limits<std::int32_t>::max();
-  char* to = records_.data() + 4 * axis;
+  // Added and taken off again, it rounds what is below 2^51 to the nearest integer, ties to even.
+  constexpr double kToInteger = 0x1.8p52;
+  std::int32_t least = INT32_MAX, most = INT32_MIN;
+  double rounding = 0;
+  char* to = out.bytes.data() + 4 * axis;
   for (std::size_t i = 0; i < block.size(); ++i, to += layout_.record_bytes) {
     const double value = block.positions[i][axis];
-    const double step = std::nearbyint((value - offset) / scale);
+    const double step = ((value - offset) / scale + kToInteger) - kToInteger;
     if (!(step >= kLeast && step <= kMost)) {
-      fail("point " + std::to_string(points_ + i),
+      fail("point " + std::to_string(out.first + i),
            std::string("its ") + "xyz"[axis] + " is out of reach for 32 bits in steps of " +
                text_of(scale),
            "write PLY, or fewer points at a time");
@@ -100,16 +156,20 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis) {
     const double read = step * scale + offset;
     const double moved = std::abs(read - value);
     if (moved > 0x1p-50 * (std::abs(value) + std::abs(offset))) {
-      rounding_ = std::max(rounding_, moved);
+      rounding = std::max(rounding, moved);
     }
-    least_[axis] = std::min(least_[axis], stored);
-    most_[axis] = std::max(most_[axis], stored);
+    least = std::min(least, stored);
+    most = std::max(most, stored);
   }
+  out.sums.least[axis] = least;
+  out.sums.most[axis] = most;
+  out.sums.rounding = std::max(out.sums.rounding, rounding);
 }
 
-void LasRecords::put_attribute(const std::byte* from, std::size_t count, const Channel& channel,
-                               const LasField& field) {
-  char* const to = records_.data() + field.offset;
+void LasRecords::put_attribute(const std::byte* from, const Channel& channel, const LasField& field,
+                               Records& out) const {
+  const auto count = static_cast<std::size_t>(out.sums.points);
+  char* const to = out.bytes.data() + field.offset;
   const bool same = channel.type == field.channel.type && channel.scale == field.channel.scale &&
                     channel.offset == field.channel.offset;
   if (same && field.bits == 0) {
@@ -128,7 +188,7 @@ void LasRecords::put_attribute(const std::byte* from, std::size_t count, const C
     for (std::size_t i = 0; i < count; ++i) {
       if (same) std::memcpy(&value, from + i * payload_bytes_, sizeof value);
       if (!same || !fits(value, field)) {
-        value = converted<Value>(from + i * payload_bytes_, channel, field, exact, points_ + i);
+        value = converted<Value>(from + i * payload_bytes_, channel, field, exact, out.first + i);
       }
       char* const at = to + i * layout_.record_bytes;
       if (field.bits == 0) {
@@ -164,17 +224,17 @@ Value LasRecords::converted(const std::byte* from, const Channel& channel, const
 }
 
 /// What says nothing of returns is the only one.
-void LasRecords::set_single_returns() {
-  for (std::size_t at = 14; at < records_.size(); at += layout_.record_bytes) {
-    records_[at] = legacy() ? '\x09' : '\x11';
+void LasRecords::set_single_returns(std::string& records) const {
+  for (std::size_t at = 14; at < records.size(); at += layout_.record_bytes) {
+    records[at] = legacy() ? '\x09' : '\x11';
   }
 }
 
-void LasRecords::count_returns() {
+void LasRecords::count_returns(Records& out) const {
   const unsigned mask = legacy() ? 7U : 15U;
-  for (std::size_t at = 14; at < records_.size(); at += layout_.record_bytes) {
-    const unsigned number = static_cast<unsigned char>(records_[at]) & mask;
-    if (number > 0) ++returns_[number - 1];
+  for (std::size_t at = 14; at < out.bytes.size(); at += layout_.record_bytes) {
+    const unsigned number = static_cast<unsigned char>(out.bytes[at]) & mask;
+    if (number > 0) ++out.sums.returns[number - 1];
   }
 }
 
@@ -184,7 +244,8 @@ std::string las_header_text(const LasRecords& records, const LasFile& file) {
     adjusted_time =
         adjusted_time || (channel.name == "gps_time" && channel.unit == kAdjustedGpsTime);
   }
-  const Lattice lattice = records.lattice();
+  const Lattice& lattice = records.lattice();
+  const LasSums& sums = records.sums();
   std::string out = "LASF";
   append_little_endian(out, std::uint16_t{0});
   append_little_endian(out,
@@ -201,25 +262,24 @@ std::string las_header_text(const LasRecords& records, const LasFile& file) {
   out += static_cast<char>(records.layout().point_format | (file.compressed ? 0x80U : 0U));
   append_little_endian(out, static_cast<std::uint16_t>(records.layout().record_bytes));
   // Programs older than LAS 1.4 read these of the old point formats.
-  const bool old =
-      records.legacy() && records.points() <= std::numeric_limits<std::uint32_t>::max();
-  append_little_endian(out, static_cast<std::uint32_t>(old ? records.points() : 0));
+  const bool old = records.legacy() && sums.points <= std::numeric_limits<std::uint32_t>::max();
+  append_little_endian(out, static_cast<std::uint32_t>(old ? sums.points : 0));
   for (std::size_t i = 0; i < 5; ++i) {
-    append_little_endian(out, static_cast<std::uint32_t>(old ? records.returns()[i] : 0));
+    append_little_endian(out, static_cast<std::uint32_t>(old ? sums.returns[i] : 0));
   }
   for (const double scale : lattice.scale) append_little_endian(out, scale);
   for (const double offset : lattice.offset) append_little_endian(out, offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const std::int32_t bound : {records.most()[axis], records.least()[axis]}) {
+    for (const std::int32_t bound : {sums.most[axis], sums.least[axis]}) {
       append_little_endian(
-          out, records.points() == 0 ? 0.0 : bound * lattice.scale[axis] + lattice.offset[axis]);
+          out, sums.points == 0 ? 0.0 : bound * lattice.scale[axis] + lattice.offset[axis]);
     }
   }
   append_little_endian(out, std::uint64_t{0});  // waveforms
   append_little_endian(out, file.evlr_offset);
   append_little_endian(out, file.evlrs);
-  append_little_endian(out, records.points());
-  for (const std::uint64_t count : records.returns()) append_little_endian(out, count);
+  append_little_endian(out, sums.points);
+  for (const std::uint64_t count : sums.returns) append_little_endian(out, count);
   assert(out.size() == kLas14HeaderBytes);
   return out;
 }

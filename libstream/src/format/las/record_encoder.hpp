@@ -2,66 +2,81 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "format/las/layout.hpp"
+#include "spares.hpp"
 #include "terrace/stream/point_writer.hpp"
 
 namespace terrace::stream {
 
-/// Converts points to LAS records, and collects the statistics for the header.
+/// What the header tells of the records.
+struct LasSums {
+  static constexpr std::size_t kReturns = 15;
+
+  std::uint64_t points = 0;
+  /// In steps of the lattice; without points least exceeds greatest.
+  std::array<std::int32_t, 3> least{INT32_MAX, INT32_MAX, INT32_MAX},
+      most{INT32_MIN, INT32_MIN, INT32_MIN};
+  std::array<std::uint64_t, kReturns> returns{};
+  double rounding = 0.0;  ///< as PointWriter::rounding()
+
+  void include(const LasSums& other);
+};
+
+/// Converts points to LAS records, and collects the sums for the header.
 class LasRecords {
  public:
-  static constexpr std::size_t kReturns = 15;  ///< counted in the header
-
   /// Throws: Error naming `path` for attributes that LAS has no room for.
   LasRecords(const std::string& path, const PointHeader& header, LasFormats formats);
+  ~LasRecords();
 
-  /// The records of a block, valid until the next call. Throws: Error for a coordinate beyond the
-  /// lattice's range and a value that its field cannot hold.
-  std::string_view pack(const PointBlock& block);
+  /// As PointWriter::encode(), for take().
+  [[nodiscard]] PointWriter::EncodedPtr encode(const PointBlock& block) const;
+  /// The records of the next points, by now counted; valid until the next call. Throws: Error for a
+  /// coordinate beyond the lattice's range and a value that its field cannot hold.
+  std::string_view take(PointWriter::EncodedPtr points);
 
   [[nodiscard]] const LasLayout& layout() const { return layout_; }
   [[nodiscard]] const std::vector<Channel>& attributes() const { return attributes_; }
   /// The lattice of the records; arbitrary before the first point.
-  [[nodiscard]] Lattice lattice() const { return lattice_.value_or(Lattice{}); }
+  [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   /// Whether the point format is one of LAS before 1.4.
   [[nodiscard]] bool legacy() const { return layout_.point_format < 6; }
-  [[nodiscard]] std::uint64_t points() const { return points_; }
-  [[nodiscard]] double rounding() const { return rounding_; }
-  /// In steps of the lattice; without points least exceeds greatest.
-  [[nodiscard]] const std::array<std::int32_t, 3>& least() const { return least_; }
-  [[nodiscard]] const std::array<std::int32_t, 3>& most() const { return most_; }
-  [[nodiscard]] const std::array<std::uint64_t, kReturns>& returns() const { return returns_; }
+  /// Of the records taken.
+  [[nodiscard]] const LasSums& sums() const { return sums_; }
 
  private:
+  struct Records;
+
   [[noreturn]] void fail(std::string where, std::string cause, std::string remedy) const;
-  void put_coordinate(const PointBlock& block, std::size_t axis);
-  void put_attribute(const std::byte* from, std::size_t count, const Channel& channel,
-                     const LasField& field);
+  void pack(const PointBlock& block, Records& out) const;
+  void put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const;
+  void put_attribute(const std::byte* from, const Channel& channel, const LasField& field,
+                     Records& out) const;
   template <class Value>
   Value converted(const std::byte* from, const Channel& channel, const LasField& field,
                   double exact, std::uint64_t point) const;
-  void set_single_returns();
-  void count_returns();
+  void set_single_returns(std::string& records) const;
+  void count_returns(Records& out) const;
 
   std::string path_;
   std::vector<Channel> attributes_;
   LasLayout layout_;
-  std::optional<Lattice> lattice_;
   std::optional<Box3> bounds_;
   std::size_t payload_bytes_ = 0;
-  std::string records_;
-  std::uint64_t points_ = 0;
-  std::array<std::int32_t, 3> least_{INT32_MAX, INT32_MAX, INT32_MAX},
-      most_{INT32_MIN, INT32_MIN, INT32_MIN};
-  std::array<std::uint64_t, kReturns> returns_{};
-  double rounding_ = 0.0;
+  std::atomic<bool> has_lattice_;  ///< else the first points make it
+  Lattice lattice_;
+  LasSums sums_;
+  std::unique_ptr<Records> taken_;
+  mutable Spares<Records> spares_;
 };
 
 /// The parts of a file that the header describes besides its points.

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "format/las/header.hpp"
@@ -114,8 +115,11 @@ class LasWriter final : public PointWriter {
     if (compressed) sink_.write(std::string(sizeof(std::uint64_t), '\0'));
   }
 
-  void append(const PointBlock& block) override {
-    const std::string_view records = records_.pack(block);
+  [[nodiscard]] EncodedPtr encode(const PointBlock& block) const override {
+    return records_.encode(block);
+  }
+  void append(EncodedPtr points) override {
+    const std::string_view records = records_.take(std::move(points));
     if (chunks_) {
       chunks_->append(records);
     } else {
@@ -134,8 +138,8 @@ class LasWriter final : public PointWriter {
     sink_.commit();
   }
 
-  std::uint64_t points() const override { return records_.points(); }
-  double rounding() const override { return records_.rounding(); }
+  std::uint64_t points() const override { return records_.sums().points; }
+  double rounding() const override { return records_.sums().rounding; }
 
  private:
   Sink sink_;

@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/ply/writer.hpp"
 
-#include <algorithm>
 #include <string_view>
 #include <utility>
 
-#include "format/output_columns.hpp"
+#include "format/plain_point_writer.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
 #include "io/number.hpp"
-#include "terrace/stream/sink.hpp"
 
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kPieceBytes = 64u << 10;
 /// Digits of the largest count: the place in the header that is kept for it.
 constexpr std::size_t kCountWidth = 20;
 
@@ -25,77 +22,58 @@ std::string count_field(std::uint64_t count) {
   return text;
 }
 
-class PlyWriter final : public PointWriter {
+class PlyWriter final : public PlainPointWriter {
  public:
   PlyWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
             bool ascii)
-      : sink_(path, options.replace, options.stop), columns_(header.attributes), ascii_(ascii) {
+      : PlainPointWriter(path, header, options), ascii_(ascii) {
     std::string text = ply_preamble(ascii, header.comments) + "element vertex ";
     count_at_ = text.size();
     text += count_field(0);
     text += "\nproperty double x\nproperty double y\nproperty double z\n";
-    for (std::size_t i = 0; i < columns_.size(); ++i) {
-      text += "property " + ply_type_name(columns_.type(i)) + " " + columns_.name(i) + "\n";
+    for (std::size_t i = 0; i < columns().size(); ++i) {
+      text += "property " + ply_type_name(columns().type(i)) + " " + columns().name(i) + "\n";
     }
     text += "end_header\n";
-    sink_.write(text);
-  }
-
-  void append(const PointBlock& block) override {
-    columns_.check(block);
-    if (ascii_) {
-      append_lines(block);
-    } else {
-      append_rows(block);
-    }
-    points_ += block.size();
+    sink().write(text);
   }
 
   void finish() override {
-    sink_.write_at(count_at_, count_field(points_));
-    sink_.commit();
+    sink().write_at(count_at_, count_field(points()));
+    PlainPointWriter::finish();
   }
-
-  std::uint64_t points() const override { return points_; }
 
  private:
-  void append_lines(const PointBlock& block) {
+  void put(const PointBlock& block, std::string& out) const override {
+    if (ascii_) {
+      put_lines(block, out);
+    } else {
+      put_rows(block, out);
+    }
+  }
+  void put_lines(const PointBlock& block, std::string& out) const {
     for (std::size_t i = 0; i < block.size(); ++i) {
       const Point3& p = block.positions[i];
-      append_number(piece_, p[0]);
-      piece_ += ' ';
-      append_number(piece_, p[1]);
-      piece_ += ' ';
-      append_number(piece_, p[2]);
-      columns_.append_text(piece_, block, i, ' ');
-      piece_ += '\n';
-      if (piece_.size() >= kPieceBytes) flush();
+      append_number(out, p[0]);
+      out += ' ';
+      append_number(out, p[1]);
+      out += ' ';
+      append_number(out, p[2]);
+      columns().append_text(out, block, i, ' ');
+      out += '\n';
     }
-    flush();
   }
-  void append_rows(const PointBlock& block) {
-    const std::size_t row = sizeof(Point3) + columns_.written_bytes(), rows = kPieceBytes / row + 1;
-    for (std::size_t i = 0; i < block.size();) {
-      const std::size_t end = std::min(block.size(), i + rows);
-      piece_.resize((end - i) * row);
-      for (char* at = piece_.data(); i < end; ++i) {
-        for (const double value : block.positions[i]) at = store_little_endian(at, value);
-        at = columns_.put_bytes(at, block, i);
-      }
-      sink_.write(piece_);
+  void put_rows(const PointBlock& block, std::string& out) const {
+    out.resize(block.size() * (sizeof(Point3) + columns().written_bytes()));
+    char* at = out.data();
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      for (const double value : block.positions[i]) at = store_little_endian(at, value);
+      at = columns().put_bytes(at, block, i);
     }
-    piece_.clear();
-  }
-  void flush() {
-    sink_.write(piece_);
-    piece_.clear();
   }
 
-  Sink sink_;
-  OutputColumns columns_;
   bool ascii_;
-  std::uint64_t count_at_ = 0, points_ = 0;
-  std::string piece_;
+  std::uint64_t count_at_ = 0;
 };
 
 }  // namespace

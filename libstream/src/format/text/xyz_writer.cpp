@@ -7,15 +7,12 @@
 #include <string_view>
 #include <system_error>
 
-#include "format/output_columns.hpp"
+#include "format/plain_point_writer.hpp"
 #include "format/writers.hpp"
 #include "io/number.hpp"
-#include "terrace/stream/sink.hpp"
 
 namespace terrace::stream {
 namespace {
-
-constexpr std::size_t kTextBytes = 64u << 10;
 
 /// A name as a field of a CSV header (RFC 4180).
 std::string csv_field(const std::string& name) {
@@ -70,62 +67,42 @@ class CoordinateText {
   int decimals_ = kMostDecimals + 1;  ///< of the lattice; more: none
 };
 
-class XyzWriter final : public PointWriter {
+class XyzWriter final : public PlainPointWriter {
  public:
   XyzWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
             char separator)
-      : sink_(path, options.replace, options.stop),
-        columns_(header.attributes),
-        separator_(separator) {
+      : PlainPointWriter(path, header, options), separator_(separator) {
     for (std::size_t axis = 0; header.lattice && axis < 3; ++axis) {
       coordinates_[axis] = {header.lattice->scale[axis], header.lattice->offset[axis]};
     }
   }
 
   void write_header() {
-    text_ = "x,y,z";
-    for (std::size_t i = 0; i < columns_.size(); ++i) {
-      text_ += ',';
-      text_ += csv_field(columns_.name(i));
+    std::string text = "x,y,z";
+    for (std::size_t i = 0; i < columns().size(); ++i) {
+      text += ',';
+      text += csv_field(columns().name(i));
     }
-    text_ += '\n';
-    sink_.write(text_);
-    text_.clear();
+    text += '\n';
+    sink().write(text);
   }
-
-  void append(const PointBlock& block) override {
-    columns_.check(block);
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      const Point3& p = block.positions[i];
-      coordinates_[0].append(text_, p[0]);
-      text_ += separator_;
-      coordinates_[1].append(text_, p[1]);
-      text_ += separator_;
-      coordinates_[2].append(text_, p[2]);
-      if (columns_.size() != 0) columns_.append_text(text_, block, i, separator_);
-      text_ += '\n';
-      if (text_.size() >= kTextBytes) flush();
-    }
-    flush();
-    points_ += block.size();
-  }
-
-  void finish() override { sink_.commit(); }
-
-  std::uint64_t points() const override { return points_; }
 
  private:
-  void flush() {
-    sink_.write(text_);
-    text_.clear();
+  void put(const PointBlock& block, std::string& out) const override {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Point3& p = block.positions[i];
+      coordinates_[0].append(out, p[0]);
+      out += separator_;
+      coordinates_[1].append(out, p[1]);
+      out += separator_;
+      coordinates_[2].append(out, p[2]);
+      if (columns().size() != 0) columns().append_text(out, block, i, separator_);
+      out += '\n';
+    }
   }
 
-  Sink sink_;
-  OutputColumns columns_;
   char separator_;
   std::array<CoordinateText, 3> coordinates_;
-  std::string text_;
-  std::uint64_t points_ = 0;
 };
 
 }  // namespace

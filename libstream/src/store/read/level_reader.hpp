@@ -131,12 +131,16 @@ class LevelReader {
   /// box and in the bounds of the store, and what they head exists. Throws: Error.
   void read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, SequentialBytes& ahead,
             ClusterDecoder& decoder, ClusterPoints& out) const;
-  /// Calls visit(page, the ordinal of its first cluster) for each page of the index. Throws: Error.
+  /// Calls visit(page, from, to) for each page of the index with some of the clusters `first` to
+  /// before `end`: `from` to before `to`. Throws: Error.
   template <class Visit>
-  void for_each_page(Visit&& visit) const {
+  void for_each_page(std::uint64_t first, std::uint64_t end, Visit&& visit) const {
     SequentialBytes ahead(*index_);
-    for (std::uint64_t number = 0; number < pages(); ++number) {
-      visit(*read_page(number, &ahead), number * layout_.page_clusters());
+    const std::uint64_t most = layout_.page_clusters();
+    while (first < end) {
+      const std::uint64_t number = first / most, to = std::min(end, (number + 1) * most);
+      visit(*read_page(number, &ahead), first, to);
+      first = to;
     }
   }
 

@@ -101,9 +101,9 @@ std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
 void Store::read(ClusterId id, ClusterPoints& out) const {
   check_stop();
   const LevelReader& level = impl_->level(level_of(id));
-  auto space = impl_->borrow();
+  auto space = impl_->spaces.take();
   level.read(ordinal_of(id), *space, out);
-  impl_->give_back(std::move(space));
+  impl_->spaces.put(std::move(space));
   mark(out);
 }
 
@@ -112,38 +112,52 @@ void Store::mark(ClusterPoints& points) const {
   if (view_) view_->mark(points);
 }
 
-void Store::for_each(
-    unsigned number,
-    const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>& visit) const {
-  const LevelReader& level = impl_->level(number);
+void Store::for_each(unsigned number, const VisitCluster& visit) const {
   const std::uint64_t members = impl_->infos[number].members;
-  const auto miscounted = [&] {
-    return Error({.file = level.data().name(),
-                  .where = {},
-                  .cause = "the clusters do not have the " + std::to_string(members) +
-                           " members that the manifest tells",
-                  .remedy = "restore the file or build the store anew"});
+  std::uint64_t visited = 0;
+  const auto count = [&](ClusterId id, const ClusterRecord& record, const ClusterPoints& points) {
+    visited += record.points;
+    if (visited > members) throw miscounted(number);
+    visit(id, record, points);
   };
+  if (for_each(number, 0, impl_->level(number).clusters(), count) != members) {
+    throw miscounted(number);
+  }
+}
+
+std::uint64_t Store::for_each(unsigned number, std::uint64_t first, std::uint64_t end,
+                              const VisitCluster& visit) const {
+  const LevelReader& level = impl_->level(number);
   SequentialBytes ahead(level.data());
-  ClusterDecoder decoder;
+  auto space = impl_->spaces.take();
   ClusterPoints points;
-  std::uint64_t counted = 0;
-  level.for_each_page([&](const IndexPage& page, std::uint64_t first) {
-    for (std::uint32_t i = 0; i < page.clusters(); ++i) {
+  std::uint64_t members = 0;
+  level.for_each_page(first, end, [&](const IndexPage& page, std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t ordinal = from; ordinal < to; ++ordinal) {
       check_stop();
-      const std::uint64_t ordinal = first + i, offset = page.offset(i);
+      const auto place = static_cast<std::uint32_t>(ordinal % level.layout().page_clusters());
+      const std::uint64_t offset = page.offset(place);
       const ClusterId id = cluster_id(number, ordinal);
       const Entry entry = level.entry(page, ordinal);
       const ClusterRecord record = record_of(entry, number, offset, level.top());
-      counted += record.points;
-      if (counted > members) throw miscounted();
+      members += record.points;
       if (number == 0 && !may_match(id)) continue;
-      level.read(ordinal, entry, offset, ahead, decoder, points);
+      level.read(ordinal, entry, offset, ahead, space->decoder, points);
       mark(points);
       visit(id, record, points);
     }
   });
-  if (counted != members) throw miscounted();
+  impl_->spaces.put(std::move(space));
+  return members;
+}
+
+Error Store::miscounted(unsigned level) const {
+  return Error({.file = impl_->level(level).data().name(),
+                .where = {},
+                .cause = "the clusters do not have the " +
+                         std::to_string(impl_->infos[level].members) +
+                         " members that the manifest tells",
+                .remedy = "restore the file or build the store anew"});
 }
 
 }  // namespace terrace::stream

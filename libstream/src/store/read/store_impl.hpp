@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "spares.hpp"
 #include "store/manifest.hpp"
 #include "store/read/level_reader.hpp"
 #include "terrace/stream/byte_source.hpp"
@@ -26,8 +26,7 @@ struct Store::Impl {
   std::vector<LevelInfo> infos;
   std::vector<std::unique_ptr<store::LevelReader>> levels;
 
-  std::mutex mutex;
-  std::vector<std::unique_ptr<store::ReadSpace>> spaces;
+  Spares<store::ReadSpace> spaces;
 
   const store::LevelReader& level(unsigned number) const {
     if (number >= levels.size()) {
@@ -38,18 +37,6 @@ struct Store::Impl {
                    .remedy = {}});
     }
     return *levels[number];
-  }
-  /// Memory for one thread's reading, kept for the next.
-  std::unique_ptr<store::ReadSpace> borrow() {
-    const std::lock_guard lock(mutex);
-    if (spaces.empty()) return std::make_unique<store::ReadSpace>();
-    auto space = std::move(spaces.back());
-    spaces.pop_back();
-    return space;
-  }
-  void give_back(std::unique_ptr<store::ReadSpace> space) {
-    const std::lock_guard lock(mutex);
-    spaces.push_back(std::move(space));
   }
 };
 

@@ -3,6 +3,7 @@
 #include <mutex>
 #include <utility>
 
+#include "spares.hpp"
 #include "store/write/level_writer.hpp"
 #include "store/write/staging.hpp"
 #include "terrace/stream/error.hpp"
@@ -43,18 +44,6 @@ struct StoreWriter::Impl {
   Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old, unsigned threads)
       : schema(std::move(given)), replace(replace_old), team(threads), staging(path) {}
 
-  /// An encoder nobody uses; memory for as many as there are threads.
-  std::unique_ptr<BlockEncoder> borrow() {
-    const std::lock_guard lock(mutex);
-    if (encoders.empty()) return std::make_unique<BlockEncoder>();
-    auto encoder = std::move(encoders.back());
-    encoders.pop_back();
-    return encoder;
-  }
-  void give_back(std::unique_ptr<BlockEncoder> encoder) {
-    const std::lock_guard lock(mutex);
-    encoders.push_back(std::move(encoder));
-  }
   SharedTablesPtr tables(unsigned level) {
     const std::lock_guard lock(mutex);
     return level < tables_by_level.size() ? tables_by_level[level] : nullptr;
@@ -73,8 +62,8 @@ struct StoreWriter::Impl {
   bool broken = false;  ///< an append or finish has thrown
 
   // Shared between threads.
+  Spares<BlockEncoder> encoders;
   std::mutex mutex;
-  std::vector<std::unique_ptr<BlockEncoder>> encoders;
   std::vector<SharedTablesPtr> tables_by_level;
 };
 
@@ -89,13 +78,13 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
   if (block.level == 0) encoded->sum_up(block.positions);
   if (const SharedTablesPtr shared = tables(block.level)) {
     const Layout layout(schema, block.level, kVersion);
-    auto encoder = borrow();
+    auto encoder = encoders.take();
     encoder->load(layout, block);
     encoder->encode(shared->encoding, shared->sequence, encoded->block.bytes,
                     encoded->block.entries, encoded->block.ranges);
     encoded->block.tables = shared;
     encoded->block.summaries.assign(block.summaries.begin(), block.summaries.end());
-    give_back(std::move(encoder));
+    encoders.put(std::move(encoder));
   } else {
     encoded->block.raw = std::make_unique<RawBlock>(block);
   }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,8 +51,26 @@ struct Detail {
 /// whole level is. Throws: stream::Error on a damaged store; UsageError for a cluster that the
 /// store does not have or that is finer than the level.
 void for_each_wanted(const stream::Store& store, const Detail& detail,
-                     const std::function<void(stream::ClusterId, const stream::ClusterRecord&,
-                                              const stream::ClusterPoints&)>& visit);
+                     const stream::Store::VisitCluster& visit);
+
+/// What is made of some clusters that follow one another, some 16,000 points.
+class WantedPart {
+ public:
+  virtual ~WantedPart() = default;
+  /// Called for each of its clusters, all by one thread.
+  virtual void add(stream::ClusterId id, const stream::ClusterRecord& record,
+                   const stream::ClusterPoints& points) = 0;
+  /// Called behind the last, by the same thread.
+  virtual void end() {}
+  /// Called when all parts before have been taken, one at a time.
+  virtual void take() = 0;
+};
+
+/// The same by several threads, which read clusters and add them to parts at once; make(worker)
+/// gives a new part to the thread of that number, 0 to threads - 1. The effect does not depend on
+/// their number if take() has all of it. At most two parts per thread wait.
+void for_each_wanted(const stream::Store& store, const Detail& detail, unsigned threads,
+                     const std::function<std::unique_ptr<WantedPart>(unsigned worker)>& make);
 
 /// The same for the index entries alone: what lies in clusters of level 0 is not read.
 void for_each_wanted_record(
@@ -62,9 +81,22 @@ void for_each_wanted_record(
 /// condition, for which the clusters are read.
 [[nodiscard]] std::uint64_t wanted_points(const stream::Store& store, const Detail& detail);
 
-/// Visits every point of the wanted clusters that meets the condition of a view and, where there is
-/// a region, lies in it or in a focus, in the order of for_each_wanted(): its cluster, its place
-/// among the points of that, and where it lies in the CRS of the store.
+/// The points of a wanted cluster that are wanted themselves: that meet the condition of a view
+/// and, where there is a region, lie in it or in a focus. Any thread. `detail` must outlive it.
+class WantedPoints {
+ public:
+  WantedPoints(const stream::Store& store, const Detail& detail);
+  /// Visits each: its place among the points of the cluster, and where it lies in the CRS of the
+  /// store.
+  void operator()(const stream::ClusterRecord& record, const stream::ClusterPoints& points,
+                  const std::function<void(std::size_t, const stream::Point3&)>& visit) const;
+
+ private:
+  const Detail& detail_;
+  stream::Placement placement_;
+};
+
+/// Visits all such points in the order of for_each_wanted().
 void for_each_wanted_point(const stream::Store& store, const Detail& detail,
                            const std::function<void(stream::ClusterId, const stream::ClusterPoints&,
                                                     std::size_t, const stream::Point3&)>& visit);
