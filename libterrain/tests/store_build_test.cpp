@@ -165,6 +165,15 @@ TEST(StoreBuild, PartsOfWhatIsWantedComeInOrderWhateverTheThreads) {
       for_each_wanted(store, detail, threads,
                       [&](unsigned) { return std::make_unique<Listed>(listed); });
       EXPECT_EQ(listed, expected) << threads << " threads";
+
+      std::vector<stream::Point3> places, shown;
+      for_each_wanted_point(store, detail,
+                            [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t,
+                                const stream::Point3& place) { places.push_back(place); });
+      for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> some) {
+        shown.insert(shown.end(), some.begin(), some.end());
+      });
+      EXPECT_EQ(shown, places) << threads << " threads";
     }
   }
 }

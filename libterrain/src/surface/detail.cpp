@@ -247,6 +247,25 @@ class Shown final : public WantedPart {
   const stream::Store::VisitCluster& visit_;
 };
 
+/// Collects the places of points.
+class Places final : public WantedPart {
+ public:
+  using Show = std::function<void(std::span<const stream::Point3>)>;
+
+  Places(const WantedPoints& wanted, const Show& show) : wanted_(wanted), show_(show) {}
+  void add(stream::ClusterId, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) override {
+    wanted_(record, points,
+            [&](std::size_t, const stream::Point3& place) { places_.push_back(place); });
+  }
+  void take() override { show_(places_); }
+
+ private:
+  const WantedPoints& wanted_;
+  const Show& show_;
+  std::vector<stream::Point3> places_;
+};
+
 }  // namespace
 
 void for_each_wanted(const stream::Store& store, const Detail& detail, unsigned threads,
@@ -277,6 +296,13 @@ void WantedPoints::operator()(
     const stream::Point3 place = world_point(placement_, points.positions[i]);
     if (whole || inside(place)) visit(i, place);
   }
+}
+
+void for_each_wanted_place(const stream::Store& store, const Detail& detail, unsigned threads,
+                           const std::function<void(std::span<const stream::Point3>)>& show) {
+  const WantedPoints wanted(store, detail);
+  for_each_wanted(store, detail, threads,
+                  [&](unsigned) { return std::make_unique<Places>(wanted, show); });
 }
 
 void for_each_wanted_point(const stream::Store& store, const Detail& detail,

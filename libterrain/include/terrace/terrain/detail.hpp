@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -95,6 +96,11 @@ class WantedPoints {
   const Detail& detail_;
   stream::Placement placement_;
 };
+
+/// Shows the places of all such points in the CRS of the store, some at a time, in the order of
+/// for_each_wanted(); `threads` read, of which any shows.
+void for_each_wanted_place(const stream::Store& store, const Detail& detail, unsigned threads,
+                           const std::function<void(std::span<const stream::Point3>)>& show);
 
 /// Visits all such points in the order of for_each_wanted().
 void for_each_wanted_point(const stream::Store& store, const Detail& detail,

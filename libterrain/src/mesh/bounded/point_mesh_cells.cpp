@@ -245,7 +245,8 @@ void SharedPlaces::add(const MeshSamples& samples) {
 }
 
 PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& detail,
-                                   const PointMeshCuts& cuts, const std::string& path)
+                                   const PointMeshCuts& cuts, const std::string& path,
+                                   unsigned threads)
     : cuts_(cuts),
       file_(place_for(path), true),
       chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(),
@@ -253,11 +254,9 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& det
       counts_(cuts.cells.size(), 0),
       waiting_(cuts.cells.size()),
       chunks_(cuts.cells.size()) {
-  for_each_wanted_point(
-      store, detail,
-      [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t, const stream::Point3& p) {
-        deal(cuts.cell_of({p[0], p[1]}), p);
-      });
+  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> places) {
+    for (const stream::Point3& p : places) deal(cuts.cell_of({p[0], p[1]}), p);
+  });
   // The rest is kept without spare capacity; the file's buffer is flushed.
   for (std::vector<stream::Point3>& rest : waiting_) rest.shrink_to_fit();
   file_.read_at(0, {});
@@ -311,7 +310,8 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
   take(waiting_[cell]);
 }
 
-PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few) {
+PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few,
+                              unsigned threads) {
   PointMeshScan scan;
   scan.whole.emplace();
   StreamingHull hull;
@@ -338,9 +338,9 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
       scan.whole->add(p);
     }
   };
-  for_each_wanted_point(store, detail,
-                        [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t,
-                            const stream::Point3& p) { add(p); });
+  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> places) {
+    for (const stream::Point3& p : places) add(p);
+  });
   if (scan.whole) {
     scan.some = {};
   } else {

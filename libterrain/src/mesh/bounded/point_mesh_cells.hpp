@@ -119,7 +119,7 @@ class PointMeshSamples {
   /// One pass over the store. path: of the mesh. Throws: stream::Error on a damaged store, or if
   /// the file cannot be written. Memory: 16 MiB, and 4 bytes per 40 samples or more.
   PointMeshSamples(const stream::Store& store, const Detail& detail, const PointMeshCuts& cuts,
-                   const std::string& path);
+                   const std::string& path, unsigned threads);
 
   [[nodiscard]] std::size_t count(std::uint32_t first_cell, std::uint32_t cells) const;
   /// Appends the samples of some cells that lie in the box, by cells, of each in the order of the
@@ -153,6 +153,7 @@ struct PointMeshScan {
 /// Reads all samples once, in the order of the store. few: how many at most are kept. Memory: of
 /// `few` samples, of up to a million places, and of the hull.
 /// Throws: stream::Error on a damaged store.
-PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few);
+PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few,
+                              unsigned threads);
 
 }  // namespace terrace::terrain
