@@ -40,9 +40,10 @@ struct BuiltNode {
 };
 
 /// The octree of places in a cube of kCubeSide steps from 0.
-std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_once) {
+std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_once,
+                             unsigned threads = 1) {
   constexpr std::size_t kRecord = 16;
-  OctreeBuilder builder("made", {}, kRecord, at_once, std::uint64_t{1} << 24);
+  OctreeBuilder builder("made", {}, kRecord, at_once, std::uint64_t{1} << 24, threads);
   std::vector<std::byte> records;
   for (std::size_t i = 0; i < places.size(); ++i) {
     append_values(records, places[i][0], places[i][1], places[i][2], static_cast<std::uint32_t>(i));
@@ -77,6 +78,8 @@ Place cell_of(const Place& place, unsigned depth, unsigned bits) {
 std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
   const std::vector<BuiltNode> nodes = built(places, std::size_t{1} << 19);
   EXPECT_TRUE(nodes == built(places, 1)) << "memory makes a difference";
+  EXPECT_TRUE(nodes == built(places, std::size_t{1} << 19, 5)) << "threads make a difference";
+  EXPECT_TRUE(nodes == built(places, 1, 3)) << "both make a difference";
 
   std::vector<bool> seen(places.size());
   std::set<std::string> names;
@@ -160,6 +163,7 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
   for (int i = 0; i < 1000; ++i) places.push_back({i * 3, i * 5, i});
   const std::vector<BuiltNode> nodes = built(places, 1);
   EXPECT_TRUE(nodes == built(places, std::size_t{1} << 19));
+  EXPECT_TRUE(nodes == built(places, 1, 3));
   std::size_t found = 0, most = 0;
   for (const BuiltNode& node : nodes) {
     found += node.points.size();

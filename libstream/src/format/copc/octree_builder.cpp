@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstring>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -75,26 +75,42 @@ struct OctreeBuilder::NodePoints {
   }
 };
 
+/// What lies below a node that one thread builds.
+struct OctreeBuilder::Subtree {
+  OctreeNode node{};
+  std::span<const Item> items{};
+  NodePoints points{};  ///< of the node
+  std::vector<std::pair<OctreeNode, std::vector<std::byte>>> written{};
+};
+
+std::span<const std::byte> OctreeBuilder::record_of(const NodePoints& points,
+                                                    const Item& item) const {
+  return std::span(points.records)
+      .subspan(std::size_t{item.index} * numbered_bytes_, numbered_bytes_);
+}
+
 std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t at_once) {
   // The beginnings of 64 buckets for each factor of 64, of which ten billion points take three or
   // four.
   constexpr std::uint64_t kBuckets = 8u << 20;
   const std::uint64_t kept = record_bytes + sizeof(std::uint64_t) + sizeof(Item);
-  // Nodes on the way up hold copies of the records in memory, in vectors that have grown. A node,
-  // its child and the bytes that are written for it come on top.
-  return kBuckets + at_once * 3 * kept + kChildren * kMostPromoted * (2 * kept + record_bytes);
+  // Nodes on the way up hold copies of the records in memory, in vectors that have grown, and wait
+  // to be written. A node, its child and the bytes that are written for it come on top.
+  return kBuckets + at_once * (3 * kept + record_bytes) +
+         kChildren * kMostPromoted * (2 * kept + record_bytes);
 }
 
 OctreeBuilder::OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
                              std::size_t record_bytes, std::size_t at_once,
-                             std::uint64_t most_together)
+                             std::uint64_t most_together, unsigned threads)
     : name_(name),
       record_bytes_(record_bytes),
       numbered_bytes_(record_bytes + sizeof(std::uint64_t)),
       at_once_(std::max(at_once, kLeafPoints)),
       most_together_(std::max<std::uint64_t>(most_together, at_once_)),
       file_(name, folder, numbered_bytes_),
-      numbered_(numbered_bytes_) {}
+      numbered_(numbered_bytes_),
+      team_(threads) {}
 
 void OctreeBuilder::add(std::span<const std::byte> records) {
   assert(records.size() % record_bytes_ == 0);
@@ -114,7 +130,7 @@ void OctreeBuilder::build(const Octree& octree, const Lattice& lattice, const Wr
   write_ = &write;
   if (points_ == 0) return;
   NodePoints root = build(OctreeNode{}, std::move(all_));
-  this->write(root);
+  this->write(root, write);
 }
 
 std::array<std::uint32_t, 3> OctreeBuilder::cell_of(const std::byte* record) const {
@@ -124,7 +140,7 @@ std::array<std::uint32_t, 3> OctreeBuilder::cell_of(const std::byte* record) con
     std::int32_t step = 0;
     std::memcpy(&step, record + axis * sizeof step, sizeof step);
     const double place = step * lattice_.scale[axis] + lattice_.offset[axis];
-    const double at = std::floor((place - corner_[axis]) / side_ * kCells);
+    const double at = (place - corner_[axis]) / side_ * kCells;
     cell[axis] = static_cast<std::uint32_t>(std::clamp(at, 0.0, kCells - 1));
   }
   return cell;
@@ -169,9 +185,9 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
   for (std::size_t i = 0; i < kChildren; ++i) {
     const std::span<Bucket> some = buckets.subspan(i * each, each);
     if (records(some) == 0) continue;
-    promote(visit(child(node, i), some), [&](const Item&, std::span<const std::byte> record) {
-      file_.append(promoted, record);
-    });
+    promote(
+        visit(child(node, i), some), *write_,
+        [&](const Item&, std::span<const std::byte> record) { file_.append(promoted, record); });
   }
   // In Morton order, as the children are.
   return load(node, std::move(promoted));
@@ -183,15 +199,18 @@ OctreeBuilder::NodePoints OctreeBuilder::load(const OctreeNode& node, Bucket buc
   file_.take(bucket, count, points.records);
   assert(points.records.size() == count * numbered_bytes_);
   points.items.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::byte* const record = points.records.data() + i * numbered_bytes_;
-    Item& item = points.items[i];
-    std::array<std::int32_t, 3> place{};
-    std::memcpy(place.data(), record, sizeof place);
-    item = {
-        .cell = cell_of(record), .index = static_cast<std::uint32_t>(i), .rank = hash_of(place)};
-    std::memcpy(&item.number, record + record_bytes_, sizeof item.number);
-  }
+  constexpr std::size_t kEach = 16384;
+  team_.run((count + kEach - 1) / kEach, [&](std::size_t part, std::size_t) {
+    for (std::size_t i = part * kEach; i < std::min(count, (part + 1) * kEach); ++i) {
+      const std::byte* const record = points.records.data() + i * numbered_bytes_;
+      Item& item = points.items[i];
+      std::array<std::int32_t, 3> place{};
+      std::memcpy(place.data(), record, sizeof place);
+      item = {
+          .cell = cell_of(record), .index = static_cast<std::uint32_t>(i), .rank = hash_of(place)};
+      std::memcpy(&item.number, record + record_bytes_, sizeof item.number);
+    }
+  });
   return points;
 }
 
@@ -207,51 +226,117 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
                  .remedy = "raise `memory_bytes`, leave them out, or write LAZ"});
   }
   NodePoints points = load(node, std::move(bucket));
-  std::sort(points.items.begin(), points.items.end(), [](const Item& a, const Item& b) {
-    // The axis whose cells differ in the highest bit decides; of equal ones the first, z.
-    std::uint32_t most = 0;
-    bool less = a.number < b.number;
-    for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
-      const std::uint32_t differ = a.cell[axis] ^ b.cell[axis];
-      if (most < differ && most < (differ ^ most)) {
-        most = differ;
-        less = a.cell[axis] < b.cell[axis];
-      }
-    }
-    return less;
+  sort(points.items, node.depth);
+  // A thread builds what lies below a node of the next depths.
+  const unsigned lowest = std::min(node.depth + kDepthsAtOnce, kDeepestLeaf);
+  const auto is_leaf = [](const OctreeNode& at, std::span<const Item> items) {
+    return items.size() <= kLeafPoints || at.depth == kDeepestLeaf;
+  };
+  const auto is_task = [&](const OctreeNode& at, std::span<const Item> items) {
+    return at.depth == lowest || is_leaf(at, items);
+  };
+  std::vector<Subtree> tasks;
+  plan(node, points.items, is_task, tasks);
+  team_.run(tasks.size(), [&](std::size_t i, std::size_t) {
+    Subtree& task = tasks[i];
+    const auto copied = [&](const OctreeNode& at, std::span<const Item> items) {
+      NodePoints leaf{.node = at};
+      leaf.items.reserve(items.size());
+      leaf.records.reserve(items.size() * numbered_bytes_);
+      for (const Item& item : items) leaf.add(item, record_of(points, item));
+      return leaf;
+    };
+    task.points = combine(task.node, task.items, is_leaf, copied,
+                          [&task](const OctreeNode& at, std::span<const std::byte> records) {
+                            task.written.emplace_back(
+                                at, std::vector<std::byte>(records.begin(), records.end()));
+                          });
   });
-  return subtree(node, points.items, points.records.data());
+  std::size_t next = 0;
+  const auto built = [&](const OctreeNode&, std::span<const Item>) {
+    Subtree task = std::move(tasks[next++]);
+    for (const auto& [at, records] : task.written) (*write_)(at, records);
+    return std::move(task.points);
+  };
+  return combine(node, points.items, is_task, built, *write_);
 }
 
-OctreeBuilder::NodePoints OctreeBuilder::subtree(const OctreeNode& node,
-                                                 std::span<const Item> items,
-                                                 const std::byte* records) {
-  NodePoints points{.node = node};
-  if (items.size() <= kLeafPoints || node.depth == kDeepestLeaf) {
-    points.items.reserve(items.size());
-    points.records.reserve(items.size() * numbered_bytes_);
-    for (const Item& item : items) {
-      points.add(item, {records + std::size_t{item.index} * numbered_bytes_, numbered_bytes_});
+/// To Morton order. depth: of the node in which all lie.
+void OctreeBuilder::sort(std::vector<Item>& items, unsigned depth) {
+  const unsigned depths = std::min(kDepthsAtOnce, kDeepestLeaf - depth);
+  const auto part_of = [&](const Item& item) {
+    std::size_t part = 0;
+    for (unsigned at = depth; at < depth + depths; ++at) {
+      part = part * kChildren + child_of(item.cell, at);
     }
-    return points;
-  }
+    return part;
+  };
+  std::vector<std::size_t> begins((std::size_t{1} << (3 * depths)) + 1, 0);
+  for (const Item& item : items) ++begins[part_of(item) + 1];
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  std::vector<Item> parted(items.size());
+  std::vector<std::size_t> next(begins.begin(), begins.end() - 1);
+  for (const Item& item : items) parted[next[part_of(item)]++] = item;
+  items.swap(parted);
+  team_.run(begins.size() - 1, [&](std::size_t part, std::size_t) {
+    const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
+    std::sort(at(begins[part]), at(begins[part + 1]), [](const Item& a, const Item& b) {
+      // The axis whose cells differ in the highest bit decides; of equal ones the first, z.
+      std::uint32_t most = 0;
+      bool less = a.number < b.number;
+      for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
+        const std::uint32_t differ = a.cell[axis] ^ b.cell[axis];
+        if (most < differ && most < (differ ^ most)) {
+          most = differ;
+          less = a.cell[axis] < b.cell[axis];
+        }
+      }
+      return less;
+    });
+  });
+}
+
+/// Calls visit(child, items) for the children of a node that have some of its items.
+template <class Item, class Visit>
+void for_each_child(const OctreeNode& node, std::span<const Item> items, const Visit& visit) {
   for (std::size_t i = 0; i < kChildren; ++i) {
     const auto end = std::partition_point(items.begin(), items.end(), [&](const Item& item) {
       return child_of(item.cell, node.depth) <= i;
     });
     const auto count = static_cast<std::size_t>(end - items.begin());
-    if (count > 0) {
-      promote(subtree(child(node, i), items.first(count), records),
-              [&](Item item, std::span<const std::byte> record) { points.add(item, record); });
-    }
+    if (count > 0) visit(child(node, i), items.first(count));
     items = items.subspan(count);
   }
+}
+
+template <class Stop>
+void OctreeBuilder::plan(const OctreeNode& node, std::span<const Item> items, const Stop& stop,
+                         std::vector<Subtree>& tasks) const {
+  if (stop(node, items)) {
+    tasks.push_back({.node = node, .items = items});
+    return;
+  }
+  for_each_child(node, items, [&](const OctreeNode& child, std::span<const Item> some) {
+    plan(child, some, stop, tasks);
+  });
+}
+
+template <class Stop, class Leaf>
+OctreeBuilder::NodePoints OctreeBuilder::combine(const OctreeNode& node,
+                                                 std::span<const Item> items, const Stop& stop,
+                                                 const Leaf& leaf, const Write& write) const {
+  if (stop(node, items)) return leaf(node, items);
+  NodePoints points{.node = node};
+  for_each_child(node, items, [&](const OctreeNode& child, std::span<const Item> some) {
+    promote(combine(child, some, stop, leaf, write), write,
+            [&](Item item, std::span<const std::byte> record) { points.add(item, record); });
+  });
   return points;
 }
 
 /// Gives one point of each of the parent's cells to it, and writes what is left of the child.
 template <class Add>
-void OctreeBuilder::promote(NodePoints child, const Add& add) {
+void OctreeBuilder::promote(NodePoints child, const Write& write, const Add& add) const {
   const unsigned shift = kCellBits - kSpanBits - (child.node.depth - 1);
   std::vector<Item>& items = child.items;
   const auto same_cell = [shift](const Item& a, const Item& b) {
@@ -278,28 +363,27 @@ void OctreeBuilder::promote(NodePoints child, const Add& add) {
   std::size_t kept = 0, next = 0;
   for (std::size_t i = 0; i < items.size(); ++i) {
     if (next < chosen.size() && chosen[next] == i) {
-      add(items[i], std::span(child.records)
-                        .subspan(std::size_t{items[i].index} * numbered_bytes_, numbered_bytes_));
+      add(items[i], record_of(child, items[i]));
       ++next;
     } else {
       items[kept++] = items[i];
     }
   }
   items.resize(kept);
-  write(child);
+  this->write(child, write);
 }
 
-void OctreeBuilder::write(NodePoints& node) {
+void OctreeBuilder::write(NodePoints& node, const Write& write) const {
   std::sort(node.items.begin(), node.items.end(),
             [](const Item& a, const Item& b) { return a.number < b.number; });
-  out_.clear();
+  std::vector<std::byte> records;
+  records.reserve(node.items.size() * record_bytes_);
   for (const Item& item : node.items) {
-    const auto record =
-        node.records.begin() + static_cast<std::ptrdiff_t>(item.index * numbered_bytes_);
-    out_.insert(out_.end(), record, record + static_cast<std::ptrdiff_t>(record_bytes_));
+    const auto record = record_of(node, item).first(record_bytes_);
+    records.insert(records.end(), record.begin(), record.end());
   }
   node.node.points = node.items.size();
-  (*write_)(node.node, out_);
+  write(node.node, records);
 }
 
 }  // namespace terrace::stream

@@ -15,6 +15,7 @@
 #include "order/point_buckets.hpp"
 #include "terrace/stream/point.hpp"
 #include "terrace/stream/schema.hpp"
+#include "thread_team.hpp"
 
 namespace terrace::stream {
 
@@ -44,9 +45,11 @@ class OctreeBuilder {
 
   /// Records begin with x, y and z as int32. name, folder: of the temporary file.
   /// at_once: the records in memory, of which results do not depend; kLeafPoints at least.
-  /// most_together: of points that the deepest node cannot part.
+  /// most_together: of points that the deepest node cannot part. threads: that work on what is in
+  /// memory; results do not depend on them either.
   OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                std::size_t record_bytes, std::size_t at_once, std::uint64_t most_together);
+                std::size_t record_bytes, std::size_t at_once, std::uint64_t most_together,
+                unsigned threads = 1);
 
   /// Throws: Error, if the disk is full above all.
   void add(std::span<const std::byte> records);
@@ -57,17 +60,30 @@ class OctreeBuilder {
  private:
   struct Item;
   struct NodePoints;
+  struct Subtree;
 
   [[nodiscard]] std::array<std::uint32_t, 3> cell_of(const std::byte* record) const;
+  /// With its number.
+  [[nodiscard]] std::span<const std::byte> record_of(const NodePoints& points,
+                                                     const Item& item) const;
   /// The records of a bucket, taken out of it, and what they are.
   NodePoints load(const OctreeNode& node, Bucket bucket);
   NodePoints build(const OctreeNode& node, Bucket bucket);
   NodePoints visit(const OctreeNode& node, std::span<Bucket> buckets);
   NodePoints build_in_memory(const OctreeNode& node, Bucket bucket);
-  NodePoints subtree(const OctreeNode& node, std::span<const Item> items, const std::byte* records);
+  void sort(std::vector<Item>& items, unsigned depth);
+  /// The nodes where stop(node, items) is true.
+  template <class Stop>
+  void plan(const OctreeNode& node, std::span<const Item> items, const Stop& stop,
+            std::vector<Subtree>& tasks) const;
+  /// The node's points once its descendants have theirs. Where stop(node, items) is true,
+  /// leaf(node, items) makes them.
+  template <class Stop, class Leaf>
+  NodePoints combine(const OctreeNode& node, std::span<const Item> items, const Stop& stop,
+                     const Leaf& leaf, const Write& write) const;
   template <class Add>
-  void promote(NodePoints child, const Add& add);
-  void write(NodePoints& node);
+  void promote(NodePoints child, const Write& write, const Add& add) const;
+  void write(NodePoints& node, const Write& write) const;
 
   std::string name_;
   std::size_t record_bytes_, numbered_bytes_, at_once_;
@@ -80,7 +96,7 @@ class OctreeBuilder {
   Point3 corner_{};
   double side_ = 1.0;
   const Write* write_ = nullptr;
-  std::vector<std::byte> out_;
+  ThreadTeam team_;
 };
 
 }  // namespace terrace::stream

@@ -105,7 +105,8 @@ class CopcWriter final : public PointWriter {
         vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
                           laz::Vlr::kVariable)),
         shares_(shares_within(options.memory_bytes, options.threads, record_bytes())),
-        builder_(path, folder_of(path), record_bytes(), shares_.at_once, shares_.together),
+        builder_(path, folder_of(path), record_bytes(), shares_.at_once, shares_.together,
+                 options.threads),
         encoders_(vlr_, shares_.threads,
                   [this](std::span<const std::byte> coded) { write_chunk(coded); }) {
     std::string vlrs;
