@@ -3,20 +3,24 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <map>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "base/parallel.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
@@ -260,13 +264,56 @@ TEST_F(RasterOfDegrees, BoxesOfProjectedRastersHaveAllTheirSamples) {
   }
 }
 
+TEST_F(RasterOfDegrees, SurfacesShareWhatOneHasRead) {
+  std::stop_source stop;
+  const stream::Store store =
+      make<float>(stream::ScalarType::f32, {0.01, 0, 10, 0, -0.01, 47}, 4326)
+          .with_stop(stop.get_token());
+  const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                           {store.schema(), HeightReference::ignore, "", 1 << 20}, 2);
+  RasterTileSurface first(raster), second(raster);
+  const GeographicBox box{12.8, 45.0, 14.0, 46.0}, other{10.5, 44.5, 11.0, 45.5};
+  const Heights heights = sampled(first, box);
+  EXPECT_GT(heights.size(), 1000u);
+  // From now on nothing can be read.
+  stop.request_stop();
+  EXPECT_EQ(sampled(second, box), heights);
+  EXPECT_THROW(sampled(second, other), stream::Stopped);
+}
+
+TEST_F(RasterOfDegrees, ThreadsOfOneCacheGetTheHeightsOfTheStore) {
+  const stream::Store store =
+      make<float>(stream::ScalarType::f32, {0.01, 0, 10, 0, -0.01, 47}, 4326);
+  std::vector<double> expected(kColumns * kRows);
+  StoreWindow(store).heights({0, 0, kColumns, kRows}, std::span<double>(expected));
+  // Fewer squares than threads, then some of the six.
+  for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{1} << 20}) {
+    HeightCache cache(store, bytes);
+    std::atomic<std::size_t> wrong = 0;
+    parallel_for(8, 8, [&](unsigned, std::size_t) {
+      StoreWindow reader(store);
+      std::vector<double> heights(100);
+      for (std::int64_t i = 0; i < 200; ++i) {
+        const std::int64_t column = i * 331 % (kColumns - 10), row = i * 97 % (kRows - 10);
+        cache.heights(reader, {column, row, 10, 10}, heights);
+        for (std::int64_t k = 0; k < 100; ++k) {
+          const auto at = static_cast<std::size_t>((row + k / 10) * kColumns + column + k % 10);
+          const double height = heights[static_cast<std::size_t>(k)];
+          if (!(height == expected[at] || std::isnan(expected[at]))) ++wrong;
+        }
+      }
+    });
+    EXPECT_EQ(wrong, 0u);
+  }
+}
+
 TEST_F(RasterOfDegrees, CachedHeightsAreThoseOfTheStore) {
   const auto check = [&](const stream::Store& store) {
     // None, a few of the nine squares, all.
     for (const std::uint64_t bytes :
          {std::uint64_t{0}, std::uint64_t{1} << 20, std::uint64_t{1} << 30}) {
       HeightCache cache(store, bytes);
-      StoreWindow plain(store);
+      StoreWindow reader(store), plain(store);
       for (int round = 0; round < 60 / TERRACE_TEST_SHARE; ++round) {
         const LatticeWindow window{static_cast<std::int64_t>(random() * 800) - 50,
                                    static_cast<std::int64_t>(random() * 400) - 50,
@@ -276,7 +323,7 @@ TEST_F(RasterOfDegrees, CachedHeightsAreThoseOfTheStore) {
                      << bytes << " bytes, round " << round << ": " << window.column << ","
                      << window.row << " " << window.columns << " x " << window.rows);
         std::vector<double> cached(window.size()), read(window.size());
-        cache.heights(window, cached);
+        cache.heights(reader, window, cached);
         plain.heights(window, std::span<double>(read));
         for (std::size_t i = 0; i < read.size(); ++i) {
           ASSERT_TRUE(cached[i] == read[i] || (std::isnan(cached[i]) && std::isnan(read[i]))) << i;

@@ -6,52 +6,78 @@
 #include <limits>
 
 namespace terrace::terrain {
-namespace {
-
-constexpr std::uint64_t kDecodedBytes = std::uint64_t{8} << 20;
-
-}  // namespace
-
 HeightCache::HeightCache(const stream::Store& store, std::uint64_t bytes)
-    : reader_(store, kDecodedBytes),
-      columns_(static_cast<std::int64_t>(store.schema().columns)),
+    : columns_(static_cast<std::int64_t>(store.schema().columns)),
       rows_(static_cast<std::int64_t>(store.schema().rows)),
       across_((columns_ + kSide - 1) / kSide),
-      floats_(reader_.float_is_exact()),
+      floats_(StoreWindow(store).float_is_exact()),
       most_(static_cast<std::size_t>(bytes / (static_cast<std::uint64_t>(kSide * kSide) *
                                               (floats_ ? sizeof(float) : sizeof(double))))) {}
 
-const HeightCache::Square& HeightCache::square(std::int64_t across, std::int64_t down) {
+HeightCache::Squares::iterator HeightCache::use(StoreWindow& reader, std::int64_t across,
+                                                std::int64_t down) {
   const std::int64_t number = down * across_ + across;
-  if (const auto found = by_number_.find(number); found != by_number_.end()) {
-    squares_.splice(squares_.begin(), squares_, found->second);
-    return squares_.front();
+  std::unique_lock lock(mutex_);
+  for (auto found = by_number_.find(number); found != by_number_.end();
+       found = by_number_.find(number)) {
+    const Squares::iterator square = found->second;
+    if (square->ready) {
+      squares_.splice(squares_.begin(), squares_, square);
+      ++square->users;
+      return square;
+    }
+    read_.wait(lock);
   }
-  // The one not used for longest lends its memory. Until the new one is whole it is in no map, so
-  // damage leaves nothing behind.
-  Squares fresh;
-  if (squares_.size() >= most_ && !squares_.empty()) {
-    by_number_.erase(squares_.back().number);
-    fresh.splice(fresh.begin(), squares_, std::prev(squares_.end()));
+  // The one not used for longest lends its memory.
+  Squares::iterator square = squares_.end();
+  if (squares_.size() >= most_) {
+    const auto unused = [](const Square& other) { return other.users == 0; };
+    const auto last = std::find_if(squares_.rbegin(), squares_.rend(), unused);
+    if (last != squares_.rend()) square = std::prev(last.base());
+  }
+  if (square == squares_.end()) {
+    square = squares_.emplace(squares_.begin());
   } else {
-    fresh.emplace_front();
+    by_number_.erase(square->number);
+    squares_.splice(squares_.begin(), squares_, square);
   }
-  Square& made = fresh.front();
-  made.number = number;
-  const LatticeWindow window{across * kSide, down * kSide, kSide, kSide};
-  if (floats_) {
-    made.floats.resize(window.size());
-    reader_.heights(window, std::span<float>(made.floats));
-  } else {
-    made.doubles.resize(window.size());
-    reader_.heights(window, std::span<double>(made.doubles));
+  square->number = number;
+  square->users = 1;
+  square->ready = false;
+  by_number_[number] = square;
+  lock.unlock();
+  try {
+    const LatticeWindow window{across * kSide, down * kSide, kSide, kSide};
+    if (floats_) {
+      square->floats.resize(window.size());
+      reader.heights(window, std::span<float>(square->floats));
+    } else {
+      square->doubles.resize(window.size());
+      reader.heights(window, std::span<double>(square->doubles));
+    }
+  } catch (...) {
+    // Damage leaves nothing behind; who waits reads it and fails by itself.
+    lock.lock();
+    by_number_.erase(number);
+    squares_.erase(square);
+    read_.notify_all();
+    throw;
   }
-  squares_.splice(squares_.begin(), fresh);
-  by_number_[number] = squares_.begin();
-  return made;
+  lock.lock();
+  square->ready = true;
+  read_.notify_all();
+  return square;
+}
+
+void HeightCache::release(Squares::iterator square) {
+  const std::lock_guard lock(mutex_);
+  if (--square->users > 0 || squares_.size() <= most_) return;
+  by_number_.erase(square->number);
+  squares_.erase(square);
 }
 
 bool HeightCache::has_all(const LatticeWindow& window) const {
+  const std::lock_guard lock(mutex_);
   for (std::int64_t down = window.row / kSide; down * kSide < window.row + window.rows; ++down) {
     for (std::int64_t across = window.column / kSide;
          across * kSide < window.column + window.columns; ++across) {
@@ -61,10 +87,10 @@ bool HeightCache::has_all(const LatticeWindow& window) const {
   return true;
 }
 
-void HeightCache::heights(const LatticeWindow& window, std::span<double> out) {
+void HeightCache::heights(StoreWindow& reader, const LatticeWindow& window, std::span<double> out) {
   assert(out.size() == window.size());
   if (window.size() <= kFew && !has_all(window)) {
-    reader_.heights(window, out);
+    reader.heights(window, out);
     return;
   }
   const std::int64_t left = std::max<std::int64_t>(window.column, 0);
@@ -77,7 +103,7 @@ void HeightCache::heights(const LatticeWindow& window, std::span<double> out) {
   if (left >= right || top >= bottom) return;
   for (std::int64_t down = top / kSide; down * kSide < bottom; ++down) {
     for (std::int64_t across = left / kSide; across * kSide < right; ++across) {
-      const Square& from = square(across, down);
+      const Squares::iterator from = use(reader, across, down);
       const std::int64_t first = std::max(left, across * kSide);
       const std::int64_t last = std::min(right, (across + 1) * kSide);
       const std::int64_t end = std::min(bottom, (down + 1) * kSide);
@@ -85,11 +111,12 @@ void HeightCache::heights(const LatticeWindow& window, std::span<double> out) {
         const std::int64_t at = (row - down * kSide) * kSide + first - across * kSide;
         const auto to = out.begin() + (row - window.row) * window.columns + first - window.column;
         if (floats_) {
-          std::copy_n(from.floats.begin() + at, last - first, to);
+          std::copy_n(from->floats.begin() + at, last - first, to);
         } else {
-          std::copy_n(from.doubles.begin() + at, last - first, to);
+          std::copy_n(from->doubles.begin() + at, last - first, to);
         }
       }
+      release(from);
     }
   }
 }

@@ -14,6 +14,9 @@
 namespace terrace::terrain {
 namespace {
 
+/// Clusters that a surface keeps.
+constexpr std::uint64_t kDecodedBytes = std::uint64_t{8} << 20;
+
 /// The places along one axis of a window that lie in a range.
 struct Part {
   std::size_t first = 0, count = 0;
@@ -52,7 +55,7 @@ void take(std::span<const double> places, const Part& part, std::vector<double>&
 }  // namespace
 
 RasterTileSurface::RasterTileSurface(const TiledRaster& raster)
-    : raster_(raster), reader_(raster.store, std::uint64_t{24} << 20) {}
+    : raster_(raster), reader_(raster.store, kDecodedBytes) {}
 
 RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
   const std::int64_t column = window.column - held_.column, row = window.row - held_.row;
@@ -61,7 +64,7 @@ RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
   if (holds) return {heights_.data() + row * held_.columns + column, held_.columns};
   held_ = {};  // if reading fails nothing is held
   heights_.resize(window.size());
-  reader_.heights(window, heights_);
+  raster_.height_cache.heights(reader_, window, heights_);
   held_ = window;
   return {heights_.data(), held_.columns};
 }

@@ -8,14 +8,13 @@
 #include <vector>
 
 #include "surface/store_window.hpp"
-#include "tile/make/height_cache.hpp"
 #include "tile/make/tile_surface.hpp"
 #include "tile/make/tiled_raster.hpp"
 
 namespace terrace::terrain {
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
-/// Memory: 36 MiB, and 8 bytes per sample of the largest box that was asked for, 24 for samples().
+/// Memory: 12 MiB, and 8 bytes per sample of the largest box that was asked for, 24 for samples().
 class RasterTileSurface : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
@@ -54,7 +53,7 @@ class RasterTileSurface : public TileSurface {
   View view(const LatticeWindow& window);
 
   const TiledRaster& raster_;
-  HeightCache reader_;
+  StoreWindow reader_;
   std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the latest
   LatticeWindow held_{};
   std::vector<double> heights_;  ///< of the held window

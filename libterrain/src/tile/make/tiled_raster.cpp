@@ -31,6 +31,8 @@ constexpr unsigned kDigestSteps = 8;
 constexpr double kSmooth = 1.0;
 /// Samples around a place: those it lies between, and what rounding moves.
 constexpr double kDigestMargin = 2.0;
+/// Bytes of heights that are kept.
+constexpr std::uint64_t kHeightsOfThread = std::uint64_t{24} << 20;
 
 void add_raster(const TiledRaster& raster, Digest& digest) {
   const stream::StoreSchema& schema = raster.store.schema();
@@ -145,7 +147,8 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
                          EllipsoidalHeights heights, unsigned threads)
     : TiledStore(checked(tiled), std::move(system), std::move(heights)),
       geography(places.crs(), tiled.schema().world),
-      blocks(tiled, threads) {
+      blocks(tiled, threads),
+      height_cache(tiled, kHeightsOfThread * threads) {
   const auto columns = static_cast<std::int64_t>(tiled.schema().columns);
   const auto rows = static_cast<std::int64_t>(tiled.schema().rows);
   // TiledStore has seen a sample with data.

@@ -8,6 +8,7 @@
 #include "earth/grid_geography.hpp"
 #include "surface/store_window.hpp"
 #include "tile/make/height_blocks.hpp"
+#include "tile/make/height_cache.hpp"
 #include "tile/make/tiled_store.hpp"
 
 namespace terrace::terrain {
@@ -16,7 +17,8 @@ namespace terrace::terrain {
 struct TiledRaster : TiledStore {
   GridGeography geography;
   HeightBlocks blocks;
-  HeightBlocks::Range everywhere;  ///< of all samples
+  mutable HeightCache height_cache;  ///< 24 MiB per thread
+  HeightBlocks::Range everywhere;    ///< of all samples
   /// Columns run along meridians, rows along parallels, at equal distances.
   bool upright = false;
 

@@ -138,6 +138,22 @@ void TileSetWriter::add_to(Family& family, std::size_t zoom, std::size_t number)
   if (zooms_[zoom]->open) family.emplace_back(zooms_[zoom].get(), number);
 }
 
+void TileSetWriter::add_families(std::vector<Family>& stage, std::size_t zoom, std::size_t number,
+                                 std::size_t last) {
+  Family family;
+  if (zoom == last) {
+    add_to(family, zoom, number);
+  } else {
+    for (const TileAddress& child : children_of(zooms_[zoom]->tiles[number])) {
+      if (const auto below = number_of(child, zooms_[zoom + 1]->tiles)) {
+        add_families(stage, zoom + 1, *below, last);
+      }
+    }
+    if (zooms_[zoom]->open) family.emplace_back(zooms_[zoom].get(), number);
+  }
+  stage.push_back(std::move(family));
+}
+
 std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
   // The uppermost zoom that has enough tiles for all threads; those above it are written one by
   // one.
@@ -146,18 +162,22 @@ std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
     --zoom;
   }
   std::vector<std::vector<Family>> stages(1);
-  for (std::size_t i = 0; i < zooms_[zoom]->tiles.size(); ++i) {
-    Family family;
-    add_to(family, zoom, i);
-    stages.back().push_back(std::move(family));
-  }
-  while (zoom-- > 0) {
-    // Metadata of a tile need its children.
-    if (options_.request.metadata) stages.emplace_back();
-    if (!zooms_[zoom]->open) continue;
-    for (std::size_t i = 0; i < zooms_[zoom]->tiles.size(); ++i) {
-      stages.back().push_back({{zooms_[zoom].get(), i}});
+  const auto add_zoom = [&](std::size_t above) {
+    if (!zooms_[above]->open) return;
+    for (std::size_t i = 0; i < zooms_[above]->tiles.size(); ++i) {
+      stages.back().push_back({{zooms_[above].get(), i}});
     }
+  };
+  // The largest tiles come first, lest few threads work on them when all else is done. Not if
+  // there are metadata: those of a tile need its children, so each zoom waits for the one below.
+  std::size_t first = options_.request.metadata ? zoom : 0;
+  while (first < zoom && zooms_[first]->tiles.size() < surfaces_.size()) add_zoom(first++);
+  for (std::size_t i = 0; i < zooms_[first]->tiles.size(); ++i) {
+    add_families(stages.back(), first, i, zoom);
+  }
+  for (std::size_t above = zoom; options_.request.metadata && above-- > 0;) {
+    stages.emplace_back();
+    add_zoom(above);
   }
   return stages;
 }

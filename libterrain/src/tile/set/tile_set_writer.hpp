@@ -76,6 +76,10 @@ class TileSetWriter {
   void begin_zooms();
   /// Families that may be written at once, by stages that wait for the one before.
   std::vector<std::vector<Family>> stages();
+  /// Adds what is below a tile by families of the zoom `last`, and tiles above that one by one,
+  /// each after its children: threads that work at one time work near each other.
+  void add_families(std::vector<Family>& stage, std::size_t zoom, std::size_t number,
+                    std::size_t last);
   /// Adds the tiles of open zooms below a tile, and itself.
   void add_to(Family& family, std::size_t zoom, std::size_t number);
   void write(const Family& family, TileSurface& surface,
