@@ -256,6 +256,10 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   }
   if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
     no_colours();
+    if (file->nodata > 0) {
+      common.context().say(with_commas(file->nodata) +
+                           " triangles are left out: a coordinate of a corner is NaN");
+    }
     return from_mesh(std::move(*file));
   }
   return from_source(path, selection.colours, most_cells, common);

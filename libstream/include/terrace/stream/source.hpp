@@ -31,9 +31,10 @@ struct SourceInfo : Schema {
   std::vector<std::string> files;  ///< as the caller named them
   /// Where the points will lie, in stored coordinates, as the files say: they may be wrong.
   std::optional<Box3> stated_bounds;
-  std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
-  std::optional<double> nodata;         ///< of the (first) raster, in raw units
-  std::optional<OctreeInfo> octree;     ///< of a single input organised as an octree
+  /// The number of points if known; an upper bound for what has nodata: rasters, PLY, meshes.
+  std::optional<std::uint64_t> points;
+  std::optional<double> nodata;      ///< of the (first) raster, in raw units
+  std::optional<OctreeInfo> octree;  ///< of a single input organised as an octree
   std::vector<std::string> comments;
   std::string note;  ///< for people: how several files were brought together; empty if as they are
   /// Bytes in temporary files that hold input from pipes or gzip for random access.
@@ -59,7 +60,9 @@ struct PointBlock {
 /// The progress of a source. Bytes refer to the input files, if the source knows them.
 struct Progress {
   std::uint64_t points = 0;
-  std::uint64_t nodata = 0;  ///< cells without data, left out
+  /// Left out: cells without data; of XYZ, CSV, PLY and meshes points (entities) of which a
+  /// coordinate is NaN. Infinite coordinates are errors.
+  std::uint64_t nodata = 0;
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
   /// Points left out by Selection::where, region and resolution, whether they were read or not; of
