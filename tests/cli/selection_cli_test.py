@@ -116,7 +116,8 @@ class SelectionTest(unittest.TestCase):
         with open(self.path('parts.lst'), 'w', encoding='ascii') as file:
             file.write('# of the survey\nparts/1.csv\nparts/more\n')
         for number, names in enumerate(([folder], ['@' + self.path('parts.lst')],
-                                        [folder + '/*.csv', folder + '/more/?.csv'])):
+                                        [folder + '/*.csv', folder + '/more/?.csv'],
+                                        [folder + '/**/*.csv'], [self.path('p*ts/**')])):
             store = self.path(f'parts{number}.st')
             self.run_ok('build', *names, '-o', store, '--block', '1000', '-q')
             self.assertEqual(json.loads(self.run_ok('verify', store, '--json'))['points'], 20000)

@@ -174,7 +174,8 @@ struct SourceOptions {
 /// names have an ending of a format (SourceOptions::format, if given), in the order of their paths;
 /// a folder with an ept.json for that dataset. "@LIST" stands for the names on the lines of LIST,
 /// relative to its folder, without blank lines and those that begin with #; a name with *, ? or
-/// [...] that is not an existing file for the files that match the pattern. Throws: Error, Stopped;
+/// [...] that is not an existing file for the files that match the pattern, in which a part ** of
+/// the path stands for any number of folders. Throws: Error, Stopped;
 /// std::invalid_argument for a format that is not known.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
