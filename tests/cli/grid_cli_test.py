@@ -293,6 +293,26 @@ class GridTest(unittest.TestCase):
         self.assertEqual(stored['bounds']['min'][:2], [8.0, 46.0])
         self.assertEqual([round(v, 9) for v in stored['bounds']['max'][:2]], [9.0, 48.0])
 
+    def test_virtual_rasters_of_other_formats(self):
+        side = 121
+        tile = array.array('h', [height(c, r) for r in range(side) for c in range(side)])
+        if sys.byteorder == 'little':
+            tile.byteswap()
+        with open(self.path('N46E008.hgt'), 'wb') as file:
+            file.write(tile.tobytes())
+        with open(self.path('real.asc'), 'w') as file:
+            file.write('ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n0.5 1 2 3 4 5\n')
+        for file, columns, rows, kind, first in (('N46E008.hgt', side, side, 'Int16', height(0, 0)),
+                                                 ('real.asc', 3, 2, 'Float32', 0.5)):
+            with open(self.path('a.vrt'), 'w') as vrt:
+                vrt.write(f'<VRTDataset rasterXSize="{columns}" rasterYSize="{rows}"><GeoTransform>0,1,0,0,0,-1'
+                          f'</GeoTransform><VRTRasterBand dataType="{kind}" band="1"><SimpleSource>'
+                          f'<SourceFilename relativeToVRT="1">{file}</SourceFilename></SimpleSource>'
+                          '</VRTRasterBand></VRTDataset>')
+            one, other = self.json_of('info', self.path(file)), self.json_of('info', self.path('a.vrt'))
+            for key in ('points', 'height', 'columns', 'rows'):
+                self.assertEqual(one[key], other[key], file)
+
     def test_dems_of_the_usgs(self):
         def real(value):
             return f'{value:24.15E}'.replace('E', 'D')
