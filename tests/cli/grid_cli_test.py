@@ -293,6 +293,18 @@ class GridTest(unittest.TestCase):
         self.assertEqual(stored['bounds']['min'][:2], [8.0, 46.0])
         self.assertEqual([round(v, 9) for v in stored['bounds']['max'][:2]], [9.0, 48.0])
 
+    def test_grids_on_both_sides_of_the_antimeridian_are_joined(self):
+        for name, west in (('west', 178), ('east', -180)):
+            with open(self.path(name + '.asc'), 'w') as file:
+                file.write(f'ncols 4\nnrows 2\nxllcorner {west}\nyllcorner -17\ncellsize 0.5\n1 2 3 4 5 6 7 8\n')
+            with open(self.path(name + '.prj'), 'w') as file:
+                file.write('GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],'
+                           'PRIMEM["Greenwich",0],UNIT["Degree",0.017453292519943295]]')
+        self.json_of('build', self.path('west.asc'), self.path('east.asc'), '-o', self.path('fiji.terrace'))
+        info = self.json_of('info', self.path('fiji.terrace'))
+        self.assertEqual((info['columns'], info['points']), (8, 16))
+        self.assertEqual([info['bounds'][end][0] for end in ('min', 'max')], [178.25, 181.75])
+
     def test_virtual_rasters_of_other_formats(self):
         side = 121
         tile = array.array('h', [height(c, r) for r in range(side) for c in range(side)])
