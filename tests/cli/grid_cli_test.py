@@ -293,6 +293,16 @@ class GridTest(unittest.TestCase):
         self.assertEqual(stored['bounds']['min'][:2], [8.0, 46.0])
         self.assertEqual([round(v, 9) for v in stored['bounds']['max'][:2]], [9.0, 48.0])
 
+    def test_a_region_that_begins_at_a_row_has_that_row(self):
+        side = 1201
+        samples = array.array('h', [1]) * (side * side)
+        with open(self.path('N46E008.hgt'), 'wb') as file:
+            file.write(samples.tobytes())
+        for box in ('8.1,46.1,8.2,46.2', '8.25,46.35,8.35,46.45', '8.7,46.3,8.8,46.4'):
+            built = self.json_of('build', self.path('N46E008.hgt'), '--region', box, '-o', self.path('part.terrace'),
+                                 '--force')
+            self.assertEqual(built['points'], 121 * 121, box)
+
     def test_grids_on_both_sides_of_the_antimeridian_are_joined(self):
         for name, west in (('west', 178), ('east', -180)):
             with open(self.path(name + '.asc'), 'w') as file:

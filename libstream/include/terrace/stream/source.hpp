@@ -103,8 +103,9 @@ struct Selection {
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
-  /// infinite. Rasters, COPC, EPT and LAS whose header lies outside are read only as far as needed;
-  /// a raster's columns and rows count from its first cell near the box.
+  /// infinite. Of rasters also those within a millionth of a cell are inside. Rasters, COPC, EPT
+  /// and LAS whose header lies outside are read only as far as needed; a raster's columns and rows
+  /// count from its first cell near the box.
   std::optional<Box3> region{};
   /// Points in `region` at whose x, y this is false are left out too; empty: no others are.
   /// Called by the thread that reads.
