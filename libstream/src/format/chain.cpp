@@ -170,6 +170,11 @@ class Chain final : public PointSource {
 
   /// The source with only the attributes that the selection needs, in the order of the first file.
   [[nodiscard]] std::unique_ptr<PointSource> narrowed(std::unique_ptr<PointSource> source) const {
+    // Selected while it still has the marks of withheld points, so that those are counted.
+    SourceOptions selecting = options_;
+    selecting.selection.keep.reset();
+    selecting.selection.drop.clear();
+    source = selection_of(std::move(source), selecting);
     const std::vector<std::string> needed = needed_attributes(source->info(), options_.selection);
     std::vector<std::string> names;
     for (const Channel& attribute : info_.attributes) names.push_back(attribute.name);

@@ -91,10 +91,8 @@ class SelectedSource final : public PointSource {
   Progress progress() const override {
     Progress progress = source_->progress();
     progress.points = delivered_;
-    if (where_ || region_) {
-      progress.withheld = withheld_;
-      progress.excluded += excluded_;
-    }
+    progress.excluded += excluded_;
+    if (withheld_attribute_) progress.withheld = withheld_;
     return progress;
   }
 
