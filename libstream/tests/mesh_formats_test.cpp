@@ -200,6 +200,37 @@ TEST_F(MeshFormats, FacesAreTheSameInAll) {
   }
 }
 
+/// A vertex of NaN is no point, and triangles that have it are left out; the others are as before.
+TEST_F(MeshFormats, CornersOfNanTakeTheirTrianglesAlong) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+      "nan 0 0\n1 0 0\n1 1 0\n0 1 2\n3 0 1 2\n3 1 2 3\n";
+  const std::string stl =
+      "solid s\nouter loop\nvertex nan 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\n"
+      "outer loop\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 2\nendloop\nendsolid\n";
+  const std::pair<const char*, std::string> files[] = {
+      {"a.obj", "v nan 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 2\nf 1 2 3\nf 2 3 4\n"},
+      {"a.off", "OFF\n4 2 0\nnan 0 0\n1 0 0\n1 1 0\n0 1 2\n3 0 1 2\n3 1 2 3\n"},
+      {"a.ply", ply},
+      {"a.stl", stl}};
+  for (const auto& [name, text] : files) {
+    SCOPED_TRACE(name);
+    const std::string file = write_text(folder_.path() / name, text);
+    const auto mesh = read_mesh(file);
+    ASSERT_TRUE(mesh);
+    EXPECT_EQ(mesh->vertices.positions, (std::vector<Point3>{{1, 0, 0}, {1, 1, 0}, {0, 1, 2}}));
+    EXPECT_EQ(mesh->triangles, (std::vector<TriangleIndices>{{0, 1, 2}}));
+    EXPECT_EQ(mesh->nodata, 1u);
+    const auto triangles = open_source(std::array{file}, {.entities = Entities::triangles});
+    EXPECT_EQ(read_all(*triangles).points.positions, (std::vector<Point3>{{1, 0, 0}}));
+    EXPECT_EQ(triangles->progress().nodata, 1u);
+    const auto points = open_source(std::array{file});
+    EXPECT_EQ(read_all(*points).points.size(), text == stl ? 5u : 3u);
+    EXPECT_EQ(points->progress().nodata, 1u);
+  }
+}
+
 TEST_F(MeshFormats, DamageIsNamed) {
   std::mt19937_64 random(33);
   SmallMesh mesh = random_mesh(random);

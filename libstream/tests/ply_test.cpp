@@ -258,7 +258,7 @@ TEST_F(Ply, RefusesDamagedBodies) {
       {"1 2 3 4\n5 6 7 1.5\n", "line 10: '1.5' is no uint8"},
       {"1 2 3 4\n5 abc 7 8\n", "line 10: 'abc' is no float32 for property 'y'"},
       {"1 2 3 4\n5 1e39 7 8\n", "'1e39' is no float32"},
-      {"1 2 3 4\n5 nan 7 8\n", "vertex 1: a coordinate is infinite or NaN"},
+      {"1 2 3 4\n5 inf 7 8\n", "vertex 1: a coordinate is infinite"},
       {"1 2 3 4\n\n\n\n\n\n\n\n\n\n\n", "the file ends in item 1 of element 'vertex'"},
   };
   for (const auto& [body, message] : cases) {
@@ -281,6 +281,34 @@ TEST_F(Ply, RefusesDamagedBodies) {
   EXPECT_NE(refusal(lists("uint", "\xff\xff\xff\xff")).find("ends in item 0"), std::string::npos);
   EXPECT_NE(refusal(lists("uint64", "\x7f\xff\xff\xff\xff\xff\xff\xff")).find("ends in item 0"),
             std::string::npos);
+}
+
+/// Scanners write NaN where nothing came back.
+TEST_F(Ply, VerticesWithNanAreLeftOutAndCounted) {
+  const std::string types = "property float x\nproperty float y\nproperty float z\n";
+  std::string body;
+  for (const float value : {NAN, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, NAN, NAN, NAN, 6.0f, 7.0f, NAN}) {
+    body.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  const std::string binary =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 4\n" + types + "end_header\n" + body;
+  const std::string ascii = "ply\nformat ascii 1.0\nelement vertex 4\n" + types +
+                            "property uchar red\nend_header\n"
+                            "nan 1 2 7\n3 4 5 8\nNaN nan -nan 9\n6 7 nan 10\n";
+  for (const std::string& text : {binary, ascii}) {
+    // Blocks of one point: some are empty before the end.
+    for (const std::size_t block_points : {1u, 100u}) {
+      const std::string file = write_text(folder_.path() / "holes.ply", text);
+      const auto source = open_source(std::array{file, file}, {.block_points = block_points});
+      const AllPoints all = read_all(*source);
+      EXPECT_EQ(all.points.positions, (std::vector<Point3>{{3, 4, 5}, {3, 4, 5}}));
+      if (text == ascii) {
+        EXPECT_EQ(all.values<std::uint8_t>(0)[1], 8);
+      }
+      EXPECT_EQ(source->progress().nodata, 6u);
+      EXPECT_EQ(source->progress().points, 2u);
+    }
+  }
 }
 
 TEST_F(Ply, ReadsHeadersOfOtherPrograms) {

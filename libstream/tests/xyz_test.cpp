@@ -141,7 +141,7 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
       {"1 2 3\n1 2 3 4\n", "line 2: has 4 columns"},
       {"1,2,3\n1,2,3,\n", "line 2: has 4 columns"},
       {"1,2,3\n1,,3\n", "line 2: column 2 is empty"},
-      {"1 2 3\n\n# c\n1 2 nan\n", "line 4: column 3 is nan"},
+      {"1 2 3\n\n# c\n1 nan inf\n", "line 4: column 3 is inf"},
       {"1 2 3\n1 -inf 3\n", "line 2: column 2 is -inf"},
       {"1 2 1e999\n", "line 1: column 3, '1e999'"},
       {"1 2 3\n1 2 abc\n", "line 2: column 3, 'abc'"},
@@ -165,6 +165,18 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
     const std::string error = refusal(text);
     EXPECT_NE(error.find(message), std::string::npos) << error;
     EXPECT_NE(error.find("points.xyz"), std::string::npos) << error;
+  }
+}
+
+TEST_F(Xyz, PointsWithNanAreLeftOutAndCounted) {
+  for (const std::string_view text : {"x,y,z,v\nnan,1,2,5\n3,4,5,6\n7,8,NaN,\"7\"\n7,nan,9,8\n",
+                                      "1 2 NAN 3\nnan nan nan nan\n3 4 5 6\n1 -nan 3 1\n"}) {
+    const std::string file = write_text(folder_.path() / "holes.xyz", text);
+    const auto source = open_source(std::array{file}, {.block_points = 1});
+    const AllPoints all = read_all(*source);
+    EXPECT_EQ(all.points.positions, (std::vector<Point3>{{3, 4, 5}}));
+    EXPECT_EQ(all.values<double>(0)[0], 6.0);
+    EXPECT_EQ(source->progress().nodata, 3u);
   }
 }
 

@@ -201,7 +201,7 @@ class ErrorTest(CommandTest):
                  'face.ply': b'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n'
                              b'property float y\nproperty float z\nelement face 1\n'
                              b'property list uchar int vertex_indices\nend_header\n0 0 0\n3 0 1 2\n',
-                 'nohead.ply': b'ply\nformat ascii 1.0\n', 'nan.xyz': b'1 2 nan\n', 'two.xyz': b'1 2\n',
+                 'nohead.ply': b'ply\nformat ascii 1.0\n', 'inf.xyz': b'1 2 inf\n', 'two.xyz': b'1 2\n',
                  'bad.obj': b'v 1 2 3\nv 1 2 4\nf 1 2 9\n'}
         for name, content in cases.items():
             with open(self.path(name), 'wb') as file:

@@ -271,6 +271,17 @@ class LinesTest(EntitiesCase):
         self.assertTrue(lines == wanted)
         self.assertGreater(len(lines), 50)
 
+    def test_pictures_show_the_lines(self):
+        light = []
+        for lines, options in ((len(self.lines), []), (len(self.lines), ['--color', 'height']), (1, ['--level', 'top'])):
+            picture = self.path('lines.png')
+            summary = json.loads(self.run_ok('render', self.stores['polylines'], '-o', picture, '--size', '300x300',
+                                             '--force', '--json', *options))
+            self.assertGreaterEqual(summary['lines'], lines)
+            # Larger, the lighter.
+            light.append(json.loads(self.run_ok('info', picture, '--rgb', 'mapbox', '--json'))['height']['mean'])
+        self.assertLess(light[0], light[2])
+
     def test_levels_are_parts(self):
         all_lines = [repr([list(map(float, p)) for p in line])[1:-1] for line in self.lines]
         lines, numbers = self.lines_of(self.run_ok('points', self.stores['polylines'], '-o', '-', '--format', 'geojson',

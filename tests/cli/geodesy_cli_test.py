@@ -162,7 +162,7 @@ class GeodesyTest(unittest.TestCase):
             self.assertAlmostEqual(float(profile.splitlines()[-1].split(',')[0]),
                                    (line['max'][0] - west) * 0.3048, delta=1e-3)
             error = self.refused(1, 'tile', store, '-o', self.path('tiles'), '--vertical', 'ellipsoidal')
-            self.assertIn('no CRS', error)
+            self.assertIn('"site", which has no place on the earth', error)
         degrees = self.build(self.cloud([(10, 10), (20, 20)]), '--crs', 'EPSG:4326')
         self.assertIn('local', self.refused(2, 'points', degrees, '-o', '-', '--to-crs', local))
 

@@ -293,6 +293,48 @@ class GridTest(unittest.TestCase):
         self.assertEqual(stored['bounds']['min'][:2], [8.0, 46.0])
         self.assertEqual([round(v, 9) for v in stored['bounds']['max'][:2]], [9.0, 48.0])
 
+    def test_a_region_that_begins_at_a_row_has_that_row(self):
+        side = 1201
+        samples = array.array('h', [1]) * (side * side)
+        with open(self.path('N46E008.hgt'), 'wb') as file:
+            file.write(samples.tobytes())
+        for box in ('8.1,46.1,8.2,46.2', '8.25,46.35,8.35,46.45', '8.7,46.3,8.8,46.4'):
+            built = self.json_of('build', self.path('N46E008.hgt'), '--region', box, '-o', self.path('part.terrace'),
+                                 '--force')
+            self.assertEqual(built['points'], 121 * 121, box)
+
+    def test_grids_on_both_sides_of_the_antimeridian_are_joined(self):
+        for name, west in (('west', 178), ('east', -180)):
+            with open(self.path(name + '.asc'), 'w') as file:
+                file.write(f'ncols 4\nnrows 2\nxllcorner {west}\nyllcorner -17\ncellsize 0.5\n1 2 3 4 5 6 7 8\n')
+            with open(self.path(name + '.prj'), 'w') as file:
+                file.write('GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],'
+                           'PRIMEM["Greenwich",0],UNIT["Degree",0.017453292519943295]]')
+        self.json_of('build', self.path('west.asc'), self.path('east.asc'), '-o', self.path('fiji.terrace'))
+        info = self.json_of('info', self.path('fiji.terrace'))
+        self.assertEqual((info['columns'], info['points']), (8, 16))
+        self.assertEqual([info['bounds'][end][0] for end in ('min', 'max')], [178.25, 181.75])
+
+    def test_virtual_rasters_of_other_formats(self):
+        side = 121
+        tile = array.array('h', [height(c, r) for r in range(side) for c in range(side)])
+        if sys.byteorder == 'little':
+            tile.byteswap()
+        with open(self.path('N46E008.hgt'), 'wb') as file:
+            file.write(tile.tobytes())
+        with open(self.path('real.asc'), 'w') as file:
+            file.write('ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n0.5 1 2 3 4 5\n')
+        for file, columns, rows, kind, first in (('N46E008.hgt', side, side, 'Int16', height(0, 0)),
+                                                 ('real.asc', 3, 2, 'Float32', 0.5)):
+            with open(self.path('a.vrt'), 'w') as vrt:
+                vrt.write(f'<VRTDataset rasterXSize="{columns}" rasterYSize="{rows}"><GeoTransform>0,1,0,0,0,-1'
+                          f'</GeoTransform><VRTRasterBand dataType="{kind}" band="1"><SimpleSource>'
+                          f'<SourceFilename relativeToVRT="1">{file}</SourceFilename></SimpleSource>'
+                          '</VRTRasterBand></VRTDataset>')
+            one, other = self.json_of('info', self.path(file)), self.json_of('info', self.path('a.vrt'))
+            for key in ('points', 'height', 'columns', 'rows'):
+                self.assertEqual(one[key], other[key], file)
+
     def test_dems_of_the_usgs(self):
         def real(value):
             return f'{value:24.15E}'.replace('E', 'D')

@@ -157,6 +157,22 @@ class LasFormatTest(LasCase):
         self.assertIn(f'{withheld} points are marked as withheld', result.stderr.decode())
         self.assertEqual(self.info(self.path('w.st'))['points'], 200)
 
+    def test_withheld_points_of_files_that_differ_are_counted(self):
+        due = {'': 0, 'intensity < 30000': 0}
+        paths = []
+        for point_format in (1, 3):
+            records = random_records(point_format, 200)
+            paths.append(self.put(f'format{point_format}.las', las(point_format, records)))
+            for record in records:
+                fields = unpack_record(point_format, record)
+                due[''] += fields['withheld']
+                due['intensity < 30000'] += fields['withheld'] if fields['intensity'] < 30000 else 0
+        for where, withheld in due.items():
+            self.assertGreater(withheld, 0)
+            result = terrace('build', *paths, '-o', self.path('differ.st'), '--force', '--keep', 'intensity',
+                             *(['--where', where] if where else []))
+            self.assertIn(f'{withheld} points are marked as withheld', result.stderr.decode())
+
     def test_the_wkt_bit_decides_between_keys_and_wkt(self):
         records = random_records(1, 20)
         for bit, code in ((0, 32632), (16, 32633)):

@@ -440,6 +440,17 @@ class OptionTest(ProcessTest):
             self.assertEqual((result.returncode, result.stdout), (2, ''))
 
 
+    def test_what_is_to_come_is_not_available_yet(self):
+        for args in (['merge', 'a.terrace', 'b.terrace', '-o', 'c.terrace'], ['build', 'a.xyz', '--append'],
+                     ['build', 'a.xyz', '-o', 'b', '--part=1/2'], ['build', 'a.xyz', '-o', 'b', '--resume'],
+                     ['mesh', 'a.terrace', '--base', '-o', 'b.ply'],
+                     ['points', 'a.terrace', '--max-points', '5', '-o', 'b.ply']):
+            with self.subTest(args=args):
+                result = subprocess.run([TERRACE, *args], capture_output=True, text=True, timeout=60)
+                self.assertEqual((result.returncode, result.stdout), (2, ''))
+                self.assertIn('is not available yet', result.stderr)
+
+
 class NameTest(ProcessTest):
     ESCAPE = '\x1b[31m'
 

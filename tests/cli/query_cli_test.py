@@ -103,6 +103,18 @@ class SampleTest(QueryTest):
         self.assertEqual(lines[6].split(',')[-4:], lines[2].split(',')[-4:])
         self.assertEqual(lines[7:], [''])
 
+    def test_no_two_columns_have_one_name(self):
+        x, y = self.low[0] + 100, self.low[1] + 100
+        places, answers = self.path('named.csv'), self.path('answered.csv')
+        for head, due in (('x,y,Height,slope,slope_2', 'height_2,gradient,slope_3,aspect'),
+                          ('x;y;aspect', 'height;gradient;slope;aspect_2')):
+            with open(places, 'w', encoding='ascii') as file:
+                file.write(head + '\n' + head[1].join(map(str, (x, y, 1, 2, 3)[:len(head.split(head[1]))])) + '\n')
+            # Known as a table of ours, which may be replaced.
+            self.run_ok('sample', self.store, '--points', places, '-o', answers, '--force')
+            with open(answers, encoding='ascii') as file:
+                self.assertEqual(file.readline(), head + head[1] + due + '\n')
+
     def test_slope_and_aspect_belong_to_the_gradient(self):
         for row in self.answers('\n'.join(f'{x},{y}' for x, y in self.somewhere(1, 200))):
             gradient, slope, aspect = map(float, row[3:])

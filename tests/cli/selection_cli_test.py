@@ -77,6 +77,34 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(rows, sorted(tuple(float(p[c]) for c in columns)
                                       for p in self.points if wanted(p)))
 
+    def test_points_with_nan_are_left_out_and_counted(self):
+        def write(name, text):
+            with open(self.path(name), 'w', encoding='ascii') as file:
+                file.write(text)
+            return self.path(name)
+
+        ply = 'ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n'
+        rows = '0 0 1\nnan 1 2\n5 0 2\n0 7 3\n1 2 NaN\n'
+        for file in (write('holes.xyz', rows), write('holes.csv', 'x,y,z\n' + rows.replace(' ', ',')),
+                     write('holes.ply', ply.format(5) + rows)):
+            store = file + '.st'
+            result = self.terrace('build', file, '-o', store)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('3 points (2 with a coordinate that is NaN left out)', result.stderr)
+            self.assertEqual(json.loads(self.run_ok('info', store, '--json'))['nodata'], 2)
+            self.assertIn('3, and 2 with a coordinate that is NaN', self.run_ok('info', file))
+            for keep in ('x > -1', 'z < 3'):
+                built = json.loads(self.run_ok('build', file, '--where', keep, '-o', store, '--force', '--json'))
+                self.assertEqual((built['points'] + built['excluded'], built['nodata']), (3, 2))
+            result = self.terrace('match', file, '-o', self.path('pairs.csv'), '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('2 points with a coordinate that is NaN are left out', result.stderr)
+        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'not one point in it (1 points, all with a coordinate NaN)'),
+                            (write('inf.ply', ply.format(1) + '1 2 inf\n'), 'a coordinate is infinite')):
+            result = self.terrace('build', file, '-o', self.path('none.st'))
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(words, result.stderr)
+
     def test_build_takes_folders_lists_and_patterns(self):
         folder = self.path('parts')
         os.makedirs(os.path.join(folder, 'more'))
@@ -88,7 +116,8 @@ class SelectionTest(unittest.TestCase):
         with open(self.path('parts.lst'), 'w', encoding='ascii') as file:
             file.write('# of the survey\nparts/1.csv\nparts/more\n')
         for number, names in enumerate(([folder], ['@' + self.path('parts.lst')],
-                                        [folder + '/*.csv', folder + '/more/?.csv'])):
+                                        [folder + '/*.csv', folder + '/more/?.csv'],
+                                        [folder + '/**/*.csv'], [self.path('p*ts/**')])):
             store = self.path(f'parts{number}.st')
             self.run_ok('build', *names, '-o', store, '--block', '1000', '-q')
             self.assertEqual(json.loads(self.run_ok('verify', store, '--json'))['points'], 20000)

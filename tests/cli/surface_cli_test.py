@@ -239,6 +239,18 @@ class SurfaceTest(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn("the points enclose nothing, as if all were in one plane; 'terrace mesh'", result.stderr)
 
+    def test_points_on_a_line_and_at_one_place_are_told(self):
+        for name, place, message in (('line', lambda i: (i / 10, -i / 10, i / 3), 'all are on a line'),
+                                     ('place', lambda i: (0.1, 0.2, 0.3), 'all are at one place')):
+            with open(self.path(name + '.xyz'), 'w') as file:
+                file.writelines('{} {} {}\n'.format(*place(i)) for i in range(20))
+            store = self.path(name + '.terrace')
+            self.assertEqual(terrace('build', self.path(name + '.xyz'), '-o', store).returncode, 0)
+            for ending, options in (('.ply', []), ('.vtk', ['--tetrahedra'])):
+                result = terrace('surface', store, '-o', self.path(name + ending), *options)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn('the points enclose nothing, ' + message, result.stderr)
+
     def test_no_points_are_no_surface(self):
         store = self.path('plane0.terrace')
         with open(self.path('plane0.xyz'), 'w') as file:

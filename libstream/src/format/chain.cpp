@@ -123,6 +123,7 @@ class Chain final : public PointSource {
         return true;
       }
       const Progress progress = part.source->progress();
+      nodata_ += progress.nodata;
       withheld_ += progress.withheld;
       excluded_ += progress.excluded;
       lost_ += progress.lost;
@@ -134,8 +135,11 @@ class Chain final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{
-        .points = delivered_, .withheld = withheld_, .excluded = excluded_, .lost = lost_};
+    Progress progress{.points = delivered_,
+                      .nodata = nodata_,
+                      .withheld = withheld_,
+                      .excluded = excluded_,
+                      .lost = lost_};
     if (turn_ == parts_.size()) {
       progress.fraction = 1.0;
       return progress;
@@ -143,6 +147,7 @@ class Chain final : public PointSource {
     const Part& part = parts_[turn_];
     if (part.source) {
       const Progress inside = part.source->progress();
+      progress.nodata += inside.nodata;
       progress.withheld += inside.withheld;
       progress.excluded += inside.excluded;
       progress.lost += inside.lost;
@@ -165,6 +170,11 @@ class Chain final : public PointSource {
 
   /// The source with only the attributes that the selection needs, in the order of the first file.
   [[nodiscard]] std::unique_ptr<PointSource> narrowed(std::unique_ptr<PointSource> source) const {
+    // Selected while it still has the marks of withheld points, so that those are counted.
+    SourceOptions selecting = options_;
+    selecting.selection.keep.reset();
+    selecting.selection.drop.clear();
+    source = selection_of(std::move(source), selecting);
     const std::vector<std::string> needed = needed_attributes(source->info(), options_.selection);
     std::vector<std::string> names;
     for (const Channel& attribute : info_.attributes) names.push_back(attribute.name);
@@ -192,8 +202,8 @@ class Chain final : public PointSource {
   bool narrowed_ = false;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
-  std::uint64_t delivered_ = 0, withheld_ = 0, excluded_ = 0, lost_ = 0, done_bytes_ = 0,
-                total_bytes_ = 0;
+  std::uint64_t delivered_ = 0, nodata_ = 0, withheld_ = 0, excluded_ = 0, lost_ = 0,
+                done_bytes_ = 0, total_bytes_ = 0;
   bool sizes_known_ = true;
 };
 

@@ -11,7 +11,7 @@ namespace terrace::stream {
 
 /// GeoTIFF; several files are a mosaic.
 const Format& geotiff_format();
-/// GDAL's virtual rasters that are mosaics of GeoTIFFs.
+/// GDAL's virtual rasters that are mosaics of other rasters.
 const Format& vrt_format();
 /// ASPRS LAS 1.0 to 1.4.
 const Format& las_format();

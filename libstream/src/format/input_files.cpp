@@ -70,14 +70,88 @@ void add_folder(const std::string& folder, const std::string& format,
   std::sort(files.begin() + static_cast<std::ptrdiff_t>(before), files.end());
 }
 
-/// What the shell would make of a pattern that it has been kept from.
-void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
+[[noreturn]] void fail_to_list(const std::string& pattern) {
+  fail(pattern, {}, "the folders of the pattern cannot be listed", {});
+}
+
+/// What matches a pattern without "**".
+std::vector<std::string> matches_of(const std::string& pattern) {
+  std::vector<std::string> names;
   ::glob_t found{};
   const int result = ::glob(pattern.c_str(), GLOB_ERR, nullptr, &found);
-  for (std::size_t i = 0; i < found.gl_pathc; ++i) files.emplace_back(found.gl_pathv[i]);
+  for (std::size_t i = 0; i < found.gl_pathc; ++i) names.emplace_back(found.gl_pathv[i]);
   ::globfree(&found);
-  if (result == GLOB_NOMATCH) fail(pattern, {}, "no file has such a name", "check the pattern");
-  if (result != 0) fail(pattern, {}, "the folders of the pattern cannot be listed", {});
+  if (result != 0 && result != GLOB_NOMATCH) fail_to_list(pattern);
+  return names;
+}
+
+/// Where a part "**" of the path begins; npos if there is none.
+std::size_t find_stars(const std::string& pattern) {
+  for (std::size_t at = pattern.find("**"); at != pattern.npos; at = pattern.find("**", at + 1)) {
+    const std::size_t end = at + 2;
+    if ((at == 0 || pattern[at - 1] == '/') && (end == pattern.size() || pattern[end] == '/')) {
+      return at;
+    }
+  }
+  return pattern.npos;
+}
+
+/// The name as a pattern that only it matches.
+std::string literal(const std::string& name) {
+  std::string pattern;
+  for (const char c : name) {
+    if (std::string_view("*?[]\\").find(c) != std::string_view::npos) pattern += '\\';
+    pattern += c;
+  }
+  return pattern;
+}
+
+/// What matches in a folder and all below it. folder: ends with '/', or is empty for the current.
+std::vector<std::string> matches_below(const std::string& folder, const std::string& pattern) {
+  std::vector<std::string> names = matches_of(literal(folder) + pattern);
+  std::error_code error;
+  fs::recursive_directory_iterator at(folder.empty() ? "." : folder, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    std::error_code ignored;
+    if (!at->is_directory(ignored)) continue;
+    if (at->path().filename().string().front() == '.') {
+      at.disable_recursion_pending();
+      continue;
+    }
+    const std::string below = folder.empty() ? at->path().string().substr(2) : at->path().string();
+    const std::vector<std::string> more = matches_of(literal(below) + '/' + pattern);
+    names.insert(names.end(), more.begin(), more.end());
+  }
+  if (error) fail_to_list(folder + pattern);
+  return names;
+}
+
+/// What the shell would make of a pattern that it has been kept from; "**" stands for any number of
+/// folders, none included, but for hidden ones.
+void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
+  std::vector<std::string> names;
+  const std::size_t stars = find_stars(pattern);
+  if (stars == pattern.npos) {
+    names = matches_of(pattern);
+  } else {
+    const std::string behind = pattern.substr(std::min(stars + 3, pattern.size()));
+    if (find_stars(behind) != behind.npos) {
+      fail(pattern, {}, "has ** twice", "once is enough to reach all folders below");
+    }
+    std::vector<std::string> folders{""};
+    if (stars > 0) folders = matches_of(pattern.substr(0, stars));
+    for (const std::string& folder : folders) {
+      const std::vector<std::string> more = matches_below(folder, behind.empty() ? "*" : behind);
+      names.insert(names.end(), more.begin(), more.end());
+    }
+    std::erase_if(names, [](const std::string& name) {
+      std::error_code ignored;
+      return fs::is_directory(name, ignored);
+    });
+    std::sort(names.begin(), names.end());
+  }
+  if (names.empty()) fail(pattern, {}, "no file has such a name", "check the pattern");
+  files.insert(files.end(), names.begin(), names.end());
 }
 
 class Names {

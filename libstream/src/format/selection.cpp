@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -36,6 +37,7 @@ class SelectedSource final : public PointSource {
     const Selection& wanted = options.selection;
     info_ = all;
     region_ = wanted.region;
+    if (region_ && all.grid) widen(*region_, all.world);
     covers_ = wanted.covers;
     if (!wanted.where.empty()) where_.emplace(wanted.where, all);
     if (where_ || region_) {
@@ -89,10 +91,8 @@ class SelectedSource final : public PointSource {
   Progress progress() const override {
     Progress progress = source_->progress();
     progress.points = delivered_;
-    if (where_ || region_) {
-      progress.withheld = withheld_;
-      progress.excluded += excluded_;
-    }
+    progress.excluded += excluded_;
+    if (withheld_attribute_) progress.withheld = withheld_;
     return progress;
   }
 
@@ -101,6 +101,15 @@ class SelectedSource final : public PointSource {
   struct Piece {
     std::size_t from = 0, bytes = 0;
   };
+
+  /// By a millionth of a cell: places of rows and columns that a border names are rounded.
+  static void widen(Box3& region, const WorldTransform& world) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double cell = std::abs(world.xy[3 * axis]) + std::abs(world.xy[3 * axis + 1]);
+      region.min[axis] -= 1e-6 * cell;
+      region.max[axis] += 1e-6 * cell;
+    }
+  }
 
   /// Appends what counts of the block that was read last.
   void append(PointBlock& block) {

@@ -3,6 +3,8 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <list>
 #include <optional>
 #include <sstream>
@@ -147,6 +149,18 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
          "reproject one (gdalwarp -t_srs), or name the CRS of all");
 }
 
+/// The text of NAME.prj beside a file, where ESRI's formats have their CRS; empty if there is none.
+std::string wkt_beside(const std::string& file) {
+  constexpr std::streamsize kMostWkt = 64 << 10;
+  std::string text(static_cast<std::size_t>(kMostWkt), '\0');
+  for (const char* const ending : {".prj", ".PRJ"}) {
+    std::ifstream beside(std::filesystem::path(file).replace_extension(ending), std::ios::binary);
+    beside.read(text.data(), kMostWkt);
+    if (beside.gcount() > 0) return text.substr(0, static_cast<std::size_t>(beside.gcount()));
+  }
+  return {};
+}
+
 /// The columns that lead once around the earth; 0 if that is not a whole number, or not known.
 std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
   const auto& m = world.xy;
@@ -270,7 +284,10 @@ class Mosaic final : public Raster {
   }
 
   /// The union's size and place; members then count from its corner.
-  void unite(const RasterInfo& first, const Crs& crs) {
+  void unite(const RasterInfo& first, Crs crs) {
+    if (crs.epsg == 0 && crs.wkt.empty() && !crs.geographic) {
+      crs.wkt = wkt_beside(first.files.front());
+    }
     const std::int64_t turn = columns_around(first.world, crs);
     if (turn > 0 && join_around(members_, first.world, turn)) {
       note("the files lie on both sides of the antimeridian: longitudes go on beyond 180 degrees");

@@ -206,6 +206,28 @@ py::array near(const OpenStore& open, const std::vector<double>& place,
   return to_records(std::move(records), record_type(store.schema(), {"distance"}));
 }
 
+/// A box as it lies in the store: where longitudes have turns these are several side by side.
+std::vector<stream::Box3> boxes_of(const terrain::Region& region) {
+  std::vector<std::array<double, 2>> spans;
+  for (const terrain::Polygon& polygon : region.polygons()) {
+    const auto [west, east] = std::minmax_element(polygon[0].begin(), polygon[0].end());
+    spans.push_back({(*west)[0], (*east)[0]});
+  }
+  if (spans.empty()) return {region.box()};
+  std::sort(spans.begin(), spans.end());
+  std::vector<stream::Box3> boxes;
+  for (const auto& [west, east] : spans) {
+    if (!boxes.empty() && west <= boxes.back().max[0]) {
+      boxes.back().max[0] = std::max(boxes.back().max[0], east);
+      continue;
+    }
+    boxes.push_back(region.box());
+    boxes.back().min[0] = west;
+    boxes.back().max[0] = east;
+  }
+  return boxes;
+}
+
 }  // namespace
 
 terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
@@ -285,8 +307,14 @@ void bind_store(py::module_& module) {
              if (xy[1] != 0 || xy[3] != 0)
                throw py::value_error(
                    "the raster is rotated: a box of its CRS is none of its columns and rows");
-             const stream::Box3 box = stored_box(store.schema(), region_of(given).value().box());
-             return released([&] { return stream::StoreQuery(store).count(box); });
+             const terrain::Region region = region_of(given, store).value();
+             return released([&] {
+               std::uint64_t points = 0;
+               for (const stream::Box3& box : boxes_of(region)) {
+                 points += stream::StoreQuery(store).count(stored_box(store.schema(), box));
+               }
+               return points;
+             });
            })
       .def("verify", [](const OpenStore& open, const py::tuple& how) {
         const stream::Store store = open.get();

@@ -122,6 +122,10 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         given = [given]
     if isinstance(given, (list, tuple)) and not given:
         raise ValueError('there is no source: name a file, or give an array')
+    if isinstance(given, (list, tuple)) and any(isinstance(name, (str, os.PathLike)) for name in given):
+        for number, name in enumerate(given):
+            if not isinstance(name, (str, os.PathLike)):
+                raise TypeError(f'source {number} is of type {type(name).__name__}: beside names of files there can be only such')
     if isinstance(given, (list, tuple)) and all(isinstance(name, (str, os.PathLike)) for name in given):
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('`transform`, `nodata` and `attributes` are for arrays: files have their own')

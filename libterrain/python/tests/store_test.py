@@ -430,6 +430,11 @@ class Sources(StoreCase):
             with self.assertRaisesRegex(ValueError, 'no source'):
                 self.built(nothing)
 
+    def test_beside_names_of_files_there_is_nothing_else(self):
+        for mixed in (['a.tif', 3], [self.points, 'a.tif'], ['a.tif', None]):
+            with self.assertRaisesRegex(TypeError, 'source [01] is of type'):
+                self.built(mixed)
+
     def test_rasters_of_other_packages(self):
         try:
             import rasterio

@@ -332,7 +332,9 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
                             " in it" +
                             (so_far.nodata == 0
                                  ? std::string()
-                                 : " (" + std::to_string(so_far.nodata) + " cells, all nodata)"),
+                                 : " (" + std::to_string(so_far.nodata) +
+                                       (info.grid ? " cells, all nodata)"
+                                                  : " points, all with a coordinate NaN)")),
          .remedy = so_far.excluded > 0 ? "give another `where` or `region`"
                    : info.grid         ? "check the file and its nodata value"
                                        : "check the file"});
@@ -342,6 +344,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   outcome.points = result.points;
   outcome.outliers = result.outliers;
   outcome.nodata = so_far.nodata;
+  outcome.raster = info.grid;
   outcome.excluded = so_far.excluded;
   outcome.lost = so_far.lost;
   outcome.store_bytes = sink.store_bytes();

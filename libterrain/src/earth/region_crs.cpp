@@ -100,6 +100,17 @@ std::vector<Polygon> outlines(const Region& region) {
             {box.min[0], box.max[1]}}}};
 }
 
+/// An infinite box as far as a turn beyond the bounds: outlines are finite.
+Region within_reach(const Region& region, double turn, const stream::Box3& bounds) {
+  if (!region.polygons().empty()) return region;
+  stream::Box3 box = region.box();
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (std::isinf(box.min[axis])) box.min[axis] = std::min(bounds.min[axis] - turn, box.max[axis]);
+    if (std::isinf(box.max[axis])) box.max[axis] = std::max(bounds.max[axis] + turn, box.min[axis]);
+  }
+  return Region::of_box(box);
+}
+
 }  // namespace
 
 Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds) {
@@ -128,7 +139,7 @@ Point2 middle_in(const Transformation& change, const stream::Box3& box) {
 }
 
 Region with_turns(const Region& region, double turn, const stream::Box3& bounds) {
-  std::vector<Polygon> polygons = outlines(region);
+  std::vector<Polygon> polygons = outlines(within_reach(region, turn, bounds));
   const std::size_t count = polygons.size();
   for (std::size_t i = 0; i < count; ++i) {
     for (const double shift : {-turn, turn}) {

@@ -19,10 +19,14 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
   const std::string file = store.path().string();
   std::optional<CoordinateSystem> system = CoordinateSystem::of(store.schema().crs, file);
   if (!system) {
-    throw stream::Error({.file = file,
-                         .where = {},
-                         .cause = "has no CRS",
-                         .remedy = "build it anew with `crs` EPSG:n" + otherwise});
+    // What is recorded by name alone is a local (engineering) system.
+    const std::string& name = store.schema().crs.name;
+    throw stream::Error(
+        {.file = file,
+         .where = {},
+         .cause = name.empty() ? "has no CRS"
+                               : "has the CRS \"" + name + "\", which has no place on the earth",
+         .remedy = "build it anew with `crs` EPSG:n" + otherwise});
   }
   return system->over(world_box(store.schema(), store.bounds()));
 }

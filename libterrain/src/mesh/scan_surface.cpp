@@ -79,6 +79,29 @@ std::vector<stream::Point3> from_ground(const std::vector<tri::Point3>& ground,
   return places;
 }
 
+/// See ScanSurface::spanned. What is off a line by less than 1e-12 of its length is so by rounding.
+unsigned dimensions_of(const std::vector<stream::Point3>& points) {
+  const auto between = [](const stream::Point3& a, const stream::Point3& b) {
+    return stream::Point3{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+  };
+  const auto square = [](const stream::Point3& v) {
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  };
+  stream::Point3 line{};
+  for (const stream::Point3& p : points) {
+    const stream::Point3 v = between(points.front(), p);
+    if (square(v) > square(line)) line = v;
+  }
+  if (square(line) == 0.0) return 0;
+  for (const stream::Point3& p : points) {
+    const stream::Point3 v = between(points.front(), p);
+    const stream::Point3 normal{line[1] * v[2] - line[2] * v[1], line[2] * v[0] - line[0] * v[2],
+                                line[0] * v[1] - line[1] * v[0]};
+    if (square(normal) > 1e-24 * square(line) * square(line)) return 2;
+  }
+  return 1;
+}
+
 void set_parts(const tri::ShapeParts& parts, ScanSurface& out) {
   out.measures.components = parts.components;
   out.measures.euler_characteristic = parts.euler_characteristic;
@@ -138,6 +161,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     } else {
       keep_tetrahedra(ground, restore, std::move(points), tri::Delaunay3<double>(), out);
     }
+    if (out.tetrahedra.empty()) out.spanned = dimensions_of(ground);
     return out;
   }
   tri::RestoredSurface surface =
@@ -151,6 +175,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     out.samples_off = ground.size() - surface.input.size();
   }
   out.mesh.triangles = std::move(surface.surface.faces);
+  if (out.mesh.triangles.empty()) out.spanned = dimensions_of(ground);
   if (surface.input.empty()) {
     out.mesh.positions = from_ground(surface.surface.points, points.positions, source.schema());
     return out;

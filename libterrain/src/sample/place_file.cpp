@@ -73,7 +73,7 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
                          .cause = "the first line has one column only",
                          .remedy = "give x and y with a comma, a semicolon or a tab between them"});
   }
-  std::vector<std::string> names;
+  std::vector<std::string>& names = layout.names;
   bool numbers = true;
   for (std::string_view rest = first_line; !rest.empty();) {
     const std::string_view cell = take_text(rest, layout.separator);

@@ -24,7 +24,8 @@ namespace terrace::terrain {
 struct PlaceLayout {
   char separator = ',';  ///< or ';' or a tab: the first of these in the first line
   std::size_t x = 0, y = 1;
-  bool header = false;  ///< the first line has names
+  bool header = false;             ///< the first line has names
+  std::vector<std::string> names;  ///< the cells of the first line, in lower case
 
   /// Throws: stream::Error for a line with fewer than two columns. file: named in the error.
   static PlaceLayout of(std::string_view first_line, const std::string& file);

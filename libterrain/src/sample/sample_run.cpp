@@ -95,7 +95,7 @@ class Answers {
         append_line(text, batch, i, conversions);
         if (is_header(batch, i)) {
           for (const char* name : {"height", "gradient", "slope", "aspect"}) {
-            (text += layout_->separator) += name;
+            (text += layout_->separator) += unused_name(name);
           }
         } else if (is_place(batch, i)) {
           ++counts_[piece].points;
@@ -115,6 +115,16 @@ class Answers {
   }
 
  private:
+  /// The name of a column of answers: with a number if the places have one of that name.
+  [[nodiscard]] std::string unused_name(const std::string& name) const {
+    const std::vector<std::string>& names = layout_->names;
+    std::string unused = name;
+    for (int i = 2; std::find(names.begin(), names.end(), unused) != names.end(); ++i) {
+      unused = name + "_" + std::to_string(i);
+    }
+    return unused;
+  }
+
   /// The line as it was, but for the place.
   void append_line(std::string& text, const PlaceBatch& batch, std::size_t i,
                    const PlaceConversions& conversions) const {

@@ -2,12 +2,16 @@
 #include "cli/cli.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <span>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -48,7 +52,28 @@ std::string version_text() {
          "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : cuda.reason) + "\n";
 }
 
+/// Verbs and options to come: promised by name, so that nobody takes them for misspelt.
+constexpr std::string_view kVerbToCome = "merge";
+constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kOptionsToCome{
+    {{"build", "--append"},
+     {"build", "--part"},
+     {"build", "--resume"},
+     {"mesh", "--base"},
+     {"points", "--max-points"}}};
+
+void refuse_options_to_come(const Verb& verb, std::span<const std::string> arguments) {
+  for (const std::string& argument : arguments) {
+    if (argument == "--") return;
+    for (const auto& [name, option] : kOptionsToCome) {
+      if (verb.name == name && argument.substr(0, argument.find('=')) == option) {
+        throw UsageError(std::string(option) + " is not available yet");
+      }
+    }
+  }
+}
+
 const Verb& find_verb(const std::string& name) {
+  if (name == kVerbToCome) throw UsageError("the verb '" + name + "' is not available yet");
   for (const Verb& verb : verbs()) {
     if (verb.name == name) return verb;
   }
@@ -126,6 +151,7 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   command->define(app);
   add_common_options(app, common);
 
+  refuse_options_to_come(verb, arguments);
   try {
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(std::move(arguments));

@@ -31,6 +31,26 @@ bool is_number_of_ours(std::string_view cell) {
   return value && number_text(*value) == cell;
 }
 
+/// True for a header of `sample`: its columns are the last, with a number behind each name that the
+/// places had already.
+bool ends_with_answers(std::string_view line) {
+  const std::size_t last = line.find_last_of(",;\t");
+  if (last == line.npos) return false;
+  const char separator = line[last];
+  for (const std::string_view name : {"aspect", "slope", "gradient", "height"}) {
+    const std::size_t begin = line.rfind(separator);
+    if (begin == line.npos) return false;
+    std::string_view cell = line.substr(begin + 1);
+    line = line.substr(0, begin);
+    if (!cell.starts_with(name)) return false;
+    cell.remove_prefix(name.size());
+    const bool numbered = cell.size() > 1 && cell.front() == '_' &&
+                          cell.find_first_not_of("0123456789", 1) == cell.npos;
+    if (!cell.empty() && !numbered) return false;
+  }
+  return true;
+}
+
 /// Recognises a table of ours by its first line, or else line by line.
 class Table {
  public:
@@ -49,13 +69,7 @@ class Table {
          {kPairsHead, kTreeHead, kBoxTreeHead, kDendrogramHead, kProfileHead}) {
       if (line == head && !comments_) return ours_ = true;
     }
-    for (const char separator : {',', ';', '\t'}) {
-      std::string answers;
-      for (const char* name : {"height", "gradient", "slope", "aspect"}) {
-        (answers += separator) += name;
-      }
-      if (line.ends_with(answers)) return ours_ = true;
-    }
+    if (ends_with_answers(line)) return ours_ = true;
     if (comments_) return false;
     const bool points = line == "x,y,z" || line.starts_with("x,y,z,");
     separator_ = points ? ',' : ' ';

@@ -5,6 +5,7 @@
 
 #include "picture/canvas.hpp"
 #include "picture/color.hpp"
+#include "terrace/terrain/detail_lines.hpp"
 
 namespace terrace::cluster {
 struct Dendrogram;
@@ -46,6 +47,12 @@ void draw_dendrogram(const cluster::Dendrogram& tree, Canvas& canvas);
 /// of a pair. O(points + lines log(lines) + samples drawn).
 void draw_matching(const MatchingPicture& picture, const Camera& camera, const DrawOptions& options,
                    Canvas& canvas);
+
+/// Draws lines, runs of `positions` (metres on the ground), on white paper, each piece in the
+/// colour of its first vertex; without colours dark. O(vertices + samples drawn).
+void draw_lines(const std::vector<stream::Point3>& positions,
+                const std::vector<LineSet::Line>& lines, const std::vector<Rgb>& colours,
+                const Camera& camera, const DrawOptions& options, Canvas& canvas);
 
 /// The smallest whole view of all positions: sets scale and centre for the size of `canvas`, with a
 /// margin of 2 %.

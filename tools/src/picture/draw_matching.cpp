@@ -67,6 +67,12 @@ class Brush {
   std::uint32_t first_, last_;
 };
 
+void fill_with_paper(Canvas& canvas, std::uint32_t first_row, std::uint32_t last_row) {
+  for (std::uint32_t y = first_row; y < last_row; ++y) {
+    for (std::uint32_t x = 0; x < canvas.width(); ++x) canvas.colour(x, y) = kPaper;
+  }
+}
+
 /// Red at the bottom, black at the top.
 Colour level_colour(std::uint32_t level, std::uint32_t top) {
   const float share = top > 1 ? static_cast<float>(level - 1) / static_cast<float>(top - 1) : 0.0F;
@@ -116,6 +122,28 @@ double usual_distance(const std::vector<MatchingLine>& lines,
 
 }  // namespace
 
+void draw_lines(const std::vector<stream::Point3>& positions,
+                const std::vector<LineSet::Line>& lines, const std::vector<Rgb>& colours,
+                const Camera& camera, const DrawOptions& options, Canvas& canvas) {
+  constexpr double kRadius = 1.0;
+  std::vector<std::array<double, 3>> places;
+  places.reserve(positions.size());
+  for (const stream::Point3& p : positions) places.push_back(camera.project(p));
+  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+    fill_with_paper(canvas, first, last);
+    Brush brush(canvas, first, last);
+    for (const LineSet::Line& line : lines) {
+      for (std::size_t i = line.begin; i + 1 < line.end; ++i) {
+        Colour colour = kDot;
+        for (std::size_t c = 0; c < 3 && !colours.empty(); ++c) {
+          colour[c] = static_cast<float>(colours[i][c]) / 255.0F;
+        }
+        brush.stroke(places[i], places[i + 1], kRadius, colour);
+      }
+    }
+  });
+}
+
 void draw_matching(const MatchingPicture& picture, const Camera& camera, const DrawOptions& options,
                    Canvas& canvas) {
   const std::vector<MatchingLine>& lines = picture.result.lines;
@@ -137,9 +165,7 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
   const double dot = std::max(2.1 * thin, 1.5);
 
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
-    for (std::uint32_t y = first; y < last; ++y) {
-      for (std::uint32_t x = 0; x < canvas.width(); ++x) canvas.colour(x, y) = kPaper;
-    }
+    fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
     for (const std::uint32_t i : order) {
       const MatchingLine& line = lines[i];

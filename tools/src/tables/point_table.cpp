@@ -98,6 +98,11 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());
   });
   table.nodata = source->progress().nodata;
+  if (table.nodata > 0 && !table.info.grid) {
+    common.context().say(with_commas(table.nodata) +
+                         " points with a coordinate that is NaN are left out: "
+                         "numbers of points do not count them");
+  }
   if (table.positions.empty()) {
     throw stream::Error({.file = file,
                          .where = {},

@@ -20,7 +20,7 @@ struct PointTable {
   stream::SourceInfo info;
   std::vector<stream::Point3> positions;  ///< in the coordinates of the CRS
   std::vector<std::byte> payload;         ///< packed records, see stream::StoreSchema
-  std::uint64_t nodata = 0;               ///< cells without data, left out
+  std::uint64_t nodata = 0;               ///< left out: see stream::Progress
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
   /// The attribute of that name as doubles, scale and offset applied.

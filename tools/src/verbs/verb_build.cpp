@@ -164,7 +164,10 @@ class BuildCommand final : public Command {
             ? with_commas(outcome.outliers) + " of them are marked: outlier = 1\n"
             : std::string();
     std::string left_out;
-    if (outcome.nodata > 0) left_out = with_commas(outcome.nodata) + " cells without data";
+    if (outcome.nodata > 0) {
+      left_out = with_commas(outcome.nodata) +
+                 (outcome.raster ? " cells without data" : " with a coordinate that is NaN");
+    }
     if (outcome.excluded > 0) {
       left_out += (left_out.empty() ? "" : " and ") + with_commas(outcome.excluded) +
                   " points that were not selected";
@@ -207,12 +210,11 @@ class BuildCommand final : public Command {
     const BuildOutcome trial = build_store(request_, context);
     const double seconds = watch.seconds();
 
-    // A raster's number of valid cells is not known before it is read: the trial's share is taken.
+    // The number of points with data is not known before they are read: the trial's share is taken.
     const double valid =
         static_cast<double>(trial.points) /
         static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
-    double points =
-        info.points ? static_cast<double>(*info.points) * (info.grid ? valid : 1.0) : -1.0;
+    double points = info.points ? static_cast<double>(*info.points) * valid : -1.0;
     const bool whole = trial.points < kTrialPoints;
     if (whole) points = static_cast<double>(trial.points);
     const double scale = points / static_cast<double>(trial.points);

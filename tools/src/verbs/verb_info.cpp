@@ -311,7 +311,11 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
     text += "nodata:    " + with_commas(contents.nodata) + " cells" +
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
-  text += "points:    " + with_commas(contents.points) + '\n';
+  text += "points:    " + with_commas(contents.points) +
+          (!info.grid && contents.nodata > 0
+               ? ", and " + with_commas(contents.nodata) + " with a coordinate that is NaN"
+               : std::string()) +
+          '\n';
   if (info.octree) {
     text += "octree:    " + with_commas(info.octree->nodes) + " nodes of " +
             std::to_string(info.octree->depths) + " depths, the root's points " +

@@ -34,6 +34,7 @@
 #include "terrace/stream/png.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/scan_surface.hpp"
@@ -54,11 +55,12 @@ struct PictureSelection {
 
 /// What is to be drawn, on the ground.
 struct PictureInput {
-  TriangleMesh mesh;            ///< positions in metres about the middle of the whole
-  std::vector<double> heights;  ///< of the vertices, in the source's unit
-  bool terrain = false;         ///< certainly a height field; else judged by the mesh
-  std::string guess;            ///< a guess that the picture depends on
-  std::string assumption;       ///< an assumption about units
+  TriangleMesh mesh;                 ///< positions in metres about the middle of the whole
+  std::vector<double> heights;       ///< of the vertices, in the source's unit
+  std::vector<LineSet::Line> lines;  ///< of the vertices, in place of triangles
+  bool terrain = false;              ///< certainly a height field; else judged by the mesh
+  std::string guess;                 ///< a guess that the picture depends on
+  std::string assumption;            ///< an assumption about units
 };
 
 /// Moves positions in stored coordinates to metres on the ground about their middle, and keeps the
@@ -201,6 +203,13 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   world.coordinates[0].unit = stored.coordinates[0].unit;
   world.coordinates[2].unit = stored.coordinates[2].unit;
   const Ground ground(world);
+  if (holds_lines(store.schema())) {
+    LineSet set = detail_lines(store, detail, common.context());
+    input.mesh.positions = std::move(set.vertices);
+    input.lines = std::move(set.lines);
+    put_on_ground(input, world, ground);
+    return input;
+  }
   // Those of a mesh are drawn as they are.
   const bool stored_triangles = entities_of(store.schema()) == stream::Entities::triangles;
   if (!store.schema().grid && !selection.triangles && !stored_triangles) {
@@ -256,6 +265,10 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   }
   if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
     no_colours();
+    if (file->nodata > 0) {
+      common.context().say(with_commas(file->nodata) +
+                           " triangles are left out: a coordinate of a corner is NaN");
+    }
     return from_mesh(std::move(*file));
   }
   return from_source(path, selection.colours, most_cells, common);
@@ -340,7 +353,8 @@ class RenderCommand : public Command {
            .remedy = selection_.where.empty() ? "check the file" : "give another --where"});
     }
     const bool terrain = input.terrain || is_height_field(mesh);
-    const std::vector<Rgb> colours = colours_of(mesh, input.heights, terrain);
+    std::vector<Rgb> colours;
+    if (input.lines.empty() || !color_.empty()) colours = colours_of(mesh, input.heights, terrain);
     const double factor = exaggerate(mesh, terrain, view);
 
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
@@ -348,7 +362,9 @@ class RenderCommand : public Command {
     fit(camera, mesh.positions, canvas);
     const Light light = terrain ? Light::for_terrain(view, relief_) : Light::beside(camera);
     const DrawOptions options{.wire = wire_, .threads = common.threads};
-    if (mesh.triangles.empty()) {
+    if (!input.lines.empty()) {
+      draw_lines(mesh.positions, input.lines, colours, camera, options, canvas);
+    } else if (mesh.triangles.empty()) {
       draw_points(mesh, colours, camera, light, options, canvas);
       std::vector<stream::Point3> marks;
       for (const std::uint32_t i : mesh.representatives) marks.push_back(mesh.positions[i]);
@@ -359,10 +375,12 @@ class RenderCommand : public Command {
     Summary summary = write(canvas, size, replace);
     summary.json["vertices"] = mesh.positions.size();
     summary.json["triangles"] = mesh.triangles.size();
+    if (!input.lines.empty()) summary.json["lines"] = input.lines.size();
     summary.json["exaggeration"] = factor;
     summary.add_cost(watch);
     summary.text += with_commas(mesh.positions.size()) + " points, " +
-                    with_commas(mesh.triangles.size()) + " triangles";
+                    (input.lines.empty() ? with_commas(mesh.triangles.size()) + " triangles"
+                                         : with_commas(input.lines.size()) + " lines");
     if (factor != 1) summary.text += ", heights x " + readable_number(factor);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;

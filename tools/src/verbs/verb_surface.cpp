@@ -64,9 +64,11 @@ class SurfaceCommand final : public Command {
     call_library(part_.path, criterion_,
                  [&] { surface = scan_surface(store, detail, options, common.context()); });
     if (surface.mesh.triangles.empty() && surface.tetrahedra.empty()) {
-      common.say(part_.path +
-                 ": the points enclose nothing, as if all were in one plane; "
-                 "'terrace mesh' triangulates heights over x and y");
+      common.say(part_.path + ": the points enclose nothing, " +
+                 (surface.spanned == 0   ? "all are at one place"
+                  : surface.spanned == 1 ? "all are on a line"
+                                         : "as if all were in one plane; 'terrace mesh' "
+                                           "triangulates heights over x and y"));
     }
     places(surface.mesh.positions);
     const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};

@@ -31,9 +31,10 @@ struct SourceInfo : Schema {
   std::vector<std::string> files;  ///< as the caller named them
   /// Where the points will lie, in stored coordinates, as the files say: they may be wrong.
   std::optional<Box3> stated_bounds;
-  std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
-  std::optional<double> nodata;         ///< of the (first) raster, in raw units
-  std::optional<OctreeInfo> octree;     ///< of a single input organised as an octree
+  /// The number of points if known; an upper bound for what has nodata: rasters, PLY, meshes.
+  std::optional<std::uint64_t> points;
+  std::optional<double> nodata;      ///< of the (first) raster, in raw units
+  std::optional<OctreeInfo> octree;  ///< of a single input organised as an octree
   std::vector<std::string> comments;
   std::string note;  ///< for people: how several files were brought together; empty if as they are
   /// Bytes in temporary files that hold input from pipes or gzip for random access.
@@ -59,7 +60,9 @@ struct PointBlock {
 /// The progress of a source. Bytes refer to the input files, if the source knows them.
 struct Progress {
   std::uint64_t points = 0;
-  std::uint64_t nodata = 0;  ///< cells without data, left out
+  /// Left out: cells without data; of XYZ, CSV, PLY and meshes points (entities) of which a
+  /// coordinate is NaN. Infinite coordinates are errors.
+  std::uint64_t nodata = 0;
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
   /// Points left out by Selection::where, region and resolution, whether they were read or not; of
@@ -100,8 +103,9 @@ struct Selection {
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
-  /// infinite. Rasters, COPC, EPT and LAS whose header lies outside are read only as far as needed;
-  /// a raster's columns and rows count from its first cell near the box.
+  /// infinite. Of rasters also those within a millionth of a cell are inside. Rasters, COPC, EPT
+  /// and LAS whose header lies outside are read only as far as needed; a raster's columns and rows
+  /// count from its first cell near the box.
   std::optional<Box3> region{};
   /// Points in `region` at whose x, y this is false are left out too; empty: no others are.
   /// Called by the thread that reads.
@@ -171,7 +175,8 @@ struct SourceOptions {
 /// names have an ending of a format (SourceOptions::format, if given), in the order of their paths;
 /// a folder with an ept.json for that dataset. "@LIST" stands for the names on the lines of LIST,
 /// relative to its folder, without blank lines and those that begin with #; a name with *, ? or
-/// [...] that is not an existing file for the files that match the pattern. Throws: Error, Stopped;
+/// [...] that is not an existing file for the files that match the pattern, in which a part ** of
+/// the path stands for any number of folders. Throws: Error, Stopped;
 /// std::invalid_argument for a format that is not known.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});

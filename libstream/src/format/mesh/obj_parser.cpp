@@ -86,7 +86,7 @@ bool read_vertex(std::string_view& text, Point3& vertex) {
     text = trim_left(text);
     const char* const end = text.data() + text.size();
     const char* const rest = parse_real(text.data(), end, value);
-    if (rest == nullptr || !std::isfinite(value)) return false;
+    if (rest == nullptr || std::isinf(value)) return false;
     text = {rest, static_cast<std::size_t>(end - rest)};
   }
   return true;

@@ -28,6 +28,7 @@ class MeshParser {
   /// Stopped.
   virtual Item next() = 0;
 
+  /// Its coordinates are finite or NaN (see is_missing()).
   [[nodiscard]] const Point3& vertex() const { return vertex_; }
   /// Three or more corners: vertex indices from 0, all of them already read.
   [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
@@ -49,8 +50,8 @@ class MeshParser {
   std::vector<std::string> comments_;
 };
 
-/// Reads the next coordinates of a line and moves past them; false unless there are three finite
-/// numbers.
+/// Reads the next coordinates of a line and moves past them; false unless there are three numbers,
+/// none of them infinite.
 bool read_vertex(std::string_view& text, Point3& vertex);
 
 /// input: at its first byte; must outlive the parser. faces: false skips them.

@@ -12,6 +12,7 @@
 #include "format/formats.hpp"
 #include "format/mesh/parser.hpp"
 #include "format/mesh/triangles.hpp"
+#include "format/missing.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -43,14 +44,18 @@ class MeshPoints final : public PointSource {
   bool next(PointBlock& block) override {
     block.clear();
     while (block.size() < block_points_ && parser_->next() == MeshParser::Item::vertex) {
-      block.positions.push_back(parser_->vertex());
+      if (is_missing(parser_->vertex())) {
+        ++nodata_;
+      } else {
+        block.positions.push_back(parser_->vertex());
+      }
     }
     delivered_ += block.size();
     return !block.empty();
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_};
+    Progress progress{.points = delivered_, .nodata = nodata_};
     if (input_.size() && *input_.size() > 0) {
       progress.fraction =
           std::min(1.0, static_cast<double>(input_.offset()) / static_cast<double>(*input_.size()));
@@ -63,7 +68,7 @@ class MeshPoints final : public PointSource {
   std::unique_ptr<MeshParser> parser_;
   std::size_t block_points_;
   SourceInfo info_;
-  std::uint64_t delivered_ = 0;
+  std::uint64_t delivered_ = 0, nodata_ = 0;
 };
 
 template <MakeParser kMake>

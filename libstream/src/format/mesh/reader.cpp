@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -9,6 +12,7 @@
 
 #include "format/formats.hpp"
 #include "format/mesh/parser.hpp"
+#include "format/missing.hpp"
 #include "format/ply/mesh.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
@@ -33,6 +37,10 @@ class Welder {
   explicit Welder(MeshFile& mesh) : mesh_(&mesh) {}
   std::uint32_t number_of(const Point3& place) {
     std::vector<Point3>& all = mesh_->vertices.positions;
+    if (is_missing(place)) {  // NaN has no order
+      all.push_back(place);
+      return static_cast<std::uint32_t>(all.size() - 1);
+    }
     const auto [at, is_new] = numbers_.emplace(place, static_cast<std::uint32_t>(all.size()));
     if (is_new) all.push_back(place);
     return at->second;
@@ -79,9 +87,31 @@ MeshFile read_simple(const std::string& file, const SourceOptions& options,
   return mesh;
 }
 
-}  // namespace
+/// Leaves out vertices of which a coordinate is NaN, and the triangles that have one.
+void leave_out_missing(MeshFile& mesh) {
+  PointBlock& vertices = mesh.vertices;
+  constexpr std::uint32_t kLeftOut = std::numeric_limits<std::uint32_t>::max();
+  const std::size_t record = mesh.info.payload_size();
+  std::vector<std::uint32_t> numbers(vertices.size(), kLeftOut);
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (is_missing(vertices.positions[i])) continue;
+    vertices.positions[kept] = vertices.positions[i];
+    std::copy_n(vertices.payload.data() + i * record, record,
+                vertices.payload.data() + kept * record);
+    numbers[i] = kept++;
+  }
+  if (kept == vertices.size()) return;
+  vertices.positions.resize(kept);
+  vertices.payload.resize(kept * record);
+  mesh.info.points = kept;
+  mesh.nodata = std::erase_if(mesh.triangles, [&](TriangleIndices& triangle) {
+    for (std::uint32_t& corner : triangle) corner = numbers[corner];
+    return std::find(triangle.begin(), triangle.end(), kLeftOut) != triangle.end();
+  });
+}
 
-std::optional<MeshFile> read_mesh(const std::string& file, const SourceOptions& options) {
+std::optional<MeshFile> read_any_mesh(const std::string& file, const SourceOptions& options) {
   // What a pipe has given would be missing where the file is read as a cloud, unless its format is
   // told by name.
   std::vector<char> head;
@@ -100,6 +130,14 @@ std::optional<MeshFile> read_mesh(const std::string& file, const SourceOptions& 
     return mesh;
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<MeshFile> read_mesh(const std::string& file, const SourceOptions& options) {
+  std::optional<MeshFile> mesh = read_any_mesh(file, options);
+  if (mesh) leave_out_missing(*mesh);
+  return mesh;
 }
 
 }  // namespace terrace::stream

@@ -139,8 +139,8 @@ class StlBinary final : public StlParser {
     const char* at = input_->window().data() + kNormalBytes + std::size_t{12} * corner_;
     for (double& value : vertex_) {
       value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
-      if (!std::isfinite(value)) {
-        fail("triangle " + std::to_string(faces_) + " has a corner that is not finite");
+      if (std::isinf(value)) {
+        fail("triangle " + std::to_string(faces_) + " has an infinite coordinate");
       }
       at += 4;
     }

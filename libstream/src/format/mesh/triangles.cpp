@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "format/missing.hpp"
 #include "io/spool.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -116,7 +117,7 @@ class TriangleSource final : public PointSource {
       }
     }
     delivered_ += block.size();
-    if (delivered_ == 0) {
+    if (delivered_ + nodata_ == 0) {
       throw Error({.file = info_.files.front(),
                    .where = {},
                    .cause = "has no faces, so no triangles",
@@ -126,7 +127,7 @@ class TriangleSource final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_};
+    Progress progress{.points = delivered_, .nodata = nodata_};
     const Input& input = mesh_.parser->input();
     if (input.size() && *input.size() > 0) {
       progress.fraction =
@@ -140,7 +141,11 @@ class TriangleSource final : public PointSource {
     return mesh_.parser->is_soup() ? soup_[number % 3] : vertices_[number];
   }
 
-  void append(PointBlock& block, const Point3& a, const Point3& b, const Point3& c) const {
+  void append(PointBlock& block, const Point3& a, const Point3& b, const Point3& c) {
+    if (is_missing(a) || is_missing(b) || is_missing(c)) {
+      ++nodata_;
+      return;
+    }
     block.positions.push_back(a);
     for (const Point3& point : {b, c}) {
       for (const double value : point) {
@@ -163,7 +168,7 @@ class TriangleSource final : public PointSource {
   SourceInfo info_;
   VertexTable vertices_;
   std::array<Point3, 3> soup_{};  ///< the last corners of what has no shared vertices
-  std::uint64_t soup_size_ = 0, delivered_ = 0;
+  std::uint64_t soup_size_ = 0, delivered_ = 0, nodata_ = 0;
   std::size_t fan_ = 0;  ///< the last corner of the next triangle of the face
   bool in_face_ = false;
 };

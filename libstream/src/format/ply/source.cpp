@@ -17,6 +17,7 @@
 #include "format/chain.hpp"
 #include "format/formats.hpp"
 #include "format/mesh/triangles.hpp"
+#include "format/missing.hpp"
 #include "format/packed_column.hpp"
 #include "format/ply/decode.hpp"
 #include "format/ply/header.hpp"
@@ -43,11 +44,13 @@ struct Field {
 
 class PlySource final : public PointSource {
  public:
-  PlySource(const std::string& file, const SourceOptions& options)
+  /// keeps_missing: also delivers vertices of which a coordinate is NaN, as faces count them.
+  PlySource(const std::string& file, const SourceOptions& options, bool keeps_missing)
       : input_(file, options.stop),
         lines_(input_),
         header_(read_ply_header(input_)),
-        block_points_(options.block_points) {
+        block_points_(options.block_points),
+        keeps_missing_(keeps_missing) {
     const auto vertex = std::find_if(header_.elements.begin(), header_.elements.end(),
                                      [](const PlyElement& e) { return e.name == "vertex"; });
     if (vertex == header_.elements.end()) {
@@ -75,20 +78,10 @@ class PlySource final : public PointSource {
   const SourceInfo& info() const override { return info_; }
 
   bool next(PointBlock& block) override {
-    const auto wanted =
-        static_cast<std::size_t>(std::min<std::uint64_t>(block_points_, count_ - delivered_));
-    block.positions.resize(wanted);
-    block.payload.resize(wanted * record_bytes_);
-    if (header_.encoding == PlyEncoding::ascii) {
-      for (std::size_t i = 0; i < wanted; ++i) read_line(block, i);
-    } else if (has_lists_) {
-      for (std::size_t i = 0; i < wanted; ++i) read_row(block, i);
-    } else {
-      read_rows(block, wanted);
-    }
-    check_finite(block);
-    delivered_ += wanted;
-    return wanted > 0;
+    do {
+      read_block(block);
+    } while (block.empty() && read_ < count_);
+    return !block.empty();
   }
 
   /// Appends the triangles of the next polygon or strip behind the vertices, which have all been
@@ -125,10 +118,10 @@ class PlySource final : public PointSource {
   [[nodiscard]] const Input& input() const { return input_; }
 
   Progress progress() const override {
-    return {.points = delivered_,
-            .nodata = 0,
-            .fraction =
-                count_ == 0 ? 1.0 : static_cast<double>(delivered_) / static_cast<double>(count_)};
+    return {
+        .points = read_ - nodata_,
+        .nodata = nodata_,
+        .fraction = count_ == 0 ? 1.0 : static_cast<double>(read_) / static_cast<double>(count_)};
   }
 
  private:
@@ -226,6 +219,25 @@ class PlySource final : public PointSource {
     return items <= std::numeric_limits<std::uint64_t>::max() / size && input_.skip(items * size);
   }
 
+  void read_block(PointBlock& block) {
+    const auto wanted =
+        static_cast<std::size_t>(std::min<std::uint64_t>(block_points_, count_ - read_));
+    block.positions.resize(wanted);
+    block.payload.resize(wanted * record_bytes_);
+    if (header_.encoding == PlyEncoding::ascii) {
+      for (std::size_t i = 0; i < wanted; ++i) read_line(block, i);
+    } else if (has_lists_) {
+      for (std::size_t i = 0; i < wanted; ++i) read_row(block, i);
+    } else {
+      read_rows(block, wanted);
+    }
+    if (!is_finite(block)) {
+      check_infinite(block);
+      if (!keeps_missing_) leave_out_missing(block);
+    }
+    read_ += wanted;
+  }
+
   /// Vertices of fixed size in a binary file.
   void read_rows(PointBlock& block, std::size_t wanted) {
     for (std::size_t done = 0; done < wanted;) {
@@ -233,7 +245,7 @@ class PlySource final : public PointSource {
           std::min(wanted - done, std::max<std::size_t>(1, kChunkBytes / stride_));
       const std::string_view window = input_.fill(rows * stride_);
       if (window.size() < rows * stride_) {
-        fail_end("vertex", delivered_ + done + window.size() / stride_);
+        fail_end("vertex", read_ + done + window.size() / stride_);
       }
       for (const Field& field : fields_) {
         const PackedColumn column{.rows = window.data() + field.offset,
@@ -257,9 +269,9 @@ class PlySource final : public PointSource {
   void read_row(PointBlock& block, std::size_t i) {
     std::array<std::byte, 8> raw{};
     for (const Field& field : fields_) {
-      const bool good = field.property.list ? skip_list(field.property, "vertex", delivered_ + i)
+      const bool good = field.property.list ? skip_list(field.property, "vertex", read_ + i)
                                             : read_scalar(field.property.type, raw.data());
-      if (!good) fail_end("vertex", delivered_ + i);
+      if (!good) fail_end("vertex", read_ + i);
       store(block, field, i, raw.data());
     }
   }
@@ -268,7 +280,7 @@ class PlySource final : public PointSource {
   void read_line(PointBlock& block, std::size_t i) {
     std::string_view line;
     do {
-      if (!lines_.next(line)) fail_end("vertex", delivered_ + i);
+      if (!lines_.next(line)) fail_end("vertex", read_ + i);
       line = trim_left(line);
     } while (line.empty());
     std::array<std::byte, 8> raw{};
@@ -403,17 +415,31 @@ class PlySource final : public PointSource {
     }
   }
 
-  void check_finite(const PointBlock& block) const {
+  static bool is_finite(const PointBlock& block) {
     // A number less itself is zero unless it is infinite or NaN, and a sum of zeros stays zero.
     double sum = 0.0;
     for (const Point3& p : block.positions) sum += (p[0] - p[0]) + (p[1] - p[1]) + (p[2] - p[2]);
-    if (sum == 0.0) return;
+    return sum == 0.0;
+  }
+  void check_infinite(const PointBlock& block) const {
     for (std::size_t i = 0; i < block.size(); ++i) {
-      const Point3& p = block.positions[i];
-      if ((p[0] - p[0]) + (p[1] - p[1]) + (p[2] - p[2]) == 0.0) continue;
-      fail("vertex " + std::to_string(delivered_ + i), "a coordinate is infinite or NaN",
+      if (!is_infinite(block.positions[i])) continue;
+      fail("vertex " + std::to_string(read_ + i), "a coordinate is infinite",
            "leave such vertices out");
     }
+  }
+  void leave_out_missing(PointBlock& block) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (is_missing(block.positions[i])) continue;
+      block.positions[kept] = block.positions[i];
+      const std::byte* const record = block.payload.data() + i * record_bytes_;
+      std::copy_n(record, record_bytes_, block.payload.data() + kept * record_bytes_);
+      ++kept;
+    }
+    nodata_ += block.size() - kept;
+    block.positions.resize(kept);
+    block.payload.resize(kept * record_bytes_);
   }
 
   Input input_;
@@ -422,9 +448,9 @@ class PlySource final : public PointSource {
   std::size_t block_points_;
   SourceInfo info_;
   std::vector<Field> fields_;
-  std::uint64_t count_ = 0, delivered_ = 0;
+  std::uint64_t count_ = 0, read_ = 0, nodata_ = 0;
   std::size_t stride_ = 0, record_bytes_ = 0;
-  bool has_lists_ = false, swap_ = false;
+  bool has_lists_ = false, swap_ = false, keeps_missing_;
   std::vector<std::int64_t> corners_;  ///< of one face
   std::size_t element_ = 0;            ///< whose items are read behind the vertices
   std::uint64_t item_ = 0;
@@ -434,7 +460,8 @@ class PlySource final : public PointSource {
 /// Vertices without their attributes, then triangles.
 class PlyParser final : public MeshParser {
  public:
-  PlyParser(const std::string& file, const SourceOptions& options) : source_(file, options) {}
+  PlyParser(const std::string& file, const SourceOptions& options)
+      : source_(file, options, /*keeps_missing=*/true) {}
 
   const char* format() const override { return "ply"; }
   const Input& input() const override { return source_.input(); }
@@ -483,7 +510,9 @@ bool recognise_ply(std::span<const std::byte> head) {
 
 std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options) {
   assert(options.block_points > 0);
-  if (options.entities == Entities::points) return std::make_unique<PlySource>(file, options);
+  if (options.entities == Entities::points) {
+    return std::make_unique<PlySource>(file, options, /*keeps_missing=*/false);
+  }
   return triangles_of({nullptr, std::make_unique<PlyParser>(file, options)}, options);
 }
 
@@ -495,7 +524,7 @@ std::unique_ptr<PointSource> open_ply(std::span<const std::string> files,
 }  // namespace
 
 std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptions& options) {
-  PlySource source(file, options);
+  PlySource source(file, options, /*keeps_missing=*/true);
   if (!source.has_faces()) return std::nullopt;
   MeshFile mesh;
   mesh.info = source.info();

@@ -16,6 +16,7 @@
 
 #include "format/chain.hpp"
 #include "format/formats.hpp"
+#include "format/missing.hpp"
 #include "format/selection.hpp"
 #include "format/text/xyz_layout.hpp"
 #include "io/line_reader.hpp"
@@ -186,7 +187,9 @@ class XyzSource final : public PointSource {
       const Point3 point{row_[ix], row_[iy], row_[iz]};
       // Infinities and NaN are what remains when a number less itself is not zero.
       if (!((point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0.0)) {
-        refuse(line);
+        if (is_infinite(point)) refuse(line);
+        ++nodata_;
+        continue;
       }
       block.positions[count] = point;
       for (const std::size_t column : layout_.attributes) {
@@ -206,7 +209,7 @@ class XyzSource final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_, .nodata = 0, .fraction = 0.0};
+    Progress progress{.points = delivered_, .nodata = nodata_, .fraction = 0.0};
     if (input_.size() && *input_.size() > 0) {
       progress.fraction =
           std::min(1.0, static_cast<double>(input_.offset()) / static_cast<double>(*input_.size()));
@@ -308,7 +311,7 @@ class XyzSource final : public PointSource {
              : coordinate ? "every point needs x, y and z"
                           : "correct it, or leave the column out (`drop` of build and convert)");
       }
-      if (coordinate && !std::isfinite(value)) {
+      if (coordinate && std::isinf(value)) {
         fail(column + " is " + std::string(field) + ", but a coordinate must be finite",
              "leave the line out");
       }
@@ -327,7 +330,7 @@ class XyzSource final : public PointSource {
   std::vector<ScalarType> types_;  ///< of the columns: f64, i64 or u64
   std::vector<bool> whole_;        ///< columns of doubles that seem to be integers
   SourceInfo info_;
-  std::uint64_t delivered_ = 0;
+  std::uint64_t delivered_ = 0, nodata_ = 0;
 };
 
 /// True for text whose first line that is no comment, or the one after a header, begins a table of

@@ -2,6 +2,7 @@
 #include "terrace/stream/raster.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -15,14 +16,47 @@
 #include <vector>
 
 #include "format/formats.hpp"
+#include "format/grid/ascii_grid.hpp"
+#include "format/grid/binary_grid.hpp"
+#include "format/grid/height_map.hpp"
+#include "format/grid/hgt.hpp"
+#include "format/grid/usgs_dem.hpp"
 #include "format/raster_points.hpp"
 #include "format/vrt/document.hpp"
+#include "io/peek.hpp"
 #include "raster/nodata.hpp"
 #include "raster/overlay.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 namespace {
+
+/// A raster of any format but VRT, told by content, then by ending.
+std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions& options) {
+  struct Kind {
+    const Format& (*format)();
+    std::unique_ptr<Raster> (*open)(const std::string& file, const RasterOptions& options);
+  };
+  static constexpr std::array<Kind, 6> kKinds{
+      {{&geotiff_format, &open_geotiff},
+       {&hgt_format, &open_hgt},
+       {&ascii_grid_format,
+        [](const std::string& name, const RasterOptions&) { return open_ascii_grid(name); }},
+       {&usgs_dem_format,
+        [](const std::string& name, const RasterOptions&) { return open_usgs_dem(name); }},
+       {&png_format, &open_height_map},
+       {&binary_grid_format, &open_binary_grid}}};
+  constexpr std::size_t kTellingBytes = 4096;
+  const std::vector<char> head = peek_head(file, kTellingBytes, {});
+  for (const Kind& kind : kKinds) {
+    if (kind.format().recognise(std::as_bytes(std::span(head)))) return kind.open(file, options);
+  }
+  const Format* const told = format_of_name(file);
+  for (const Kind& kind : kKinds) {
+    if (told != nullptr && told->name == kind.format().name) return kind.open(file, options);
+  }
+  return open_geotiff(file, options);
+}
 
 class VrtRaster final : public Raster {
  public:
@@ -119,7 +153,7 @@ class VrtRaster final : public Raster {
   [[nodiscard]] std::unique_ptr<Raster> open(const VrtSource& source) const {
     RasterOptions options = options_;
     options.band = source.band;
-    std::unique_ptr<Raster> raster = open_geotiff(source.file, options);
+    std::unique_ptr<Raster> raster = open_member(source.file, options);
     const RasterInfo& found = raster->info();
     const auto refuse = [&](const std::string& cause) {
       throw Error({.file = info_.files.front(),

@@ -72,7 +72,8 @@ struct BuildRequest {
 
 struct BuildOutcome {
   std::uint64_t points = 0;
-  std::uint64_t nodata = 0;
+  std::uint64_t nodata = 0;    ///< cells without data; points of which a coordinate is NaN
+  bool raster = false;         ///< the points are cells
   std::uint64_t excluded = 0;  ///< points that the selection left out
   std::uint64_t lost = 0;      ///< points in damaged parts, left out
   std::uint64_t outliers = 0;  ///< points marked as outliers

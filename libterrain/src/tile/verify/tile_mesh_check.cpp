@@ -70,13 +70,14 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   }
   const Point3 right = horizon_occlusion_point(towards, points);
   const double needed = std::sqrt(dot(right, right));
+  constexpr int kDigits = 12;  // these numbers are little above 1
   if (length < needed * (1.0 - 1e-9)) {
     fault(kHorizonAt, "the horizon occlusion point is hidden while a vertex is not: it is " +
-                          readable_number(length) + " radii out, " + readable_number(needed) +
-                          " are needed");
+                          readable_number(length, kDigits) + " radii out, " +
+                          readable_number(needed, kDigits) + " are needed");
   } else if (length > needed * (1.0 + kShareSlack)) {
-    fault(kHorizonAt, "the horizon occlusion point is " + readable_number(length) + " radii out, " +
-                          readable_number(needed) + " are needed");
+    fault(kHorizonAt, "the horizon occlusion point is " + readable_number(length, kDigits) +
+                          " radii out, " + readable_number(needed, kDigits) + " are needed");
   }
   return faults;
 }
