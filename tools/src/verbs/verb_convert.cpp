@@ -94,10 +94,16 @@ class ConvertCommand : public Command {
                     {"excluded", source->progress().excluded},
                     {"lost", source->progress().lost}};
     summary.add_cost(watch);
-    const std::uint64_t excluded = source->progress().excluded;
+    const stream::Progress done = source->progress();
+    std::string left_out;
+    if (done.excluded > 0) left_out = with_commas(done.excluded) + " were not selected";
+    if (done.nodata > 0 && !info.grid) {
+      left_out += (left_out.empty() ? "" : ", ") + with_commas(done.nodata) +
+                  " had a coordinate that is NaN";
+    }
     summary.text = output_ + ": " + with_commas(writer->points()) + " points" +
-                   (excluded > 0 ? " (" + with_commas(excluded) + " were not selected)" : "") +
-                   ", " + readable_seconds(watch.seconds()) + '\n';
+                   (left_out.empty() ? "" : " (" + left_out + ")") + ", " +
+                   readable_seconds(watch.seconds()) + '\n';
     tell_rounding(*writer, summary);
     return summary;
   }
