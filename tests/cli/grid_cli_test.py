@@ -324,8 +324,10 @@ class GridTest(unittest.TestCase):
             file.write(tile.tobytes())
         with open(self.path('real.asc'), 'w') as file:
             file.write('ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n0.5 1 2 3 4 5\n')
-        for file, columns, rows, kind, first in (('N46E008.hgt', side, side, 'Int16', height(0, 0)),
-                                                 ('real.asc', 3, 2, 'Float32', 0.5)):
+        with open(self.path('whole.asc'), 'w') as file:
+            file.write('ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\nnodata_value -9\n-7 16777215\n-9 4\n')
+        for file, columns, rows, kind in (('N46E008.hgt', side, side, 'Int16'), ('real.asc', 3, 2, 'Float32'),
+                                          ('whole.asc', 2, 2, 'Int32')):
             with open(self.path('a.vrt'), 'w') as vrt:
                 vrt.write(f'<VRTDataset rasterXSize="{columns}" rasterYSize="{rows}"><GeoTransform>0,1,0,0,0,-1'
                           f'</GeoTransform><VRTRasterBand dataType="{kind}" band="1"><SimpleSource>'

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <list>
 #include <memory>
 #include <optional>
@@ -27,6 +29,7 @@
 #include "raster/nodata.hpp"
 #include "raster/overlay.hpp"
 #include "terrace/stream/error.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -57,6 +60,62 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
   }
   return open_geotiff(file, options);
 }
+
+/// A grid of text with integers as samples: its whole numbers are reals to us, integers to GDAL.
+class WholeNumbers final : public Raster {
+ public:
+  WholeNumbers(std::unique_ptr<Raster> raster, ScalarType type)
+      : raster_(std::move(raster)), info_(raster_->info()) {
+    info_.sample.type = type;
+  }
+
+  [[nodiscard]] const RasterInfo& info() const override { return info_; }
+  void set_open_bytes(std::uint64_t bytes) override { raster_->set_open_bytes(bytes); }
+
+  bool read_over(const CellWindow& window, const CellBuffer& out) override {
+    const ScalarType from = raster_->info().sample.type;
+    const auto columns = static_cast<std::size_t>(window.columns);
+    reals_.resize(columns * size_of(from));
+    bool any = false;
+    for (std::uint64_t row = 0; row < window.rows; ++row) {
+      valid_.assign(columns, 0);
+      raster_->read_over(
+          {.column = window.column, .row = window.row + row, .columns = window.columns, .rows = 1},
+          {.samples = reals_.data(), .valid = valid_.data(), .stride = columns});
+      for (std::size_t i = 0; i < columns; ++i) {
+        if (valid_[i] == 0) continue;
+        const std::size_t to = static_cast<std::size_t>(row) * out.stride + i;
+        put(to_double(from, reals_.data() + i * size_of(from)), out.samples, to);
+        out.valid[to] = 1;
+        any = true;
+      }
+    }
+    return any;
+  }
+
+ private:
+  void put(double real, std::byte* samples, std::size_t to) const {
+    with_type(info_.sample.type, [&]<class T>(T) {
+      // Both limits are exact: the upper one is the power of two after the largest value.
+      const double end = std::ldexp(1.0, std::numeric_limits<T>::digits);
+      if (!(real >= static_cast<double>(std::numeric_limits<T>::min()) && real < end) ||
+          real != std::trunc(real)) {
+        throw Error({.file = info_.files.front(),
+                     .where = {},
+                     .cause = "has samples that are no " + std::string(name_of(info_.sample.type)) +
+                              ", which those of the whole are",
+                     .remedy = "make the virtual raster anew"});
+      }
+      const T number = static_cast<T>(real);
+      std::memcpy(samples + to * sizeof number, &number, sizeof number);
+    });
+  }
+
+  std::unique_ptr<Raster> raster_;
+  RasterInfo info_;
+  std::vector<std::byte> reals_;
+  std::vector<std::uint8_t> valid_;
+};
 
 class VrtRaster final : public Raster {
  public:
@@ -154,6 +213,11 @@ class VrtRaster final : public Raster {
     RasterOptions options = options_;
     options.band = source.band;
     std::unique_ptr<Raster> raster = open_member(source.file, options);
+    const ScalarType type = info_.sample.type;
+    const bool reals = type == ScalarType::f32 || type == ScalarType::f64;
+    if (raster->info().format == ascii_grid_format().name && !reals) {
+      raster = std::make_unique<WholeNumbers>(std::move(raster), type);
+    }
     const RasterInfo& found = raster->info();
     const auto refuse = [&](const std::string& cause) {
       throw Error({.file = info_.files.front(),
