@@ -36,10 +36,12 @@ struct Drawn {
   std::uint64_t segments = 0, open_points = 0;
 };
 
-Drawn draw(const std::vector<double>& lattice, double interval, std::int64_t band) {
+Drawn draw(const std::vector<double>& lattice, double interval, std::int64_t band,
+           unsigned threads = 1) {
   Drawn drawn;
-  ContourLines lines(kColumns, interval,
-                     [&](const ContourLine& line) { drawn.lines.push_back(line); });
+  ContourLines lines(
+      kColumns, interval, [&](const ContourLine& line) { drawn.lines.push_back(line); }, {},
+      threads);
   for (std::int64_t row = 0; row + 1 < kRows; row += band) {
     const std::int64_t rows = std::min(band + 1, kRows - row);
     lines.add(std::span(lattice).subspan(static_cast<std::size_t>(row * kColumns),
@@ -77,6 +79,18 @@ std::map<Edge, int> edges_of(const std::vector<double>& lattice) {
     }
   }
   return edges;
+}
+
+TEST(ContourLines, AreTheSameOnAnyNumberOfThreads) {
+  const std::vector<double> lattice = random_lattice(7, 40, 9);
+  const Drawn one = draw(lattice, 5, 10), several = draw(lattice, 5, 10, 4);
+  ASSERT_GT(one.lines.size(), 10u);
+  ASSERT_EQ(one.lines.size(), several.lines.size());
+  for (std::size_t i = 0; i < one.lines.size(); ++i) {
+    EXPECT_EQ(one.lines[i].level, several.lines[i].level);
+    EXPECT_EQ(one.lines[i].points, several.lines[i].points);
+  }
+  EXPECT_EQ(one.segments, several.segments);
 }
 
 TEST(ContourLines, CrossEveryEdgeWhoseEndsStraddleALevelAndEndAtBordersOnly) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "base/parallel.hpp"
 #include "base/portable_math.hpp"
 
 namespace terrace::terrain {
@@ -16,8 +17,12 @@ constexpr std::uint64_t kHorizontal = 0, kVerticalSide = 1, kFalling = 2, kRisin
 }  // namespace
 
 ContourLines::ContourLines(std::int64_t columns, double interval,
-                           std::function<void(ContourLine&&)> emit, OpenLineLimit limit)
-    : columns_(columns), contour_levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
+                           std::function<void(ContourLine&&)> emit, OpenLineLimit limit,
+                           unsigned threads)
+    : columns_(columns),
+      contour_levels_(interval),
+      joiner_(std::move(emit), std::move(limit)),
+      threads_(threads) {}
 
 std::size_t ContourLines::Hash::operator()(const Crossing& c) const {
   return scramble(c.edge ^ scramble(static_cast<std::uint64_t>(c.level)));
@@ -59,24 +64,38 @@ void ContourLines::emit_whole(std::int64_t last_row, bool all) {
   });
 }
 
+void ContourLines::find_crossed(std::span<const double> heights, std::int64_t rows) {
+  const auto columns = static_cast<std::size_t>(columns_);
+  levels_.resize(heights.size());
+  parallel_for(static_cast<std::size_t>(rows), threads_, [&](unsigned, std::size_t row) {
+    for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
+      levels_[i] = std::isnan(heights[i]) ? 0 : contour_levels_.at_or_above(heights[i]);
+    }
+  });
+  crossed_.resize(std::max(crossed_.size(), static_cast<std::size_t>(rows - 1)));
+  parallel_for(static_cast<std::size_t>(rows - 1), threads_, [&](unsigned, std::size_t row) {
+    crossed_[row].clear();
+    for (std::size_t column = 0; column + 1 < columns; ++column) {
+      const std::size_t at = row * columns + column, below = at + columns;
+      const std::int64_t level = levels_[at];
+      if (levels_[at + 1] == level && levels_[below] == level && levels_[below + 1] == level) {
+        continue;
+      }
+      crossed_[row].push_back(static_cast<std::uint32_t>(column));
+    }
+  });
+}
+
 void ContourLines::add(std::span<const double> heights, std::int64_t rows,
                        const std::function<bool(std::int64_t, std::int64_t)>& wanted) {
-  levels_.resize(heights.size());
-  for (std::size_t i = 0; i < heights.size(); ++i) {
-    levels_[i] = std::isnan(heights[i]) ? 0 : contour_levels_.at_or_above(heights[i]);
-  }
+  find_crossed(heights, rows);
   const auto corner = [&](std::int64_t column, std::int64_t row) {
     const auto at = static_cast<std::size_t>(row * columns_ + column);
     return Corner{column, row_ + row, heights[at], levels_[at]};
   };
   for (std::int64_t row = 0; row + 1 < rows; ++row) {
-    for (std::int64_t column = 0; column + 1 < columns_; ++column) {
-      const auto at = static_cast<std::size_t>(row * columns_ + column);
-      const auto below = at + static_cast<std::size_t>(columns_);
-      const std::int64_t level = levels_[at];
-      if (levels_[at + 1] == level && levels_[below] == level && levels_[below + 1] == level) {
-        continue;
-      }
+    for (const std::uint32_t crossed : crossed_[static_cast<std::size_t>(row)]) {
+      const std::int64_t column = crossed;
       if (wanted && !wanted(column, row_ + row)) continue;
       const Corner c00 = corner(column, row), c10 = corner(column + 1, row),
                    c01 = corner(column, row + 1), c11 = corner(column + 1, row + 1);

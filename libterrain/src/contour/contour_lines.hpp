@@ -23,7 +23,7 @@ class ContourLines {
   /// columns: of the lattice. emit: takes every line once it is whole, in an order that depends on
   /// the lattice alone. Lines that shrink to a point are left out.
   ContourLines(std::int64_t columns, double interval, std::function<void(ContourLine&&)> emit,
-               OpenLineLimit limit = {});
+               OpenLineLimit limit = {}, unsigned threads = 1);
 
   /// The next band: `rows` rows of heights (NaN: no data), of which the first is the last of the
   /// band before. wanted: whether the square right of and below (column, row) of the lattice
@@ -57,6 +57,8 @@ class ContourLines {
   [[nodiscard]] Crossing crossing(std::int64_t level, const Corner& a, const Corner& b) const;
   [[nodiscard]] Point2 place(std::int64_t level, const Corner& a, const Corner& b) const;
   void triangle(const Corner& a, const Corner& b, const Corner& c);
+  /// Fills levels_ and crossed_ with all threads.
+  void find_crossed(std::span<const double> heights, std::int64_t rows);
   void emit_whole(std::int64_t last_row, bool all);
 
   std::int64_t columns_;
@@ -64,6 +66,9 @@ class ContourLines {
   LineJoiner<Crossing, Hash> joiner_;
   std::int64_t row_ = 0;  ///< of the next band's first row
   std::vector<std::int64_t> levels_;
+  std::vector<std::vector<std::uint32_t>>
+      crossed_;  ///< by row of the band: columns of squares that levels may cross
+  unsigned threads_;
 };
 
 }  // namespace terrace::terrain

@@ -63,7 +63,7 @@ void draw_lattice_contours(const ContourParts& parts) {
         for (Point2& p : line.points) p = stored(p);
         parts.emit(std::move(line));
       },
-      parts.limit);
+      parts.limit, parts.threads);
   std::function<bool(std::int64_t, std::int64_t)> wanted;
   if (request.region) {
     wanted = [&](std::int64_t column, std::int64_t row) {
