@@ -81,6 +81,15 @@ std::map<Edge, int> edges_of(const std::vector<double>& lattice) {
   return edges;
 }
 
+TEST(ContourLines, ComeInTheSameOrderByBandsOfAnySize) {
+  const std::vector<double> lattice = random_lattice(7, 40, 9);
+  const Drawn large = draw(lattice, 5, 256), small = draw(lattice, 5, 2);
+  ASSERT_EQ(large.lines.size(), small.lines.size());
+  for (std::size_t i = 0; i < large.lines.size(); ++i) {
+    EXPECT_EQ(large.lines[i].points, small.lines[i].points);
+  }
+}
+
 TEST(ContourLines, AreTheSameOnAnyNumberOfThreads) {
   const std::vector<double> lattice = random_lattice(7, 40, 9);
   const Drawn one = draw(lattice, 5, 10), several = draw(lattice, 5, 10, 4);

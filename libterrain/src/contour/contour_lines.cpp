@@ -111,9 +111,13 @@ void ContourLines::add(std::span<const double> heights, std::int64_t rows,
     }
   }
   row_ += rows - 1;
-  emit_whole(row_, false);
+  // Not after every band: the order of lines would depend on how many rows fit into memory.
+  if (row_ % kMostBandRows == 0) emit_whole(row_, false);
 }
 
-void ContourLines::finish() { emit_whole(row_, true); }
+void ContourLines::finish() {
+  emit_whole(row_, false);
+  emit_whole(row_, true);
+}
 
 }  // namespace terrace::terrain

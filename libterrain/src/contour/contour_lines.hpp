@@ -20,6 +20,9 @@ namespace terrace::terrain {
 /// lines that are not at their ends.
 class ContourLines {
  public:
+  /// Bands whose rows, less the first, are a part of so many give the lines in the same order.
+  static constexpr std::int64_t kMostBandRows = 256;
+
   /// columns: of the lattice. emit: takes every line once it is whole, in an order that depends on
   /// the lattice alone. Lines that shrink to a point are left out.
   ContourLines(std::int64_t columns, double interval, std::function<void(ContourLine&&)> emit,

@@ -15,7 +15,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::int64_t kBandRows = 256, kWindow = 512;
+constexpr std::int64_t kWindow = 512;
 /// Bytes per sample of a band: its height and its level.
 constexpr std::uint64_t kContourBytesPerSample = 16;
 
@@ -50,9 +50,10 @@ void draw_lattice_contours(const ContourParts& parts) {
   }
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);
-  const std::int64_t band = std::clamp<std::int64_t>(
-      static_cast<std::int64_t>(parts.memory_bytes / 4 / kContourBytesPerSample) / lattice.columns,
-      2, kBandRows);
+  const std::int64_t fits =
+      static_cast<std::int64_t>(parts.memory_bytes / 4 / kContourBytesPerSample) / lattice.columns;
+  std::int64_t band = ContourLines::kMostBandRows;
+  while (band > 2 && band > fits) band /= 2;
   const auto stored = [&](const Point2& p) {
     return Point2{p[0] + static_cast<double>(lattice.column),
                   p[1] + static_cast<double>(lattice.row)};
