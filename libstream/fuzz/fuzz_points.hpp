@@ -78,8 +78,9 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
     require(block.empty(), "an empty block at the end");
     require(source->progress().points == reading.points, "progress");
     const auto promised = source->info().points;
-    const std::uint64_t lost = source->progress().lost;
-    require(!promised || *promised == reading.points + lost, "as many points as promised");
+    const Progress done = source->progress();
+    require(!promised || *promised == reading.points + done.nodata + done.lost,
+            "as many points as promised");
   } catch (const Error& error) {
     require(!error.parts().cause.empty(), "a cause");
     reading = {.refused = true};
