@@ -50,7 +50,7 @@ class LasRecords {
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   /// Whether the point format is one of LAS before 1.4.
   [[nodiscard]] bool legacy() const { return layout_.point_format < 6; }
-  /// Of the records taken.
+  /// About all records taken so far.
   [[nodiscard]] const LasSums& sums() const { return sums_; }
 
  private:
