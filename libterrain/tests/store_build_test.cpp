@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -66,26 +67,37 @@ TEST(StoreBuild, ChecksumIsTheSameWithEveryCompiler) {
   fs::remove_all(folder);
 }
 
-// By the ranges of their attributes; what comes is what the condition takes of all points.
-TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
-  const tests::TemporaryFolder folder;
-  const fs::path points = folder.path() / "points.csv";
+/// Builds a store of points whose lines of CSV are `line(i)`.
+stream::Store store_of_lines(const fs::path& folder, const std::string& columns, int points,
+                             std::size_t block_points,
+                             const std::function<void(std::ostream& file, int i)>& line) {
+  const fs::path path = folder / "points.csv";
   {
-    std::ofstream file(points);
-    file << "x,y,z,class\n";
-    // Strips of a class each.
-    for (int i = 0; i < 20000; ++i) {
-      const int x = i * 7919 % 10007, y = i * 104729 % 10009;
-      file << x / 10 << '.' << x % 10 << ',' << y / 10 << '.' << y % 10 << ',' << i % 97 << ','
-           << x / 1000 << '\n';
+    std::ofstream file(path);
+    file << columns << '\n';
+    for (int i = 0; i < points; ++i) {
+      line(file, i);
+      file << '\n';
     }
   }
   BuildRequest request;
-  request.inputs = {points.string()};
-  request.store = folder.path() / "store";
-  request.block_points = 2000;
+  request.inputs = {path.string()};
+  request.store = folder / "store";
+  request.block_points = block_points;
   build_store(request);
-  stream::Store store = stream::Store::open(request.store);
+  return stream::Store::open(request.store);
+}
+
+// By the ranges of their attributes; what comes is what the condition takes of all points.
+TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
+  const tests::TemporaryFolder folder;
+  // Strips of a class each.
+  stream::Store store =
+      store_of_lines(folder.path(), "x,y,z,class", 20000, 2000, [](std::ostream& file, int i) {
+        const int x = i * 7919 % 10007, y = i * 104729 % 10009;
+        file << x / 10 << '.' << x % 10 << ',' << y / 10 << '.' << y % 10 << ',' << i % 97 << ','
+             << x / 1000;
+      });
   const Detail detail;
   const auto visit = [&](std::uint64_t& clusters, std::uint64_t& met) {
     for_each_wanted(store, detail,
@@ -136,20 +148,10 @@ class Listed final : public WantedPart {
 
 TEST(StoreBuild, PartsOfWhatIsWantedComeInOrderWhateverTheThreads) {
   const tests::TemporaryFolder folder;
-  const fs::path points = folder.path() / "points.csv";
-  {
-    std::ofstream file(points);
-    file << "x,y,z\n";
-    for (int i = 0; i < 100000; ++i) {
-      file << i * 7919LL % 100003 << ',' << i * 104729LL % 100019 << ',' << i % 97 << '\n';
-    }
-  }
-  BuildRequest request;
-  request.inputs = {points.string()};
-  request.store = folder.path() / "store";
-  request.block_points = 500;
-  build_store(request);
-  const stream::Store store = stream::Store::open(request.store);
+  const stream::Store store =
+      store_of_lines(folder.path(), "x,y,z", 100000, 500, [](std::ostream& file, int i) {
+        file << i * 7919LL % 100003 << ',' << i * 104729LL % 100019 << ',' << i % 97;
+      });
   ASSERT_GE(store.top(), 2u);
   const Region part = Region::of_box({{20000, 10000, 0}, {70000, 90000, 0}});
   for (const Detail& detail : {Detail{}, Detail{.level = 1}, Detail{.region = part},
@@ -181,20 +183,10 @@ TEST(StoreBuild, PartsOfWhatIsWantedComeInOrderWhateverTheThreads) {
 // Every point of a level and above belongs to one cluster of each level that is not finer.
 TEST(StoreBuild, TheClustersOfALevelPartThePointsOfEveryFinerOne) {
   const tests::TemporaryFolder folder;
-  const fs::path points = folder.path() / "points.csv";
-  {
-    std::ofstream file(points);
-    file << "x,y,z,number\n";
-    for (int i = 0; i < 20000; ++i) {
-      file << i * 7919 % 10007 << ',' << i * 104729 % 10009 << ',' << i % 97 << ',' << i << '\n';
-    }
-  }
-  BuildRequest request;
-  request.inputs = {points.string()};
-  request.store = folder.path() / "store";
-  request.block_points = 50;
-  build_store(request);
-  const stream::Store store = stream::Store::open(request.store);
+  const stream::Store store =
+      store_of_lines(folder.path(), "x,y,z,number", 20000, 50, [](std::ostream& file, int i) {
+        file << i * 7919 % 10007 << ',' << i * 104729 % 10009 << ',' << i % 97 << ',' << i;
+      });
   ASSERT_GE(store.top(), 2u);
   const auto numbers_of = [&](const Detail& detail) {
     std::vector<double> numbers;

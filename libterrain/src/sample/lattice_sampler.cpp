@@ -90,7 +90,8 @@ class LatticeSampler final : public HeightSampler {
         workers_(std::max(1U, context.threads)) {}
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {
-    sort_by_tile(places, out);
+    std::fill(out.begin(), out.end(), SurfacePoint{});
+    sort_by_tile(places);
     parallel_for(tiles_.size(), static_cast<unsigned>(workers_.size()),
                  [&](unsigned thread, std::size_t i) {
                    std::unique_ptr<Worker<T>>& worker = workers_[thread];
@@ -120,15 +121,12 @@ class LatticeSampler final : public HeightSampler {
   }
 
   /// Fills order_ with the numbers of the places inside, by tiles, and tiles_ with those that have
-  /// any. Within a tile the numbers ascend. Places outside have no height.
-  void sort_by_tile(std::span<const Point2> places, std::span<SurfacePoint> out) {
+  /// any. Within a tile the numbers ascend.
+  void sort_by_tile(std::span<const Point2> places) {
     const auto across = static_cast<std::uint64_t>((raster_.columns + tile_ - 1) / tile_);
     keyed_.clear();
     for (std::size_t i = 0; i < places.size(); ++i) {
-      if (!inside(places[i])) {
-        out[i] = {};
-        continue;
-      }
+      if (!inside(places[i])) continue;
       const auto column = static_cast<std::uint64_t>(cell(places[i][0]) / tile_);
       const auto row = static_cast<std::uint64_t>(cell(places[i][1]) / tile_);
       keyed_.push_back({row * across + column, static_cast<std::uint32_t>(i)});

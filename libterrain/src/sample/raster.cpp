@@ -239,10 +239,7 @@ class RasterRun {
       }
     });
     sampler_->sample(places_, surface_);
-    parallel_for(height, context_.threads, [&](unsigned, std::size_t j) {
-      const std::size_t end = (j + 1) * width_;
-      for (std::size_t i = j * width_; i < end; ++i) heights_[i] = surface_[i].height;
-    });
+    for (std::size_t i = 0; i < surface_.size(); ++i) heights_[i] = surface_[i].height;
   }
 
   void make_tiles(std::span<const TilePlace> block, stream::GeoTiffWriter& writer) {
