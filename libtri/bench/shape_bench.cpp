@@ -2,9 +2,10 @@
 // Restoring shapes: from scratch and after a change, on a noisy torus of 200,000 points, and on the
 // scans in the folder named by TERRACE_DATA, for which a table shows the quality of the results.
 //
-// Times are of the restoring alone, after the build; a "change" is the removal of the 100 points
-// nearest to one of them, or their reinsertion.
+// Times are of the restoring alone, after the build; "collapse" follows the removal of the 100
+// points nearest to one of them, "expand" their reinsertion.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include <memory>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include <benchmark/benchmark.h>
 
@@ -73,45 +75,59 @@ void restore(benchmark::State& state, const ShapeOptions& options) {
   state.counters["rescued"] = static_cast<double>(shape.rescued_count());
 }
 
-template <class Coord>
-void update(benchmark::State& state, const ShapeOptions& options) {
-  Torus<Coord> torus;
-  auto& triangulation = torus.triangulation;
-  Shape3<Coord> shape(options);
-  triangulation.start_journal();
-  shape.restore(triangulation);
-  // The points nearest to one of them, breadth-first.
-  std::vector<VertexId> cluster{*triangulation.all_vertices().begin()}, around;
+double seconds(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// 100 points nearest to one of them, breadth-first.
+template <class Triangulation>
+std::vector<VertexId> nearest(const Triangulation& triangulation, VertexId seed) {
+  std::vector<VertexId> cluster{seed}, around;
   for (std::size_t i = 0; cluster.size() < 100; ++i) {
     triangulation.adjacent(cluster[i], around);
     for (const VertexId v : around)
       if (cluster.size() < 100 && std::find(cluster.begin(), cluster.end(), v) == cluster.end())
         cluster.push_back(v);
   }
+  return cluster;
+}
+
+/// Seconds that the shape takes to follow the expansion and the collapse of a cluster, which gets
+/// its new vertices.
+template <class Coord>
+std::array<double, 2> take_out_and_put_back(Delaunay3<Coord>& triangulation, Shape3<Coord>& shape,
+                                            std::vector<VertexId>& cluster) {
   std::vector<std::array<Coord, 3>> points;
   for (const VertexId v : cluster) points.push_back(triangulation.point(v));
   std::vector<typename Delaunay3<Coord>::Insertion> inserted(points.size());
   typename Delaunay3<Coord>::Changes changes;
-  for (auto _ : state) {
-    state.PauseTiming();
-    triangulation.remove(cluster);
+  const auto follow = [&] {
     triangulation.take_changes(changes);
-    state.ResumeTiming();
-    shape.update_nearby(triangulation, changes);
-    state.PauseTiming();
-    triangulation.insert(points, inserted);
-    for (std::size_t i = 0; i < cluster.size(); ++i) cluster[i] = inserted[i].vertex;
-    triangulation.take_changes(changes);
-    state.ResumeTiming();
-    shape.update_nearby(triangulation, changes);
-  }
-  state.SetItemsProcessed(2 * state.iterations());  // changes
+    return seconds([&] { shape.update_nearby(triangulation, changes); });
+  };
+  triangulation.remove(cluster);
+  const double collapse = follow();
+  triangulation.insert(points, inserted);
+  for (std::size_t i = 0; i < cluster.size(); ++i) cluster[i] = inserted[i].vertex;
+  return {follow(), collapse};
 }
 
-double seconds(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+enum class Change { kExpand, kCollapse };
+
+template <class Coord>
+void update(benchmark::State& state, const ShapeOptions& options, Change timed) {
+  Torus<Coord> torus;
+  auto& triangulation = torus.triangulation;
+  Shape3<Coord> shape(options);
+  triangulation.start_journal();
+  shape.restore(triangulation);
+  std::vector<VertexId> cluster = nearest(triangulation, *triangulation.all_vertices().begin());
+  for (auto _ : state) {
+    const auto times = take_out_and_put_back(triangulation, shape, cluster);
+    state.SetIterationTime(times[static_cast<std::size_t>(timed)]);
+  }
 }
 
 struct Scan {
@@ -129,15 +145,35 @@ constexpr Scan kScans[] = {
     {"armadillo_tm.ply", "armadillo 2"},
 };
 
+/// The mean of 40 clusters all over a scan, see take_out_and_put_back().
+template <class Coord>
+std::array<double, 2> mean_of_clusters(Delaunay3<Coord>& triangulation, Shape3<Coord>& shape) {
+  constexpr std::size_t kClusters = 40;
+  triangulation.start_journal();
+  std::vector<VertexId> seeds;
+  for (const VertexId v : triangulation.all_vertices()) seeds.push_back(v);
+  std::array<double, 2> sum{};
+  for (std::size_t i = 0; i < kClusters; ++i) {
+    const VertexId seed = seeds[i * seeds.size() / kClusters];
+    if (!triangulation.alive(seed)) continue;
+    std::vector<VertexId> cluster = nearest(triangulation, seed);
+    const auto times = take_out_and_put_back(triangulation, shape, cluster);
+    for (std::size_t k = 0; k < 2; ++k) sum[k] += times[k] / kClusters;
+  }
+  return sum;
+}
+
 void print_row(const char* name, const char* how, double build, double shape_time,
                const SurfaceMeasures& m, std::size_t lost, std::size_t rescued, double scale,
-               const SurfaceMeasures& original, double volume) {
+               const SurfaceMeasures& original, double volume,
+               const std::array<double, 2>& follow) {
   std::printf("%-12s %-14s %6.3f %6.4f %7zu %6lld %5zu %6zu %6zu %6zu", name, how, build,
               shape_time, m.faces, static_cast<long long>(m.euler_characteristic), m.components,
               m.non_manifold_edges, lost, rescued);
   if (original.faces > 0)
     std::printf(" %7.4f %7.4f", m.area * scale * scale / original.area,
                 m.volume * scale * scale * scale / volume);
+  if (follow[0] > 0) std::printf(" %6.2f %6.2f", 1e3 * follow[0], 1e3 * follow[1]);
   std::printf("%s\n", m.closed ? "" : " open");
 }
 
@@ -166,6 +202,8 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     double time = 1e9;
     for (int round = 0; round < 3; ++round)
       time = std::min(time, seconds([&] { shape.restore(triangulation); }));
+    std::array<double, 2> follow{};
+    if (way.options.rule == ShapeRule::kPoles) follow = mean_of_clusters(triangulation, shape);
     const std::string how = std::string(way.name) + (std::is_same_v<Coord, double> ? " d" : " i");
     const ShapeSurface surface = shape.surface(triangulation);
     SurfaceMeasures found = measure(surface.surface);
@@ -173,17 +211,19 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     found.components = parts.components;
     found.euler_characteristic = parts.euler_characteristic;
     print_row(name, how.c_str(), build, time, found, shape.lost_vertices().size(),
-              shape.rescued_count(), step, measures, volume);
+              shape.rescued_count(), step, measures, volume, follow);
   }
 }
 
 void print_table(const std::filesystem::path& folder) {
   std::printf(
       "Scans, points alone; build and restoring in seconds, best of 3; i: integers of 24 bits, d:\n"
-      "doubles; area and volume over the original's, its openings closed.\n"
-      "%-12s %-14s %6s %6s %7s %6s %5s %6s %6s %6s %7s %7s\n",
+      "doubles; area and volume over the original's, its openings closed; following the expansion "
+      "and\n"
+      "the collapse of 100 points in milliseconds, mean of 40 clusters.\n"
+      "%-12s %-14s %6s %6s %7s %6s %5s %6s %6s %6s %7s %7s %6s %6s\n",
       "", "", "build", "shape", "faces", "chi", "comp", "nonman", "lost", "put b.", "area",
-      "volume");
+      "volume", "expand", "coll.");
   for (const Scan& scan : kScans) {
     if (!std::filesystem::exists(folder / scan.file)) continue;
     const Surface original = read_scan(folder / scan.file);
@@ -220,10 +260,20 @@ int main(int argc, char** argv) {
   add("flood/no guard", [=](auto& state) { restore<std::int32_t>(state, no_guard); });
   add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
   add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
-  add("poles/update/integers", [](auto& state) { update<std::int32_t>(state, {}); });
-  add("poles/update/doubles", [](auto& state) { update<double>(state, {}); });
-  add("flood/update/integers", [=](auto& state) { update<std::int32_t>(state, flood); });
-  add("flood/update/doubles", [=](auto& state) { update<double>(state, flood); });
+  const auto add_update = [&](const std::string& name, const ShapeOptions& options) {
+    for (const Change change : {Change::kExpand, Change::kCollapse}) {
+      const std::string of = change == Change::kExpand ? "/expand" : "/collapse";
+      for (auto* function : {&update<std::int32_t>, &update<double>}) {
+        const bool integers = function == &update<std::int32_t>;
+        benchmark::RegisterBenchmark((name + of + (integers ? "/integers" : "/doubles")).c_str(),
+                                     [=](auto& state) { function(state, options, change); })
+            ->Unit(benchmark::kMillisecond)
+            ->UseManualTime();
+      }
+    }
+  };
+  add_update("poles", {});
+  add_update("flood", flood);
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;
