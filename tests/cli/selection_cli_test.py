@@ -13,6 +13,8 @@ import subprocess
 import tempfile
 import unittest
 
+from small_tiff import GEOGRAPHIC, write_tiff
+
 TERRACE = os.environ.get('TERRACE', 'terrace')
 NAMES = ['x', 'y', 'z', 'classification', 'return_number', 'number_of_returns', 'red', 'green']
 
@@ -273,6 +275,28 @@ class SelectionTest(unittest.TestCase):
                         self.run_ok('convert', self.path(file), '-o', self.path('found.csv'), '-q', '--force',
                                     '--region', region, '--region-crs', 'EPSG:4326')
                         self.assertEqual(self.rows('found.csv')[1], wanted)
+
+    def test_border_cells_whatever_turn_their_longitudes_have(self):
+        """Law: a box whose sides are rows and columns of cells has them, for each verb, of a file and of stores."""
+        write_tiff(self.path('degrees.tif'), 60, 60, range(3600), (8.1, 46.6), 1 / 1200, GEOGRAPHIC, kind='h')
+        whole, part = self.path('degrees.st'), self.path('degrees-part.st')
+        self.run_ok('build', self.path('degrees.tif'), '-o', whole, '-q')
+        west, east = (8.1 + (c + 0.5) / 1200 for c in (10, 46))
+        south, north = (46.6 - (r + 0.5) / 1200 for r in (46, 10))
+        lost = 0
+        for turns in (0, -1, 1, 2):
+            with self.subTest(turns=turns):
+                box = f'--region={west + 360 * turns},{south},{east + 360 * turns},{north}'
+                lost += west + 360 * turns - 360 * turns != west
+                self.run_ok('build', self.path('degrees.tif'), box, '-o', part, '-q', '--force')
+                commands = [['convert', self.path('degrees.tif')], ['points', whole], ['points', part],
+                            ['points', whole, '--region-crs', 'EPSG:4326']]
+                for command in commands:
+                    self.run_ok(*command, box, '-o', self.path('border.csv'), '-q', '--force')
+                    self.assertEqual(len(self.rows('border.csv')[1]), 37 * 37, command)
+                said = json.loads(self.run_ok('raster', whole, box, '-o', self.path('border.tif'), '--json', '--force'))
+                self.assertEqual((said['columns'], said['rows']), (37, 37))
+        self.assertGreater(lost, 0)
 
     def test_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
