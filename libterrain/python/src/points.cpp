@@ -65,11 +65,11 @@ class PointReader {
   stream::PointBlock block_;
 };
 
-/// (points written, how far a coordinate was moved at most)
+/// (points written, points left out as a coordinate is NaN, how far a coordinate was moved at most)
 py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
                        const std::string& format, bool replace, const py::tuple& how) {
   const OpenSource open = opener_of(source);
-  std::uint64_t points = 0;
+  std::uint64_t points = 0, nodata = 0;
   double rounding = 0;
   Job(how).run([&](const terrain::Context& context) {
     stream::SourceOptions options;
@@ -106,9 +106,10 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
     writer->finish();
     report(true);
     points = writer->points();
+    nodata = from->progress().nodata;
     rounding = writer->rounding();
   });
-  return py::make_tuple(points, rounding);
+  return py::make_tuple(points, nodata, rounding);
 }
 
 }  // namespace

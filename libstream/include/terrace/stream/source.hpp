@@ -60,8 +60,8 @@ struct PointBlock {
 /// The progress of a source. Bytes refer to the input files, if the source knows them.
 struct Progress {
   std::uint64_t points = 0;
-  /// Left out: cells without data; of XYZ, CSV, PLY and meshes points (entities) of which a
-  /// coordinate is NaN. Infinite coordinates are errors.
+  /// Left out: cells without data; of XYZ, CSV, PLY, meshes and arrays points (entities) of which a
+  /// coordinate is NaN (in text also an empty field or NA). Infinite coordinates are errors.
   std::uint64_t nodata = 0;
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
