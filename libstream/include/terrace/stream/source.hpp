@@ -181,6 +181,10 @@ struct SourceOptions {
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 
+/// NAME.prj beside NAME.tif and the like, where ESRI's formats have their CRS; empty if there is
+/// none.
+[[nodiscard]] std::string prj_beside(const std::string& file);
+
 /// The same stream, read on a separate thread, at most `blocks` blocks ahead. An Error thrown there
 /// is rethrown by the `next` that would have delivered the block. The thread starts at once, that
 /// of a raster with the first `next`, as refine() comes before it; if none can be started the
