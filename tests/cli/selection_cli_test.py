@@ -298,6 +298,20 @@ class SelectionTest(unittest.TestCase):
                 self.assertEqual((said['columns'], said['rows']), (37, 37))
         self.assertGreater(lost, 0)
 
+    def test_longitudes_of_points_may_be_whole_turns_away(self):
+        places = [(lon, lat) for lon in range(0, 360, 5) for lat in range(-80, 81, 5)]
+        with open(self.path('globe.csv'), 'w', encoding='ascii') as file:
+            file.write('lon,lat,height\n' + ''.join(f'{lon},{lat},{lon + lat}\n' for lon, lat in places))
+        self.run_ok('build', self.path('globe.csv'), '-o', self.path('globe.st'), '-q')
+        for west, east in ((-10, 10), (350, 370), (-180, 180), (-180, -100), (100, 200)):
+            wanted = sorted((x, y, x + y) for x, y in places
+                            if abs(y) <= 30 and any(west <= x + turn <= east for turn in (-360, 0, 360)))
+            self.assertGreater(len(wanted), 10)
+            box = f'--region={west},-30,{east},30'
+            for command in (['convert', self.path('globe.csv')], ['points', self.path('globe.st')]):
+                self.run_ok(*command, box, '-o', self.path('lon.csv'), '-q', '--force')
+                self.assertEqual(sorted(self.rows('lon.csv')[1]), wanted, (command, box))
+
     def test_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
                     '--where', 'classification != 2', '--region', '100,100,400,500.5')

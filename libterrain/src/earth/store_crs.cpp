@@ -63,15 +63,15 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   } catch (const stream::Error&) {
     if (!named.empty()) throw;
   }
-  if (!system) {
-    if (named.empty()) return;
+  if (!system && !named.empty()) {
     throw stream::Error(
         {.file = source.files.empty() ? std::string() : source.files.front(),
          .where = {},
          .cause = "has no known CRS, into which the region could be converted",
          .remedy = "leave `region_crs` out and give the region in its coordinates"});
   }
-  turn_ = system->turn();
+  const bool degrees = source.crs.geographic && source.crs.horizontal_unit == "degree";
+  turn_ = system ? system->turn() : degrees ? 360 : 0;
   std::optional<stream::Box3> stored = source.stated_bounds;
   if (source.grid) {
     const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
