@@ -92,16 +92,16 @@ class SelectionTest(unittest.TestCase):
             store = file + '.st'
             result = self.terrace('build', file, '-o', store)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertIn('3 points (2 with a coordinate that is NaN left out)', result.stderr)
+            self.assertIn('3 points (2 without a coordinate left out)', result.stderr)
             self.assertEqual(json.loads(self.run_ok('info', store, '--json'))['nodata'], 2)
-            self.assertIn('3, and 2 with a coordinate that is NaN', self.run_ok('info', file))
+            self.assertIn('3, and 2 without a coordinate', self.run_ok('info', file))
             for keep in ('x > -1', 'z < 3'):
                 built = json.loads(self.run_ok('build', file, '--where', keep, '-o', store, '--force', '--json'))
                 self.assertEqual((built['points'] + built['excluded'], built['nodata']), (3, 2))
             result = self.terrace('match', file, '-o', self.path('pairs.csv'), '--force')
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertIn('2 points with a coordinate that is NaN are left out', result.stderr)
-        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'not one point in it (1 points, all with a coordinate NaN)'),
+            self.assertIn('2 points without a coordinate are left out', result.stderr)
+        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'not one point in it (1 points, all without a coordinate)'),
                             (write('inf.ply', ply.format(1) + '1 2 inf\n'), 'a coordinate is infinite')):
             result = self.terrace('build', file, '-o', self.path('none.st'))
             self.assertEqual(result.returncode, 1)
