@@ -125,6 +125,20 @@ TEST(RegionCrs, ABoxHasAPartAtEachEndOfTheDataThatItReaches) {
   EXPECT_TRUE(with_turns(Region::parse("-180,-90,180,90"), 360, world).covers({270, 0}));
 }
 
+TEST(RegionCrs, PolygonsOnBothSidesOfTheAntimeridianComeTogether) {
+  const stream::Box3 fiji{{179, -18, 0}, {181, -16, 0}};
+  const auto square = [](double west) {
+    return Polygon{{{west, -17}, {west + 0.5, -17}, {west + 0.5, -16}, {west, -16}}};
+  };
+  for (const double away : {0.0, 360.0}) {
+    const Region region =
+        with_turns(Region::of_polygons({square(179.5 + away), square(-180)}, 0, 0), 360, fiji);
+    EXPECT_EQ(region.box().min[0], 179.5);
+    EXPECT_EQ(region.box().max[0], 180.5);
+    for (const double x : {179.5, 180.0, 180.5}) EXPECT_TRUE(region.covers({x, -16.5})) << x;
+  }
+}
+
 TEST(RegionCrs, AnInfiniteBoxIsMeantAsItIsWritten) {
   const Region west = Region::of_box({{-kInfinity, -kInfinity, 0}, {8.5, kInfinity, 0}});
   EXPECT_TRUE(with_turns(west, 360, kAlps).covers({8.5, 46}));

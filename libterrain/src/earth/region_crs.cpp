@@ -106,7 +106,7 @@ struct Turns {
 };
 
 Turns turns_to(const stream::Box3& box, double turn, const stream::Box3& bounds) {
-  if (!(turn > 0) || !(box.max[0] - box.min[0] <= 2 * turn)) return {};
+  if (!(turn > 0)) return {};
   // Nobody is further off.
   constexpr double kMost = 4;
   const Turns turns{std::max(-kMost, std::ceil((bounds.min[0] - box.max[0]) / turn)),
@@ -155,6 +155,9 @@ Point2 middle_in(const Transformation& change, const stream::Box3& box) {
 Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
                   const Point2& tolerance) {
   const stream::Box3& given = region.box();
+  const bool box = region.polygons().empty();
+  // What is wider than two turns, as an infinite box is, is meant as it is written.
+  if (box && !(given.max[0] - given.min[0] <= 2 * turn)) turn = 0;
   // A shift by whole turns rounds as well.
   Point2 rounding{0x1p-50 * turn, 0};
   const auto [first, last] = turns_to(widened(widened(given, tolerance), rounding), turn, bounds);
@@ -162,7 +165,6 @@ Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
   stream::Box3 extent = widened(given, rounding);
   extent.min[0] += first * turn;
   extent.max[0] += last * turn;
-  const bool box = region.polygons().empty();
   if (box && (first == last || given.max[0] - given.min[0] >= turn)) {
     return Region::of_box(widened(extent, tolerance)).with_extent(extent);
   }
@@ -172,12 +174,20 @@ Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
   std::vector<Polygon> polygons;
   for (double i = first; i <= last; ++i) {
     for (Polygon polygon : one) {
+      stream::Box3 around;
       for (std::vector<Point2>& ring : polygon) {
-        for (Point2& p : ring) p[0] += i * turn;
+        for (Point2& p : ring) {
+          p[0] += i * turn;
+          around.include(stream::Point3{p[0], p[1], 0});
+        }
       }
-      polygons.push_back(std::move(polygon));
+      // Of several polygons some may lie elsewhere.
+      if (around.min[0] <= bounds.max[0] && around.max[0] >= bounds.min[0]) {
+        polygons.push_back(std::move(polygon));
+      }
     }
   }
+  if (polygons.empty()) return region;
   const Region made = Region::of_polygons(std::move(polygons), given.min[2], given.max[2]);
   return box ? made.with_extent(extent) : made;
 }

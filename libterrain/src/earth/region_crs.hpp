@@ -15,9 +15,9 @@ namespace terrace::terrain {
 Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds);
 
 /// The region whole turns away, where `bounds` lies: more than one part if both ends of the data
-/// do; where it is if none does, or if it is wider than two turns, as an infinite box is. turn: 0
-/// if x does not lead around. A box is made wider by the tolerance on each side; its extent() is
-/// not.
+/// do; where it is if none does, or if it is a box wider than two turns, as infinite ones are.
+/// turn: 0 if x does not lead around. A box is made wider by the tolerance on each side; its
+/// extent() is not.
 Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
                   const Point2& tolerance = {});
 
