@@ -75,6 +75,12 @@ std::array<double, 2> stored_place(const Placement& placement, const std::array<
   return {(xy[4] * x - xy[1] * y) / determinant, (xy[0] * y - xy[3] * x) / determinant};
 }
 
+std::array<double, 2> border_tolerance(const Schema& schema) {
+  if (!schema.grid) return {};
+  const std::array<double, 6>& xy = schema.world.xy;
+  return {1e-6 * (std::abs(xy[0]) + std::abs(xy[1])), 1e-6 * (std::abs(xy[3]) + std::abs(xy[4]))};
+}
+
 std::size_t Schema::attribute_offset(std::size_t attribute) const {
   std::size_t offset = 0;
   for (std::size_t i = 0; i < attribute; ++i) offset += size_of(attributes[i].type);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <limits>
 #include <random>
 #include <string>
 #include <utility>
@@ -320,6 +321,35 @@ TEST_F(GlbFiles, LargeMeshesAreReadAsPointsAndAsTriangles) {
     ASSERT_EQ(triangles.values<double>(0)[t], expected[corners[3 * t + 1]][0]);
     ASSERT_EQ(triangles.values<double>(3)[t], expected[corners[3 * t + 2]][0]);
   }
+}
+
+TEST_F(GlbFiles, VerticesWithoutACoordinateAreLeftOutAndCounted) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  for (const bool moved : {false, true}) {
+    GlbMaker glb;
+    const std::uint64_t positions =
+        glb.add_positions({{0, 0, 0}, {1, kNan, 0}, {0, 1, 0}, {1, 1, 0}});
+    glb.add_mesh({{"attributes", {{"POSITION", positions}}},
+                  {"indices", glb.add_indices({0, 1, 2, 0, 3, 2}, 1)}},
+                 {{"translation", {moved ? 1 : 0, 0, 0}}});
+    const std::string file = put(glb.bytes());
+    for (const Entities entities : {Entities::points, Entities::triangles}) {
+      const auto source = open_source(std::array{file}, {.entities = entities});
+      EXPECT_EQ(read_all(*source).points.size(), entities == Entities::points ? 3U : 1U);
+      EXPECT_EQ(source->progress().nodata, 1U);
+    }
+    const std::optional<MeshFile> mesh = read_mesh(file);
+    ASSERT_TRUE(mesh);
+    EXPECT_EQ(mesh->vertices.size(), 3U);
+    EXPECT_EQ(mesh->triangles.size(), 1U);
+    EXPECT_EQ(mesh->nodata, 1U);
+  }
+  GlbMaker infinite;
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const std::uint64_t positions = infinite.add_positions({{0, kInfinity, 0}, {1, 0, 0}, {0, 1, 0}});
+  infinite.add_mesh({{"attributes", {{"POSITION", positions}}}}, {{"translation", {1, 0, 0}}});
+  const std::string file = put(infinite.bytes());
+  EXPECT_NE(error_of([&] { read_all({file}); }).find("infinite"), std::string::npos);
 }
 
 TEST_F(GlbFiles, WhatIsWrongIsNamed) {

@@ -237,9 +237,16 @@ TEST_F(Las, DoublesHoldWhatNoLatticeDoes) {
 }
 
 TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
-  const auto written = [&](std::vector<Point3> points, std::optional<Box3> bounds = {}) {
+  const auto written = [&](std::vector<Point3> points, std::optional<Box3> bounds = {},
+                           bool degrees = false) {
     const std::string path = folder_.path() / "decimals.las";
-    const auto writer = open_point_writer(path, {.bounds = bounds}, {.replace = true});
+    const auto system = [degrees] {
+      Crs crs;
+      crs.geographic = degrees;
+      return crs;
+    };
+    const auto writer =
+        open_point_writer(path, {.crs = system, .bounds = bounds}, {.replace = true});
     writer->append({.positions = points, .payload = {}});
     writer->finish();
     const AllPoints all = read_file(path);
@@ -262,6 +269,12 @@ TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
   EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{0.001, 0.001, 1}));
   bounds.max[1] = 1e12;
   EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{1000, 1000, 1}));
+  // Without bounds more points may follow: millimetres are kept over 200 km, finer steps over less.
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5, 5.1e6 + 0.125, 7}}), (Point3{0.001, 0.001, 1}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5 + 1 / 3.0, 5.1e6, 7}}), (Point3{0.001, 0.001, 1}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {4e5 + 1 / 3.0, 5e6 + 400, 7}}), (Point3{1e-4, 1e-4, 1}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {8e5, 5.1e6 + 0.125, 7}}), (Point3{0.01, 0.01, 1}));
+  EXPECT_EQ(written({{8, 46, 7}, {9, 47 - 1 / 3.0, 7}}, {}, true), (Point3{1e-7, 1e-7, 1}));
 }
 
 TEST_F(Las, DamageIsOneLine) {

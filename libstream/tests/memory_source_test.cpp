@@ -101,9 +101,30 @@ TEST(MemorySource, SelectsPointsAndReadsColumnsBackwards) {
   EXPECT_EQ(seen, 357U);
 }
 
+TEST(MemorySource, LeavesOutPointsWithoutACoordinateAndCountsThem) {
+  std::vector<PackedRow> rows = some_rows();
+  for (std::size_t i = 100; i < 350; ++i) rows[i].z = std::nan("");  // a block and more
+  rows.back().y = std::nanf("");
+  const auto source = open_memory(points_of_rows(rows), {.block_points = 100});
+  PointBlock block;
+  std::vector<Point3> positions;
+  while (source->next(block)) {
+    ASSERT_EQ(block.payload.size(), block.size());
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Point3& place = block.positions[i];
+      EXPECT_EQ(block.payload[i], std::byte(static_cast<int>(place[0]) % 7));
+      positions.push_back(place);
+    }
+  }
+  EXPECT_EQ(positions.size(), rows.size() - 251);
+  EXPECT_EQ(positions[100], (Point3{350, 87.5, -525}));
+  EXPECT_EQ(source->progress().points, positions.size());
+  EXPECT_EQ(source->progress().nodata, 251U);
+}
+
 TEST(MemorySource, RefusesPointsThatAreNowhere) {
   std::vector<PackedRow> rows = some_rows();
-  rows[1234].z = std::nan("");
+  rows[1234].z = -std::numeric_limits<double>::infinity();
   const auto source = open_memory(points_of_rows(rows));
   PointBlock block;
   try {

@@ -140,7 +140,10 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
       {"1 2 3\n1 2\n", "line 2: has 2 columns, the lines before have 3"},
       {"1 2 3\n1 2 3 4\n", "line 2: has 4 columns"},
       {"1,2,3\n1,2,3,\n", "line 2: has 4 columns"},
-      {"1,2,3\n1,,3\n", "line 2: column 2 is empty"},
+      {"1,2,3,4\n1,2,3,\n", "line 2: column 4 is empty"},
+      {"1,2,3\n1,null,3\n", "line 2: column 2, 'null'"},
+      {"1,2,3\n1,-,3\n", "line 2: column 2, '-'"},
+      {"1,2,3\n,inf,3\n", "line 2: column 2 is inf"},
       {"1 2 3\n\n# c\n1 nan inf\n", "line 4: column 3 is inf"},
       {"1 2 3\n1 -inf 3\n", "line 2: column 2 is -inf"},
       {"1 2 1e999\n", "line 1: column 3, '1e999'"},
@@ -168,9 +171,11 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
   }
 }
 
-TEST_F(Xyz, PointsWithNanAreLeftOutAndCounted) {
+TEST_F(Xyz, PointsWithoutACoordinateAreLeftOutAndCounted) {
   for (const std::string_view text : {"x,y,z,v\nnan,1,2,5\n3,4,5,6\n7,8,NaN,\"7\"\n7,nan,9,8\n",
-                                      "1 2 NAN 3\nnan nan nan nan\n3 4 5 6\n1 -nan 3 1\n"}) {
+                                      "1 2 NAN 3\nnan nan nan nan\n3 4 5 6\n1 -nan 3 1\n",
+                                      "x,y,z,v\n1,,2,5\n3,4,5,6\n\"\",NA,2,7\n1,2, ,8\n",
+                                      "1;;2;5\n3;4;5;6\nNA;8;9;7\n1;2;\"NA\";1\n"}) {
     const std::string file = write_text(folder_.path() / "holes.xyz", text);
     const auto source = open_source(std::array{file}, {.block_points = 1});
     const AllPoints all = read_all(*source);
@@ -200,8 +205,8 @@ TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
   EXPECT_NE(error_of([&] { read(text, options); }).find("line 2: column 5"), std::string::npos);
   options.selection = {.drop = {name}};
   EXPECT_NE(error_of([&] {
-              read("x,y,z,\"place, name\"\n1,,3,a\n1,2,3,b\n", options);
-            }).find("line 2: column 2 is empty"),
+              read("x,y,z,\"place, name\"\n1,-,3,a\n1,2,3,b\n", options);
+            }).find("line 2: column 2, '-'"),
             std::string::npos);
 }
 

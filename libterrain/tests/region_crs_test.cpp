@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "earth/region_crs.hpp"
 
+#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -95,6 +96,53 @@ TEST(RegionCrs, AMercatorMapGoesOnAtItsEdges) {
   }
   EXPECT_FALSE(region.covers({0, 5e5}));
   EXPECT_FALSE(region.covers({-18.9e6, 5e5}));
+}
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+const stream::Box3 kAlps{{8, 46, 0}, {9, 47, 0}};
+
+TEST(RegionCrs, ABoxTurnedToTheDataIsABox) {
+  for (const char* const text : {"8.3,46,8.5,47", "-351.7,46,-351.5,47", "368.3,46,368.5,47"}) {
+    const Region region = with_turns(Region::parse(text), 360, kAlps, {1e-9, 1e-9});
+    EXPECT_TRUE(region.polygons().empty()) << text;
+    for (const double x : {8.3, 8.5}) EXPECT_TRUE(region.covers({x, 46})) << text;
+    for (const double x : {8.2999, 8.5001}) EXPECT_FALSE(region.covers({x, 46})) << text;
+    EXPECT_NEAR(region.extent().min[0], 8.3, 1e-12) << text;
+  }
+  // Without rounding there is nothing to add, with it the box is wider than its extent.
+  EXPECT_EQ(with_turns(Region::parse("8.3,46,8.5,47"), 360, kAlps).box().min[0], 8.3);
+  EXPECT_LT(with_turns(Region::parse("8.3,46,8.5,47"), 360, kAlps, {1e-9, 0}).box().min[0], 8.3);
+}
+
+TEST(RegionCrs, ABoxHasAPartAtEachEndOfTheDataThatItReaches) {
+  const stream::Box3 world{{0, -90, 0}, {359, 90, 0}};
+  const Region region = with_turns(Region::of_box({{-10, -kInfinity, 0}, {10, kInfinity, 0}}), 360,
+                                   world, {1e-6, 1e-6});
+  EXPECT_EQ(region.polygons().size(), 2U);
+  for (const double x : {0.0, 10.0, 350.0, 359.0}) EXPECT_TRUE(region.covers({x, 90})) << x;
+  for (const double x : {10.01, 180.0, 349.99}) EXPECT_FALSE(region.covers({x, 90})) << x;
+  EXPECT_TRUE(with_turns(Region::parse("-180,-90,180,90"), 360, world).polygons().empty());
+  EXPECT_TRUE(with_turns(Region::parse("-180,-90,180,90"), 360, world).covers({270, 0}));
+}
+
+TEST(RegionCrs, PolygonsOnBothSidesOfTheAntimeridianComeTogether) {
+  const stream::Box3 fiji{{179, -18, 0}, {181, -16, 0}};
+  const auto square = [](double west) {
+    return Polygon{{{west, -17}, {west + 0.5, -17}, {west + 0.5, -16}, {west, -16}}};
+  };
+  for (const double away : {0.0, 360.0}) {
+    const Region region =
+        with_turns(Region::of_polygons({square(179.5 + away), square(-180)}, 0, 0), 360, fiji);
+    EXPECT_EQ(region.box().min[0], 179.5);
+    EXPECT_EQ(region.box().max[0], 180.5);
+    for (const double x : {179.5, 180.0, 180.5}) EXPECT_TRUE(region.covers({x, -16.5})) << x;
+  }
+}
+
+TEST(RegionCrs, AnInfiniteBoxIsMeantAsItIsWritten) {
+  const Region west = Region::of_box({{-kInfinity, -kInfinity, 0}, {8.5, kInfinity, 0}});
+  EXPECT_TRUE(with_turns(west, 360, kAlps).covers({8.5, 46}));
+  EXPECT_FALSE(with_turns(west, 360, kAlps).covers({8.6, 46}));
 }
 
 }  // namespace

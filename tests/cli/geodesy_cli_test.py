@@ -464,9 +464,18 @@ class GeodesyTest(unittest.TestCase):
         store = self.build(dem)
         self.ok('contour', store, '--interval', 300, '-o', self.path('lines.geojson'))
         with open(self.path('lines.geojson'), encoding='utf-8') as file:
-            lines = [line['geometry']['coordinates'] for line in json.load(file)['features']]
-        longitudes = [place[0] for line in lines for place in line]
-        self.assertTrue(min(longitudes) < 180 < max(longitudes) < 181)
+            lines = [line['geometry'] for line in json.load(file)['features']]
+        # GeoJSON alone wants what crosses cut in two (RFC 7946, 3.1.9).
+        kinds = {line['type'] for line in lines}
+        self.assertEqual(kinds, {'LineString', 'MultiLineString'})
+        for line in lines:
+            parts = line['coordinates'] if line['type'] == 'MultiLineString' else [line['coordinates']]
+            for part in parts:
+                self.assertGreater(len(part), 1)
+                self.assertLess(max(abs(x - part[0][0]) for x, _ in part), 1)
+                self.assertLessEqual(max(abs(x) for x, _ in part), 180)
+            for (x, y), (on_x, on_y) in zip((part[-1] for part in parts), (part[0] for part in parts[1:])):
+                self.assertEqual((abs(x), on_x, on_y), (180, -x, y))
         mesh = self.path('mesh.ply')
         self.ok('mesh', store, '--to-crs', 'EPSG:4326', '-o', mesh, '--format', 'ply-ascii')
         with open(mesh, encoding='utf-8') as file:

@@ -196,6 +196,11 @@ class SampleTest(QueryTest):
         self.expect_error(2, 'sample', self.store, '--json', text='1,2\n')
         self.expect_error(2, 'sample', self.store, '--level', 99, text='1,2\n')
 
+    def test_a_place_without_a_coordinate_has_no_height(self):
+        for missing in ('', 'NA', 'nan', '"NA"'):
+            lines = self.run_ok('sample', self.store, text=f'x,y\n{missing},2\n1,{missing}\n').split('\n')
+            self.assertEqual(lines[1:3], [f'{missing},2,,,,', f'1,{missing},,,,'])
+
     def test_nothing_in_nothing_out(self):
         self.assertEqual(self.run_ok('sample', self.store, text=''), '')
 

@@ -13,6 +13,8 @@ import subprocess
 import tempfile
 import unittest
 
+from small_tiff import GEOGRAPHIC, write_tiff
+
 TERRACE = os.environ.get('TERRACE', 'terrace')
 NAMES = ['x', 'y', 'z', 'classification', 'return_number', 'number_of_returns', 'red', 'green']
 
@@ -90,16 +92,16 @@ class SelectionTest(unittest.TestCase):
             store = file + '.st'
             result = self.terrace('build', file, '-o', store)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertIn('3 points (2 with a coordinate that is NaN left out)', result.stderr)
+            self.assertIn('3 points (2 without a coordinate left out)', result.stderr)
             self.assertEqual(json.loads(self.run_ok('info', store, '--json'))['nodata'], 2)
-            self.assertIn('3, and 2 with a coordinate that is NaN', self.run_ok('info', file))
+            self.assertIn('3, and 2 without a coordinate', self.run_ok('info', file))
             for keep in ('x > -1', 'z < 3'):
                 built = json.loads(self.run_ok('build', file, '--where', keep, '-o', store, '--force', '--json'))
                 self.assertEqual((built['points'] + built['excluded'], built['nodata']), (3, 2))
             result = self.terrace('match', file, '-o', self.path('pairs.csv'), '--force')
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertIn('2 points with a coordinate that is NaN are left out', result.stderr)
-        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'not one point in it (1 points, all with a coordinate NaN)'),
+            self.assertIn('2 points without a coordinate are left out', result.stderr)
+        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'not one point in it (1 points, all without a coordinate)'),
                             (write('inf.ply', ply.format(1) + '1 2 inf\n'), 'a coordinate is infinite')):
             result = self.terrace('build', file, '-o', self.path('none.st'))
             self.assertEqual(result.returncode, 1)
@@ -273,6 +275,42 @@ class SelectionTest(unittest.TestCase):
                         self.run_ok('convert', self.path(file), '-o', self.path('found.csv'), '-q', '--force',
                                     '--region', region, '--region-crs', 'EPSG:4326')
                         self.assertEqual(self.rows('found.csv')[1], wanted)
+
+    def test_border_cells_whatever_turn_their_longitudes_have(self):
+        """Law: a box whose sides are rows and columns of cells has them, for each verb, of a file and of stores."""
+        write_tiff(self.path('degrees.tif'), 60, 60, range(3600), (8.1, 46.6), 1 / 1200, GEOGRAPHIC, kind='h')
+        whole, part = self.path('degrees.st'), self.path('degrees-part.st')
+        self.run_ok('build', self.path('degrees.tif'), '-o', whole, '-q')
+        west, east = (8.1 + (c + 0.5) / 1200 for c in (10, 46))
+        south, north = (46.6 - (r + 0.5) / 1200 for r in (46, 10))
+        lost = 0
+        for turns in (0, -1, 1, 2):
+            with self.subTest(turns=turns):
+                box = f'--region={west + 360 * turns},{south},{east + 360 * turns},{north}'
+                lost += west + 360 * turns - 360 * turns != west
+                self.run_ok('build', self.path('degrees.tif'), box, '-o', part, '-q', '--force')
+                commands = [['convert', self.path('degrees.tif')], ['points', whole], ['points', part],
+                            ['points', whole, '--region-crs', 'EPSG:4326']]
+                for command in commands:
+                    self.run_ok(*command, box, '-o', self.path('border.csv'), '-q', '--force')
+                    self.assertEqual(len(self.rows('border.csv')[1]), 37 * 37, command)
+                said = json.loads(self.run_ok('raster', whole, box, '-o', self.path('border.tif'), '--json', '--force'))
+                self.assertEqual((said['columns'], said['rows']), (37, 37))
+        self.assertGreater(lost, 0)
+
+    def test_longitudes_of_points_may_be_whole_turns_away(self):
+        places = [(lon, lat) for lon in range(0, 360, 5) for lat in range(-80, 81, 5)]
+        with open(self.path('globe.csv'), 'w', encoding='ascii') as file:
+            file.write('lon,lat,height\n' + ''.join(f'{lon},{lat},{lon + lat}\n' for lon, lat in places))
+        self.run_ok('build', self.path('globe.csv'), '-o', self.path('globe.st'), '-q')
+        for west, east in ((-10, 10), (350, 370), (-180, 180), (-180, -100), (100, 200)):
+            wanted = sorted((x, y, x + y) for x, y in places
+                            if abs(y) <= 30 and any(west <= x + turn <= east for turn in (-360, 0, 360)))
+            self.assertGreater(len(wanted), 10)
+            box = f'--region={west},-30,{east},30'
+            for command in (['convert', self.path('globe.csv')], ['points', self.path('globe.st')]):
+                self.run_ok(*command, box, '-o', self.path('lon.csv'), '-q', '--force')
+                self.assertEqual(sorted(self.rows('lon.csv')[1]), wanted, (command, box))
 
     def test_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',

@@ -217,4 +217,13 @@ std::vector<std::string> input_files(std::span<const std::string> names,
   return files;
 }
 
+std::string prj_beside(const std::string& file) {
+  for (const char* const ending : {".prj", ".PRJ"}) {
+    const fs::path path = fs::path(file).replace_extension(ending);
+    std::error_code ignored;
+    if (file != "-" && path != file && fs::is_regular_file(path, ignored)) return path.string();
+  }
+  return {};
+}
+
 }  // namespace terrace::stream

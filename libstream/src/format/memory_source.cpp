@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "format/missing.hpp"
 #include "format/selection.hpp"
 #include "terrace/stream/error.hpp"
 #include "with_type.hpp"
@@ -30,19 +31,26 @@ class ColumnSource final : public PointSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return points_.info; }
   [[nodiscard]] Progress progress() const override {
-    return {.points = delivered_,
+    return {.points = read_ - nodata_,
+            .nodata = nodata_,
             .fraction = points_.count == 0
                             ? 1.0
-                            : static_cast<double>(delivered_) / static_cast<double>(points_.count)};
+                            : static_cast<double>(read_) / static_cast<double>(points_.count)};
   }
 
   bool next(PointBlock& block) override {
     block.clear();
-    const auto size = static_cast<std::size_t>(
-        std::min<std::uint64_t>(block_points_, points_.count - delivered_));
-    if (size == 0) return false;
+    while (block.empty() && read_ < points_.count) read(block);
+    return !block.empty();
+  }
+
+ private:
+  void read(PointBlock& block) {
+    const auto size =
+        static_cast<std::size_t>(std::min<std::uint64_t>(block_points_, points_.count - read_));
     block.positions.resize(size);
-    for (std::size_t axis = 0; axis < 3; ++axis) fill_axis(axis, block);
+    bool missing = false;
+    for (std::size_t axis = 0; axis < 3; ++axis) missing |= fill_axis(axis, block);
     const SourceInfo& info = points_.info;
     const std::size_t record = info.payload_size();
     block.payload.resize(size * record);
@@ -50,34 +58,36 @@ class ColumnSource final : public PointSource {
       const std::size_t bytes = size_of(info.attributes[a].type);
       std::byte* to = block.payload.data() + info.attribute_offset(a);
       for (std::size_t i = 0; i < size; ++i, to += record) {
-        std::memcpy(to, value_of_column(points_.attributes[a], delivered_ + i), bytes);
+        std::memcpy(to, value_of_column(points_.attributes[a], read_ + i), bytes);
       }
     }
-    delivered_ += size;
-    return true;
+    read_ += size;
+    if (missing) nodata_ += leave_out_missing(block, record);
   }
 
- private:
-  void fill_axis(std::size_t axis, PointBlock& block) const {
+  /// Returns whether a coordinate is NaN.
+  bool fill_axis(std::size_t axis, PointBlock& block) const {
+    bool missing = false;
     with_type(points_.info.coordinates[axis].type, [&]<class T>(T number) {
       for (std::size_t i = 0; i < block.positions.size(); ++i) {
-        std::memcpy(&number, value_of_column(points_.coordinates[axis], delivered_ + i),
-                    sizeof number);
+        std::memcpy(&number, value_of_column(points_.coordinates[axis], read_ + i), sizeof number);
         const auto value = static_cast<double>(number);
-        if (!std::isfinite(value)) {
+        missing = missing || std::isnan(value);
+        if (std::isinf(value)) {
           throw Error({.file = points_.info.files.empty() ? "" : points_.info.files.front(),
-                       .where = "point " + std::to_string(delivered_ + i),
-                       .cause = "its " + points_.info.coordinates[axis].name + " is not finite",
+                       .where = "point " + std::to_string(read_ + i),
+                       .cause = "its " + points_.info.coordinates[axis].name + " is infinite",
                        .remedy = "leave such points out"});
         }
         block.positions[i][axis] = value;
       }
     });
+    return missing;
   }
 
   MemoryPoints points_;
   std::size_t block_points_;
-  std::uint64_t delivered_ = 0;
+  std::uint64_t read_ = 0, nodata_ = 0;
 };
 
 class SampleArray final : public Raster {

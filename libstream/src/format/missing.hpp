@@ -1,20 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
-#include "terrace/stream/schema.hpp"
+#include "terrace/stream/source.hpp"
 
 namespace terrace::stream {
 
-/// True if a coordinate is NaN, which is how scanners and photogrammetry write "no return": files
-/// of points and meshes are read without such points and count them as nodata.
+/// True if a coordinate is NaN, which is how scanners and photogrammetry write "no return": points
+/// and meshes, of files or arrays, are read without such points, which count as nodata.
 inline bool is_missing(const Point3& point) {
   return std::isnan(point[0]) || std::isnan(point[1]) || std::isnan(point[2]);
 }
 
 inline bool is_infinite(const Point3& point) {
   return std::isinf(point[0]) || std::isinf(point[1]) || std::isinf(point[2]);
+}
+
+/// Leaves out such points and their records of so many bytes. Returns how many.
+inline std::size_t leave_out_missing(PointBlock& block, std::size_t record) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    if (is_missing(block.positions[i])) continue;
+    block.positions[kept] = block.positions[i];
+    std::copy_n(block.payload.data() + i * record, record, block.payload.data() + kept * record);
+    ++kept;
+  }
+  const std::size_t missing = block.size() - kept;
+  block.positions.resize(kept);
+  block.payload.resize(kept * record);
+  return missing;
 }
 
 }  // namespace terrace::stream

@@ -37,7 +37,13 @@ class SelectedSource final : public PointSource {
     const Selection& wanted = options.selection;
     info_ = all;
     region_ = wanted.region;
-    if (region_ && all.grid) widen(*region_, all.world);
+    if (region_) {
+      const std::array<double, 2> tolerance = border_tolerance(all);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        region_->min[axis] -= tolerance[axis];
+        region_->max[axis] += tolerance[axis];
+      }
+    }
     covers_ = wanted.covers;
     if (!wanted.where.empty()) where_.emplace(wanted.where, all);
     if (where_ || region_) {
@@ -101,15 +107,6 @@ class SelectedSource final : public PointSource {
   struct Piece {
     std::size_t from = 0, bytes = 0;
   };
-
-  /// By a millionth of a cell: places of rows and columns that a border names are rounded.
-  static void widen(Box3& region, const WorldTransform& world) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const double cell = std::abs(world.xy[3 * axis]) + std::abs(world.xy[3 * axis + 1]);
-      region.min[axis] -= 1e-6 * cell;
-      region.max[axis] += 1e-6 * cell;
-    }
-  }
 
   /// Appends what counts of the block that was read last.
   void append(PointBlock& block) {

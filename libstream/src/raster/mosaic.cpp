@@ -3,13 +3,12 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <list>
 #include <optional>
 #include <sstream>
 #include <utility>
 
+#include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
 
@@ -18,6 +17,7 @@ namespace {
 
 constexpr std::uint64_t kMostMosaicCells = 1u << 30;
 constexpr double kPhase = 1e-3;  // cells
+constexpr std::size_t kMostWkt = std::size_t{64} << 10;
 
 std::string shown(double value) {
   std::ostringstream out;
@@ -149,18 +149,6 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
          "reproject one (gdalwarp -t_srs), or name the CRS of all");
 }
 
-/// The text of NAME.prj beside a file, where ESRI's formats have their CRS; empty if there is none.
-std::string wkt_beside(const std::string& file) {
-  constexpr std::streamsize kMostWkt = 64 << 10;
-  std::string text(static_cast<std::size_t>(kMostWkt), '\0');
-  for (const char* const ending : {".prj", ".PRJ"}) {
-    std::ifstream beside(std::filesystem::path(file).replace_extension(ending), std::ios::binary);
-    beside.read(text.data(), kMostWkt);
-    if (beside.gcount() > 0) return text.substr(0, static_cast<std::size_t>(beside.gcount()));
-  }
-  return {};
-}
-
 /// The columns that lead once around the earth; 0 if that is not a whole number, or not known.
 std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
   const auto& m = world.xy;
@@ -286,7 +274,10 @@ class Mosaic final : public Raster {
   /// The union's size and place; members then count from its corner.
   void unite(const RasterInfo& first, Crs crs) {
     if (crs.epsg == 0 && crs.wkt.empty() && !crs.geographic) {
-      crs.wkt = wkt_beside(first.files.front());
+      const std::string prj = prj_beside(first.files.front());
+      const std::vector<char> text =
+          prj.empty() ? std::vector<char>() : peek_head(prj, kMostWkt, {});
+      crs.wkt.assign(text.begin(), text.end());
     }
     const std::int64_t turn = columns_around(first.world, crs);
     if (turn > 0 && join_around(members_, first.world, turn)) {

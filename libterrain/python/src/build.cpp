@@ -43,7 +43,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   if (options.contains("metric")) {
     request.metric = terrain::MetricChoice::parse(options["metric"].cast<std::string>());
   }
-  request.selection = selection_of(options);
+  request.selection = reading_of(source, options).selection;
   const auto text = [&](const char* name, std::string value) {
     take_option(options, name, value);
     return value;

@@ -19,35 +19,12 @@
 namespace terrace::python {
 namespace {
 
-stream::SourceOptions reading(const py::dict& given, unsigned threads, std::stop_token stop) {
-  stream::SourceOptions options;
-  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
-  set("input_format", options.format);
-  set("block_points", options.block_points);
-  set("band", options.band);
-  set("cell", options.cell);
-  if (options.block_points < 1) throw py::value_error("`block_points` must be above 0");
-  if (options.band < 1) throw py::value_error("`band` counts from 1");
-  if (given.contains("crs")) {
-    options.crs = terrain::crs_named(given["crs"].cast<std::string>());
-  }
-  bool skip_damaged = false;
-  set("skip_damaged", skip_damaged);
-  if (skip_damaged) options.on_damage = [](const stream::Error&, std::uint64_t) {};
-  options.selection = selection_of(given);
-  options.entities = entities_of(given);
-  options.heights_of_colour = colours_of(given);
-  options.threads = threads;
-  options.stop = std::move(stop);
-  return options;
-}
-
 /// Blocks of a source, in coordinates of its CRS. Python's threads may share one.
 class PointReader {
  public:
   PointReader(const py::object& source, const py::dict& given, unsigned threads) : held_(source) {
     const OpenSource open = opener_of(source);
-    const stream::SourceOptions options = reading(given, all_or(threads), {});
+    const stream::SourceOptions options = reading_of(source, given, all_or(threads));
     source_ = released([&] { return open(options); });
     type_ = record_type(source_->info());
   }
@@ -88,17 +65,17 @@ class PointReader {
   stream::PointBlock block_;
 };
 
-/// (points written, how far a coordinate was moved at most)
+/// (points written, points left out as a coordinate is NaN, how far a coordinate was moved at most)
 py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
                        const std::string& format, bool replace, const py::tuple& how) {
   const OpenSource open = opener_of(source);
-  std::uint64_t points = 0;
+  std::uint64_t points = 0, nodata = 0;
   double rounding = 0;
   Job(how).run([&](const terrain::Context& context) {
     stream::SourceOptions options;
     {
       const py::gil_scoped_acquire held;
-      options = reading(given, context.threads, context.stop);
+      options = reading_of(source, given, context.threads, context.stop);
     }
     const std::unique_ptr<stream::PointSource> from = open(options);
     const stream::SourceInfo& info = from->info();
@@ -129,9 +106,10 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
     writer->finish();
     report(true);
     points = writer->points();
+    nodata = from->progress().nodata;
     rounding = writer->rounding();
   });
-  return py::make_tuple(points, rounding);
+  return py::make_tuple(points, nodata, rounding);
 }
 
 }  // namespace

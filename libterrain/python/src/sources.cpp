@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sources.hpp"
 
+#include <algorithm>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <pybind11/stl.h>
 #include <terrace/stream/memory_source.hpp>
+#include <terrace/terrain/crs.hpp>
 #include <terrace/terrain/region.hpp>
 
 #include "arrays.hpp"
+#include "call.hpp"
 
 namespace terrace::python {
 namespace {
@@ -75,6 +80,34 @@ std::string name_in(const py::dict& options, const char* key, std::string otherw
   return otherwise;
 }
 
+/// Pipes can be read only once.
+bool opens_twice(const py::object& source) {
+  if (!py::isinstance<py::list>(source)) return true;
+  const auto names = source.cast<std::vector<std::string>>();
+  return std::none_of(names.begin(), names.end(), [](const std::string& name) {
+    std::error_code ignored;
+    return name == "-" || std::filesystem::is_fifo(name, ignored);
+  });
+}
+
+/// where, keep, drop, resolution and region.
+stream::Selection selection_of(const py::object& source, const py::dict& given,
+                               const stream::SourceOptions& options) {
+  stream::Selection selection;
+  take_option(given, "where", selection.where);
+  take_option(given, "keep", selection.keep);
+  take_option(given, "drop", selection.drop);
+  take_option(given, "resolution", selection.resolution);
+  if (!given.contains("region")) return selection;
+  auto region = region_of(given["region"]);
+  if (region && opens_twice(source)) {
+    const OpenSource open = opener_of(source);
+    region = released([&] { return terrain::RegionConversion(open(options)->info())(*region); });
+  }
+  if (region) region->restrict(selection);
+  return selection;
+}
+
 }  // namespace
 
 OpenSource opener_of(const py::object& source) {
@@ -94,18 +127,6 @@ OpenSource opener_of(const py::object& source) {
   };
 }
 
-stream::Selection selection_of(const py::dict& options) {
-  stream::Selection selection;
-  take_option(options, "where", selection.where);
-  take_option(options, "keep", selection.keep);
-  take_option(options, "drop", selection.drop);
-  take_option(options, "resolution", selection.resolution);
-  if (options.contains("region")) {
-    if (const auto region = region_of(options["region"])) region->restrict(selection);
-  }
-  return selection;
-}
-
 stream::HeightsOfColour colours_of(const py::dict& options) {
   using stream::HeightsOfColour;
   return named<HeightsOfColour>(name_in(options, "heights_of_colour", "none"), "heights_of_colour",
@@ -121,6 +142,30 @@ stream::Entities entities_of(const py::dict& options) {
                           {"triangles", Entities::triangles},
                           {"segments", Entities::segments},
                           {"polylines", Entities::polylines}});
+}
+
+stream::SourceOptions reading_of(const py::object& source, const py::dict& given, unsigned threads,
+                                 std::stop_token stop) {
+  stream::SourceOptions options;
+  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  set("input_format", options.format);
+  set("block_points", options.block_points);
+  set("band", options.band);
+  set("cell", options.cell);
+  if (options.block_points < 1) throw py::value_error("`block_points` must be above 0");
+  if (options.band < 1) throw py::value_error("`band` counts from 1");
+  if (given.contains("crs")) {
+    options.crs = terrain::crs_named(given["crs"].cast<std::string>());
+  }
+  bool skip_damaged = false;
+  set("skip_damaged", skip_damaged);
+  if (skip_damaged) options.on_damage = [](const stream::Error&, std::uint64_t) {};
+  options.entities = entities_of(given);
+  options.heights_of_colour = colours_of(given);
+  options.threads = threads;
+  options.stop = std::move(stop);
+  options.selection = selection_of(source, given, options);
+  return options;
 }
 
 }  // namespace terrace::python

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <stop_token>
 
 #include <terrace/stream/source.hpp>
 
@@ -21,8 +22,9 @@ using OpenSource =
 /// "scale", "offset"}.
 OpenSource opener_of(const py::object& source);
 
-/// where, keep, drop, resolution and region.
-stream::Selection selection_of(const py::dict& options);
+/// How `source` is read; the region is moved to where it lies.
+stream::SourceOptions reading_of(const py::object& source, const py::dict& options,
+                                 unsigned threads = 1, std::stop_token stop = {});
 stream::HeightsOfColour colours_of(const py::dict& options);
 stream::Entities entities_of(const py::dict& options);
 

@@ -82,15 +82,16 @@ def write_points(path, points, *, transform=None, crs=None, nodata=None, attribu
 
     points, transform, crs, nodata, attributes, options: as of point_batches(): files too, which are converted in
     constant memory. format: in place of the ending: 'xyz', 'csv', 'ply', 'ply-ascii', 'las', 'laz', 'copc'. Returns: a
-    dict: points, rounding (how far a coordinate was moved, at most, to the lattice of LAS). Raises: FileExistsError or
-    another OSError; Error; ValueError; KeyboardInterrupt on Ctrl-C, and then no file stands.
+    dict: points, nodata (cells without data; points left out as a coordinate is NaN), rounding (how far a coordinate
+    was moved, at most, to the lattice of LAS). Raises: FileExistsError or another OSError; Error; ValueError;
+    KeyboardInterrupt on Ctrl-C, and then no file stands.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_points(folder + '/cube.laz', np.arange(6.0).reshape(2, 3))
-    {'points': 2, 'rounding': 0.0}
+    {'points': 2, 'nodata': 0, 'rounding': 0.0}
     """
     source, given = _reading(points, transform, crs, nodata, attributes, options, 'write_points')
     path = os.fspath(path)
-    written, rounding = _core.write_points(source, given, path, format or '', bool(replace), job(progress, threads))
-    return {'points': written, 'rounding': rounding}
+    written, missing, rounding = _core.write_points(source, given, path, format or '', bool(replace), job(progress, threads))
+    return {'points': written, 'nodata': missing, 'rounding': rounding}

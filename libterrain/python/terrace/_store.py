@@ -81,7 +81,8 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
       with ``transform`` (and ``crs``, ``nodata``);
     - anything else with numpy's array interface, the buffer protocol or DLPack.
 
-    Arrays are read in place. Coordinates that are not finite are refused; samples that are not are nodata.
+    Arrays are read in place. Points with a coordinate that is NaN or masked are left out and count as nodata, as
+    samples that are not finite do; infinite coordinates are refused.
 
     store: the folder to make; it appears when it is whole. crs: of the source, in place of what it says: 'EPSG:n',
     a name, WKT, or an object with to_wkt().

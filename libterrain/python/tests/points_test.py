@@ -52,6 +52,23 @@ class Points(StoreCase):
         told = terrace.write_points(self.path('part.ply'), path, where='classification == 2', region=(0, 0, 300500, 1e7))
         self.assertEqual(told['points'], len(wanted))
 
+    def test_longitudes_of_regions_may_be_whole_turns_away(self):
+        samples, transform = np.arange(400, dtype=np.int16).reshape(20, 20), (1 / 1200, 0, 8.3, 0, -1 / 1200, 46.5)
+        given = {'transform': transform, 'crs': 'EPSG:4326'}
+        whole = terrace.build(samples, self.path('degrees'), **given)
+        for turn in (0, -360, 360):
+            box = (8.3 + 2.5 / 1200 + turn, 46.5 - 9.5 / 1200, 8.3 + 9.5 / 1200 + turn, 46.5 - 2.5 / 1200)
+            for polygon in (False, True):
+                region = box
+                if polygon:  # a little wider: of polygons nothing is rounded
+                    west, south, east, north = (side + off for side, off in zip(box, (-1e-9, -1e-9, 1e-9, 1e-9)))
+                    region = {'type': 'Polygon', 'coordinates': [[(west, south), (east, south), (east, north), (west, north)]]}
+                self.assertEqual(len(whole.points(region=region)), 64)
+                self.assertEqual(len(terrace.read_points(samples, region=region, **given)), 64)
+                self.assertEqual(len(terrace.build(samples, self.path('part'), region=region, replace=True, **given)), 64)
+        inf = float('inf')
+        self.assertEqual(len(whole.points(region=(-inf, -inf, 8.3 + 9.5 / 1200, inf))), 200)
+
     def test_batches_are_blocks_of_constant_size(self):
         reader = terrace.point_batches(ALPS, block_points=3000)
         self.assertIn('x, y, z', repr(reader))

@@ -416,11 +416,20 @@ class Sources(StoreCase):
         masked = np.ma.masked_equal(with_holes, -9999)
         self.assertEqual(len(self.built(masked, **options)), self.samples.size - 600)
 
+    def test_points_without_a_coordinate_are_left_out_and_counted(self):
+        points = self.points.copy()
+        points[3, 0] = points[[3, 17, 4000], 1] = points[len(points) - 1, 2] = np.nan
+        store = self.built(points, attributes={'number': np.arange(len(points))})
+        self.assertEqual((len(store), store.info['nodata']), (len(points) - 4, 4))
+        self.assertEqual(set(range(len(points))) - set(store.points()['number']), {3, 17, 4000, len(points) - 1})
+        told = terrace.write_points(self.path('without.ply'), points)
+        self.assertEqual((told['points'], told['nodata']), (len(points) - 4, 4))
+
     def test_masks_are_not_overlooked(self):
         points = np.ma.array(self.points[:100])
         points[3, 2] = np.ma.masked
-        with self.assertRaisesRegex(terrace.Error, 'finite'):
-            self.built(points)
+        store = self.built(points)
+        self.assertEqual((len(store), store.info['nodata']), (99, 1))
         numbers = np.ma.array(np.arange(100), mask=np.arange(100) == 7)
         with self.assertRaisesRegex(ValueError, 'masked'):
             self.built(self.points[:100], attributes={'number': numbers})
@@ -509,9 +518,9 @@ class Sources(StoreCase):
             with self.subTest(repr(wrong)):
                 with self.assertRaises(kind):
                     self.built(wrong)
-        with self.assertRaisesRegex(terrace.Error, 'point 17: its y is not finite'):
+        with self.assertRaisesRegex(terrace.Error, 'point 17: its y is infinite'):
             points = self.points.copy()
-            points[17, 1] = np.nan
+            points[17, 1] = -np.inf
             self.built(points)
         with self.assertRaisesRegex(terrace.Error, 'not one point with data'):
             self.built(np.full((5, 5), np.nan))

@@ -134,6 +134,12 @@ Region Region::of_box(const stream::Box3& box) {
   return region;
 }
 
+Region Region::with_extent(const stream::Box3& extent) const {
+  Region region = *this;
+  region.extent_ = extent;
+  return region;
+}
+
 Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high) {
   return of_shape(std::make_shared<RegionShape>(std::move(polygons), ""), low, high);
 }
@@ -164,7 +170,8 @@ bool Region::covers(const Point2& place) const {
 }
 
 void Region::restrict(stream::Selection& selection) const {
-  selection.region = box_;
+  // Of a box the source knows what it may round.
+  selection.region = shape_ ? box_ : extent();
   selection.covers = {};
   if (shape_) {
     selection.covers = [shape = shape_](const Point2& place) { return shape->covers(place); };

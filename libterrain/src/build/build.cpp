@@ -334,7 +334,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
                                  ? std::string()
                                  : " (" + std::to_string(so_far.nodata) +
                                        (info.grid ? " cells, all nodata)"
-                                                  : " points, all with a coordinate NaN)")),
+                                                  : " points, all without a coordinate)")),
          .remedy = so_far.excluded > 0 ? "give another `where` or `region`"
                    : info.grid         ? "check the file and its nodata value"
                                        : "check the file"});

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include <terrace/stream/error.hpp>
@@ -22,6 +23,47 @@ namespace {
 constexpr int kDecimals = 9, kOwnDecimals = 6;
 /// Points turned into text at a time.
 constexpr std::size_t kContourPoints = std::size_t{1} << 17;
+
+/// Cuts a line of longitudes that go on beyond 180 degrees into parts from -180 to 180 (RFC 7946,
+/// 3.1.9).
+std::vector<std::vector<Point2>> cut_at_antimeridian(std::span<const Point2> line) {
+  std::vector<std::vector<Point2>> parts;
+  double turn = 0;
+  const auto add = [&](const Point2& a, const Point2& b) {
+    const double turns = (0.5 * a[0] + 0.5 * b[0]) / 360;
+    const double now = 360 * (turns == 0.5 ? 0 : std::round(turns));  // 180 stays on its side
+    if (parts.empty() || now != turn) parts.push_back({{a[0] - now, a[1]}});
+    turn = now;
+    parts.back().push_back({b[0] - now, b[1]});
+  };
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    const Point2 &a = line[i - 1], &b = line[i];
+    const auto [least, most] = std::minmax(a[0], b[0]);
+    const double cut = 360 * std::floor((least + 180) / 360) + 180;
+    if (least < cut && cut < most) {
+      const Point2 between{cut, a[1] + (b[1] - a[1]) * ((cut - a[0]) / (b[0] - a[0]))};
+      add(a, between);
+      add(between, b);
+    } else {
+      add(a, b);
+    }
+  }
+  return parts;
+}
+
+void append_positions(std::string& text, std::span<const Point2> places, const FixedText& number) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    std::array<char, 2 * FixedText::kLongest + 4> pair;
+    char* at = pair.data();
+    if (i > 0) *at++ = ',';
+    *at++ = '[';
+    at = number.write(at, places[i][0]);
+    *at++ = ',';
+    at = number.write(at, places[i][1]);
+    *at++ = ']';
+    text.append(pair.data(), at);
+  }
+}
 
 }  // namespace
 
@@ -79,18 +121,22 @@ void ContourText::append(std::string& text, const ContourLine& line,
                                    "place out with `region`"});
   }
   text += "{\"type\":\"Feature\",\"properties\":{\"elev\":" +
-          number_text(static_cast<double>(line.level) * interval_) +
-          "},\"geometry\":{\"type\":\"LineString\",\"coordinates\":[";
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    std::array<char, 2 * FixedText::kLongest + 4> pair;
-    char* at = pair.data();
-    if (i > 0) *at++ = ',';
-    *at++ = '[';
-    at = number_.write(at, places[i][0]);
-    *at++ = ',';
-    at = number_.write(at, places[i][1]);
-    *at++ = ']';
-    text.append(pair.data(), at);
+          number_text(static_cast<double>(line.level) * interval_) + "},\"geometry\":{\"type\":";
+  const bool beyond = geography_ && std::any_of(places.begin(), places.end(), [](const Point2& p) {
+                        return std::abs(p[0]) > 180;
+                      });
+  std::vector<std::vector<Point2>> parts;
+  if (beyond) parts = cut_at_antimeridian(places);
+  if (parts.size() > 1) {
+    text += "\"MultiLineString\",\"coordinates\":[";
+    for (const std::vector<Point2>& part : parts) {
+      text += &part == parts.data() ? "[" : ",[";
+      append_positions(text, part, number_);
+      text += ']';
+    }
+  } else {
+    text += "\"LineString\",\"coordinates\":[";
+    append_positions(text, beyond ? parts.front() : places, number_);
   }
   text += "]}}";
 }

@@ -100,36 +100,50 @@ std::vector<Polygon> outlines(const Region& region) {
             {box.min[0], box.max[1]}}}};
 }
 
-/// An infinite box as far as a turn beyond the bounds: outlines are finite.
-Region within_reach(const Region& region, double turn, const stream::Box3& bounds) {
-  if (!region.polygons().empty()) return region;
-  stream::Box3 box = region.box();
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    if (std::isinf(box.min[axis])) box.min[axis] = std::min(bounds.min[axis] - turn, box.max[axis]);
-    if (std::isinf(box.max[axis])) box.max[axis] = std::max(bounds.max[axis] + turn, box.min[axis]);
-  }
+/// Shifts by whole turns, from the first to the last.
+struct Turns {
+  double first = 0, last = 0;
+};
+
+Turns turns_to(const stream::Box3& box, double turn, const stream::Box3& bounds) {
+  if (!(turn > 0)) return {};
+  // Nobody is further off.
+  constexpr double kMost = 4;
+  const Turns turns{std::max(-kMost, std::ceil((bounds.min[0] - box.max[0]) / turn)),
+                    std::min(kMost, std::floor((bounds.max[0] - box.min[0]) / turn))};
+  return turns.first <= turns.last ? turns : Turns{};
+}
+
+/// Latitudes without bounds end beyond the data's: outlines are finite.
+Region within_reach(stream::Box3 box, const stream::Box3& bounds) {
+  box.min[1] = std::max(box.min[1], std::min(bounds.min[1] - 1, box.max[1]));
+  box.max[1] = std::min(box.max[1], std::max(bounds.max[1] + 1, box.min[1]));
   return Region::of_box(box);
+}
+
+stream::Box3 widened(stream::Box3 box, const Point2& by) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    box.min[axis] -= by[axis];
+    box.max[axis] += by[axis];
+  }
+  return box;
 }
 
 }  // namespace
 
 Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds) {
   const CoordinateSystem& to = change.from();
-  std::vector<Polygon> polygons = outlines(region);
-  if (!change.identity()) {
-    const Outline outline(change);
-    std::vector<Polygon> there;
-    for (Polygon& polygon : polygons) {
-      for (std::vector<Point2>& ring : polygon) ring = outline.ring(ring);
-      // Sides may come to lie on each other, as the meridians of 180 degrees east and west do.
-      for (Polygon& part : valid_polygons(polygon)) there.push_back(std::move(part));
-    }
-    if (there.empty()) fail(to, "the region has no area in");
-    polygons = std::move(there);
+  const Outline outline(change);
+  std::vector<Polygon> polygons;
+  for (Polygon& polygon : outlines(region)) {
+    for (std::vector<Point2>& ring : polygon) ring = outline.ring(ring);
+    // Sides may come to lie on each other, as the meridians of 180 degrees east and west do.
+    for (Polygon& part : valid_polygons(polygon)) polygons.push_back(std::move(part));
   }
+  if (polygons.empty()) fail(to, "the region has no area in");
   const Region there =
       Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
-  return to.turn() > 0 ? with_turns(there, to.turn(), bounds) : there;
+  return with_turns(there, to.turn(), bounds);
 }
 
 Point2 middle_in(const Transformation& change, const stream::Box3& box) {
@@ -138,25 +152,44 @@ Point2 middle_in(const Transformation& change, const stream::Box3& box) {
   return middle;
 }
 
-Region with_turns(const Region& region, double turn, const stream::Box3& bounds) {
-  std::vector<Polygon> polygons = outlines(within_reach(region, turn, bounds));
-  const std::size_t count = polygons.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    for (const double shift : {-turn, turn}) {
-      Polygon copy = polygons[i];
-      double west = std::numeric_limits<double>::infinity(), east = -west;
-      for (std::vector<Point2>& ring : copy) {
+Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
+                  const Point2& tolerance) {
+  const stream::Box3& given = region.box();
+  const bool box = region.polygons().empty();
+  // What is wider than two turns, as an infinite box is, is meant as it is written.
+  if (box && !(given.max[0] - given.min[0] <= 2 * turn)) turn = 0;
+  // A shift by whole turns rounds as well.
+  Point2 rounding{0x1p-50 * turn, 0};
+  const auto [first, last] = turns_to(widened(widened(given, tolerance), rounding), turn, bounds);
+  if (first == 0 && last == 0) rounding[0] = 0;
+  stream::Box3 extent = widened(given, rounding);
+  extent.min[0] += first * turn;
+  extent.max[0] += last * turn;
+  if (box && (first == last || given.max[0] - given.min[0] >= turn)) {
+    return Region::of_box(widened(extent, tolerance)).with_extent(extent);
+  }
+  if (first == 0 && last == 0) return region;
+  const std::vector<Polygon> one =
+      outlines(box ? within_reach(widened(widened(given, rounding), tolerance), bounds) : region);
+  std::vector<Polygon> polygons;
+  for (double i = first; i <= last; ++i) {
+    for (Polygon polygon : one) {
+      stream::Box3 around;
+      for (std::vector<Point2>& ring : polygon) {
         for (Point2& p : ring) {
-          p[0] += shift;
-          west = std::min(west, p[0]);
-          east = std::max(east, p[0]);
+          p[0] += i * turn;
+          around.include(stream::Point3{p[0], p[1], 0});
         }
       }
-      if (west <= bounds.max[0] && east >= bounds.min[0]) polygons.push_back(std::move(copy));
+      // Of several polygons some may lie elsewhere.
+      if (around.min[0] <= bounds.max[0] && around.max[0] >= bounds.min[0]) {
+        polygons.push_back(std::move(polygon));
+      }
     }
   }
-  if (polygons.size() == count) return region;
-  return Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
+  if (polygons.empty()) return region;
+  const Region made = Region::of_polygons(std::move(polygons), given.min[2], given.max[2]);
+  return box ? made.with_extent(extent) : made;
 }
 
 }  // namespace terrace::terrain

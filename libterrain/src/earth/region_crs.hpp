@@ -14,8 +14,12 @@ namespace terrace::terrain {
 /// CRS shows, or is torn there.
 Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds);
 
-/// The region of a geographic system, and what of it `bounds` holds whole turns away.
-Region with_turns(const Region& region, double turn, const stream::Box3& bounds);
+/// The region whole turns away, where `bounds` lies: more than one part if both ends of the data
+/// do; where it is if none does, or if it is a box wider than two turns, as infinite ones are.
+/// turn: 0 if x does not lead around. A box is made wider by the tolerance on each side; its
+/// extent() is not.
+Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
+                  const Point2& tolerance = {});
 
 /// The middle of a box in the CRS that `change` leads to; NaN if it has no place there.
 Point2 middle_in(const Transformation& change, const stream::Box3& box);

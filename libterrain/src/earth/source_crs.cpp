@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "earth/source_crs.hpp"
 
-#include <filesystem>
-#include <system_error>
-
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
@@ -15,17 +12,6 @@ namespace {
 [[noreturn]] void fail(const std::string& file, const std::string& cause,
                        const std::string& remedy) {
   throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
-}
-
-/// NAME.prj beside NAME.tif; empty if there is none.
-std::string sidecar_of(const std::string& file) {
-  if (file == "-") return {};
-  for (const char* ending : {".prj", ".PRJ"}) {
-    const std::filesystem::path path = std::filesystem::path(file).replace_extension(ending);
-    std::error_code ignored;
-    if (path != file && std::filesystem::is_regular_file(path, ignored)) return path.string();
-  }
-  return {};
 }
 
 CoordinateSystem read_sidecar(const std::string& file) {
@@ -42,7 +28,7 @@ std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& inf
                                                    std::optional<stream::Crs>& local) {
   std::optional<CoordinateSystem> system;
   for (const std::string& file : info.files) {
-    const std::string sidecar = sidecar_of(file);
+    const std::string sidecar = stream::prj_beside(file);
     if (sidecar.empty()) continue;
     if (const auto own = local_crs_named(sidecar)) {
       local = own;

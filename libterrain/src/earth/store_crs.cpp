@@ -9,6 +9,7 @@
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
+#include "earth/source_crs.hpp"
 #include "earth/whole_turns.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
@@ -45,32 +46,53 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 
 RegionConversion::RegionConversion(const stream::Store& store)
     : bounds_(world_box(store.schema(), store.whole().bounds())),
+      tolerance_(border_tolerance(store.schema())),
       turn_(WholeTurns(store.schema(), store.whole().bounds()).turn()) {}
 
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
-    : to_regions_(std::move(to_regions)),
-      bounds_(world_box(store.schema(), store.whole().bounds())) {}
-
-RegionConversion::RegionConversion(const stream::SourceInfo& source,
-                                   const CoordinateSystem& system) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  bounds_ = {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-  if (!source.grid) return;
-  const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
-  bounds_ = world_box(source, {{0, 0, 0}, {end(source.columns), end(source.rows), 0}});
-  const double turn = system.turn();
-  if (bounds_.max[0] - bounds_.min[0] <= turn) turn_ = turn;
+    : RegionConversion(store) {
+  if (!to_regions.identity()) to_regions_ = std::move(to_regions);
 }
 
-RegionConversion::RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,
-                                   const std::string& named)
-    : RegionConversion(source, system) {
-  to_regions_.emplace(source.grid ? system.over(bounds_) : system, CoordinateSystem::parse(named));
+RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::string& named,
+                                   const std::optional<DatumShift>& shift)
+    : tolerance_(border_tolerance(source)) {
+  std::optional<CoordinateSystem> system;
+  try {
+    system = crs_of_source(source, shift).system;
+  } catch (const stream::Error&) {
+    if (!named.empty()) throw;
+  }
+  if (!system && !named.empty()) {
+    throw stream::Error(
+        {.file = source.files.empty() ? std::string() : source.files.front(),
+         .where = {},
+         .cause = "has no known CRS, into which the region could be converted",
+         .remedy = "leave `region_crs` out and give the region in its coordinates"});
+  }
+  const bool degrees = source.crs.geographic && source.crs.horizontal_unit == "degree";
+  turn_ = system ? system->turn() : degrees ? 360 : 0;
+  std::optional<stream::Box3> stored = source.stated_bounds;
+  if (source.grid) {
+    const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
+    stored = {{0, 0, 0}, {end(source.columns), end(source.rows), 0}};
+  }
+  if (stored) {
+    bounds_ = world_box(source, *stored);
+    // What is wider is no place on the earth.
+    if (!(bounds_.max[0] - bounds_.min[0] <= turn_)) turn_ = 0;
+  } else {
+    // Longitudes from -180 to 180, or from 0 to 360.
+    bounds_ = {{-0.5 * turn_, -0.5 * turn_, 0}, {turn_, 0.5 * turn_, 0}};
+  }
+  if (named.empty()) return;
+  Transformation change(stored ? system->over(bounds_) : *system, CoordinateSystem::parse(named));
+  if (!change.identity()) to_regions_ = std::move(change);
 }
 
 Region RegionConversion::operator()(Region region) const {
-  if (!to_regions_) return turn_ > 0 ? with_turns(region, turn_, bounds_) : region;
-  return region_in(region, *to_regions_, bounds_);
+  return to_regions_ ? region_in(region, *to_regions_, bounds_)
+                     : with_turns(region, turn_, bounds_, tolerance_);
 }
 
 PlaceConversion::PlaceConversion(Transformation change) {

@@ -42,7 +42,7 @@ std::string_view bare(std::string_view cell) {
 
 std::optional<double> number_in(std::string_view cell) {
   cell = bare(cell);
-  if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
+  if (cell.empty() || cell == "NA") return std::numeric_limits<double>::quiet_NaN();
   if (cell.front() == '+') cell.remove_prefix(1);
   return number_from<double>(cell);
 }

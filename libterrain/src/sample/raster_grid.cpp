@@ -108,7 +108,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   const stream::Box3 area = area_of(store);
   stream::Box3 box = area;
   if (request.region) {
-    const stream::Box3& wanted = request.region->box();
+    const stream::Box3& wanted = request.region->extent();
     for (std::size_t axis = 0; axis < 2; ++axis) {
       box.min[axis] = std::max(box.min[axis], wanted.min[axis]);
       box.max[axis] = std::min(box.max[axis], wanted.max[axis]);

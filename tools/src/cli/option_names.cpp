@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 37> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 38> kOptions{{
     {"band", "--band"},
     {"block_points", "--block"},
     {"cell", "--cell"},
@@ -37,6 +37,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 37> kOptions
     {"outlier_price", "--outlier-price"},
     {"own_crs", "--own-crs"},
     {"region", "--region"},
+    {"region_crs", "--region-crs"},
     {"replace", "--force"},
     {"resolution", "--resolution"},
     {"resume", "--resume"},

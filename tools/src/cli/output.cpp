@@ -145,8 +145,10 @@ bool may_replace(const std::string& path, bool force) {
     throw stream::Error({.file = path, .where = {}, .cause = cause, .remedy = remedy});
   };
   if (error) throw stream::system_error(path, "cannot be looked at", error.value());
+  if (!fs::is_regular_file(status)) {
+    refuse("is not a regular file", "name another output; - is standard output");
+  }
   if (!force) refuse("exists already", "name another output, or give --force to replace it");
-  if (!fs::is_regular_file(status)) refuse("is not a regular file", "name another output");
   if (!written_by_terrace(path)) {
     refuse("was not written by terrace, as far as its format tells, so --force does not replace it",
            "remove it yourself or name another output");

@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "cli/cli.hpp"
-#include "earth/source_crs.hpp"
-#include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -36,11 +34,6 @@ std::vector<std::string> names_in(const std::string& text, const std::string& op
     names.push_back(name);
   }
   return names;
-}
-
-/// Whether a box may be one of longitudes and latitudes.
-bool is_in_degrees(const stream::Box3& box) {
-  return box.min[0] >= -360 && box.max[0] <= 360 && box.min[1] >= -90 && box.max[1] <= 90;
 }
 
 }  // namespace
@@ -82,20 +75,8 @@ terrain::RegionConversion SelectionOptions::conversion(
                                 input + " can be read only once; name a file");
     }
   }
-  const auto source = stream::open_source(inputs, reading);
-  const terrain::SourceCrs crs = terrain::crs_of_source(source->info(), shift);
-  if (region_crs_.empty()) {
-    if (!crs.system) return {};
-    return {source->info(), *crs.system};
-  }
-  if (!crs.system) {
-    throw stream::Error(
-        {.file = inputs.front(),
-         .where = {},
-         .cause = "has no known CRS, into which the region could be converted",
-         .remedy = "leave --region-crs out and give the region in its coordinates"});
-  }
-  return {source->info(), *crs.system, region_crs_};
+  return terrain::RegionConversion(stream::open_source(inputs, reading)->info(), region_crs_,
+                                   shift);
 }
 
 stream::Selection SelectionOptions::selection(std::span<const std::string> inputs,
@@ -104,14 +85,9 @@ stream::Selection SelectionOptions::selection(std::span<const std::string> input
                                               const CommonOptions& common) const {
   stream::Selection selection{.where = where_, .resolution = resolution_.value_or(0)};
   if (!region_.empty()) {
-    terrain::Region region = terrain::Region::parse(region_);
-    // Rasters on both sides of the antimeridian are joined there, whichever longitudes they have.
-    if (!region_crs_.empty() || is_in_degrees(region.box())) {
-      const terrain::RegionConversion converted = conversion(inputs, reading, shift);
-      region = converted(std::move(region));
-      if (!converted.note().empty()) common.say(converted.note());
-    }
-    region.restrict(selection);
+    const terrain::RegionConversion converted = conversion(inputs, reading, shift);
+    converted(terrain::Region::parse(region_)).restrict(selection);
+    if (!converted.note().empty()) common.say(converted.note());
   }
   if (!keep_.empty()) selection.keep = names_in(keep_, "--keep");
   if (!drop_.empty()) selection.drop = names_in(drop_, "--drop");

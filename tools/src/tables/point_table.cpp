@@ -100,7 +100,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   table.nodata = source->progress().nodata;
   if (table.nodata > 0 && !table.info.grid) {
     common.context().say(with_commas(table.nodata) +
-                         " points with a coordinate that is NaN are left out: "
+                         " points without a coordinate are left out: "
                          "numbers of points do not count them");
   }
   if (table.positions.empty()) {

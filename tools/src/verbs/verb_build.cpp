@@ -166,7 +166,7 @@ class BuildCommand final : public Command {
     std::string left_out;
     if (outcome.nodata > 0) {
       left_out = with_commas(outcome.nodata) +
-                 (outcome.raster ? " cells without data" : " with a coordinate that is NaN");
+                 (outcome.raster ? " cells without data" : " without a coordinate");
     }
     if (outcome.excluded > 0) {
       left_out += (left_out.empty() ? "" : " and ") + with_commas(outcome.excluded) +

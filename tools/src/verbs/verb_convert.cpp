@@ -98,8 +98,8 @@ class ConvertCommand : public Command {
     std::string left_out;
     if (done.excluded > 0) left_out = with_commas(done.excluded) + " were not selected";
     if (done.nodata > 0 && !info.grid) {
-      left_out += (left_out.empty() ? "" : ", ") + with_commas(done.nodata) +
-                  " had a coordinate that is NaN";
+      left_out +=
+          (left_out.empty() ? "" : ", ") + with_commas(done.nodata) + " lacked a coordinate";
     }
     summary.text = output_ + ": " + with_commas(writer->points()) + " points" +
                    (left_out.empty() ? "" : " (" + left_out + ")") + ", " +

@@ -313,7 +313,7 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
   }
   text += "points:    " + with_commas(contents.points) +
           (!info.grid && contents.nodata > 0
-               ? ", and " + with_commas(contents.nodata) + " with a coordinate that is NaN"
+               ? ", and " + with_commas(contents.nodata) + " without a coordinate"
                : std::string()) +
           '\n';
   if (info.octree) {

@@ -171,7 +171,8 @@ std::string finest_level(const stream::Store& store, const std::string& region) 
   constexpr std::uint64_t kMost = 4000000;
   if (region.empty()) return std::to_string(level_within(store, kMost));
   for (unsigned level = 0; level < store.top(); ++level) {
-    const Detail detail = parse_detail(store, std::to_string(level), region, {});
+    const Detail detail =
+        parse_detail(store, std::to_string(level), region, {}, RegionConversion(store));
     if (wanted_points(store, detail) <= kMost) return std::to_string(level);
   }
   return "top";
@@ -196,7 +197,8 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   }
   const bool chosen = !selection.level.empty() || !selection.focuses.empty();
   const std::string level = chosen ? selection.level : finest_level(store, selection.region);
-  const Detail detail = parse_detail(store, level, selection.region, selection.focuses);
+  const Detail detail =
+      parse_detail(store, level, selection.region, selection.focuses, RegionConversion(store));
   // These positions are in the CRS already.
   stream::Placement world;
   world.crs = stored.crs;

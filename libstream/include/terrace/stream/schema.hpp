@@ -164,4 +164,8 @@ struct Schema : Placement {
   }
 };
 
+/// How much wider on each side along x and y a region of a raster is taken: a millionth of a cell,
+/// since the places of rows and columns that a border names are rounded. Points have none.
+[[nodiscard]] std::array<double, 2> border_tolerance(const Schema& schema);
+
 }  // namespace terrace::stream

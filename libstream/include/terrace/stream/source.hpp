@@ -60,8 +60,8 @@ struct PointBlock {
 /// The progress of a source. Bytes refer to the input files, if the source knows them.
 struct Progress {
   std::uint64_t points = 0;
-  /// Left out: cells without data; of XYZ, CSV, PLY and meshes points (entities) of which a
-  /// coordinate is NaN. Infinite coordinates are errors.
+  /// Left out: cells without data; of XYZ, CSV, PLY, meshes and arrays points (entities) of which a
+  /// coordinate is NaN (in text also an empty field or NA). Infinite coordinates are errors.
   std::uint64_t nodata = 0;
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
@@ -180,6 +180,10 @@ struct SourceOptions {
 /// std::invalid_argument for a format that is not known.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
+
+/// NAME.prj beside NAME.tif and the like, where ESRI's formats have their CRS; empty if there is
+/// none.
+[[nodiscard]] std::string prj_beside(const std::string& file);
 
 /// The same stream, read on a separate thread, at most `blocks` blocks ahead. An Error thrown there
 /// is rethrown by the `next` that would have delivered the block. The thread starts at once, that

@@ -113,7 +113,7 @@ class CopcWriter final : public PointWriter {
     append_vlr(vlrs, kCopcUser, kCopcInfo, std::string(kCopcInfoBytes, '\0'));
     append_vlr(vlrs, laz::Vlr::kUserId, laz::Vlr::kRecordId, text_of_bytes(vlr_.serialise()));
     file_.vlrs = 2;
-    append_vlrs(vlrs, header.crs ? header.crs() : Crs{}, records_.layout(), path, file_);
+    append_vlrs(vlrs, records_.crs(), records_.layout(), path, file_);
     file_.points_offset = kLas14HeaderBytes + vlrs.size();
     sink_.write(std::string(kLas14HeaderBytes, '\0') + vlrs +
                 std::string(sizeof(std::uint64_t), '\0'));

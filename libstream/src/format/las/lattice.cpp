@@ -31,32 +31,32 @@ int decimals_of(std::span<const Point3> points, std::size_t axis, int decimals) 
 
 }  // namespace
 
-Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds) {
+Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds,
+                        bool degrees) {
   Box3 box;
   for (const Point3& p : points) box.include(p);
-  double grown = 1;
-  if (bounds) {
-    box.include(*bounds);
-  } else {
-    grown = 1000;
-  }
+  if (bounds) box.include(*bounds);
   Lattice lattice;
   if (box.empty()) return lattice;
-  std::array<double, 3> reach{};  // from the offset, which is a whole number
+  std::array<double, 3> half{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     lattice.offset[axis] = std::nearbyint(0.5 * box.min[axis] + 0.5 * box.max[axis]);
-    reach[axis] = (0.5 * box.max[axis] - 0.5 * box.min[axis]) * grown + 1;
+    half[axis] = 0.5 * box.max[axis] - 0.5 * box.min[axis];
   }
-  reach[0] = reach[1] = std::max(reach[0], reach[1]);
+  half[0] = half[1] = std::max(half[0], half[1]);
   const int planar = decimals_of(points, 1, decimals_of(points, 0, 0));
   const std::array<int, 3> wanted{planar, planar, decimals_of(points, 2, 0)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int usual = degrees && axis < 2 ? 7 : 3;
     int decimals = wanted[axis];
-    while (decimals > 0 && reach[axis] * kPowers[static_cast<std::size_t>(decimals)] > kReach) {
+    const auto reach = [&] {  // from the offset, which is a whole number
+      return half[axis] * (bounds ? 1 : decimals > usual ? 1000 : 20) + 1;
+    };
+    while (decimals > 0 && reach() * kPowers[static_cast<std::size_t>(decimals)] > kReach) {
       --decimals;
     }
     double step = 1 / kPowers[static_cast<std::size_t>(decimals)];
-    while (reach[axis] / step > kReach) step *= 10;
+    while (reach() / step > kReach) step *= 10;
     lattice.scale[axis] = step;
   }
   return lattice;

@@ -66,6 +66,7 @@ LasRecords::LasRecords(const std::string& path, const PointHeader& header, LasFo
     : path_(path),
       attributes_(header.attributes),
       layout_(las_layout(header.attributes, path, formats)),
+      crs_(header.crs ? header.crs() : Crs{}),
       bounds_(header.bounds),
       has_lattice_(header.lattice.has_value()),
       lattice_(header.lattice.value_or(Lattice{})) {
@@ -98,7 +99,7 @@ std::string_view LasRecords::take(PointWriter::EncodedPtr points) {
   Records& records = *taken_;
   if (records.unpacked) {
     if (!has_lattice_) {
-      lattice_ = decimal_lattice(records.unpacked->positions, bounds_);
+      lattice_ = decimal_lattice(records.unpacked->positions, bounds_, crs_.geographic);
       has_lattice_ = true;
     }
     records.first = sums_.points;
@@ -149,7 +150,7 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
       fail("point " + std::to_string(out.first + i),
            std::string("its ") + "xyz"[axis] + " is out of reach for 32 bits in steps of " +
                text_of(scale),
-           "write PLY, or fewer points at a time");
+           "write PLY, or build a store and write its points, whose bounds are known");
     }
     const auto stored = static_cast<std::int32_t>(step);
     std::memcpy(to, &stored, sizeof stored);

@@ -46,6 +46,7 @@ class LasRecords {
 
   [[nodiscard]] const LasLayout& layout() const { return layout_; }
   [[nodiscard]] const std::vector<Channel>& attributes() const { return attributes_; }
+  [[nodiscard]] const Crs& crs() const { return crs_; }
   /// The lattice of the records; arbitrary before the first point.
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   /// Whether the point format is one of LAS before 1.4.
@@ -70,6 +71,7 @@ class LasRecords {
   std::string path_;
   std::vector<Channel> attributes_;
   LasLayout layout_;
+  Crs crs_;
   std::optional<Box3> bounds_;
   std::size_t payload_bytes_ = 0;
   std::atomic<bool> has_lattice_;  ///< else the first points make it

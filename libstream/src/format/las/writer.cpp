@@ -101,7 +101,7 @@ class LasWriter final : public PointWriter {
         file_{.compressed = compressed} {
     const LasLayout& layout = records_.layout();
     std::string vlrs;
-    append_vlrs(vlrs, header.crs ? header.crs() : Crs{}, layout, path, file_);
+    append_vlrs(vlrs, records_.crs(), layout, path, file_);
     if (compressed) {
       const laz::Vlr vlr = laz::Vlr::of(layout.point_format, layout.record_bytes);
       const std::vector<std::byte> data = vlr.serialise();

@@ -24,6 +24,7 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::string_view kGlbRemedy = "the file is damaged; write it anew";
+constexpr const char* kInfinite = "has a vertex with an infinite coordinate";
 constexpr std::string_view kPlainRemedy = "write it as plain glTF 2.0 in one .glb file";
 
 /// A linear map and a translation: rows of four numbers.
@@ -445,13 +446,14 @@ class GlbParser final : public MeshParser {
     Point3 p;
     for (double& value : p) {
       value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
+      if (std::isinf(value)) fail({}, kInfinite);
       at += sizeof(float);
     }
     Point3 world;
     for (std::size_t row = 0; row < 3; ++row) {
       const double* const t = parts_[at_].transform.data() + 4 * row;
       world[row] = moved_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
-      if (!std::isfinite(world[row])) fail({}, "has a vertex that is not finite");
+      if (std::isinf(world[row])) fail({}, kInfinite);
     }
     vertex_ = {world[0], 0.0 - world[2], world[1]};  // y up to z up; zero stays without a sign
     return true;

@@ -233,7 +233,7 @@ class PlySource final : public PointSource {
     }
     if (!is_finite(block)) {
       check_infinite(block);
-      if (!keeps_missing_) leave_out_missing(block);
+      if (!keeps_missing_) nodata_ += leave_out_missing(block, record_bytes_);
     }
     read_ += wanted;
   }
@@ -427,19 +427,6 @@ class PlySource final : public PointSource {
       fail("vertex " + std::to_string(read_ + i), "a coordinate is infinite",
            "leave such vertices out");
     }
-  }
-  void leave_out_missing(PointBlock& block) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      if (is_missing(block.positions[i])) continue;
-      block.positions[kept] = block.positions[i];
-      const std::byte* const record = block.payload.data() + i * record_bytes_;
-      std::copy_n(record, record_bytes_, block.payload.data() + kept * record_bytes_);
-      ++kept;
-    }
-    nodata_ += block.size() - kept;
-    block.positions.resize(kept);
-    block.payload.resize(kept * record_bytes_);
   }
 
   Input input_;

@@ -45,6 +45,12 @@ const char* parse_number(const char* at, const char* end, ScalarType type, doubl
   return type == ScalarType::u64 ? parse(std::uint64_t{}) : parse(std::int64_t{});
 }
 
+/// What pandas, QGIS (nothing) and R (NA) write where there is no value; NaN is a number.
+bool is_missing_value(std::string_view field) {
+  field = trim(unquoted(field));
+  return field.empty() || field == "NA";
+}
+
 /// True for digits, with a sign or without.
 bool is_integer(std::string_view field) {
   if (field.starts_with('-') || field.starts_with('+')) field.remove_prefix(1);
@@ -266,10 +272,13 @@ class XyzSource final : public PointSource {
     if (fields.size() != layout_.columns) return false;
     for (std::size_t i = 0; i < fields.size(); ++i) {
       if (parse_field(fields[i], types_[i], row_[i])) continue;
-      if (!optional_[i]) return false;
+      if (!optional_[i] && !(is_coordinate(i) && is_missing_value(fields[i]))) return false;
       row_[i] = std::numeric_limits<double>::quiet_NaN();
     }
     return true;
+  }
+  [[nodiscard]] bool is_coordinate(std::size_t column) const {
+    return std::find(layout_.xyz.begin(), layout_.xyz.end(), column) != layout_.xyz.end();
   }
   static bool parse_field(std::string_view field, ScalarType type, double& value) {
     field = unquoted(field);
@@ -294,10 +303,10 @@ class XyzSource final : public PointSource {
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const std::string_view field = fields[i];
       const std::string column = "column " + std::to_string(i + 1);
-      const bool coordinate =
-          std::find(layout_.xyz.begin(), layout_.xyz.end(), i) != layout_.xyz.end();
+      const bool coordinate = is_coordinate(i);
       double value = 0;
-      if (!parse_field(field, types_[i], value) && !optional_[i]) {
+      if (!parse_field(field, types_[i], value) && !optional_[i] &&
+          !(coordinate && is_missing_value(field))) {
         const bool comma = field.find(',') != field.npos;
         if (types_[i] != ScalarType::f64 && !field.empty()) {
           fail(column + ", " + in_quotes(field) + ", is not an integer that " +
@@ -308,7 +317,7 @@ class XyzSource final : public PointSource {
                            ? " is empty"
                            : ", " + in_quotes(field) + ", is not a number that a double holds"),
              comma        ? "write numbers with a decimal point"
-             : coordinate ? "every point needs x, y and z"
+             : coordinate ? "write numbers, or NA where there is none"
                           : "correct it, or leave the column out (`drop` of build and convert)");
       }
       if (coordinate && std::isinf(value)) {

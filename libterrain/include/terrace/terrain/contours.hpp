@@ -29,7 +29,8 @@ struct ContourOutcome {
 
 /// The contour lines of the linear surface as GeoJSON (RFC 7946): one LineString in longitude and
 /// latitude of WGS 84 per line, within 1e-10 degrees before they are rounded to nine decimals, with
-/// its height as `elev`, higher ground on its right. See ContourLevels for what is exact.
+/// its height as `elev`, higher ground on its right; a MultiLineString for one that the
+/// antimeridian cuts. See ContourLevels for what is exact.
 ///
 /// The surface of a raster at level 0 is its triangulated lattice of samples; else the Delaunay
 /// triangulation of the points of the level and above (see PointWindow), which spans the points'

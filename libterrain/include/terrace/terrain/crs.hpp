@@ -163,22 +163,22 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift = std::nullopt);
 
-/// Regions in another CRS as regions in that of the data; made by default, it leaves them as they
-/// are.
+/// Regions, of another CRS too, as regions in that of the data; made by default, it leaves them as
+/// they are. Longitudes may be off by whole turns, and a box of a raster holds what lies within a
+/// millionth of a cell.
 class RegionConversion {
  public:
   RegionConversion() = default;
-  /// Regions in the store's own CRS; longitudes may be off by whole turns.
+  /// Regions in the store's own CRS.
   explicit RegionConversion(const stream::Store& store);
   /// to_regions: from the store's CRS to that of the regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
-  /// Regions in a source's own CRS; longitudes may be off by whole turns. system: the CRS.
-  RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system);
-  /// From the CRS of a source, `system`, to that of the regions, `named` as for
-  /// CoordinateSystem::parse. Throws: UsageError for an unknown CRS, stream::Error if nothing leads
-  /// from one datum to the other.
-  RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,
-                   const std::string& named);
+  /// For Region::restrict() of a source that is opened again. named: the CRS of the regions, as for
+  /// CoordinateSystem::parse; empty: the source's own, be it known or not. shift: of --towgs84.
+  /// Throws: UsageError for an unknown name, stream::Error if nothing leads from one CRS to the
+  /// other.
+  explicit RegionConversion(const stream::SourceInfo& source, const std::string& named = {},
+                            const std::optional<DatumShift>& shift = {});
   /// Outlines, a box's too, get so many corners that they run within a millionth of their length of
   /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows.
   [[nodiscard]] Region operator()(Region region) const;
@@ -188,6 +188,7 @@ class RegionConversion {
  private:
   std::optional<Transformation> to_regions_;
   stream::Box3 bounds_;
+  Point2 tolerance_{};
   double turn_ = 0;  ///< of longitudes; 0: none
 };
 

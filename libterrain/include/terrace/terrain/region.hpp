@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,8 @@ class Region {
   static Region parse(const std::string& text);
 
   static Region of_box(const stream::Box3& box);
+  /// The same region with another extent().
+  [[nodiscard]] Region with_extent(const stream::Box3& extent) const;
   /// The union of polygons, each with heights from `low` to `high`.
   /// Throws: stream::Error without polygons, or for an invalid one (a ring that crosses or
   /// touches itself along a line, has fewer than three corners, no area or a coordinate that is not
@@ -53,6 +56,9 @@ class Region {
 
   /// The smallest box around the region. Without heights its z is unbounded.
   [[nodiscard]] const stream::Box3& box() const { return box_; }
+  /// The box that rasters of the region cover: box(), unless that was widened to hold what rounding
+  /// would leave out.
+  [[nodiscard]] const stream::Box3& extent() const { return extent_ ? *extent_ : box_; }
   /// None: the region is its box.
   [[nodiscard]] const std::vector<Polygon>& polygons() const;
   [[nodiscard]] bool contains(const stream::Point3& p) const;
@@ -71,6 +77,7 @@ class Region {
   static Region of_shape(std::shared_ptr<const RegionShape> shape, double low, double high);
 
   stream::Box3 box_;
+  std::optional<stream::Box3> extent_;
   std::shared_ptr<const RegionShape> shape_;  ///< none: the box itself
 };
 
