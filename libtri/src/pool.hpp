@@ -101,5 +101,9 @@ template <class T>
 std::span<T> span_of(Pool<T>& pool) {
   return {pool.data(), pool.size()};
 }
+template <class T>
+std::span<const T> span_of(const Pool<T>& pool) {
+  return {pool.data(), pool.size()};
+}
 
 }  // namespace terrace::tri

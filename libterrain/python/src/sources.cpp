@@ -100,7 +100,7 @@ stream::Selection selection_of(const py::object& source, const py::dict& given,
   take_option(given, "resolution", selection.resolution);
   if (!given.contains("region")) return selection;
   auto region = region_of(given["region"]);
-  if (region && opens_twice(source)) {
+  if (region && terrain::RegionConversion::may_turn(*region) && opens_twice(source)) {
     const OpenSource open = opener_of(source);
     region = released([&] { return terrain::RegionConversion(open(options)->info())(*region); });
   }

@@ -90,6 +90,13 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   if (!change.identity()) to_regions_ = std::move(change);
 }
 
+bool RegionConversion::may_turn(const Region& region) {
+  constexpr double kFourTurns = 1600, kPole = 100;  // in gradians, the smallest unit
+  const stream::Box3& box = region.box();
+  return box.min[0] <= kFourTurns && box.max[0] >= -kFourTurns && box.min[1] <= kPole &&
+         box.max[1] >= -kPole;
+}
+
 Region RegionConversion::operator()(Region region) const {
   return to_regions_ ? region_in(region, *to_regions_, bounds_)
                      : with_turns(region, turn_, bounds_, tolerance_);

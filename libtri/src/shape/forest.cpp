@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "../for_blocks.hpp"
+#include "../pool.hpp"
 #include "poles.hpp"
 
 namespace terrace::tri::shape {
@@ -44,66 +45,73 @@ struct Poles {
 class PoleFinder {
  public:
   /// In a part only whole vertices have poles.
-  PoleFinder(const Spheres& spheres, const Part& part)
-      : spheres_(spheres),
-        part_(part),
-        poles_(spheres.places().size()),
-        to_first_(spheres.places().size()) {}
+  PoleFinder(const Spheres& spheres, const Part& part) : spheres_(spheres), part_(part) {
+    const std::vector<Place>& places = spheres.places();
+    vertices_.resize(static_cast<std::uint32_t>(places.size()));
+    for (std::uint32_t v = 0; v < vertices_.size(); ++v)
+      vertices_[v] = {places[v].at, {}, least(v), spatial::kNone};
+  }
 
   std::vector<Poles> find() {
-    const auto tetrahedra = spheres_.tetrahedra();
-    std::vector<Largest> largest(poles_.size());
-    // Flat tetrahedra have no radius: no comparison with NaN is true.
-    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-      if (!spheres_.finite(t)) continue;
-      const double r2 = spheres_.radius2(t);
-      for (const std::uint32_t v : tetrahedra[t].corner)
-        if (whole(v) && larger(r2, t, largest[v])) largest[v] = {r2, t};
+    take_largest([](const Vertex&, const Vector3&) { return true; });
+    std::vector<Poles> poles(vertices_.size());
+    for (std::uint32_t v = 1; v < poles.size(); ++v) {
+      Vertex& vertex = vertices_[v];
+      poles[v].first = vertex.tetrahedron;
+      if (vertex.tetrahedron != spatial::kNone)
+        vertex.to_first = spheres_.to_centre(vertex.tetrahedron, vertex.at);
+      vertex.radius2 = least(v);
+      vertex.tetrahedron = spatial::kNone;
     }
-    for (std::uint32_t v = 1; v < poles_.size(); ++v) {
-      poles_[v].first = largest[v].tetrahedron;
-      if (poles_[v].first != spatial::kNone) to_first_[v] = spheres_.to_centre(poles_[v].first, v);
-      largest[v] = {};
-    }
-    add_hull();
-    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-      if (!spheres_.finite(t)) continue;
-      const double r2 = spheres_.radius2(t);
-      for (const std::uint32_t v : tetrahedra[t].corner)
-        if (whole(v) && larger(r2, t, largest[v]) &&
-            dot(spheres_.to_centre(t, v), to_first_[v]) < 0.0)
-          largest[v] = {r2, t};
-    }
-    for (std::uint32_t v = 1; v < poles_.size(); ++v) poles_[v].second = largest[v].tetrahedron;
-    for (std::uint32_t v = 1; v < poles_.size(); ++v) {
-      Poles& pole = poles_[v];
-      if (pole.second == spatial::kNone) continue;
-      Vector3 back = spheres_.to_centre(pole.second, v);
+    add_hull(poles);
+    take_largest([](const Vertex& vertex, const Vector3& to_centre) {
+      return dot(to_centre, vertex.to_first) < 0.0;
+    });
+    for (std::uint32_t v = 1; v < poles.size(); ++v) {
+      const Vertex& vertex = vertices_[v];
+      poles[v].second = vertex.tetrahedron;
+      if (vertex.tetrahedron == spatial::kNone) continue;
+      Vector3 back = spheres_.to_centre(vertex.tetrahedron, vertex.at);
       for (double& c : back) c = -c;
-      pole.defect = kPoleWeight * defect_between(to_first_[v], back);
+      poles[v].defect = kPoleWeight * defect_between(vertex.to_first, back);
     }
-    return std::move(poles_);
+    return poles;
   }
 
  private:
-  struct Largest {
-    double radius2 = -1.0;
-    std::uint32_t tetrahedron = spatial::kNone;
+  /// What is looked at for every tetrahedron around a vertex, in one cache line.
+  struct Vertex {
+    Vector3 at, to_first;
+    double radius2;  ///< the largest so far, of the tetrahedron behind
+    std::uint32_t tetrahedron;
   };
-  [[nodiscard]] bool whole(std::uint32_t v) const {
-    return part_.whole.empty() || part_.whole[v] != 0;
+  /// No radius is larger than that of a vertex without poles.
+  [[nodiscard]] double least(std::uint32_t v) const {
+    return part_.whole.empty() || part_.whole[v] != 0 ? -1.0 : HUGE_VAL;
   }
-  /// Where two radii are equal, the tetrahedron with the lexicographically first corners is the
-  /// pole.
-  [[nodiscard]] bool larger(double r2, std::uint32_t t, const Largest& held) const {
-    if (r2 != held.radius2) [[likely]]
-      return r2 > held.radius2;
-    return spheres_.ranks_of(t) < spheres_.ranks_of(held.tetrahedron);
+  /// Finds the largest sphere at every vertex of those whose centre is admitted. Where two radii
+  /// are equal, it is that of the tetrahedron with the lexicographically first corners.
+  template <class Admits>
+  void take_largest(Admits&& admits) {
+    const auto tetrahedra = spheres_.tetrahedra();
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+      if (!spheres_.finite(t)) continue;
+      const double r2 = spheres_.radius2(t);
+      for (const std::uint32_t v : tetrahedra[t].corner) {
+        Vertex& vertex = vertices_[v];
+        // Flat tetrahedra have no radius: no comparison with NaN is true.
+        if (!(r2 >= vertex.radius2) || !admits(vertex, spheres_.to_centre(t, vertex.at))) continue;
+        if (r2 == vertex.radius2 && !(spheres_.ranks_of(t) < spheres_.ranks_of(vertex.tetrahedron)))
+          continue;
+        vertex.radius2 = r2;
+        vertex.tetrahedron = t;
+      }
+    }
   }
 
   /// Vertices on the hull have their first pole beyond it, in the direction of the sum of the
   /// outward normals around them.
-  void add_hull() {
+  void add_hull(std::vector<Poles>& poles) {
     struct Normal {
       std::uint32_t vertex;
       Ranks facet;
@@ -115,7 +123,8 @@ class PoleFinder {
       if (!spatial::is_ghost(ghost.corner)) continue;
       const std::uint32_t i = spatial::ghost_index(ghost.corner);
       const auto facet = spatial::facet_of(ghost, i);
-      if (std::none_of(facet.begin(), facet.end(), [&](std::uint32_t v) { return whole(v); }))
+      if (std::none_of(facet.begin(), facet.end(),
+                       [&](std::uint32_t v) { return vertices_[v].radius2 < 0.0; }))
         continue;
       const spatial::Side side = ghost.mate[i];
       const Vector3 normal = spheres_.hull_normal(side);
@@ -127,24 +136,24 @@ class PoleFinder {
     });
     std::uint32_t before = spatial::kNone;
     for (const Normal& n : normals) {
-      Vector3& sum = to_first_[n.vertex];
+      Vector3& sum = vertices_[n.vertex].to_first;
       if (n.vertex != before) sum = {};
       before = n.vertex;
-      poles_[n.vertex].first = spatial::kNone;
+      poles[n.vertex].first = spatial::kNone;
       for (std::size_t k = 0; k < 3; ++k) sum[k] += n.normal[k];
     }
   }
 
   const Spheres& spheres_;
   const Part& part_;
-  std::vector<Poles> poles_;
-  std::vector<Vector3> to_first_;
+  Pool<Vertex> vertices_;
 };
 
 /// Disjoint sets of tetrahedra, each known to be alike or unlike its set's root.
 class SignedSets {
  public:
-  explicit SignedSets(std::size_t count) : parent_(count) {
+  explicit SignedSets(std::uint32_t count) {
+    parent_.resize(count);
     for (std::uint32_t i = 0; i < count; ++i) parent_[i] = 2 * i;
   }
   /// The root, doubled, plus 1 if it is unlike.
@@ -170,7 +179,7 @@ class SignedSets {
   }
 
  private:
-  std::vector<std::uint32_t> parent_;
+  Pool<std::uint32_t> parent_;
 };
 
 class Forest {
@@ -184,12 +193,13 @@ class Forest {
   std::vector<std::uint8_t> labels() {
     poles_ = PoleFinder(spheres_, part_).find();
     state_all();
-    SignedSets sets(std::size_t{beyond_} + 1);
+    SignedSets sets(beyond_ + 1);
     std::vector<std::uint32_t> roots;
     for (std::uint32_t t = 0; t < beyond_; ++t)
       if (node(t) == 2 * t) roots.push_back(t);
     roots.push_back(beyond_);
-    while (!list_.empty()) join_best(sets, roots);
+    best_.resize(beyond_ + 1);
+    while (list_.size() > 0) join_best(sets, roots);
     const std::uint32_t outside = sets.find(beyond_);
     std::vector<std::uint8_t> inside(beyond_);
     for (std::uint32_t t = 0; t < beyond_; ++t)
@@ -237,7 +247,7 @@ class Forest {
     const auto at_vertices = static_cast<std::size_t>(
         std::count_if(poles_.begin(), poles_.end(),
                       [](const Poles& poles) { return poles.second != spatial::kNone; }));
-    list_.resize(start.back() + at_vertices);
+    list_.resize(static_cast<std::uint32_t>(start.back() + at_vertices));
     for_blocks(unlabelled, kForestBlock, threads_, none,
                [&](std::size_t begin, std::size_t end, int) {
                  const std::span to{list_.data() + start[begin / kForestBlock],
@@ -268,13 +278,12 @@ class Forest {
       *to = make(key_of(poles.defect, true), v, poles.second, poles.first, 1);
       to += to->one != to->other >> 1;  // else both are known
     }
-    list_.resize(static_cast<std::size_t>(to - list_.data()));
+    list_.resize(static_cast<std::uint32_t>(to - list_.data()));
   }
 
   /// One of Boruvka's rounds: every set is joined with another by the best statement about it, and
   /// statements within one set are dropped.
   void join_best(SignedSets& sets, std::vector<std::uint32_t>& roots) {
-    if (best_.empty()) best_.resize(std::size_t{beyond_} + 1);
     for (const std::uint32_t root : roots) best_[root] = kNoBest;
     for (std::uint32_t i = 0; i < list_.size(); ++i) {
       const Statement& s = list_[i];
@@ -299,14 +308,14 @@ class Forest {
       if (up >> 1 == root) roots[count++] = root;
     }
     roots.resize(count);
-    count = 0;
-    for (const Statement& s : list_) {
+    std::uint32_t left = 0;
+    for (const Statement& s : span_of(list_)) {
       const auto one = static_cast<std::uint32_t>(best_[s.one]);
       const auto other = static_cast<std::uint32_t>(best_[s.other >> 1]);
-      list_[count] = {s.key, s.what, one >> 1, other ^ ((one ^ s.other) & 1)};
-      count += one >> 1 != other >> 1;
+      list_[left] = {s.key, s.what, one >> 1, other ^ ((one ^ s.other) & 1)};
+      left += one >> 1 != other >> 1;
     }
-    list_.resize(count);
+    list_.resize(left);
   }
 
   /// Decides between defects that are the same when rounded: by defect, corners, facets first.
@@ -331,10 +340,10 @@ class Forest {
   const Part& part_;
   std::uint32_t beyond_;
   std::vector<Poles> poles_;
-  std::vector<Statement> list_;
+  Pool<Statement> list_;
   /// By root: the rounded defect of the best statement about the set, above its number; after the
   /// joining the new root, doubled, plus 1 if unlike.
-  std::vector<std::uint64_t> best_;
+  Pool<std::uint64_t> best_;
 };
 
 }  // namespace

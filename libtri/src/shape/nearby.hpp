@@ -51,9 +51,9 @@ class Nearby {
   void relabel(const Changes& changes, std::span<const TetrahedronId> unlabelled) {
     collect(changes, unlabelled);
     number_vertices();
-    const std::vector<spatial::Tetrahedron> tetrahedra = local_tetrahedra();
-    const Spheres spheres(tetrahedra, local_places(), 1);
-    std::vector<std::uint8_t> known(tetrahedra.size());
+    number_tetrahedra();
+    const Spheres spheres(tetrahedra_, local_places(), 1);
+    std::vector<std::uint8_t> known(tetrahedra_.size());
     for (std::size_t i = sought_; i < slots_.size(); ++i)
       known[i] = static_cast<std::uint8_t>(1 + state_.forest[slots_[i]]);
     const Part part{known, sought_, whole_};
@@ -61,10 +61,10 @@ class Nearby {
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
       if (i < sought_) state_.forest[slots_[i]] = inside[i];
       // Where nothing will be flipped, the labels after the flips are kept.
-      if (!between_whole(tetrahedra[i])) inside[i] = state_.of[slots_[i]] == kKept;
+      if (!between_whole(tetrahedra_[i])) inside[i] = state_.of[slots_[i]] == kKept;
     }
     smooth_and_sculpt(spheres, inside, part);
-    write(tetrahedra, inside);
+    write(inside);
   }
   /// By slot, all tetrahedra whose label or whose neighbours may have changed: those looked at, the
   /// new ones and their neighbours, and those exposed. To be called last.
@@ -90,6 +90,7 @@ class Nearby {
     if (state_.local_tetrahedron[t] != spatial::kNone) return;
     state_.local_tetrahedron[t] = static_cast<std::uint32_t>(slots_.size());
     slots_.push_back(t);
+    __builtin_prefetch(&mesh_.tetrahedron[t]);
   }
   template <class Changes>
   void collect(const Changes& changes, std::span<const TetrahedronId> unlabelled) {
@@ -121,23 +122,25 @@ class Nearby {
     }
     // All tetrahedra at these vertices, ghosts too: joined to those listed by facets with such a
     // corner.
+    tetrahedra_.reserve(4 * slots_.size());
     for (std::size_t i = 0; i < slots_.size(); ++i) {
-      for (const spatial::Side mate : mesh_.tetrahedron[slots_[i]].mate) {
-        const std::uint32_t t = spatial::tetrahedron_of(mate);
-        if (state_.local_tetrahedron[t] != spatial::kNone) continue;
-        const auto& corner = mesh_.tetrahedron[t].corner;
-        if (std::any_of(corner.begin(), corner.end(), [&](std::uint32_t v) {
-              return v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
-            }))
-          take(t);
+      const spatial::Tetrahedron& t = tetrahedra_.emplace_back(mesh_.tetrahedron[slots_[i]]);
+      std::array<bool, 4> at_vertex{};
+      int count = 0;
+      for (std::size_t k = 0; k < 4; ++k) {
+        const std::uint32_t v = t.corner[k];
+        at_vertex[k] = v != spatial::kGhost && state_.local_vertex[v] != spatial::kNone;
+        count += at_vertex[k];
       }
+      for (std::size_t k = 0; k < 4; ++k)
+        if (count > at_vertex[k]) take(spatial::tetrahedron_of(t.mate[k]));
     }
   }
   /// In lexicographic order, from 1.
   void number_vertices() {
     const std::size_t whole = vertices_.size();
-    for (const std::uint32_t t : slots_) {
-      for (const std::uint32_t v : mesh_.tetrahedron[t].corner) {
+    for (const spatial::Tetrahedron& t : tetrahedra_) {
+      for (const std::uint32_t v : t.corner) {
         if (v == spatial::kGhost || state_.local_vertex[v] != spatial::kNone) continue;
         state_.local_vertex[v] = static_cast<std::uint32_t>(vertices_.size());
         vertices_.push_back(v);
@@ -159,22 +162,18 @@ class Nearby {
     places.insert(places.begin(), Place{{}, 0});
     return places;
   }
-  /// Behind the last one a slot that is not finite, the neighbour of what is not here.
-  std::vector<spatial::Tetrahedron> local_tetrahedra() const {
+  /// Behind the last one comes a slot that is not finite, the neighbour of what is not here.
+  void number_tetrahedra() {
     const auto nowhere = static_cast<std::uint32_t>(slots_.size());
-    std::vector<spatial::Tetrahedron> result(slots_.size() + 1);
-    result.back().corner.fill(spatial::kFreeCorner);
-    for (std::size_t i = 0; i < slots_.size(); ++i) {
-      const spatial::Tetrahedron& t = mesh_.tetrahedron[slots_[i]];
-      for (std::size_t k = 0; k < 4; ++k) {
-        result[i].corner[k] =
-            t.corner[k] == spatial::kGhost ? spatial::kGhost : state_.local_vertex[t.corner[k]];
-        const std::uint32_t n = state_.local_tetrahedron[spatial::tetrahedron_of(t.mate[k])];
-        result[i].mate[k] =
-            spatial::make_side(n == spatial::kNone ? nowhere : n, spatial::index_of(t.mate[k]));
+    for (spatial::Tetrahedron& t : tetrahedra_) {
+      for (std::uint32_t& v : t.corner)
+        if (v != spatial::kGhost) v = state_.local_vertex[v];
+      for (spatial::Side& mate : t.mate) {
+        const std::uint32_t n = state_.local_tetrahedron[spatial::tetrahedron_of(mate)];
+        mate = spatial::make_side(n == spatial::kNone ? nowhere : n, spatial::index_of(mate));
       }
     }
-    return result;
+    tetrahedra_.emplace_back().corner.fill(spatial::kFreeCorner);
   }
   [[nodiscard]] bool between_whole(const spatial::Tetrahedron& t) const {
     return spatial::is_finite(t.corner) &&
@@ -182,12 +181,11 @@ class Nearby {
                        [&](std::uint32_t v) { return whole_[v] != 0; });
   }
 
-  void write(const std::vector<spatial::Tetrahedron>& tetrahedra,
-             const std::vector<std::uint8_t>& inside) {
+  void write(const std::vector<std::uint8_t>& inside) {
     std::vector<std::array<bool, 2>> has(whole_.size());  // tetrahedra outside, inside
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
-      for (const std::uint32_t v : tetrahedra[i].corner) has[v][inside[i]] = true;
-      if (!spatial::is_finite(tetrahedra[i].corner)) continue;
+      for (const std::uint32_t v : tetrahedra_[i].corner) has[v][inside[i]] = true;
+      if (!spatial::is_finite(tetrahedra_[i].corner)) continue;
       const bool was = state_.of[slots_[i]] == kKept;
       if (inside[i] != 0 && !was) state_.keep(mesh_, slots_[i]);
       if (inside[i] == 0 && was) state_.remove(mesh_, slots_[i], 0);
@@ -205,22 +203,31 @@ class Nearby {
 
   const Mesh& mesh_;
   State& state_;
-  std::vector<std::uint32_t> slots_;     ///< of tetrahedra, by local number
-  std::vector<std::uint32_t> examined_;  ///< see examined()
-  std::size_t sought_ = 0;               ///< how many of these, from the first, are sought
-  std::vector<std::uint32_t> vertices_;  ///< slots, by local number - 1
-  std::vector<std::uint8_t> whole_;      ///< by local vertex: all tetrahedra at it are here
+  std::vector<std::uint32_t> slots_;              ///< of tetrahedra, by local number
+  std::vector<spatial::Tetrahedron> tetrahedra_;  ///< by local number, in the end in such numbers
+  std::vector<std::uint32_t> examined_;           ///< see examined()
+  std::size_t sought_ = 0;                        ///< how many of these, from the first, are sought
+  std::vector<std::uint32_t> vertices_;           ///< slots, by local number - 1
+  std::vector<std::uint8_t> whole_;  ///< by local vertex: all tetrahedra at it are here
 };
 
 /// The state of the poles rule from scratch. Requires a scope of the metric.
 template <class Mesh>
 void restore_by_poles(const Mesh& mesh, State& state, unsigned threads) {
-  const Spheres spheres(std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()),
-                        places_of(mesh), threads);
+  const Renumbered ordered = in_order_of_vertices(
+      std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()), mesh.vertex.size(), threads);
+  const Spheres spheres(span_of(ordered.tetrahedra), places_of(mesh), threads);
   std::vector<std::uint8_t> inside = signed_forest(spheres, threads);
-  state.forest = inside;
+  const auto by_slot = [&] {
+    std::vector<std::uint8_t> labels(mesh.tetrahedron.size());
+    for (std::uint32_t t = 0; t < labels.size(); ++t)
+      if (mesh.tetrahedron[t].corner[0] != spatial::kFreeCorner)
+        labels[t] = inside[ordered.number[t]];
+    return labels;
+  };
+  state.forest = by_slot();
   smooth_and_sculpt(spheres, inside);
-  set_labels(mesh, state, inside);
+  set_labels(mesh, state, by_slot());
 }
 
 /// Whether update_nearby() can follow the changes, and costs less than starting from scratch.

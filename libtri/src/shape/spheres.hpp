@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../delaunay3/mesh.hpp"
+#include "../pool.hpp"
 #include "criterion.hpp"
 
 /// Circumspheres of the tetrahedra and the angles between them, on which the poles rule stands.
@@ -95,6 +96,15 @@ std::vector<Place> places_of(const Mesh& mesh) {
   return places;
 }
 
+/// Tetrahedra in the order of their first vertices. Neighbours that a bulk build has left far apart
+/// lie close together in memory then, as the vertices of both do.
+struct Renumbered {
+  Pool<spatial::Tetrahedron> tetrahedra;
+  Pool<std::uint32_t> number;  ///< by slot; of free slots arbitrary
+};
+Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra,
+                                std::size_t vertex_slots, unsigned threads);
+
 /// The corners of a tetrahedron or facet by rank.
 using Ranks = std::array<std::uint32_t, 4>;
 
@@ -116,10 +126,10 @@ class Spheres {
   [[nodiscard]] double radius2(std::uint32_t t) const {
     return dot(sphere_[t].centre, sphere_[t].centre);
   }
-  /// From a vertex of the finite tetrahedron t to its circumcentre.
-  [[nodiscard]] Vector3 to_centre(std::uint32_t t, std::uint32_t vertex) const {
+  /// From a vertex of the finite tetrahedron t, given by its place, to its circumcentre.
+  [[nodiscard]] Vector3 to_centre(std::uint32_t t, const Vector3& vertex) const {
     const Sphere& s = sphere_[t];
-    const Vector3 shift = minus(places_[s.first].at, places_[vertex].at);
+    const Vector3 shift = minus(places_[s.first].at, vertex);
     return {shift[0] + s.centre[0], shift[1] + s.centre[1], shift[2] + s.centre[2]};
   }
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&sphere_[t]); }
@@ -147,7 +157,7 @@ class Spheres {
     return ranks;
   }
   [[nodiscard]] std::size_t bytes() const {
-    return places_.capacity() * sizeof(Place) + sphere_.capacity() * sizeof(Sphere);
+    return places_.capacity() * sizeof(Place) + sphere_.bytes();
   }
 
  private:
@@ -156,10 +166,16 @@ class Spheres {
     std::uint32_t first;  ///< the lexicographically first corner; kGhost if not finite
   };
   [[nodiscard]] Sphere sphere_of(const spatial::Tetrahedron& t) const;
+  /// A vertex behind its rank: such numbers are put in order without branches, which the processor
+  /// could not predict.
+  [[nodiscard]] std::uint64_t key_of(std::uint32_t vertex) const {
+    return std::uint64_t{ranks_[vertex]} << 32 | vertex;
+  }
+  static std::uint32_t vertex_of(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
 
   std::span<const spatial::Tetrahedron> tetrahedra_;
   std::vector<Place> places_;         ///< by vertex slot
-  std::vector<Sphere> sphere_;        ///< by tetrahedron slot
+  Pool<Sphere> sphere_;               ///< by tetrahedron slot
   std::vector<std::uint32_t> ranks_;  ///< of places_, close together
 };
 

@@ -85,9 +85,13 @@ stream::Selection SelectionOptions::selection(std::span<const std::string> input
                                               const CommonOptions& common) const {
   stream::Selection selection{.where = where_, .resolution = resolution_.value_or(0)};
   if (!region_.empty()) {
-    const terrain::RegionConversion converted = conversion(inputs, reading, shift);
-    converted(terrain::Region::parse(region_)).restrict(selection);
-    if (!converted.note().empty()) common.say(converted.note());
+    terrain::Region region = terrain::Region::parse(region_);
+    if (!region_crs_.empty() || terrain::RegionConversion::may_turn(region)) {
+      const terrain::RegionConversion converted = conversion(inputs, reading, shift);
+      region = converted(std::move(region));
+      if (!converted.note().empty()) common.say(converted.note());
+    }
+    region.restrict(selection);
   }
   if (!keep_.empty()) selection.keep = names_in(keep_, "--keep");
   if (!drop_.empty()) selection.drop = names_in(drop_, "--drop");

@@ -179,6 +179,9 @@ class RegionConversion {
   /// other.
   explicit RegionConversion(const stream::SourceInfo& source, const std::string& named = {},
                             const std::optional<DatumShift>& shift = {});
+  /// False for a region that is nowhere on the globe in angles of any unit: in the CRS of its data
+  /// it stays as it is, and a source need not be opened to learn its CRS.
+  static bool may_turn(const Region& region);
   /// Outlines, a box's too, get so many corners that they run within a millionth of their length of
   /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows.
   [[nodiscard]] Region operator()(Region region) const;
