@@ -259,6 +259,8 @@ class SurfaceTest(unittest.TestCase):
             result = terrace('surface', self.path('pair.terrace'), '-o', self.path('pair.ply'), '--force', '--criterion', criterion)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn('0 vertices, 0 triangles, 2 samples not on it in', result.stderr)
+        result = terrace('render', self.path('pair.terrace'), '--where', 'x == 0', '-o', self.path('one.png'))
+        self.assertIn('1 point, 0 triangles', result.stderr)
 
     def test_samples_at_one_place_count_once_whatever_the_criterion(self):
         with open(self.path('twice.xyz'), 'w') as file:
