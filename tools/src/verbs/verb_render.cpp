@@ -360,6 +360,7 @@ class RenderCommand : public Command {
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
     Camera camera(view);
     fit(camera, mesh.positions, canvas);
+    if (mesh.triangles.empty() && input.lines.empty()) fit_discs(camera, mesh.positions, canvas);
     const Light light = terrain ? Light::for_terrain(view, relief_) : Light::beside(camera);
     const DrawOptions options{.wire = wire_, .threads = common.threads};
     if (!input.lines.empty()) {
