@@ -125,6 +125,7 @@ TEST_F(ScanSurfaceTest, CornersOfAMethodAreNewPointsUnlessItNamesThem) {
   const ScanSurface named = scan_surface(store(), {}, options);
   ASSERT_EQ(named.mesh.positions.size(), 3U);
   for (const stream::Point3& p : named.mesh.positions) EXPECT_NEAR(radius_of(p), kRadius, 1e-5);
+  EXPECT_EQ(named.samples_off, 2997U);
   options.tetrahedra = true;
   EXPECT_THROW(static_cast<void>(scan_surface(store(), {}, options)), UsageError);
 }

@@ -134,6 +134,18 @@ class ScanTest(unittest.TestCase):
         self.assertLess(coarse['vertices'], POINTS // 20)
         self.covered(rows, 0.85)
 
+    def test_discs_of_few_points_are_not_cut_off(self):
+        cloud, out = self.path('few.xyz'), self.path('few.png')
+        for count in (2, 30, 1000):
+            with open(cloud, 'w') as file:
+                file.writelines(f'{i % 32} {i * 7 % 31} {i % 5}\n' for i in range(count))
+            result = terrace('render', cloud, '-o', out, '--size', '300x240', '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            _, _, rows = png_pixels(out)
+            background = rows[0][:3]
+            rim = [rows[0], rows[-1]] + [row[:3] + row[-3:] for row in rows]
+            self.assertTrue(all(row[x:x + 3] == background for row in rim for x in range(0, len(row), 3)), count)
+
     def test_a_region_shows_what_is_inside(self):
         summary, _ = self.picture('--region', '0,0,0,11,11,11')
         self.assertEqual(summary['vertices'], sum(min(p) >= 0 for p in self.all))

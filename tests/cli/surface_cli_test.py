@@ -251,6 +251,40 @@ class SurfaceTest(unittest.TestCase):
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertIn('the points enclose nothing, ' + message, result.stderr)
 
+    def test_an_empty_surface_is_not_called_closed_and_its_samples_are_counted(self):
+        with open(self.path('pair.xyz'), 'w') as file:
+            file.write('0 0 0\n1 2 3\n1 2 3\n')
+        self.assertEqual(terrace('build', self.path('pair.xyz'), '-o', self.path('pair.terrace')).returncode, 0)
+        for criterion in ('poles', 'advancing-front'):
+            result = terrace('surface', self.path('pair.terrace'), '-o', self.path('pair.ply'), '--force', '--criterion', criterion)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('0 vertices, 0 triangles, 2 samples not on it in', result.stderr)
+        result = terrace('render', self.path('pair.terrace'), '--where', 'x == 0', '-o', self.path('one.png'))
+        self.assertIn('1 point, 0 triangles', result.stderr)
+
+    def test_samples_at_one_place_count_once_whatever_the_criterion(self):
+        with open(self.path('twice.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {z}\n' for x, y, z in 2 * sphere(500))
+        self.assertEqual(terrace('build', self.path('twice.xyz'), '-o', self.path('twice.terrace')).returncode, 0)
+        for criterion in ('poles', 'advancing-front'):
+            result = terrace('surface', self.path('twice.terrace'), '-o', self.path('twice.ply'), '--force', '--json',
+                             '--criterion', criterion)
+            self.assertEqual(json.loads(result.stdout)['samples_off'], 0, criterion)
+
+    def test_a_factor_that_keeps_nothing_is_not_taken_for_a_plane(self):
+        with open(self.path('block.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {z}\n' for x in range(5) for y in range(5) for z in range(5))
+        self.assertEqual(terrace('build', self.path('block.xyz'), '-o', self.path('block.terrace')).returncode, 0)
+        result = terrace('surface', self.path('block.terrace'), '-o', self.path('block.ply'), '--criterion', 'edge')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('--criterion edge keeps no tetrahedron', result.stderr)
+        self.assertNotIn('plane', result.stderr)
+
+    def test_a_mesh_of_a_scan_points_to_the_surface(self):
+        result = terrace('mesh', self.store, '-o', self.path('over_xy.ply'))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("'terrace surface' makes the surface of a scan", result.stderr)
+
     def test_no_points_are_no_surface(self):
         store = self.path('plane0.terrace')
         with open(self.path('plane0.xyz'), 'w') as file:

@@ -36,7 +36,7 @@ async function open(hash = '', {url = site.url, size = {width: 720, height: 450}
   page.on('pageerror', error => errors.push(error.message));
   await context.route('**/*', route => {
     const {protocol, hostname} = new URL(route.request().url());
-    if (hostname === '127.0.0.1' || protocol === 'data:' || protocol === 'blob:') return route.continue();
+    if (hostname === '127.0.0.1' || protocol === 'data:' || protocol === 'blob:' || protocol === 'file:') return route.continue();
     outside.push(route.request().url());
     return route.abort();
   });
@@ -432,6 +432,114 @@ describe('pages side by side', {concurrency: 3}, () => {
     // But for the haze.
     assert.ok(spread < 12, `colours differ by ${spread}`);
     assert.deepEqual(errors, []);
+    await close();
+  });
+
+  test('a small scan at a great height is drawn, and its profile has digits that tell', async () => {
+    const {page, errors, close} = await open('#s=high&q=1', {size: {width: 700, height: 600}});
+    assert.equal((await state(page)).kind, 'surface');
+    const [sky, ...body] = await pixels(page, [[0.02, 0.5], ...Array.from({length: 100}, (_, i) => [0.45 + 0.1 * (i % 10) / 10, 0.45 + 0.1 * Math.floor(i / 10) / 10])]);
+    const shown = body.filter(colour => Math.hypot(...colour.map((c, i) => c - sky[i])) > 12);
+    assert.ok(shown.length > 95, `${shown.length} of 100`);
+    await page.click('#upright span:text-is("Z")');
+    await settled(page);
+    await page.mouse.click(300, 300);
+    await page.waitForSelector('#place:not([hidden])');
+    await page.mouse.click(390, 330);
+    await page.waitForSelector('#profile:not([hidden])');
+    const [low, high] = await page.evaluate(() => ['low', 'high'].map(end => parseFloat(document.getElementById(`profile-${end}`).textContent)));
+    assert.ok(high - low > 0.001 && high - low < 0.021, `${low} ${high}`);
+    assert.deepEqual(errors, []);
+    await close();
+  });
+
+  test('a place of a small cloud has digits enough, in the link as well, and a long name leaves room for them', async () => {
+    const {page, errors, close} = await open('#s=long', {size: {width: 900, height: 600}});
+    await page.focus('#picture');
+    for (let i = 0; i < 9; ++i) await page.keyboard.press('+');
+    await page.keyboard.press('ArrowLeft');
+    await page.waitForTimeout(1000);
+    await settled(page);
+    const {target, distance} = (await state(page)).camera;
+    const again = await open(new URL(page.url()).hash, {size: {width: 900, height: 600}});
+    const there = (await state(again.page)).camera.target;
+    assert.ok(Math.hypot(...target.map((c, i) => c - there[i])) < 0.01 * distance, page.url());
+    await page.keyboard.press('Home');
+    for (let y = 60; !await page.isVisible('#place'); y += 14) {
+      assert.ok(y < 600, 'no point is met');
+      for (let x = 20; x < 640 && !await page.isVisible('#place'); x += 14) await page.mouse.click(x, y, {delay: 0});
+    }
+    const first = page.locator('#place-text dd').first();
+    assert.match(await first.textContent(), /^0\.(1234|2345|3000)\d+$/);
+    assert.ok((await first.boundingBox()).height < 30, 'a number is broken into lines');
+    assert.deepEqual([...errors, ...again.errors], []);
+    await again.close();
+    await close();
+  });
+
+  test('a link to a store that is not there says so, one to nowhere shows all, and the way back leads to the store before', async () => {
+    const {page, errors, close} = await open('#s=gone&v=0,0,0,0,42,1&q=32', {size: {width: 600, height: 400}});
+    assert.match(await page.textContent('#notice'), /“gone”/);
+    const {camera} = await state(page);
+    assert.ok(camera.distance > 1000, `${camera.distance}`);
+    await page.selectOption('#store', 'three');
+    await page.waitForFunction(() => window.terrace.settled && window.terrace.state.store === 'three');
+    await page.goBack();
+    await page.waitForFunction(() => window.terrace.settled && window.terrace.state.store === 'alps');
+    assert.equal(new URL(page.url()).hash.split('&')[0], '#s=alps');
+    const far = await open('#s=three&v=1e300,0,0,0,42,1');
+    assert.ok(Math.abs((await state(far.page)).camera.target[0]) < 100);
+    assert.deepEqual([...errors, ...far.errors], []);
+    await far.close();
+    await close();
+  });
+
+  test('when the graphics driver comes back, so does the view', async () => {
+    const {page, close} = await open('#s=three', {size: {width: 600, height: 400}});
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('e');
+    await settled(page);
+    await page.evaluate(() => {
+      window.before = true;
+      window.lose = document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context');
+      window.lose.loseContext();
+    });
+    await page.waitForSelector('#message:not([hidden])');
+    await page.evaluate(() => window.lose.restoreContext());
+    await page.waitForFunction(() => !window.before && window.terrace?.settled);
+    assert.ok(!await page.isVisible('#message'));
+    assert.equal((await state(page)).camera.azimuth, 6);
+    await close();
+  });
+
+  test('all stays in sight when the window changes, until one moves', async () => {
+    const {page, close} = await open('#s=cloud', {size: {width: 900, height: 500}});
+    const before = (await state(page)).camera.distance;
+    await page.setViewportSize({width: 400, height: 500});
+    await page.waitForFunction(distance => window.terrace.settled && window.terrace.state.camera.distance > 1.3 * distance, before);
+    await page.focus('#picture');
+    await page.keyboard.press('+');
+    await settled(page);
+    const near = (await state(page)).camera.distance;
+    await page.setViewportSize({width: 900, height: 500});
+    await page.waitForTimeout(500);
+    await settled(page);
+    assert.equal((await state(page)).camera.distance, near);
+    await close();
+  });
+
+  test('a store of triangles is no scan: a point for each, and the status says so', async () => {
+    const {page, errors, close} = await open('#s=corners');
+    assert.equal((await state(page)).kind, 'points');
+    assert.match(await page.textContent('#status'), /triangles, the first corner of each/);
+    assert.deepEqual(errors, []);
+    await close();
+  });
+
+  test('a page from the disk says what it needs', async () => {
+    const {page, close} = await open('', {url: `file://${sites.site}/index.html`, settle: false});
+    await page.waitForSelector('#message:not([hidden])');
+    assert.match(await page.textContent('#message-text'), /web server/);
     await close();
   });
 

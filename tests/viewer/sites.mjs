@@ -58,24 +58,29 @@ export class Sites {
     writeFileSync(join(this.folder, 'cloud.csv'), cloud);
     this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
     // A scan: a ball with bumps; and one that lacks a cap in the east.
-    let ball = 'x,y,z\n', bowl = ball;
+    let ball = 'x,y,z\n', bowl = ball, high = ball;
     for (let i = 0; i < 12_000; ++i) {
       const z = 1 - (2 * i + 1) / 12_000, turn = i * 2.399963229728653, r = Math.sqrt(1 - z * z);
       const size = 10 + 0.5 * Math.sin(5 * z) + 0.4 * Math.sin(6 * r * Math.cos(turn));
       const point = `${size * r * Math.cos(turn)},${size * r * Math.sin(turn)},${size * z}\n`;
       ball += point;
+      // As small as the steps of a float at its height.
+      if (i % 4 === 0) high += `${0.01 * r * Math.cos(turn)},${0.01 * r * Math.sin(turn)},${1e6 + 0.01 * z}\n`;
       if (r * Math.cos(turn) < 0.4) bowl += point;
     }
-    for (const [name, points] of Object.entries({ball, bowl})) {
+    for (const [name, points] of Object.entries({ball, bowl, high})) {
       writeFileSync(join(this.folder, `${name}.csv`), points);
       this.terrace('build', `${name}.csv`, '-o', `${name}.store`, '--block', '1000', '-q');
     }
+    this.terrace('surface', 'high.store', '-o', 'high.ply', '-q');
+    this.terrace('build', 'high.ply', '--entities', 'triangles', '-o', 'corners.store', '-q');
     // Few points, and such as have no triangles.
     const grid = (columns, rows, value) => [`ncols ${columns}`, `nrows ${rows}`, 'xllcorner 0', 'yllcorner 0', 'cellsize 10', 'nodata_value -9999',
       ...Array.from({length: rows}, (_, row) => Array.from({length: columns}, (_, column) => value(column, row)).join(' '))].join('\n');
     const small = {
       'point.csv': 'x,y,z\n500000,5000000,100\n',
       'three.csv': 'x,y,z\n500000,5000000,100\n500010,5000000,105\n500000,5000010,99\n',
+      'long.csv': `x,y,z,${'attribute_with_a_long_name_'.repeat(3)}\n0.1234,0.2,0,1\n0.2345,0.3,0,1\n0.3,0.2,0.01,1\n`,
       'cell.asc': grid(50, 40, (column, row) => column === 25 && row === 20 ? 123.5 : -9999),
       'row.asc': grid(60, 1, column => column % 7),
       'plain.asc': grid(60, 60, () => 7),
@@ -85,7 +90,7 @@ export class Sites {
       writeFileSync(join(this.folder, name), text);
       this.terrace('build', name, '-o', `${name.split('.')[0]}.store`, '-q');
     }
-    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
+    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'cloud.store', 'ball.store', 'bowl.store', 'high.store', 'corners.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);

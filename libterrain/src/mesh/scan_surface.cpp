@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/terrain/scan_surface.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -79,7 +81,8 @@ std::vector<stream::Point3> from_ground(const std::vector<tri::Point3>& ground,
   return places;
 }
 
-/// See ScanSurface::spanned. What is off a line by less than 1e-12 of its length is so by rounding.
+/// See ScanSurface::spanned. What is off a line or a plane by less than 1e-12 of its length is so
+/// by rounding.
 unsigned dimensions_of(const std::vector<stream::Point3>& points) {
   const auto between = [](const stream::Point3& a, const stream::Point3& b) {
     return stream::Point3{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
@@ -93,13 +96,25 @@ unsigned dimensions_of(const std::vector<stream::Point3>& points) {
     if (square(v) > square(line)) line = v;
   }
   if (square(line) == 0.0) return 0;
+  stream::Point3 normal{};
   for (const stream::Point3& p : points) {
     const stream::Point3 v = between(points.front(), p);
-    const stream::Point3 normal{line[1] * v[2] - line[2] * v[1], line[2] * v[0] - line[0] * v[2],
-                                line[0] * v[1] - line[1] * v[0]};
-    if (square(normal) > 1e-24 * square(line) * square(line)) return 2;
+    const stream::Point3 n{line[1] * v[2] - line[2] * v[1], line[2] * v[0] - line[0] * v[2],
+                           line[0] * v[1] - line[1] * v[0]};
+    if (square(n) > square(normal)) normal = n;
   }
-  return 1;
+  if (!(square(normal) > 1e-24 * square(line) * square(line))) return 1;
+  const double rounding = 1e-12 * std::sqrt(square(normal) * square(line));
+  const bool flat = std::all_of(points.begin(), points.end(), [&](const stream::Point3& p) {
+    const stream::Point3 v = between(points.front(), p);
+    return std::abs(v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2]) <= rounding;
+  });
+  return flat ? 2 : 3;
+}
+
+std::size_t distinct_places(std::vector<stream::Point3> points) {
+  std::sort(points.begin(), points.end());
+  return static_cast<std::size_t>(std::unique(points.begin(), points.end()) - points.begin());
 }
 
 void set_parts(const tri::ShapeParts& parts, ScanSurface& out) {
@@ -171,8 +186,8 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     set_parts(surface.parts, out);
     out.samples_off = surface.points_off;
     out.open = surface.open;
-  } else if (!surface.input.empty()) {
-    out.samples_off = ground.size() - surface.input.size();
+  } else if (!surface.input.empty() || surface.surface.faces.empty()) {
+    out.samples_off = distinct_places(ground) - surface.input.size();
   }
   out.mesh.triangles = std::move(surface.surface.faces);
   if (out.mesh.triangles.empty()) out.spanned = dimensions_of(ground);

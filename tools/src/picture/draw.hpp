@@ -58,4 +58,7 @@ void draw_lines(const std::vector<stream::Point3>& positions,
 /// margin of 2 %.
 void fit(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas);
 
+/// After fit(), for draw_points(): as much smaller as keeps the discs of few points in the picture.
+void fit_discs(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas);
+
 }  // namespace terrace::tools

@@ -55,6 +55,24 @@ double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   return area;
 }
 
+std::vector<Splat> projected(const std::vector<stream::Point3>& positions, const Camera& camera) {
+  std::vector<Splat> splats(positions.size());
+  for (std::size_t i = 0; i < splats.size(); ++i) {
+    const auto [x, y, depth] = camera.project(positions[i]);
+    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0};
+  }
+  return splats;
+}
+
+/// Discs of radius r cover all but exp(-points * pi * r^2 / area) of an area over which so many
+/// points are scattered evenly. Of a closed body half of the points lie behind the other half, so
+/// half a percent of it stays uncovered, and nothing of a terrain.
+double usual_radius(const std::vector<Splat>& splats, const Canvas& canvas) {
+  constexpr double kCover = 1.9;
+  const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
+  return std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0);
+}
+
 /// Where a cloud is coarse in parts, discs as large as the part needs: by the distances to a few
 /// neighbours among the points that are as coarse, but not much above what is usual among them.
 void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& canvas,
@@ -195,20 +213,21 @@ bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth
 
 }  // namespace
 
+void fit_discs(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas) {
+  if (positions.empty()) return;
+  // The radius may grow a little as the area is measured in coarse cells.
+  constexpr double kMargin = 0.02, kGrowth = 1.3;
+  const double side = std::min(canvas.width(), canvas.height());
+  const double beyond =
+      kGrowth * usual_radius(projected(positions, camera), canvas) - kMargin * side;
+  if (beyond > 0) camera.scale *= std::max(0.5, 1 - 2 * beyond / ((1 - 2 * kMargin) * side));
+}
+
 void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
                  const Light& light, const DrawOptions& options, Canvas& canvas) {
-  std::vector<Splat> splats(cloud.positions.size());
-  for (std::size_t i = 0; i < splats.size(); ++i) {
-    const auto [x, y, depth] = camera.project(cloud.positions[i]);
-    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0};
-  }
+  std::vector<Splat> splats = projected(cloud.positions, camera);
   if (splats.empty()) return;
-  // Discs of radius r cover all but exp(-points * pi * r^2 / area) of an area over which so many
-  // points are scattered evenly. Of a closed body half of the points lie behind the other half, so
-  // half a percent of it stays uncovered, and nothing of a terrain.
-  constexpr double kCover = 1.9;
-  const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
-  const auto usual = static_cast<float>(std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0));
+  const auto usual = static_cast<float>(usual_radius(splats, canvas));
   const bool own_normals = cloud.normals.size() == cloud.positions.size();
   for (Splat& splat : splats) splat.radius = usual;
   if (cloud.left_out.size() == splats.size()) set_radii(cloud, camera, canvas, options, splats);

@@ -461,9 +461,9 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
                   {"gap", or_null(gap)}};
   summary.add_cost(watch);
   std::string& text = summary.text;
-  text = with_commas(points) + " points, ";
+  text = counted(points, "point") + ", ";
   if (!outcome.labels.empty()) {
-    text += with_commas(outcome.representatives.size()) + " clusters";
+    text += counted(outcome.representatives.size(), "cluster");
     if (outliers > 0) text += " and " + with_commas(outliers) + " outliers";
     text += ", ";
   }

@@ -59,8 +59,9 @@ class ContourCommand final : public Command {
         {"lines", outcome.lines}, {"closed", outcome.closed}, {"points", outcome.points}};
     summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(outcome.lines) + " lines, " +
-                   with_commas(outcome.closed) + " of them closed, " + with_commas(outcome.points) +
-                   " points in " + readable_seconds(watch.seconds()) + "\n";
+                   with_commas(outcome.closed) + " of them closed, " +
+                   counted(outcome.points, "point") + " in " + readable_seconds(watch.seconds()) +
+                   "\n";
     return summary;
   }
 

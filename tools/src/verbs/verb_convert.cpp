@@ -101,7 +101,7 @@ class ConvertCommand : public Command {
       left_out +=
           (left_out.empty() ? "" : ", ") + with_commas(done.nodata) + " lacked a coordinate";
     }
-    summary.text = output_ + ": " + with_commas(writer->points()) + " points" +
+    summary.text = output_ + ": " + counted(writer->points(), "point") +
                    (left_out.empty() ? "" : " (" + left_out + ")") + ", " +
                    readable_seconds(watch.seconds()) + '\n';
     tell_rounding(*writer, summary);

@@ -161,7 +161,7 @@ class PointsCommand final : public Command {
     Summary summary;
     summary.json = {{"vertices", points}, {"triangles", 0}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(points) + " points in " +
+    summary.text = output_ + ": " + counted(points, "point") + " in " +
                    readable_seconds(watch.seconds()) + "\n";
     if (points == 0) {
       common.say(part_.path + ": no point is selected; all of the store's have " +
@@ -247,7 +247,7 @@ class PointsCommand final : public Command {
     Summary summary;
     summary.json = {{"vertices", found.size()}, {"triangles", 0}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(found.size()) + " points";
+    summary.text = output_ + ": " + counted(found.size(), "point");
     if (!found.empty()) {
       summary.json["nearest_metres"] = found.front().distance;
       summary.json["farthest_metres"] = found.back().distance;

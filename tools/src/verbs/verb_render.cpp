@@ -362,6 +362,7 @@ class RenderCommand : public Command {
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
     Camera camera(view);
     fit(camera, mesh.positions, canvas);
+    if (mesh.triangles.empty() && input.lines.empty()) fit_discs(camera, mesh.positions, canvas);
     const Light light = terrain ? Light::for_terrain(view, relief_) : Light::beside(camera);
     const DrawOptions options{.wire = wire_, .threads = common.threads};
     if (!input.lines.empty()) {
@@ -380,8 +381,8 @@ class RenderCommand : public Command {
     if (!input.lines.empty()) summary.json["lines"] = input.lines.size();
     summary.json["exaggeration"] = factor;
     summary.add_cost(watch);
-    summary.text += with_commas(mesh.positions.size()) + " points, " +
-                    (input.lines.empty() ? with_commas(mesh.triangles.size()) + " triangles"
+    summary.text += counted(mesh.positions.size(), "point") + ", " +
+                    (input.lines.empty() ? counted(mesh.triangles.size(), "triangle")
                                          : with_commas(input.lines.size()) + " lines");
     if (factor != 1) summary.text += ", heights x " + readable_number(factor);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
@@ -408,7 +409,7 @@ class RenderCommand : public Command {
     summary.json["points"] = tree.points;
     summary.json["merges"] = tree.merges.size();
     summary.add_cost(watch);
-    summary.text += "a dendrogram of " + with_commas(tree.points) + " points, " +
+    summary.text += "a dendrogram of " + counted(tree.points, "point") + ", " +
                     readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
@@ -443,7 +444,7 @@ class RenderCommand : public Command {
     summary.add_cost(watch);
     summary.text +=
         with_commas(result.lines.size()) + (result.tree ? " lines of a tree of " : " pairs of ") +
-        with_commas(result.points) + " points, " + readable_seconds(watch.seconds()) + '\n';
+        counted(result.points, "point") + ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 

@@ -62,7 +62,7 @@ class SampleCommand final : public Command {
                     {"seconds", watch.seconds()},
                     {"points_per_second", static_cast<double>(counts.points) / watch.seconds()},
                     {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = with_commas(counts.points) + " points, " +
+    summary.text = counted(counts.points, "point") + ", " +
                    with_commas(counts.points - counts.answered) + " of them without a height, in " +
                    readable_seconds(watch.seconds()) + ", " +
                    readable_rate(static_cast<double>(counts.points) / watch.seconds()) + "\n";

@@ -64,11 +64,14 @@ class SurfaceCommand final : public Command {
     call_library(part_.path, criterion_,
                  [&] { surface = scan_surface(store, detail, options, common.context()); });
     if (surface.mesh.triangles.empty() && surface.tetrahedra.empty()) {
-      common.say(part_.path + ": the points enclose nothing, " +
-                 (surface.spanned == 0   ? "all are at one place"
-                  : surface.spanned == 1 ? "all are on a line"
-                                         : "as if all were in one plane; 'terrace mesh' "
-                                           "triangulates heights over x and y"));
+      common.say(
+          part_.path + ": the points enclose nothing, " +
+          (surface.spanned == 0   ? "all are at one place"
+           : surface.spanned == 1 ? "all are on a line"
+           : surface.spanned == 3 && options.restore.shape.rule == tri::ShapeRule::kPublished
+               ? "because --criterion edge keeps no tetrahedron; give it a larger factor, as edge:2"
+               : "as if all were in one plane; 'terrace mesh' "
+                 "triangulates heights over x and y"));
     }
     places(surface.mesh.positions);
     const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};
@@ -99,9 +102,12 @@ class SurfaceCommand final : public Command {
       summary.text += with_commas(surface.tetrahedra.size()) + " tetrahedra";
     } else {
       summary.json["triangles"] = surface.mesh.triangles.size();
-      summary.text += with_commas(surface.mesh.triangles.size()) + " triangles, " +
-                      (measures.closed ? "closed, " : "open, ") + with_commas(measures.components) +
-                      (measures.components == 1 ? " part" : " parts");
+      summary.text += with_commas(surface.mesh.triangles.size()) + " triangles";
+      if (!surface.mesh.triangles.empty()) {
+        summary.text += (measures.closed ? ", closed, " : ", open, ") +
+                        with_commas(measures.components) +
+                        (measures.components == 1 ? " part" : " parts");
+      }
     }
     if (surface.open) summary.text += ", without the faces over the gaps of the scan";
     if (surface.samples_off.value_or(0) > 0) {

@@ -143,8 +143,8 @@ class SynthCommand : public Command {
     Summary summary;
     summary.json = {{"points", points}, {"bytes", bytes}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(points) + " points, " +
-                   readable_seconds(watch.seconds()) + '\n';
+    summary.text =
+        output_ + ": " + counted(points, "point") + ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 

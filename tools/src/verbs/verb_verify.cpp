@@ -72,10 +72,9 @@ class VerifyCommand final : public Command {
     for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
     summary.json = {
         {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
-    summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
-                    " points in " + with_commas(clusters) + " clusters, " +
-                    readable_bytes(store.bytes()) + ", checked in " +
-                    readable_seconds(watch.seconds()) + "\n";
+    summary.text += std::string(ok ? "sound: " : "damaged: ") + counted(store.points(), "point") +
+                    " in " + counted(clusters, "cluster") + ", " + readable_bytes(store.bytes()) +
+                    ", checked in " + readable_seconds(watch.seconds()) + "\n";
     summary.exit_code = ok ? 0 : 1;
     return summary;
   }

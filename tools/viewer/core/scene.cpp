@@ -54,6 +54,8 @@ class SceneOf final : public Scene {
           const tri::ViewOptions& options,
           const std::function<bool(const stream::ByteRange&)>& given)
       : store_(store), view_(store, ground, options, given), bounds_(store.bounds()) {
+    const stream::Box3 all = box();
+    base_[2] = (all.min[2] + all.max[2]) / 2;
     vertices_.reserve(options.max_points);
     if constexpr (kTriangles) triangles_.reserve(2 * options.max_points);
     if constexpr (!kRaster) {
@@ -186,7 +188,7 @@ class SceneOf final : public Scene {
   }
   /// Without sliding.
   void place(tri::VertexId vertex) {
-    const Point3 p = view_.in_view_frame(vertex);
+    const Point3 p = difference(view_.in_view_frame(vertex), base_);
     Vertex& v = vertices_.change(drawn(vertex));
     v.x = static_cast<float>(p[0]);
     v.y = static_cast<float>(p[1]);
@@ -262,17 +264,21 @@ class SceneOf final : public Scene {
       }
     }
   }
+  template <class Place>
+  [[nodiscard]] Point3 to_draw(const Place& place) const {
+    return difference(view_.model_in_view_frame(place), base_);
+  }
   void slide(const tri::Slides& slides, double time) {
     for (std::size_t i = 0; i < slides.size(); ++i) {
-      move(vertices_.change(drawn(slides.vertices[i])), view_.model_in_view_frame(slides.start[i]),
-           view_.model_in_view_frame(slides.end[i]), time);
+      move(vertices_.change(drawn(slides.vertices[i])), to_draw(slides.start[i]),
+           to_draw(slides.end[i]), time);
     }
   }
   template <class Delta>
   void wait(const Delta& delta, double time);
   [[nodiscard]] Point3 position(tri::VertexId vertex) const {
     const Vertex& v = vertices_[drawn(vertex)];
-    return {v.x, v.y, v.z};
+    return {v.x + base_[0], v.y + base_[1], v.z + base_[2]};
   }
 
   /// The triangle as it is drawn: not at all where a raster has no data.
@@ -292,6 +298,8 @@ class SceneOf final : public Scene {
   stream::Store store_;
   View view_;
   stream::Box3 bounds_;
+  /// What is drawn counts from here: the middle of the heights, for floats far from 0 are coarse.
+  Point3 base_{};
   CloudColours colours_;
   Blocks<Vertex> vertices_;
   std::vector<Vertex> changed_vertices_;
@@ -415,7 +423,7 @@ void SceneOf<Shown>::wait(const Delta& delta, double time) {
     const tri::Anchor& anchor = waiting_.anchors()[i];
     if (!anchor.moved) continue;
     Vertex& v = vertices_.change(waiting_.slot_of_anchor(i));
-    move(v, place_at(v, time), view_.model_in_view_frame(anchor.end), time);
+    move(v, place_at(v, time), to_draw(anchor.end), time);
   }
   for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
     const Part& part = parts_[numbers.removed[i]];
@@ -423,7 +431,7 @@ void SceneOf<Shown>::wait(const Delta& delta, double time) {
     on = kNone;
     if (!part.waits) continue;
     Vertex v = vertices_[drawn(morph_.removed.vertices[i])];
-    move(v, place_at(v, time), view_.model_in_view_frame(morph_.removed.end[i]), time);
+    move(v, place_at(v, time), to_draw(morph_.removed.end[i]), time);
     on = waiting_.keep(
         part.group, v,
         {morph_.removed.start[i], morph_.removed.end[i], morph_.removed_on[i], false});

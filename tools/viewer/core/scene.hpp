@@ -19,7 +19,8 @@
 
 namespace terrace::viewer {
 
-/// A vertex as a graphics processor takes it: metres in the view frame of terrain::StoreView.
+/// A vertex as a graphics processor takes it: metres in the view frame of terrain::StoreView, but
+/// heights count from the middle of Scene::box().
 struct SceneVertex {
   static constexpr std::uint8_t kNone = 255;  ///< the level of a slot without a vertex
 

@@ -125,10 +125,10 @@ export class OrbitCamera {
     this.target = add(eye, this.direction, this.distance);
   }
 
-  /// View and projection, column by column as WebGL takes them.
-  matrix(aspect: number, near: number, far: number): Float32Array {
+  /// View and projection from an eye, column by column as WebGL takes them.
+  matrix(aspect: number, near: number, far: number, e: Vec3): Float32Array {
     const f = 1 / Math.tan(FOV / 2 * RADIANS);
-    const r = this.right, u = this.up, d = this.direction, e = this.eye;
+    const r = this.right, u = this.up, d = this.direction;
     const view = [
       [r[0], r[1], r[2], -dot(r, e)], [u[0], u[1], u[2], -dot(u, e)], [-d[0], -d[1], -d[2], dot(d, e)], [0, 0, 0, 1]
     ];

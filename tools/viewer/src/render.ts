@@ -249,7 +249,9 @@ export class Renderer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (!this.state) return;
     const aspect = this.canvas.width / this.canvas.height;
-    const eye = camera.eye, box = this.box;
+    // Heights count from the middle of the box, as those of the vertices.
+    const middleHeight = (this.box[2] + this.box[5]) / 2;
+    const eye = add(camera.eye, [0, 0, middleHeight], -1), box = this.box.map((c, i) => i % 3 === 2 ? c - middleHeight : c);
     const extent = Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]) || 1;
     let farthest = 0;
     for (let i = 0; i < 8; ++i) {
@@ -259,7 +261,7 @@ export class Renderer {
     const far = farthest * 1.01 + camera.distance * 0.01;
     const near = Math.max(far * 2e-5, camera.distance * 0.02);
     gl.useProgram(this.program);
-    gl.uniformMatrix4fv(this.uniform('matrix'), false, camera.matrix(aspect, near, far));
+    gl.uniformMatrix4fv(this.uniform('matrix'), false, camera.matrix(aspect, near, far, eye));
     gl.uniform1f(this.uniform('time'), time);
     const pointSize = look.pointSize * this.canvas.width / this.canvas.clientWidth;
     gl.uniform1f(this.uniform('pointSize'), pointSize);
@@ -267,7 +269,7 @@ export class Renderer {
     gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
     // What is flat has the middle colour: differences from rounding are none.
     const low = yUp ? box[1] : box[2], high = yUp ? box[4] : box[5], middle = (low + high) / 2;
-    const reach = Math.max((high - low) / 2, 1e-5 * Math.abs(middle));
+    const reach = Math.max((high - low) / 2, 1e-9 * Math.abs(yUp ? middle : middleHeight));
     gl.uniform2f(this.uniform('heights'), middle - reach, middle + reach);
     gl.uniform1f(this.uniform('top'), this.top);
     gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);

@@ -27,6 +27,7 @@ export interface Manifest {
   attributes: Channel[];
   crs: {epsg: number, name: string, geographic: boolean, horizontal_unit: string, vertical_unit: string};
   levels: Array<{level: number, points: number}>;
+  parameters: Array<{name: string, value: string}>;
   files: Map<string, number>;  ///< sizes by name
 }
 

@@ -8,10 +8,10 @@ import {CATEGORIES, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from
 import {type Colour, COLOURS, type Look, Renderer} from './render';
 import {type Listed, type Manifest, worldPoint} from './store';
 
-const phone = matchMedia('(max-width: 640px)').matches;
+const phone = matchMedia('(max-width: 640px)');
 const touch = matchMedia('(pointer: coarse)').matches;
 /// Points at once: what phones draw without effort is less.
-const MOST_POINTS = phone ? 400_000 : 1_500_000;
+const MOST_POINTS = phone.matches ? 400_000 : 1_500_000;
 /// The standard classes of ASPRS LAS 1.4.
 const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation', 'medium vegetation', 'high vegetation',
                  'building', 'low point', 'model key', 'water', 'rail', 'road', 'overlap', 'wire guard', 'wire conductor',
@@ -62,6 +62,7 @@ class Viewer {
   private box: number[] = [];
   private kind: Kind = 'raster';
   private heightUnit = 1;   ///< metres
+  private lost = false;     ///< by the graphics driver
   private scan = false;     ///< of a body
   private asPoints = false; ///< how a scan is to be shown
   private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
@@ -69,6 +70,7 @@ class Viewer {
   private hashes = new Map<number, (hash: string) => void>();
   private profiles = new Map<number, (line: Array<[number, number]>) => void>();
   private level = 255;  ///< shown everywhere; 255: none
+  private size = 0;     ///< of points, in pixels, that the user or the link chose
   private detailTimer = 0;  ///< of profile and outline, which follow the surface
   private next = 0;
   private serial = 0;  ///< of the last view
@@ -82,6 +84,7 @@ class Viewer {
   private pointer: [number, number] = [0, 0];  ///< over the picture; the middle if it is not
   private linkTimer = 0;
   private pivotTimer = 0;
+  private fitted = false;    ///< all is shown: so it stays when the window changes
   private pivoting = false;  ///< the ground in the middle of the picture is being looked for
 
   /// first: a worker that has been launched for what the link names.
@@ -156,11 +159,20 @@ class Viewer {
   private list(stores: Listed[], name: string): void {
     this.stores = stores;
     this.store = name;
+    const wanted = this.link.get('s');
+    if (wanted !== null && wanted !== name) this.noSuchStore(wanted);
     document.title = `${name} · terrace`;
     const select = element<HTMLSelectElement>('store');
     select.replaceChildren(...stores.map(store => new Option(store.name, store.name)));
     select.disabled = stores.length === 1;
     select.value = name;
+  }
+  private noSuchStore(name: string): void {
+    // The place in the link belongs to it.
+    this.link = new URLSearchParams();
+    element('notice').textContent = `There is no store “${name}” here: this is “${this.store}”.`;
+    element('notice').hidden = false;
+    setTimeout(() => element('notice').hidden = true, 10_000);
   }
   private tell(message: ToWorker): void {
     this.worker?.postMessage(message);
@@ -183,6 +195,7 @@ class Viewer {
         this.colours = message.scene.colours;
         element<HTMLInputElement>('level').max = String(message.manifest.levels.length - 1);
         element('with-level').hidden = message.manifest.levels.length < 2;
+        this.setSize(this.size);
         if (this.level !== 255) this.level = Math.min(this.level, message.manifest.levels.length - 1);
         this.renderer.show(this.box, message.manifest.levels.length - 1, this.kind, this.scan);
         if (!again) {
@@ -275,7 +288,10 @@ class Viewer {
   }
   private tick(): void {
     requestAnimationFrame(() => this.tick());
-    if (this.renderer.resize()) this.moved = true;
+    if (this.renderer.resize()) {
+      if (this.fitted) this.fit();
+      this.moved = true;
+    }
     if (this.moved) {
       this.moved = false;
       this.redraw = true;
@@ -314,7 +330,8 @@ class Viewer {
   private showStatus(): void {
     const s = this.status;
     if (!s) return;
-    const parts = [counted(s.state.points, 'point')];
+    const what = this.manifest?.parameters.find(({name}) => name === 'entities')?.value.replace(/s$/, '');
+    const parts = [what ? `${counted(s.state.points, what)}, the first corner of each` : counted(s.state.points, 'point')];
     if (this.kind !== 'points') parts.push(counted(s.state.triangles, 'triangle'));
     parts.push(`<b>${readable(s.stats.bytes)}</b>`);
     parts[parts.length - 1] += `<span class="wide"> · ${counted(s.stats.requests, 'request')} · ` +
@@ -362,11 +379,11 @@ class Viewer {
     if (!hit || !this.manifest) return this.closePlace();
     const crs = this.manifest.crs;
     const world = worldPoint(this.manifest, hit.stored);
-    const digits = crs.geographic ? 6 : 2;
+    const place = (n: number) => crs.geographic ? n.toFixed(6) : this.plain(n, 2);
     const rows: Array<[string, string]> = this.scan ? world.map((c, i): [string, string] => ['XYZ'[i], this.plain(c)]) : [
-      [crs.geographic ? 'Longitude' : 'East', world[0].toFixed(digits)],
-      [crs.geographic ? 'Latitude' : 'North', world[1].toFixed(digits)],
-      ['Height', `${world[2].toFixed(2)}${this.unit}`]
+      [crs.geographic ? 'Longitude' : 'East', place(world[0])],
+      [crs.geographic ? 'Latitude' : 'North', place(world[1])],
+      ['Height', `${this.plain(world[2], 2)}${this.unit}`]
     ];
     // As the command takes it: --cluster L:N.
     rows.push(['Level', `${hit.level}`], ['Cluster', `${hit.clusterLevel}:${hit.clusterOrdinal}`]);
@@ -392,10 +409,15 @@ class Viewer {
     this.redraw = true;
     this.followSurface(0);
   }
-  /// A number of a scan without units, to a hundred-thousandth of its size.
-  private plain(n: number): string {
+  /// A number to a hundred-thousandth of the store's size, with so many digits at least.
+  private plain(n: number, least = 0): string {
     const size = Math.max(...[0, 1, 2].map(i => this.box[i + 3] - this.box[i]));
-    return n.toFixed(Math.min(12, Math.max(0, 5 - Math.floor(Math.log10(size || 1)))));
+    return n.toFixed(Math.min(12, Math.max(least, 5 - Math.floor(Math.log10(size || 1)))));
+  }
+  /// 0: as suits the store; few small points would be lost from sight.
+  private setSize(size: number): void {
+    this.size = size;
+    this.look.pointSize = size || ((this.manifest?.points ?? 0) < 1000 ? 6 : 2.5);
   }
   /// The unit of heights, if it is known.
   private get unit(): string {
@@ -451,10 +473,12 @@ class Viewer {
     element('profile-plot').replaceChildren(shape);
     // The view frame counts Y from the middle of the store.
     const above = axis === 1 ? worldPoint(this.manifest!, stored)[1] - to[1] : 0;
-    const brief = (n: number, text: string) => this.scan ? `${Number(n.toPrecision(3))}` : text;
-    element('profile-low').textContent = `${brief(low + above, this.height(low))} lowest`;
-    element('profile-length').textContent = brief(length, this.ground(length));
-    element('profile-high').textContent = `${brief(high + above, this.height(high))} highest`;
+    // As many digits as tell the lowest from the highest.
+    const digits = Math.min(12, Math.max(0, 2 - Math.floor(Math.log10(rise))));
+    const at = (n: number) => this.scan ? (n + above).toFixed(digits) : this.height(n);
+    element('profile-low').textContent = `${at(low)} lowest`;
+    element('profile-length').textContent = this.scan ? `${Number(length.toPrecision(3))}` : this.ground(length);
+    element('profile-high').textContent = `${at(high)} highest`;
   }
   private showMark(): void {
     this.showMarkAt('mark', this.hit);
@@ -490,22 +514,26 @@ class Viewer {
     const error = Number(this.link.get('q'));
     if (error >= 0.5 && error <= 32) this.error = error;
     const size = Number(this.link.get('r'));
-    this.look.pointSize = size >= 1 && size <= 8 ? size : 2.5;
+    this.setSize(size >= 1 && size <= 8 ? size : 0);
   }
   private applyLink(): void {
     const numbers = (this.link.get('v') ?? '').split(',').map(Number);
     if (numbers.length !== 6 || !numbers.every(Number.isFinite) || numbers[5] <= 0) return;
+    // From farther away nothing would be seen.
+    const {least, most} = this.camera, middle = [0, 1, 2].map(i => (this.box[i] + this.box[i + 3]) / 2);
+    if (Math.hypot(...middle.map((c, i) => numbers[i] - c)) > most) return;
     this.camera.target = [numbers[0], numbers[1], numbers[2]];
     this.camera.azimuth = numbers[3];
     this.camera.tilt = this.camera.within(numbers[4]);
-    this.camera.distance = numbers[5];
+    this.camera.distance = Math.min(most, Math.max(least, numbers[5]));
+    this.fitted = false;
   }
   private writeLink(): void {
     const c = this.camera;
-    const view = [...c.target.map(n => this.scan ? this.plain(n) : n.toFixed(2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
+    const view = [...c.target.map(n => this.plain(n, this.scan ? 0 : 2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
     const parts = [`s=${encodeURIComponent(this.store)}`, `v=${view.join(',')}`, `c=${this.look.colour}`, `q=${this.error}`];
     if (this.look.wire) parts.push('w=1');
-    if (this.look.pointSize !== 2.5) parts.push(`r=${this.look.pointSize}`);
+    if (this.size > 0) parts.push(`r=${this.size}`);
     if (this.scan && this.asPoints) parts.push('p=1');
     if (this.scan) parts.push(`u=${c.yUp ? 'y' : 'z'}`);
     if (this.level !== 255) parts.push(`l=${this.level}`);
@@ -537,6 +565,7 @@ class Viewer {
   }
   private change(zoomed = false): void {
     this.moved = true;
+    this.fitted = false;
     // A body is turned about its middle until one goes nearer.
     if (this.scan && !zoomed) return;
     this.pivoting = true;
@@ -658,10 +687,16 @@ class Viewer {
       this.moved = true;
     });
     element('size').addEventListener('input', event => {
-      this.look.pointSize = Number((event.target as HTMLInputElement).value);
+      this.setSize(Number((event.target as HTMLInputElement).value));
       this.changeLook();
     });
-    element('store').addEventListener('change', event => this.open((event.target as HTMLSelectElement).value, false));
+    element('store').addEventListener('change', event => {
+      const {value} = event.target as HTMLSelectElement;
+      // The way back leads to the store before.
+      this.writeLink();
+      history.pushState(null, '', `#s=${encodeURIComponent(value)}`);
+      this.open(value, false);
+    });
     element('fit').addEventListener('click', () => this.fit());
     element('theme').addEventListener('click', () => this.setDark(!this.look.dark));
     element('link').addEventListener('click', () => {
@@ -679,6 +714,7 @@ class Viewer {
     element('collapse').addEventListener('click', () => this.tell({type: 'pin', how: 0}));
     element('release').addEventListener('click', () => this.tell({type: 'pin', how: -1}));
     element('retry').addEventListener('click', () => {
+      if (this.lost) location.reload();
       element('message').hidden = true;
       if (this.manifest) {
         this.tell({type: 'retry'});
@@ -692,6 +728,9 @@ class Viewer {
       const wanted = this.link.get('s');
       if (wanted !== null && wanted !== this.store && this.stores.some(store => store.name === wanted)) {
         this.open(wanted, true);
+      } else if (wanted !== null && wanted !== this.store) {
+        this.noSuchStore(wanted);
+        this.writeLink();
       } else {
         this.applyLink();
         this.moved = true;
@@ -699,8 +738,12 @@ class Viewer {
     });
     canvas.addEventListener('webglcontextlost', event => {
       event.preventDefault();
-      fail('The graphics driver has given up. Load the page anew.', false);
+      this.lost = true;
+      if (this.manifest) this.writeLink();
+      fail('The graphics driver has given up, as it may when it is short of memory.');
     });
+    // The link restores the view.
+    canvas.addEventListener('webglcontextrestored', () => location.reload());
   }
   private changeLook(): void {
     this.redraw = true;
@@ -712,10 +755,10 @@ class Viewer {
     const {clientWidth: width, clientHeight: height} = this.canvas;
     const across = (pixels: number) => 2 * pixels / width, down = (pixels: number) => 2 * pixels / height;
     // Between the panels.
-    const edge = phone ? across(16) : across(24), tools = phone || width < 900 ? 0 : across(256);
+    const narrow = phone.matches, edge = across(narrow ? 16 : 24), tools = narrow || width < 900 ? 0 : across(256);
     this.camera.fit(
-        this.box, this.aspect, -1 + edge, 1 - Math.max(edge, tools), -1 + down(52), 1 - down(phone ? 72 : 24));
-    this.moved = true;
+        this.box, this.aspect, -1 + edge, 1 - Math.max(edge, tools), -1 + down(52), 1 - down(narrow ? 72 : 24));
+    this.fitted = this.moved = true;
   }
   /// Expands or collapses the cluster under the pointer.
   private async pinPointed(how: number): Promise<void> {
@@ -753,14 +796,21 @@ class Viewer {
 }
 
 // The worker fetches while WebGL starts, which takes long and holds the page; before that the worker has to be there.
-const link = new URLSearchParams(location.hash.slice(1));
-const first = launch(link.get('s') ?? '', true, link.get('p') === '1');
-first.onmessage = () => {
-  try {
-    Object.assign(window, {terrace: new Viewer(first)});
-  } catch (error) {
-    first.terminate();
-    fail((error as Error).message, false);
-  }
-};
-first.onerror = event => fail(event.message || NO_WORKER, false);
+function start(): void {
+  const link = new URLSearchParams(location.hash.slice(1));
+  const first = launch(link.get('s') ?? '', true, link.get('p') === '1');
+  first.onmessage = () => {
+    try {
+      Object.assign(window, {terrace: new Viewer(first)});
+    } catch (error) {
+      first.terminate();
+      fail((error as Error).message, false);
+    }
+  };
+  first.onerror = event => fail(event.message || NO_WORKER, false);
+}
+if (location.protocol === 'file:') {
+  fail('Browsers let pages read no files beside them on the disk. Put this folder on a web server that answers range requests, or use "terrace view".', false);
+} else {
+  start();
+}

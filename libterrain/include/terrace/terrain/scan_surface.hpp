@@ -43,7 +43,8 @@ struct ScanSurface {
   /// Samples that are a corner of no face; samples at the same place count once. nullopt of a
   /// surface that has corners of its own.
   std::optional<std::size_t> samples_off;
-  /// Where nothing is enclosed: 0 if all points are at one place, 1 if they are on a line, else 2.
+  /// Where nothing is enclosed: 0 if all points are at one place, 1 if they are on a line, 2 if
+  /// they are in a plane, else 3.
   unsigned spanned = 3;
   /// The scan is open: the lids over what has not been scanned were left out, see
   /// tri::BasicShape3::surface_without_lids(). Never of tetrahedra, which fill the closed surface.

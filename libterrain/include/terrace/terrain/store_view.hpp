@@ -35,10 +35,10 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
 };
 
 /// Whether the points of a store are taken for the scan of a body, to be shown by its surface: no
-/// raster, in no reference system, without classes as laser clouds have them, and the Delaunay
-/// triangles of their horizontal places, at the top, are steeper than 60 degrees by more than half
-/// of their area, as those between the two sides of a body are. ground: the linear map from stored
-/// coordinates to metres. O(n log n) for the n points of the top.
+/// raster, triangles or lines, in no reference system, without classes as laser clouds have them,
+/// and the Delaunay triangles of their horizontal places, at the top, are steeper than 60 degrees
+/// by more than half of their area, as those between the two sides of a body are. ground: the
+/// linear map from stored coordinates to metres. O(n log n) for the n points of the top.
 /// Throws: stream::Error if the top is damaged; stream::MissingBytes.
 [[nodiscard]] bool is_scan(const stream::Store& store, const stream::LinearMap& ground);
 
