@@ -46,7 +46,7 @@ Seen<Coord> seen(const ShapeSurface& surface, const Delaunay3<Coord>& triangulat
 /// What is seen of the closed surface by the definition; `share` is that of the lids.
 template <class Coord>
 Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& triangulation,
-                          double& share) {
+                          double& share, std::size_t& lids) {
   using Wide = long double;  // neither the largest nor the smallest doubles leave its range
   const auto length = [&](VertexId a, VertexId b) {
     const auto p = triangulation.point(a), q = triangulation.point(b);
@@ -87,6 +87,7 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
     }
     of_all += std::sqrt(square);
     of_lids += lid ? std::sqrt(square) : 0;
+    lids += lid;
     all.triangles.insert(Drawn<Coord>::from_least(p));
     if (!lid) others.triangles.insert(Drawn<Coord>::from_least(p));
   }
@@ -123,8 +124,11 @@ TYPED_TEST(Lids, AreThoseOfTheDefinition) {
     Shape3<Coord> shape;
     shape.restore(triangulation);
     double share = 0.0;
-    const auto expected = by_definition(shape.surface(triangulation), triangulation, share);
-    const auto found = seen(shape.surface_without_lids(triangulation), triangulation);
+    std::size_t lids = 0;
+    const auto expected = by_definition(shape.surface(triangulation), triangulation, share, lids);
+    const ShapeSurface without = shape.surface_without_lids(triangulation);
+    const auto found = seen(without, triangulation);
+    EXPECT_EQ(without.lids, lids);
     if (std::abs(share - 0.1) < 1e-4) return;  // areas are cut to 18 bits
     ASSERT_EQ(found, expected) << share;
     open += found.open;

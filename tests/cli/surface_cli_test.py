@@ -102,7 +102,13 @@ class SurfaceTest(unittest.TestCase):
         result = terrace('surface', store, '-o', self.path('bowl.obj'), '--force')
         self.assertIn('open, 1 part, without the faces over the gaps of the scan', result.stderr)
         closed, _ = self.surface('ball.obj')
-        self.assertEqual((closed['open_scan'], closed['samples_off']), (False, 0))
+        self.assertEqual((closed['open_scan'], closed['samples_off'], closed['lids']), (False, 0, 0))
+        # A small opening is closed, and the summary does not keep that back.
+        with open(self.path('jar.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {z}\n' for x, y, z in sphere(6000) if z < 9)
+        self.assertEqual(terrace('build', self.path('jar.xyz'), '-o', self.path('jar.terrace')).returncode, 0)
+        result = terrace('surface', self.path('jar.terrace'), '-o', self.path('jar.obj'))
+        self.assertRegex(result.stderr, r'triangles \(\d+ over gaps of the scan\), closed, 1 part')
 
     def test_coarse_with_a_fine_part(self):
         coarse, _ = self.surface('coarse.ply', '--level', 'top')

@@ -186,6 +186,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     set_parts(surface.parts, out);
     out.samples_off = surface.points_off;
     out.open = surface.open;
+    out.lids = surface.lids;
   } else if (!surface.input.empty() || surface.surface.faces.empty()) {
     out.samples_off = distinct_places(ground) - surface.input.size();
   }

@@ -209,7 +209,7 @@ class LidFinder {
   spatial::Star<typename Mesh::Kernel> star_;
 };
 
-/// Removes the lids of an open scan, and the vertices that only they have; sets `open`.
+/// Removes the lids of an open scan, and the vertices that only they have; sets `open` and `lids`.
 template <class Mesh>
 void leave_out_lids(const Mesh& mesh, ShapeSurface& result) {
   using Face = std::array<std::uint32_t, 3>;
@@ -225,6 +225,7 @@ void leave_out_lids(const Mesh& mesh, ShapeSurface& result) {
     measured.lid = is_lid[f] = finder.lid(face);
     share.add(measured);
   }
+  result.lids = static_cast<std::size_t>(std::count(is_lid.begin(), is_lid.end(), true));
   if (!share.open()) return;
 
   result.open = true;

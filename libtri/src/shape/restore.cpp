@@ -71,6 +71,7 @@ RestoredSurface shape_faces(std::span<const typename Triangulation::Point> point
     for (std::uint32_t& v : face) v = point_of[slot(surface.vertices[v])];
   result.points_off = triangulation.vertex_count() - surface.vertices.size();
   result.open = surface.open;
+  result.lids = surface.lids;
   return result;
 }
 

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "../curve_sort.hpp"
 #include "../delaunay3/mesh.hpp"
 #include "../pool.hpp"
 #include "criterion.hpp"
@@ -32,22 +34,33 @@ struct Place {
 /// Lexicographic order of the living vertices.
 template <class Mesh>
 std::vector<std::uint32_t> sorted_vertices(const Mesh& mesh) {
-  struct Key {
-    double x;
-    std::uint32_t vertex;
-  };
-  std::vector<Key> keys;
-  keys.reserve(mesh.vertex.size());
-  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
-    if (mesh.vertex_alive(v)) keys.push_back({static_cast<double>(mesh.vertex[v].point[0]), v});
-  std::sort(keys.begin(), keys.end(), [&](const Key& a, const Key& b) {
-    if (a.x != b.x) return a.x < b.x;
-    return spatial::lexicographically_less(mesh.vertex[a.vertex].point,
-                                           mesh.vertex[b.vertex].point);
-  });
+  // By x in whole steps first, the others within a step. Halves, so that differences do not
+  // overflow.
+  const auto x = [&](std::uint32_t v) { return static_cast<double>(mesh.vertex[v].point[0]) / 2; };
   std::vector<std::uint32_t> order;
-  order.reserve(keys.size());
-  for (const Key& key : keys) order.push_back(key.vertex);
+  order.reserve(mesh.vertex.size());
+  double min = std::numeric_limits<double>::infinity(), max = -min;
+  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v) {
+    if (!mesh.vertex_alive(v)) continue;
+    order.push_back(v);
+    min = std::min(min, x(v));
+    max = std::max(max, x(v));
+  }
+  Pool<CurveEntry> entries;
+  entries.resize(static_cast<std::uint32_t>(order.size()));
+  for (std::uint32_t i = 0; i < entries.size(); ++i) {
+    const double part = max > min ? (x(order[i]) - min) / (max - min) : 0.0;
+    entries[i] = {static_cast<std::uint32_t>(part * 0x3FFFFFFFp0), order[i]};
+  }
+  radix_sort<10, 3>(entries);
+  for (std::uint32_t i = 0; i < entries.size(); ++i) order[i] = entries[i].number;
+  for (std::uint32_t i = 0, end = 0; i < entries.size(); i = end) {
+    while (end < entries.size() && entries[end].key == entries[i].key) ++end;
+    if (end - i < 2) continue;
+    std::sort(order.begin() + i, order.begin() + end, [&](std::uint32_t a, std::uint32_t b) {
+      return spatial::lexicographically_less(mesh.vertex[a].point, mesh.vertex[b].point);
+    });
+  }
   return order;
 }
 

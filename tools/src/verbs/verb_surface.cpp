@@ -93,7 +93,8 @@ class SurfaceCommand final : public Command {
                     {"components", measures.components},
                     {"euler_characteristic", measures.euler_characteristic},
                     {"closed", measures.closed},
-                    {"open_scan", surface.open}};
+                    {"open_scan", surface.open},
+                    {"lids", surface.lids}};
     if (surface.samples_off) summary.json["samples_off"] = *surface.samples_off;
     summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(surface.mesh.positions.size()) + " vertices, ";
@@ -103,6 +104,9 @@ class SurfaceCommand final : public Command {
     } else {
       summary.json["triangles"] = surface.mesh.triangles.size();
       summary.text += with_commas(surface.mesh.triangles.size()) + " triangles";
+      if (!surface.open && surface.lids > 0) {
+        summary.text += " (" + with_commas(surface.lids) + " over gaps of the scan)";
+      }
       if (!surface.mesh.triangles.empty()) {
         summary.text += (measures.closed ? ", closed, " : ", open, ") +
                         with_commas(measures.components) +

@@ -49,6 +49,7 @@ struct ScanSurface {
   /// The scan is open: the lids over what has not been scanned were left out, see
   /// tri::BasicShape3::surface_without_lids(). Never of tetrahedra, which fill the closed surface.
   bool open = false;
+  std::size_t lids = 0;  ///< how many lids were left out or, if it is not open, are triangles
 };
 
 /// The surface of the points that `detail` wants, restored in metres on the ground: of points in

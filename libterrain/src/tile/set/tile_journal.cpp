@@ -122,9 +122,12 @@ const FinishedTile* TileJournal::find(const TileAddress& tile) const {
 }
 
 void TileJournal::add(const TileAddress& tile, const FinishedTile& finished) {
-  file_ << line_of(tile, finished);
-  file_.flush();
-  if (!file_) throw stream::system_error(path_, "cannot be written", errno);
+  if (file_) {
+    file_ << line_of(tile, finished);
+    file_.flush();
+    if (!file_) failure_ = errno;
+  }
+  if (!file_) throw stream::system_error(path_, "cannot be written", failure_);
   tidy_ = false;
 }
 

@@ -53,6 +53,7 @@ class TileJournal {
   std::vector<Record> earlier_;  ///< sorted by address
   bool tidy_ = true;             ///< the file holds these, in this order
   std::ofstream file_;
+  int failure_ = 0;  ///< the error number of the first add() that failed; others fail alike
 };
 
 /// The records of a finished set, sorted by address; empty without a journal that this version can

@@ -123,6 +123,7 @@ struct ShapeSurface {
   std::vector<VertexId> vertices;     ///< the vertex of each point of the surface; by slot
   std::vector<TetrahedronId> behind;  ///< the kept tetrahedron behind each face
   bool open = false;                  ///< lids were left out
+  std::size_t lids = 0;               ///< of surface_without_lids(): how many, left out or not
 };
 
 /// What a surface consists of once it is taken apart where solids touch in an edge or a vertex.
@@ -248,7 +249,8 @@ struct RestoredSurface {
   /// The scan is open, and the lids over what has not been scanned were left out (poles rule only),
   /// see BasicShape3::surface_without_lids().
   bool open = false;
-  ShapeParts parts{};  ///< see BasicShape3::parts()
+  std::size_t lids = 0;  ///< how many lids were left out or, if it is not open, are faces
+  ShapeParts parts{};    ///< see BasicShape3::parts()
 };
 
 /// The surface from which the points were scanned. No faces if all points (after any rounding) are
