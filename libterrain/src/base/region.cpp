@@ -170,7 +170,7 @@ bool Region::covers(const Point2& place) const {
 }
 
 void Region::restrict(stream::Selection& selection) const {
-  // Of a box the source knows what it may round.
+  // The source itself widens a box by what it may round.
   selection.region = shape_ ? box_ : extent();
   selection.covers = {};
   if (shape_) {

@@ -181,7 +181,7 @@ Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
           around.include(stream::Point3{p[0], p[1], 0});
         }
       }
-      // Of several polygons some may lie elsewhere.
+      // Some of several polygons may lie elsewhere.
       if (around.min[0] <= bounds.max[0] && around.max[0] >= bounds.min[0]) {
         polygons.push_back(std::move(polygon));
       }

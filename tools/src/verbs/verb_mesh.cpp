@@ -15,17 +15,16 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/store_checks.hpp"
-#include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "cli/store_options.hpp"
-#include "mesh/scene.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/store_view.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 #include "verbs/verbs.hpp"
 
@@ -192,11 +191,11 @@ class MeshCommand final : public Command {
            (one ? "all points have the same x and y" : "all points are on one line over x and y");
   }
 
-  static bool could_be_scan(const stream::StoreSchema& schema) {
-    return !schema.grid && schema.crs.epsg == 0 && schema.crs.wkt.empty() &&
-           entities_of(schema) == stream::Entities::points &&
-           std::none_of(schema.attributes.begin(), schema.attributes.end(),
-                        [](const auto& attribute) { return attribute.name == "classification"; });
+  /// What has a reference system is none, and its way to the ground need not be found.
+  static bool looks_like_scan(const stream::Store& store) {
+    const stream::Crs& crs = store.schema().crs;
+    return !store.schema().grid && crs.epsg == 0 && crs.wkt.empty() &&
+           is_scan(store, StoreView<tri::PointCloud>(store).ground());
   }
 
   static std::string counting(const std::string& duplicates) {
@@ -231,11 +230,10 @@ class MeshCommand final : public Command {
     TriangleMesh mesh = detail_mesh(store, detail, options, common.context());
     if (mesh.positions.empty()) throw_none_inside(store, "triangle");
     if (mesh.triangles.empty()) common.say(part_.path + ": " + why_flat(mesh.positions));
-    const bool steep = could_be_scan(store.schema()) && mostly_steep(mesh);
     places(mesh.positions);
     write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()});
     if (writer) writer->finish();
-    if (steep) {
+    if (looks_like_scan(store)) {
       common.say(part_.path +
                  ": most triangles are steep, as between the two sides of a body; "
                  "'terrace surface' makes the surface of a scan");
