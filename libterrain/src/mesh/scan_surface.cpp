@@ -20,8 +20,9 @@ namespace {
 /// Peak bytes per point: tetrahedra and their vertices, the shape, positions in the CRS and on the
 /// ground, and the surface.
 constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
-/// Spheres and statements of the poles rule, in place of the surface.
-constexpr std::uint64_t kPolesBytesPerPoint = 420;
+/// The tetrahedra in another order, spheres and statements of the poles rule, in place of the
+/// surface.
+constexpr std::uint64_t kPolesBytesPerPoint = 660;
 
 void check_surface_memory(const stream::Store& store, const Detail& detail,
                           std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {

@@ -32,7 +32,7 @@ struct Part {
 /// whole forest, so are the others: joining tetrahedra by their right labels in advance closes no
 /// cycle against them.
 ///
-/// O(n log n); memory 60 bytes per tetrahedron, freed at the end.
+/// O(n log n); memory 60 bytes per tetrahedron, freed at the end, besides the spheres.
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
                                         const Part& part = {});
 
