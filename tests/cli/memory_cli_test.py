@@ -349,6 +349,16 @@ class StoreMemoryTest(MemoryCase):
         needs = self.needed(64, mesh, 'mesh', self.store, '--max-error', 2)
         self.within(needs, 'mesh', self.store, '--max-error', 2, '-o', mesh)
 
+    def test_surface(self):
+        scan, store = self.path('scan.las'), self.path('scan.store')
+        for args in (('synth', 'surface', '--points', 200000, '-o', scan), ('build', scan, '-o', store)):
+            code, _, err, _ = run(*args)
+            self.assertEqual(code, 0, err)
+        for criterion in ('poles', 'gabriel'):
+            surface = ('surface', store, '--criterion', criterion, '--threads', 2)
+            needs = self.needed(64, self.path(f'{criterion}.ply'), *surface)
+            self.within(needs, *surface, '-o', self.path(f'{criterion}.ply'))
+
     def test_tiles(self):
         tiles = self.path('tiles')
         tile = ('tile', self.store, '--zoom', '0-9', '--threads', 2, '--vertical', 'ellipsoidal')

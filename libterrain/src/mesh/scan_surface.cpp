@@ -23,11 +23,13 @@ constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
 /// The tetrahedra in another order, spheres and statements of the poles rule, in place of the
 /// surface.
 constexpr std::uint64_t kPolesBytesPerPoint = 660;
+/// What the program and the reading of the store take.
+constexpr std::uint64_t kSurfaceBytesBeside = std::uint64_t{48} << 20;
 
 void check_surface_memory(const stream::Store& store, const Detail& detail,
                           std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
   const std::uint64_t points = wanted_points(store, detail);
-  const std::uint64_t needed = points * bytes_per_point;
+  const std::uint64_t needed = kSurfaceBytesBeside + points * bytes_per_point;
   if (needed <= memory_bytes) return;
   throw stream::Error({.file = store.path().string(),
                        .where = {},
