@@ -27,7 +27,8 @@ struct Statement {
   /// The sets, by their roots; the second doubled, plus 1 if the roots are said to be unlike.
   std::uint32_t one, other;
 
-  [[nodiscard]] bool of_vertex() const { return (key & 1) != 0; }
+  /// Key and what it is about.
+  [[nodiscard]] std::uint64_t claim() const { return std::uint64_t{key} << 32 | what; }
 };
 
 std::uint32_t key_of(double defect, bool of_vertex) {
@@ -49,29 +50,35 @@ class PoleFinder {
     const std::vector<Place>& places = spheres.places();
     vertices_.resize(static_cast<std::uint32_t>(places.size()));
     for (std::uint32_t v = 0; v < vertices_.size(); ++v)
-      vertices_[v] = {places[v].at, {}, least(v), spatial::kNone};
+      vertices_[v] = {places[v].at, {}, least(v)};
   }
 
   std::vector<Poles> find() {
-    take_largest([](const Vertex&, const Vector3&) { return true; });
     std::vector<Poles> poles(vertices_.size());
-    for (std::uint32_t v = 1; v < poles.size(); ++v) {
-      Vertex& vertex = vertices_[v];
-      poles[v].first = vertex.tetrahedron;
-      if (vertex.tetrahedron != spatial::kNone)
-        vertex.to_first = spheres_.to_centre(vertex.tetrahedron, vertex.at);
-      vertex.radius2 = least(v);
-      vertex.tetrahedron = spatial::kNone;
+    {
+      Pool<std::uint64_t> largest;
+      largest.resize(vertices_.size());
+      for (std::uint32_t v = 0; v < vertices_.size(); ++v) largest[v] = least(v);
+      for_all([&](std::uint64_t sphere, std::uint32_t v) { take_larger(largest[v], sphere); });
+      for (std::uint32_t v = 1; v < poles.size(); ++v) {
+        if (!is_sphere(largest[v])) continue;
+        poles[v].first = tetrahedron_of(largest[v]);
+        vertices_[v].to_first = spheres_.to_centre(poles[v].first, vertices_[v].at);
+      }
     }
     add_hull(poles);
-    take_largest([](const Vertex& vertex, const Vector3& to_centre) {
-      return dot(to_centre, vertex.to_first) < 0.0;
+    for_all([&](std::uint64_t sphere, std::uint32_t v) {
+      Vertex& vertex = vertices_[v];
+      const Vector3 to_centre = spheres_.to_centre(tetrahedron_of(sphere), vertex.at);
+      // Without a branch, which the processor could not predict.
+      const auto admitted = static_cast<std::uint64_t>(dot(to_centre, vertex.to_first) < 0.0);
+      take_larger(vertex.largest, sphere & (0 - admitted));
     });
     for (std::uint32_t v = 1; v < poles.size(); ++v) {
       const Vertex& vertex = vertices_[v];
-      poles[v].second = vertex.tetrahedron;
-      if (vertex.tetrahedron == spatial::kNone) continue;
-      Vector3 back = spheres_.to_centre(vertex.tetrahedron, vertex.at);
+      if (!is_sphere(vertex.largest)) continue;
+      poles[v].second = tetrahedron_of(vertex.largest);
+      Vector3 back = spheres_.to_centre(poles[v].second, vertex.at);
       for (double& c : back) c = -c;
       poles[v].defect = kPoleWeight * defect_between(vertex.to_first, back);
     }
@@ -82,30 +89,48 @@ class PoleFinder {
   /// What is looked at for every tetrahedron around a vertex, in one cache line.
   struct Vertex {
     Vector3 at, to_first;
-    double radius2;  ///< the largest so far, of the tetrahedron behind
-    std::uint32_t tetrahedron;
+    std::uint64_t largest;  ///< sphere so far whose centre is on the other side, see sphere_of()
   };
-  /// No radius is larger than that of a vertex without poles.
-  [[nodiscard]] double least(std::uint32_t v) const {
-    return part_.whole.empty() || part_.whole[v] != 0 ? -1.0 : HUGE_VAL;
+
+  // Spheres as numbers: the upper half of the squared radius, plus 2, above the tetrahedron's
+  // number. Below them: none. Above them: none, and none will be taken.
+  static constexpr std::uint64_t kNoSphere = std::uint64_t{1} << 32;
+  static constexpr std::uint64_t kNeverAny = ~std::uint64_t{0};
+
+  /// 0 if flat.
+  [[nodiscard]] std::uint64_t sphere_of(std::uint32_t t) const {
+    const double r2 = spheres_.radius2(t);
+    if (std::isnan(r2)) return 0;
+    return ((std::bit_cast<std::uint64_t>(r2) >> 32) + 2) << 32 | t;
   }
-  /// Finds the largest sphere at every vertex of those whose centre is admitted. Where two radii
-  /// are equal, it is that of the tetrahedron with the lexicographically first corners.
-  template <class Admits>
-  void take_largest(Admits&& admits) {
+  static bool is_sphere(std::uint64_t sphere) { return sphere > kNoSphere && sphere != kNeverAny; }
+  static std::uint32_t tetrahedron_of(std::uint64_t sphere) {
+    return static_cast<std::uint32_t>(sphere);
+  }
+  [[nodiscard]] std::uint64_t least(std::uint32_t v) const {
+    return part_.whole.empty() || part_.whole[v] != 0 ? kNoSphere : kNeverAny;
+  }
+  /// Where two radii are equal, the larger sphere is that of the tetrahedron with the
+  /// lexicographically first corners.
+  void take_larger(std::uint64_t& held, std::uint64_t sphere) const {
+    if (held >> 32 == sphere >> 32) [[unlikely]] {
+      const std::uint32_t a = tetrahedron_of(held), b = tetrahedron_of(sphere);
+      const double radius_a = spheres_.radius2(a), radius_b = spheres_.radius2(b);
+      if (radius_a != radius_b ? radius_b > radius_a : spheres_.ranks_of(b) < spheres_.ranks_of(a))
+        held = sphere;
+    } else {
+      held = std::max(held, sphere);
+    }
+  }
+  /// Calls take(sphere, corner) for all corners of all finite tetrahedra.
+  template <class Take>
+  void for_all(const Take& take) const {
     const auto tetrahedra = spheres_.tetrahedra();
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
       if (!spheres_.finite(t)) continue;
-      const double r2 = spheres_.radius2(t);
-      for (const std::uint32_t v : tetrahedra[t].corner) {
-        Vertex& vertex = vertices_[v];
-        // Flat tetrahedra have no radius: no comparison with NaN is true.
-        if (!(r2 >= vertex.radius2) || !admits(vertex, spheres_.to_centre(t, vertex.at))) continue;
-        if (r2 == vertex.radius2 && !(spheres_.ranks_of(t) < spheres_.ranks_of(vertex.tetrahedron)))
-          continue;
-        vertex.radius2 = r2;
-        vertex.tetrahedron = t;
-      }
+      const std::uint64_t sphere = sphere_of(t);
+      if (sphere == 0) continue;
+      for (const std::uint32_t v : tetrahedra[t].corner) take(sphere, v);
     }
   }
 
@@ -124,7 +149,7 @@ class PoleFinder {
       const std::uint32_t i = spatial::ghost_index(ghost.corner);
       const auto facet = spatial::facet_of(ghost, i);
       if (std::none_of(facet.begin(), facet.end(),
-                       [&](std::uint32_t v) { return vertices_[v].radius2 < 0.0; }))
+                       [&](std::uint32_t v) { return least(v) == kNoSphere; }))
         continue;
       const spatial::Side side = ghost.mate[i];
       const Vector3 normal = spheres_.hull_normal(side);
@@ -149,37 +174,37 @@ class PoleFinder {
   Pool<Vertex> vertices_;
 };
 
-/// Disjoint sets of tetrahedra, each known to be alike or unlike its set's root.
+/// Disjoint sets of tetrahedra, each known to be alike or unlike its set's root. Nodes are given
+/// doubled, plus 1 if what is meant is unlike them.
 class SignedSets {
  public:
   explicit SignedSets(std::uint32_t count) {
-    parent_.resize(count);
-    for (std::uint32_t i = 0; i < count; ++i) parent_[i] = 2 * i;
+    up_.resize(count);
+    for (std::uint32_t x = 0; x < count; ++x) up_[x] = 2 * x;
   }
-  /// The root, doubled, plus 1 if it is unlike.
-  std::uint32_t find(std::uint32_t x) {
-    std::uint32_t sign = 0;
-    for (;;) {
-      const std::uint32_t up = parent_[x];
-      if (up >> 1 == x) return 2 * x | sign;
-      const std::uint32_t next = parent_[up >> 1] ^ (up & 1);
-      parent_[x] = next;
-      sign ^= next & 1;
-      x = next >> 1;
+  /// Makes x, a root, a child.
+  void hook(std::uint32_t x, std::uint32_t below) { up_[x] = below; }
+  /// Makes x a root again if it has been hooked to a root that has been hooked to x. To be called
+  /// in ascending order, so that the smaller number stays the root: roots are in spatial order
+  /// then, as their tetrahedra are.
+  void cut_pair(std::uint32_t x) {
+    if (up_[up_[x] >> 1] >> 1 == x) up_[x] = 2 * x;
+  }
+  [[nodiscard]] bool is_root(std::uint32_t x) const { return up_[x] == 2 * x; }
+  /// Makes x a child of its set's root.
+  void flatten(std::uint32_t x) {
+    for (std::uint32_t up = up_[x];;) {
+      const std::uint32_t next = up_[up >> 1] ^ (up & 1);
+      up_[x] = next;
+      if (next == up) return;
+      up = next;
     }
   }
-  /// If they are in different sets; `unlike` is 0 or 1.
-  void join(std::uint32_t a, std::uint32_t b, std::uint32_t unlike) {
-    const std::uint32_t root_a = find(a), root_b = find(b);
-    if (root_a >> 1 == root_b >> 1) return;
-    const std::uint32_t sign = (root_a ^ root_b ^ unlike) & 1;
-    // The smaller number is the root, so that roots stay in spatial order as their tetrahedra are.
-    const std::uint32_t low = std::min(root_a, root_b) >> 1, high = std::max(root_a, root_b) >> 1;
-    parent_[high] = 2 * low | sign;
-  }
+  /// The root of a node that has been flattened.
+  [[nodiscard]] std::uint32_t root(std::uint32_t node) const { return up_[node >> 1] ^ (node & 1); }
 
  private:
-  Pool<std::uint32_t> parent_;
+  Pool<std::uint32_t> up_;
 };
 
 class Forest {
@@ -192,93 +217,148 @@ class Forest {
 
   std::vector<std::uint8_t> labels() {
     poles_ = PoleFinder(spheres_, part_).find();
-    state_all();
+    measure_facets();
     SignedSets sets(beyond_ + 1);
-    std::vector<std::uint32_t> roots;
-    for (std::uint32_t t = 0; t < beyond_; ++t)
-      if (node(t) == 2 * t) roots.push_back(t);
-    roots.push_back(beyond_);
-    best_.resize(beyond_ + 1);
+    join_tetrahedra(sets);
+    list_statements(sets);
+    std::vector<std::uint32_t> first_roots;
+    for (std::uint32_t x = 0; x <= beyond_; ++x)
+      if (sets.is_root(x)) first_roots.push_back(x);
+    std::vector<std::uint32_t> roots = first_roots;
     while (list_.size() > 0) join_best(sets, roots);
-    const std::uint32_t outside = sets.find(beyond_);
+    for (const std::uint32_t x : first_roots) sets.flatten(x);
+    for (std::uint32_t x = 0; x <= beyond_; ++x) sets.flatten(x);
+    const std::uint32_t outside = sets.root(2 * beyond_);
     std::vector<std::uint8_t> inside(beyond_);
     for (std::uint32_t t = 0; t < beyond_; ++t)
-      inside[t] = static_cast<std::uint8_t>((sets.find(node(t) >> 1) ^ node(t) ^ outside) & 1);
+      inside[t] = static_cast<std::uint8_t>((sets.root(2 * t) ^ outside) & 1);
     return inside;
   }
 
  private:
-  /// The set that t belongs to from the start, doubled, plus 1 if t is known to be inside.
-  [[nodiscard]] std::uint32_t node(std::uint32_t t) const {
-    if (!spheres_.finite(t)) return 2 * beyond_;
-    if (part_.label.empty() || part_.label[t] == 0) return 2 * t;
-    return 2 * beyond_ + (part_.label[t] == 2);
-  }
   /// Whether this side of a finite tetrahedron stands for its facet, about which it says something
   /// new.
   [[nodiscard]] bool stands(std::uint32_t t, spatial::Side mate) const {
     const std::uint32_t other = spatial::tetrahedron_of(mate);
-    return t < other || !spheres_.finite(other);
+    return (t < other) | !spheres_.finite(other);
+  }
+  [[nodiscard]] std::uint32_t unlabelled() const {
+    return part_.label.empty() ? beyond_ : static_cast<std::uint32_t>(part_.unlabelled);
   }
 
-  /// `other` may be kNone: beyond the hull.
-  [[nodiscard]] Statement make(std::uint32_t key, std::uint32_t what, std::uint32_t one,
-                               std::uint32_t other, std::uint32_t unlike) const {
-    const std::uint32_t a = node(one), b = other == spatial::kNone ? 2 * beyond_ : node(other);
-    return {key, what, a >> 1, b ^ (a & 1) ^ unlike};
-  }
-
-  void state_all() {
+  /// Writes the key of every facet of an unlabelled tetrahedron at both of its sides.
+  void measure_facets() {
     const auto tetrahedra = spheres_.tetrahedra();
-    const std::size_t unlabelled = part_.label.empty() ? tetrahedra.size() : part_.unlabelled;
-    const std::size_t blocks = (unlabelled + kForestBlock - 1) / kForestBlock;
-    std::vector<std::size_t> start(blocks + 1);
-    const auto none = [] { return 0; };
-    for_blocks(unlabelled, kForestBlock, threads_, none,
-               [&](std::size_t begin, std::size_t end, int) {
-                 std::size_t count = 0;
-                 for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
-                   if (!spheres_.finite(t)) continue;
-                   for (const spatial::Side mate : tetrahedra[t].mate) count += stands(t, mate);
-                 }
-                 start[begin / kForestBlock] = count;
-               });
-    std::exclusive_scan(start.begin(), start.end(), start.begin(), std::size_t{0});
-    const auto at_vertices = static_cast<std::size_t>(
-        std::count_if(poles_.begin(), poles_.end(),
-                      [](const Poles& poles) { return poles.second != spatial::kNone; }));
-    list_.resize(static_cast<std::uint32_t>(start.back() + at_vertices));
-    for_blocks(unlabelled, kForestBlock, threads_, none,
-               [&](std::size_t begin, std::size_t end, int) {
-                 const std::span to{list_.data() + start[begin / kForestBlock],
-                                    list_.data() + start[begin / kForestBlock + 1]};
+    const std::uint32_t count = unlabelled();
+    keys_.resize(4 * count);
+    const auto scratch = [] { return std::vector<spatial::Side>(); };
+    for_blocks(count, kForestBlock, threads_, scratch,
+               [&](std::size_t begin, std::size_t end, std::vector<spatial::Side>& sides) {
                  // First the facets alone, so that the branch is not mixed with the arithmetic.
-                 std::size_t count = 0;
+                 sides.resize(4 * (end - begin));
+                 std::size_t facets = 0;
                  for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
                    if (!spheres_.finite(t)) continue;
                    for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
-                     const spatial::Side mate = tetrahedra[t].mate[i];
-                     if (!stands(t, mate)) continue;
-                     to[count].what = spatial::make_side(t, i);
-                     to[count++].other = spatial::tetrahedron_of(mate);
+                     sides[facets] = spatial::make_side(t, i);
+                     facets += stands(t, tetrahedra[t].mate[i]);
                    }
                  }
-                 for (std::size_t i = 0; i < to.size(); ++i) {
+                 const auto mate_of = [&](spatial::Side side) {
+                   return tetrahedra[spatial::tetrahedron_of(side)].mate[spatial::index_of(side)];
+                 };
+                 for (std::size_t f = 0; f < facets; ++f) {
                    // Neighbours lie anywhere.
-                   spheres_.prefetch(to[std::min(i + kAhead, to.size() - 1)].other);
-                   Statement& s = to[i];
-                   s = make(key_of(spheres_.facet_defect(s.what), false), s.what,
-                            spatial::tetrahedron_of(s.what), s.other, 0);
+                   spheres_.prefetch(
+                       spatial::tetrahedron_of(mate_of(sides[std::min(f + kAhead, facets - 1)])));
+                   const spatial::Side mate = mate_of(sides[f]);
+                   const std::uint32_t key = key_of(spheres_.facet_defect(sides[f]), false);
+                   keys_[sides[f]] = key;
+                   if (spatial::tetrahedron_of(mate) < count) keys_[mate] = key;
                  }
                });
-    Statement* to = list_.data() + start.back();
+  }
+
+  /// Boruvka's first round, before there is a list: every tetrahedron is joined with another by the
+  /// best statement about it.
+  void join_tetrahedra(SignedSets& sets) {
+    const std::uint32_t count = unlabelled();
+    best_.resize(beyond_ + 1);
+    std::fill(best_.data(), best_.data() + count, kNoBest);
+    for (std::uint32_t v = 1; v < poles_.size(); ++v) {
+      if (poles_[v].second == spatial::kNone) continue;
+      for (const std::uint32_t t : {poles_[v].first, poles_[v].second})
+        if (t < count) take_better(best_[t], key_of(poles_[v].defect, true), v);
+    }
+    for (std::uint32_t t = 0; t < beyond_; ++t) {
+      if (!spheres_.finite(t)) {
+        sets.hook(t, 2 * beyond_);
+      } else if (t >= count) {
+        sets.hook(t, 2 * beyond_ + (part_.label[t] == 2));
+      } else {
+        std::uint64_t best = best_[t];
+        for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
+          const spatial::Side side = spatial::make_side(t, i);
+          take_better(best, keys_[side], side);
+        }
+        sets.hook(t, partner(t, best));
+      }
+    }
+    for (std::uint32_t t = 0; t < count; ++t) sets.cut_pair(t);
+    for (std::uint32_t t = 0; t < count; ++t) sets.flatten(t);
+  }
+
+  /// The other node of a claim about t, whose side it names if it is of a facet.
+  [[nodiscard]] std::uint32_t partner(std::uint32_t t, std::uint64_t claim) const {
+    const auto what = static_cast<std::uint32_t>(claim);
+    if (!of_vertex(claim))
+      return 2 * spatial::tetrahedron_of(spheres_.tetrahedra()[t].mate[spatial::index_of(what)]);
+    const std::uint32_t other = poles_[what].first == t ? poles_[what].second : poles_[what].first;
+    return 2 * (other == spatial::kNone ? beyond_ : other) + 1;
+  }
+
+  /// Lists all statements between two sets.
+  void list_statements(const SignedSets& sets) {
+    const auto tetrahedra = spheres_.tetrahedra();
+    const std::uint32_t count = unlabelled();
+    std::uint32_t left = 0;
+    const auto has_room_for_more = [&](std::uint32_t more) {
+      if (left + more > list_.size()) list_.resize(left + left / 8 + more);
+    };
+    const auto list = [&](std::uint32_t key, std::uint32_t what, std::uint32_t one,
+                          std::uint32_t other, bool new_one) {
+      list_[left] = {key, what, one >> 1, other ^ (one & 1)};
+      left += static_cast<std::uint32_t>(new_one) & (one >> 1 != other >> 1);
+    };
+    has_room_for_more(count + count / 2);
+    for (std::uint32_t t = 0; t < count; ++t) {
+      if (!spheres_.finite(t)) continue;
+      has_room_for_more(4);
+      const std::uint32_t one = sets.root(2 * t);
+      for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
+        const spatial::Side side = spatial::make_side(t, i), mate = tetrahedra[t].mate[i];
+        list(keys_[side], side, one, sets.root(2 * spatial::tetrahedron_of(mate)), stands(t, mate));
+      }
+    }
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
       const Poles& poles = poles_[v];
       if (poles.second == spatial::kNone) continue;
-      *to = make(key_of(poles.defect, true), v, poles.second, poles.first, 1);
-      to += to->one != to->other >> 1;  // else both are known
+      has_room_for_more(1);
+      const std::uint32_t first = poles.first == spatial::kNone ? beyond_ : poles.first;
+      list(key_of(poles.defect, true), v, sets.root(2 * poles.second), sets.root(2 * first + 1),
+           true);
     }
-    list_.resize(static_cast<std::uint32_t>(to - list_.data()));
+    list_.resize(left);
+    keys_.release();
+  }
+
+  void take_better(std::uint64_t& best, std::uint32_t key, std::uint32_t what) const {
+    const std::uint64_t candidate = std::uint64_t{key} << 32 | what;
+    if (best >> 33 == candidate >> 33) [[unlikely]] {
+      if (before(candidate, best)) best = candidate;
+    } else {
+      best = std::min(best, candidate);
+    }
   }
 
   /// One of Boruvka's rounds: every set is joined with another by the best statement about it, and
@@ -290,7 +370,7 @@ class Forest {
       const std::uint64_t best = std::uint64_t{s.key >> 1} << 32 | i;
       for (std::uint64_t* held : {&best_[s.one], &best_[s.other >> 1]}) {
         if (*held >> 32 == best >> 32) [[unlikely]] {
-          if (before(s, list_[static_cast<std::uint32_t>(*held)])) *held = best;
+          if (before(s.claim(), list_[static_cast<std::uint32_t>(*held)].claim())) *held = best;
         } else {
           *held = std::min(*held, best);
         }
@@ -299,38 +379,41 @@ class Forest {
     for (const std::uint32_t root : roots) {
       if (best_[root] == kNoBest) continue;
       const Statement& s = list_[static_cast<std::uint32_t>(best_[root])];
-      sets.join(s.one, s.other >> 1, s.other & 1);
+      sets.hook(root, s.one == root ? s.other : 2 * s.one | (s.other & 1));
     }
+    for (const std::uint32_t root : roots) sets.cut_pair(root);
+    for (const std::uint32_t root : roots) sets.flatten(root);
     std::size_t count = 0;
     for (const std::uint32_t root : roots) {
-      const std::uint32_t up = sets.find(root);
-      best_[root] = up;
-      if (up >> 1 == root) roots[count++] = root;
+      roots[count] = root;
+      count += sets.is_root(root);
     }
     roots.resize(count);
     std::uint32_t left = 0;
     for (const Statement& s : span_of(list_)) {
-      const auto one = static_cast<std::uint32_t>(best_[s.one]);
-      const auto other = static_cast<std::uint32_t>(best_[s.other >> 1]);
-      list_[left] = {s.key, s.what, one >> 1, other ^ ((one ^ s.other) & 1)};
+      const std::uint32_t one = sets.root(2 * s.one), other = sets.root(s.other);
+      list_[left] = {s.key, s.what, one >> 1, other ^ (one & 1)};
       left += one >> 1 != other >> 1;
     }
     list_.resize(left);
   }
 
-  /// Decides between defects that are the same when rounded: by defect, corners, facets first.
-  [[nodiscard]] bool before(const Statement& a, const Statement& b) const {
+  /// Decides between claims with the same defect when rounded: by defect, corners, facets first.
+  [[nodiscard]] bool before(std::uint64_t a, std::uint64_t b) const {
     const double defect_a = defect_of(a), defect_b = defect_of(b);
     if (defect_a != defect_b) return defect_a < defect_b;
     return corners_of(a) < corners_of(b);
   }
-  [[nodiscard]] double defect_of(const Statement& s) const {
-    return s.of_vertex() ? poles_[s.what].defect : spheres_.facet_defect(s.what);
+  static bool of_vertex(std::uint64_t claim) { return (claim >> 32 & 1) != 0; }
+  [[nodiscard]] double defect_of(std::uint64_t claim) const {
+    const auto what = static_cast<std::uint32_t>(claim);
+    return of_vertex(claim) ? poles_[what].defect : spheres_.facet_defect(what);
   }
-  [[nodiscard]] Ranks corners_of(const Statement& s) const {
+  [[nodiscard]] Ranks corners_of(std::uint64_t claim) const {
     constexpr std::uint32_t kNoCorner = 0xFFFFFFFFu;
-    if (!s.of_vertex()) return spheres_.facet_ranks(s.what);
-    return {spheres_.places()[s.what].rank, kNoCorner, kNoCorner, kNoCorner};
+    const auto what = static_cast<std::uint32_t>(claim);
+    if (!of_vertex(claim)) return spheres_.facet_ranks(what);
+    return {spheres_.places()[what].rank, kNoCorner, kNoCorner, kNoCorner};
   }
 
   static constexpr std::uint64_t kNoBest = ~std::uint64_t{0};
@@ -340,9 +423,10 @@ class Forest {
   const Part& part_;
   std::uint32_t beyond_;
   std::vector<Poles> poles_;
+  Pool<std::uint32_t> keys_;  ///< of facets, by side
   Pool<Statement> list_;
-  /// By root: the rounded defect of the best statement about the set, above its number; after the
-  /// joining the new root, doubled, plus 1 if unlike.
+  /// By root: the rounded defect of the best statement about the set, above its number; in the
+  /// first round its key, above a side or a vertex.
   Pool<std::uint64_t> best_;
 };
 

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "poles.hpp"
-#include "state.hpp"
 
 /// The poles rule after a local change, see BasicShape3::update_nearby().
 
@@ -159,18 +158,32 @@ class Nearby {
   }
   std::vector<Place> local_places() const {
     std::vector<Place> places = places_of(mesh_, std::span<const std::uint32_t>(vertices_));
-    places.insert(places.begin(), Place{{}, 0});
+    places.insert(places.begin(), kGhostPlace);
     return places;
   }
-  /// Behind the last one comes a slot that is not finite, the neighbour of what is not here.
+  /// Turned. Behind the last one comes a slot that is not finite, the neighbour of what is not
+  /// here.
   void number_tetrahedra() {
     const auto nowhere = static_cast<std::uint32_t>(slots_.size());
+    std::vector<std::uint8_t> turns;
+    turns.reserve(slots_.size());
     for (spatial::Tetrahedron& t : tetrahedra_) {
       for (std::uint32_t& v : t.corner)
         if (v != spatial::kGhost) v = state_.local_vertex[v];
-      for (spatial::Side& mate : t.mate) {
-        const std::uint32_t n = state_.local_tetrahedron[spatial::tetrahedron_of(mate)];
-        mate = spatial::make_side(n == spatial::kNone ? nowhere : n, spatial::index_of(mate));
+      // The numbers are in order already; before the first, 1, comes the last, the ghost's.
+      turns.push_back(turn_of(t.corner, [](std::uint32_t v) { return v - 1; }));
+    }
+    for (std::size_t n = 0; n < turns.size(); ++n) {
+      const spatial::Tetrahedron t = tetrahedra_[n];
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::uint8_t from = kTurns[turns[n]].from[i];
+        const spatial::Side mate = t.mate[from];
+        const std::uint32_t other = state_.local_tetrahedron[spatial::tetrahedron_of(mate)];
+        tetrahedra_[n].corner[i] = t.corner[from];
+        tetrahedra_[n].mate[i] =
+            other == spatial::kNone
+                ? spatial::make_side(nowhere, 0)
+                : spatial::make_side(other, kTurns[turns[other]].to[spatial::index_of(mate)]);
       }
     }
     tetrahedra_.emplace_back().corner.fill(spatial::kFreeCorner);
@@ -210,25 +223,6 @@ class Nearby {
   std::vector<std::uint32_t> vertices_;           ///< slots, by local number - 1
   std::vector<std::uint8_t> whole_;  ///< by local vertex: all tetrahedra at it are here
 };
-
-/// The state of the poles rule from scratch. Requires a scope of the metric.
-template <class Mesh>
-void restore_by_poles(const Mesh& mesh, State& state, unsigned threads) {
-  const Renumbered ordered = in_order_of_vertices(
-      std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()), mesh.vertex.size(), threads);
-  const Spheres spheres(span_of(ordered.tetrahedra), places_of(mesh), threads);
-  std::vector<std::uint8_t> inside = signed_forest(spheres, threads);
-  const auto by_slot = [&] {
-    std::vector<std::uint8_t> labels(mesh.tetrahedron.size());
-    for (std::uint32_t t = 0; t < labels.size(); ++t)
-      if (mesh.tetrahedron[t].corner[0] != spatial::kFreeCorner)
-        labels[t] = inside[ordered.number[t]];
-    return labels;
-  };
-  state.forest = by_slot();
-  smooth_and_sculpt(spheres, inside);
-  set_labels(mesh, state, by_slot());
-}
 
 /// Whether update_nearby() can follow the changes, and costs less than starting from scratch.
 template <class Changes, class Mesh>

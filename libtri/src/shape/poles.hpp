@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "spheres.hpp"
+#include "state.hpp"
 
 /// The poles rule, see ShapeRule::kPoles: which tetrahedra are inside, by the strongest evidence
 /// among angles between circumspheres.
@@ -36,7 +40,10 @@ struct Part {
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
                                         const Part& part = {});
 
-/// The second and the third step.
+/// How many tetrahedra outside and inside every vertex has, by slot. Ghosts are outside.
+using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
+
+/// The second and the third step. Returns the counts after them.
 ///
 /// 2. Flips tetrahedra whose facets contradict their label by more than they support it, the
 /// strongest first. No vertex loses its last tetrahedron of a label.
@@ -47,7 +54,39 @@ std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads
 /// on it otherwise.
 ///
 /// In a part only tetrahedra between whole vertices are flipped.
-void smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-                       const Part& part = {});
+LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
+                              const Part& part = {});
+
+/// The state of the poles rule from scratch. Vertices that are not on the surface are lost.
+/// Requires a scope of the metric.
+template <class Mesh>
+void restore_by_poles(const Mesh& mesh, State& state, unsigned threads) {
+  std::vector<Place> places = places_of(mesh);
+  const Renumbered ordered = in_order_of_vertices(
+      std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()), places, threads);
+  const Spheres spheres(span_of(ordered.tetrahedra), std::move(places), threads);
+  const std::vector<std::uint8_t> forest = signed_forest(spheres, threads);
+  std::vector<std::uint8_t> inside = forest;
+  const LabelCounts counts = smooth_and_sculpt(spheres, inside);
+  state.of.assign(mesh.tetrahedron.size(), kAbsent);
+  state.forest.assign(mesh.tetrahedron.size(), 0);
+  state.kept_count = 0;
+  for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
+    if (mesh.tetrahedron[t].corner[0] == spatial::kFreeCorner) continue;
+    const std::uint32_t n = ordered.number[t];
+    if (!spheres.finite(n)) continue;
+    state.forest[t] = forest[n];
+    state.of[t] = inside[n] != 0 ? kKept : 0;
+    state.kept_count += inside[n];
+  }
+  state.degree.assign(mesh.vertex.size(), 0);
+  state.lost.clear();
+  state.rescued.clear();
+  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v) {
+    state.degree[v] = counts[v][1];
+    if (!mesh.flat && mesh.vertex_alive(v) && (counts[v][0] == 0 || counts[v][1] == 0))
+      state.lost.push_back(v);
+  }
+}
 
 }  // namespace terrace::tri::shape

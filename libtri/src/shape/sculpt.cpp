@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <queue>
+#include <utility>
 
 #include "poles.hpp"
 
 namespace terrace::tri::shape {
 namespace {
 
-/// Labels, and how many tetrahedra of each label every vertex has. The space beyond the hull counts
-/// as one tetrahedron outside at every vertex of the hull.
+/// Labels, and how many tetrahedra of each label every vertex has.
 class Labels {
  public:
   Labels(const Spheres& spheres, std::vector<std::uint8_t>& inside,
@@ -31,12 +31,15 @@ class Labels {
   [[nodiscard]] bool buried(std::uint32_t v) const {
     return count_[v][0] == 0 || count_[v][1] == 0;
   }
-  /// Whether a vertex is buried whose tetrahedra may change.
-  [[nodiscard]] bool any_buried() const {
-    for (std::uint32_t v = 1; v < count_.size(); ++v)
-      if (count_[v][0] + count_[v][1] > 0 && buried(v) && (whole_.empty() || whole_[v] != 0))
-        return true;
-    return false;
+  /// By vertex, whether it is buried and its tetrahedra may change; empty if none is.
+  [[nodiscard]] std::vector<std::uint8_t> all_buried() const {
+    std::vector<std::uint8_t> result(count_.size());
+    bool any = false;
+    for (std::uint32_t v = 1; v < count_.size(); ++v) {
+      if (count_[v][0] + count_[v][1] == 0 || !buried(v)) continue;
+      any |= (result[v] = whole_.empty() || whole_[v] != 0) != 0;
+    }
+    return any ? result : std::vector<std::uint8_t>{};
   }
   /// Whether t is finite and all tetrahedra at its corners are there.
   [[nodiscard]] bool changeable(std::uint32_t t) const {
@@ -45,6 +48,7 @@ class Labels {
     return whole_.empty() || std::all_of(corner.begin(), corner.end(),
                                          [&](std::uint32_t v) { return whole_[v] != 0; });
   }
+  LabelCounts take_counts() { return std::move(count_); }
   void flip(std::uint32_t t) {
     for (const std::uint32_t v : spheres_.tetrahedra()[t].corner) {
       --count_[v][inside_[t]];
@@ -57,7 +61,7 @@ class Labels {
   const Spheres& spheres_;
   std::vector<std::uint8_t>& inside_;
   std::span<const std::uint8_t> whole_;
-  std::vector<std::array<std::uint32_t, 2>> count_;
+  LabelCounts count_;
 };
 
 /// Gains of rounding alone could turn a tetrahedron back and forth.
@@ -138,9 +142,13 @@ void sculpt(const Spheres& spheres, Labels& labels) {
     next.push({spheres.facet_defect(side), spheres.places()[vertex_of(side)].rank,
                spheres.facet_ranks(side), side});
   };
-  if (!labels.any_buried()) return;
-  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t)
-    for (const std::uint32_t i : {0u, 1u, 2u, 3u}) consider(spatial::make_side(t, i));
+  const std::vector<std::uint8_t> buried = labels.all_buried();
+  if (buried.empty()) return;
+  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+    if (!spheres.finite(t)) continue;
+    for (const std::uint32_t i : {0u, 1u, 2u, 3u})
+      if (buried[tetrahedra[t].corner[i]] != 0) consider(spatial::make_side(t, i));
+  }
   while (!next.empty()) {
     const spatial::Side side = next.top().side;
     next.pop();
@@ -155,11 +163,12 @@ void sculpt(const Spheres& spheres, Labels& labels) {
 
 }  // namespace
 
-void smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-                       const Part& part) {
+LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
+                              const Part& part) {
   Labels labels(spheres, inside, part.whole);
   smooth(spheres, labels);
   sculpt(spheres, labels);
+  return labels.take_counts();
 }
 
 }  // namespace terrace::tri::shape

@@ -16,40 +16,42 @@ constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 }  // namespace
 
 Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra,
-                                std::size_t vertex_slots, unsigned threads) {
-  const auto free = [](const spatial::Tetrahedron& t) {
-    return t.corner[0] == spatial::kFreeCorner;
-  };
-  const auto first_vertex = [](const spatial::Tetrahedron& t) {
-    // The ghost, 0, counts as the last.
-    static_assert(spatial::kGhost == 0);
-    std::uint32_t first = ~std::uint32_t{0};
-    for (const std::uint32_t v : t.corner) first = std::min(first, v - 1);
-    return first;
-  };
+                                std::span<const Place> places, unsigned threads) {
+  // Ranks close together in memory.
+  std::vector<std::uint32_t> ranks(places.size());
+  for (std::size_t v = 0; v < places.size(); ++v) ranks[v] = places[v].rank;
   Renumbered result;
-  result.number.resize(static_cast<std::uint32_t>(tetrahedra.size()));
-  std::vector<std::uint32_t> next(vertex_slots);
+  const auto slots = static_cast<std::uint32_t>(tetrahedra.size());
+  result.number.resize(slots);
+  Pool<std::uint8_t> turn;  // 0: the slot is free
+  turn.resize(slots);
+  std::vector<std::uint32_t> next(places.size());
   std::uint32_t count = 0;
-  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-    if (free(tetrahedra[t])) continue;
-    ++next[result.number[t] = first_vertex(tetrahedra[t])];
+  for (std::uint32_t t = 0; t < slots; ++t) {
+    const auto& corner = tetrahedra[t].corner;
+    turn[t] = 0;
+    if (corner[0] == spatial::kFreeCorner) continue;
+    turn[t] = turn_of(corner, [&](std::uint32_t v) { return ranks[v]; });
+    ++next[result.number[t] = corner[kTurns[turn[t]].from[0]]];
     ++count;
   }
   std::exclusive_scan(next.begin(), next.end(), next.begin(), std::uint32_t{0});
-  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t)
-    if (!free(tetrahedra[t])) result.number[t] = next[result.number[t]]++;
+  for (std::uint32_t t = 0; t < slots; ++t)
+    if (turn[t] != 0) result.number[t] = next[result.number[t]]++;
   result.tetrahedra.resize(count);
   for_blocks(
-      tetrahedra.size(), kSphereBlock, threads, [] { return 0; },
+      slots, kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
         for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
-          if (free(tetrahedra[t])) continue;
+          if (turn[t] == 0) continue;
           spatial::Tetrahedron& to = result.tetrahedra[result.number[t]];
-          to = tetrahedra[t];
-          for (spatial::Side& mate : to.mate) {
-            mate = spatial::make_side(result.number[spatial::tetrahedron_of(mate)],
-                                      spatial::index_of(mate));
+          for (std::size_t i = 0; i < 4; ++i) {
+            const std::uint8_t from = kTurns[turn[t]].from[i];
+            const spatial::Side mate = tetrahedra[t].mate[from];
+            const std::uint32_t other = spatial::tetrahedron_of(mate);
+            to.corner[i] = tetrahedra[t].corner[from];
+            to.mate[i] = spatial::make_side(result.number[other],
+                                            kTurns[turn[other]].to[spatial::index_of(mate)]);
           }
         }
       });
@@ -58,30 +60,25 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
 
 Spheres::Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
                  unsigned threads)
-    : tetrahedra_(tetrahedra), places_(std::move(places)), ranks_(places_.size()) {
+    : tetrahedra_(tetrahedra), places_(std::move(places)) {
   sphere_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
-  for (std::size_t v = 0; v < places_.size(); ++v) ranks_[v] = places_[v].rank;
+  finite_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
   for_blocks(
       tetrahedra.size(), kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
-        for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t)
-          sphere_[t] = sphere_of(tetrahedra[t]);
+        for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
+          finite_[t] = spatial::is_finite(tetrahedra[t].corner);
+          if (finite(t)) sphere_[t] = sphere_of(tetrahedra[t]);
+        }
       });
 }
 
 Spheres::Sphere Spheres::sphere_of(const spatial::Tetrahedron& t) const {
-  if (!spatial::is_finite(t.corner)) return {{}, spatial::kGhost};
-  std::array<std::uint64_t, 4> key;
-  for (std::size_t i = 0; i < 4; ++i) key[i] = key_of(t.corner[i]);
-  const auto order = [&](std::size_t i, std::size_t j) {
-    const std::uint64_t low = std::min(key[i], key[j]);
-    key[j] = std::max(key[i], key[j]);
-    key[i] = low;
-  };
-  order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
-  const auto place = [&](std::size_t i) { return places_[vertex_of(key[i])].at; };
-  const Vector3 a = place(0);
-  const Vector3 b = minus(place(1), a), c = minus(place(2), a), d = minus(place(3), a);
+  const Vector3& a = places_[t.corner[0]].at;
+  const auto to = [&](std::uint32_t v) { return minus(places_[v].at, a); };
+  const bool in_order = places_[t.corner[2]].rank < places_[t.corner[3]].rank;
+  const Vector3 b = to(t.corner[1]), c = to(t.corner[in_order ? 2 : 3]),
+                d = to(t.corner[in_order ? 3 : 2]);
   const Vector3 cd = cross(c, d), db = cross(d, b), bc = cross(b, c);
   const double volume6 = dot(b, cd);
   // The sum of the absolute values of the six products in it; each has at most 8 roundings.
@@ -89,12 +86,12 @@ Spheres::Sphere Spheres::sphere_of(const spatial::Tetrahedron& t) const {
                        std::abs(b[1]) * (std::abs(c[2] * d[0]) + std::abs(c[0] * d[2])) +
                        std::abs(b[2]) * (std::abs(c[0] * d[1]) + std::abs(c[1] * d[0]));
   if (!(std::abs(volume6) > 0x1p-50 * total))
-    return {{kNoNumber, kNoNumber, kNoNumber}, vertex_of(key[0])};
+    return {{kNoNumber, kNoNumber, kNoNumber}, t.corner[0]};
   const double bb = dot(b, b), cc = dot(c, c), dd = dot(d, d), by = 2.0 * volume6;
   Vector3 centre;
   for (std::size_t k = 0; k < 3; ++k) centre[k] = (bb * cd[k] + cc * db[k] + dd * bc[k]) / by;
   if (!(largest(centre) < 0x1p250)) centre.fill(kNoNumber);
-  return {centre, vertex_of(key[0])};
+  return {centre, t.corner[0]};
 }
 
 Vector3 Spheres::hull_normal(Side side) const {
@@ -118,9 +115,8 @@ Vector3 Spheres::hull_normal(Side side) const {
 double Spheres::facet_defect(Side side) const {
   const std::uint32_t t = spatial::tetrahedron_of(side);
   const std::uint32_t other = spatial::tetrahedron_of(tetrahedra_[t].mate[spatial::index_of(side)]);
-  const auto f = spatial::facet_of(tetrahedra_[t], spatial::index_of(side));
-  const std::uint32_t first = vertex_of(std::min({key_of(f[0]), key_of(f[1]), key_of(f[2])}));
-  const Vector3& at = places_[first].at;
+  // The first corner of the facet.
+  const Vector3& at = places_[tetrahedra_[t].corner[spatial::index_of(side) == 0 ? 1 : 0]].at;
   const Vector3 u = to_centre(t, at);
   return defect_between(u, finite(other) ? to_centre(other, at) : hull_normal(side));
 }

@@ -28,8 +28,9 @@ namespace terrace::tri::shape {
 /// elliptical metric mapped to where the metric is Euclidean.
 struct Place {
   Vector3 at;
-  std::uint32_t rank;  ///< among all vertices in lexicographic order
+  std::uint32_t rank;  ///< among all vertices in lexicographic order; the ghost's is the last
 };
+inline constexpr Place kGhostPlace{{}, 0xFFFFFFFFu};
 
 /// Lexicographic order of the living vertices.
 template <class Mesh>
@@ -104,19 +105,57 @@ template <class Mesh>
 std::vector<Place> places_of(const Mesh& mesh) {
   const std::vector<std::uint32_t> sorted = sorted_vertices(mesh);
   const std::vector<Place> in_order = places_of(mesh, sorted);
-  std::vector<Place> places(mesh.vertex.size(), Place{{}, 0});
+  std::vector<Place> places(mesh.vertex.size(), kGhostPlace);
   for (std::size_t i = 0; i < sorted.size(); ++i) places[sorted[i]] = in_order[i];
   return places;
 }
 
-/// Tetrahedra in the order of their first vertices. Neighbours that a bulk build has left far apart
-/// lie close together in memory then, as the vertices of both do.
+/// A turn of a tetrahedron that keeps its orientation and puts the two corners first, in order,
+/// that come first in lexicographic order.
+struct Turn {
+  std::array<std::uint8_t, 4> from;  ///< by new index of a corner the old one
+  std::array<std::uint8_t, 4> to;    ///< by old index the new one
+};
+/// By the old index of the first corner, times 4, plus that of the second.
+inline constexpr std::array<Turn, 16> kTurns = [] {
+  std::array<Turn, 16> turns{};
+  for (std::uint8_t first = 0; first < 4; ++first) {
+    for (std::uint8_t second = 0; second < 4; ++second) {
+      if (second == first) continue;
+      Turn& turn = turns[4 * first + second];
+      // The facet opposite to the first corner, begun at the second.
+      const auto& facet = spatial::kFacet[first];
+      const std::size_t at = facet[0] == second ? 0 : facet[1] == second ? 1 : 2;
+      turn.from = {first, second, facet[(at + 1) % 3], facet[(at + 2) % 3]};
+      for (std::uint8_t i = 0; i < 4; ++i) turn.to[turn.from[i]] = i;
+    }
+  }
+  return turns;
+}();
+
+/// The number of the turn in kTurns, never 0. rank(vertex): see Place.
+template <class Rank>
+std::uint8_t turn_of(const std::array<std::uint32_t, 4>& corner, const Rank& rank) {
+  // An index behind its rank: such numbers are put in order without branches, which the processor
+  // could not predict.
+  std::array<std::uint64_t, 4> key;
+  for (std::size_t i = 0; i < 4; ++i) key[i] = std::uint64_t{rank(corner[i])} << 2 | i;
+  const std::uint64_t a = std::min(key[0], key[1]), b = std::min(key[2], key[3]);
+  const std::uint64_t first = std::min(a, b);
+  const std::uint64_t after_first =
+      first == a ? std::max(key[0], key[1]) : std::max(key[2], key[3]);
+  const std::uint64_t second = std::min(std::max(a, b), after_first);
+  return static_cast<std::uint8_t>((first & 3) << 2 | (second & 3));
+}
+
+/// Tetrahedra in the order of their first corners, turned. Neighbours that a bulk build has left
+/// far apart lie close together in memory then, as the vertices of both do.
 struct Renumbered {
   Pool<spatial::Tetrahedron> tetrahedra;
   Pool<std::uint32_t> number;  ///< by slot; of free slots arbitrary
 };
 Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra,
-                                std::size_t vertex_slots, unsigned threads);
+                                std::span<const Place> places, unsigned threads);
 
 /// The corners of a tetrahedron or facet by rank.
 using Ranks = std::array<std::uint32_t, 4>;
@@ -125,14 +164,14 @@ class Spheres {
  public:
   using Side = spatial::Side;
 
-  /// O(tetrahedra). Any number of threads computes the same.
+  /// Of turned tetrahedra. O(tetrahedra). Any number of threads computes the same.
   Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
           unsigned threads);
 
   [[nodiscard]] std::span<const spatial::Tetrahedron> tetrahedra() const { return tetrahedra_; }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }
   /// Whether the slot holds a finite tetrahedron.
-  [[nodiscard]] bool finite(std::uint32_t t) const { return sphere_[t].first != spatial::kGhost; }
+  [[nodiscard]] bool finite(std::uint32_t t) const { return finite_[t] != 0; }
   /// Whether the tetrahedron is so flat that rounding decides where its circumcentre lies.
   [[nodiscard]] bool flat(std::uint32_t t) const { return std::isnan(sphere_[t].centre[0]); }
   /// The squared circumradius; NaN if flat.
@@ -170,26 +209,20 @@ class Spheres {
     return ranks;
   }
   [[nodiscard]] std::size_t bytes() const {
-    return places_.capacity() * sizeof(Place) + sphere_.bytes();
+    return places_.capacity() * sizeof(Place) + sphere_.bytes() + finite_.bytes();
   }
 
  private:
   struct Sphere {
     Vector3 centre;       ///< as seen from the first corner; NaN if flat
-    std::uint32_t first;  ///< the lexicographically first corner; kGhost if not finite
+    std::uint32_t first;  ///< the first corner
   };
   [[nodiscard]] Sphere sphere_of(const spatial::Tetrahedron& t) const;
-  /// A vertex behind its rank: such numbers are put in order without branches, which the processor
-  /// could not predict.
-  [[nodiscard]] std::uint64_t key_of(std::uint32_t vertex) const {
-    return std::uint64_t{ranks_[vertex]} << 32 | vertex;
-  }
-  static std::uint32_t vertex_of(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
-
   std::span<const spatial::Tetrahedron> tetrahedra_;
-  std::vector<Place> places_;         ///< by vertex slot
-  Pool<Sphere> sphere_;               ///< by tetrahedron slot
-  std::vector<std::uint32_t> ranks_;  ///< of places_, close together
+  std::vector<Place> places_;  ///< by vertex slot
+  // By tetrahedron slot:
+  Pool<Sphere> sphere_;        ///< of those that are finite
+  Pool<std::uint8_t> finite_;  ///< apart, as it is asked everywhere
 };
 
 /// 1 - cos of the angle between two vectors, in 0 .. 2; 1 where rounding leaves no angle.

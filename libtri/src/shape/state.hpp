@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -84,32 +83,6 @@ void find_lost(const Mesh& mesh, State& state) {
   if (mesh.flat) return;
   for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
     if (state.degree[v] == 0 && mesh.vertex_alive(v)) state.lost.push_back(v);
-}
-
-/// Sets the finite tetrahedra inside to kept, the others to removed. Lost are the vertices that are
-/// not on the surface.
-template <class Mesh>
-void set_labels(const Mesh& mesh, State& state, const std::vector<std::uint8_t>& inside) {
-  state.of.assign(mesh.tetrahedron.size(), kAbsent);
-  state.degree.assign(mesh.vertex.size(), 0);
-  state.rescued.clear();
-  state.kept_count = 0;
-  std::vector<std::uint8_t> outside(mesh.vertex.size());
-  for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
-    const auto& corner = mesh.tetrahedron[t].corner;
-    if (corner[0] == spatial::kFreeCorner) continue;
-    if (inside[t] != 0) {
-      state.keep(mesh, t);
-      continue;
-    }
-    for (const std::uint32_t v : corner) outside[v] = 1;
-    if (!spatial::has_ghost(corner)) state.of[t] = 0;
-  }
-  find_lost(mesh, state);
-  if (mesh.flat) return;
-  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
-    if (outside[v] == 0 && mesh.vertex_alive(v)) state.lost.push_back(v);
-  std::sort(state.lost.begin(), state.lost.end());
 }
 
 }  // namespace terrace::tri::shape
