@@ -45,6 +45,7 @@ class MemoryFile {
 struct Reading {
   bool refused = false;
   std::uint64_t points = 0;
+  std::uint64_t empty_values = 0;
   std::uint64_t hash = 0;
 
   friend bool operator==(const Reading&, const Reading&) = default;
@@ -79,6 +80,9 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
     require(source->progress().points == reading.points, "progress");
     const auto promised = source->info().points;
     const Progress done = source->progress();
+    reading.empty_values = done.empty_values;
+    require(done.empty_values <= reading.points * source->info().attributes.size(),
+            "no more empty values than values");
     require(!promised || *promised == reading.points + done.nodata + done.lost,
             "as many points as promised");
   } catch (const Error& error) {

@@ -58,6 +58,12 @@ TEST_F(Xyz, LargeIntegersAreKeptOrRefused) {
   EXPECT_NE(refusal("1 2 3 9007199254740993\n" + late + "1 2 3 0.5\n")
                 .find("'0.5', is not an integer that int64 holds"),
             std::string::npos);
+  std::string csv = "1,2,3,9007199254740993\n";
+  for (int i = 0; i < 1000; ++i) csv += "1,2,3,4\n";
+  EXPECT_NE(refusal(csv + "1,2,3,\n")
+                .find("line 1002: column 4 is empty, not an integer that int64 holds, as those "
+                      "before are; correct it, or leave the column out"),
+            std::string::npos);
 }
 
 TEST_F(Xyz, SeparatorsInQuotedNamesDoNotCount) {
@@ -140,7 +146,10 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
       {"1 2 3\n1 2\n", "line 2: has 2 columns, the lines before have 3"},
       {"1 2 3\n1 2 3 4\n", "line 2: has 4 columns"},
       {"1,2,3\n1,2,3,\n", "line 2: has 4 columns"},
-      {"1,2,3,4\n1,2,3,\n", "line 2: column 4 is empty"},
+      {"1,2,3,\n1,2,3,9007199254740993\n", "line 2: column 4, '9007199254740993', is an integer"},
+      {"1,2,3,4\n1,2,3,none\n", "line 2: column 4, 'none', is not a number that a double holds"},
+      {"x\ty\tz\tv\n1\t2\t3\n", "line 2: has 3 columns, but the header in line 1 names 4"},
+      {"1\t2\t3\t4\n1\t\t4\n", "line 2: has 3 columns, the lines before have 4"},
       {"1,2,3\n1,null,3\n", "line 2: column 2, 'null'"},
       {"1,2,3\n1,-,3\n", "line 2: column 2, '-'"},
       {"1,2,3\n,inf,3\n", "line 2: column 2 is inf"},
@@ -183,6 +192,57 @@ TEST_F(Xyz, PointsWithoutACoordinateAreLeftOutAndCounted) {
     EXPECT_EQ(all.values<double>(0)[0], 6.0);
     EXPECT_EQ(source->progress().nodata, 3u);
   }
+}
+
+TEST_F(Xyz, EmptyAttributesAreNaNAndCounted) {
+  for (const std::string_view text : {
+           "x,y,z,v,w\n1,2,3,,5\n,2,3,,5\n4,5,6,7,\n7,8,9,NA,\"\"\n",
+           "1;2;3;;5\nNA;2;3;4;5\n4;5;6;7;\n7;8;9; ;\"NA\"\n",
+           "x\ty\tz\tv\tw\n1\t2\t3\t\t5\n\t2\t3\t\t5\n4\t5\t6\t7\t\n7\t8\t9\t\t\n",
+           "1\t2\t3\t-1\t5\n1\t\t\t\t\n1\t2\t3\t\t5\n4\t5\t6\t7\t\n7\t8\t9\t\t\n",
+           "#x\ty\tz\tv\tw\n1\t2\t3\t\t5\n1\t2\tNA\t\t5\n4\t5\t6\t7\t\n7\t8\t9\tNA\t\n",
+       }) {
+    SCOPED_TRACE(text);
+    const std::string file = write_text(folder_.path() / "empty.csv", text);
+    const auto source = open_source(std::array{file, file}, {.block_points = 2});
+    const AllPoints all = read_all(*source);
+    const std::size_t complete = text[6] == '-' ? 1 : 0, points = 3 + complete;
+    ASSERT_EQ(all.points.size(), 2 * points);
+    EXPECT_EQ(source->progress().nodata, 2u);
+    EXPECT_EQ(source->progress().empty_values, 8u);
+    const auto v = all.values<double>(0), w = all.values<double>(1);
+    for (const std::size_t first : {complete, points + complete}) {
+      EXPECT_EQ(all.points.positions[first + 2], (Point3{7, 8, 9}));
+      EXPECT_TRUE(std::isnan(v[first]) && std::isnan(v[first + 2]));
+      EXPECT_TRUE(std::isnan(w[first + 1]) && std::isnan(w[first + 2]));
+      EXPECT_EQ(v[first + 1], 7.0);
+      EXPECT_EQ(w[first], 5.0);
+    }
+  }
+}
+
+TEST_F(Xyz, TabsSeparateFieldsWithBlanksAndAlignTables) {
+  // A name that is missing (an index) or has blanks; a text that nobody needs.
+  AllPoints all = read("\tx\ty\tz\tpoint id\n0\t1\t2\t3\t5\n1\t4\t5\t6\t\n");
+  ASSERT_EQ(all.info.attributes.size(), 2u);
+  EXPECT_EQ(all.info.attributes[0].name, "a0");
+  EXPECT_EQ(all.info.attributes[1].name, "point id");
+  EXPECT_EQ(all.points.positions[1], (Point3{4, 5, 6}));
+  all = read("x\ty\tz\tplace\tv\n1\t2\t3\tNew York\t8\n4\t5\t6\t7 8\t\n",
+             {.format = "xyz", .selection = {.drop = {"place"}}});
+  EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_TRUE(std::isnan(all.values<double>(0)[1]));
+  // Runs of blanks and tabs remain one separator where they align columns.
+  for (const std::string_view text :
+       {"x\t\ty\tz\n1\t\t2\t3\n", "1\t\t2\t\t3\n", "\t1\t2\t3\n", "1\t2\t3\t\t\n", "1\t 2 \t3\n",
+        "x y z\n1\t2\t3\n", "x\ty\tz\n1 2\t3\n", "x\ty\tz\n1\t\t2\t3\n"}) {
+    SCOPED_TRACE(text);
+    all = read(std::string(text) + "400\t5\t6\n4\t\t5\t6\n");
+    EXPECT_TRUE(all.info.attributes.empty());
+    EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1, 2, 3}, {400, 5, 6}, {4, 5, 6}}));
+  }
+  all = read("x y z\tr\tg\tb\n1 2 3\t4\t5\t6\n");
+  EXPECT_EQ(all.values<double>(2)[0], 6.0);
 }
 
 TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {

@@ -107,6 +107,26 @@ class SelectionTest(unittest.TestCase):
             self.assertEqual(result.returncode, 1)
             self.assertIn(words, result.stderr)
 
+    def test_empty_attributes_of_text_are_nan_and_counted(self):
+        rows = ['x y z intensity colour', '0 0 1 7 ', '5 0 2  NA', '0  3  8', '0 7 3  4']
+        for name, separator in (('empty.csv', ','), ('empty.tsv', '\t')):
+            with open(self.path(name), 'w', encoding='ascii') as file:
+                file.write('\n'.join(rows).replace(' ', separator) + '\n')
+            store = self.path(name + '.st')
+            result = self.terrace('build', self.path(name), '-o', store)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('3 points (1 without a coordinate left out)', result.stderr)
+            self.assertIn('4 attributes have no value in their file; they are NaN', result.stderr)
+            self.assertIn('4 attributes without a value', self.run_ok('info', self.path(name)))
+            self.assertEqual(json.loads(self.run_ok('info', self.path(name), '--json'))['empty_values'], 4)
+            result = self.terrace('convert', self.path(name), '-o', self.path(name + '.ply'))
+            self.assertIn('4 attributes without a value are NaN', result.stderr)
+            out = self.run_ok('points', store, '--level', '0', '--where', 'colour == 4', '-o', '-', '--format', 'xyz')
+            self.assertEqual(out, '0 7 3 nan 4\n')
+            # An attribute that is left out is no loss.
+            result = self.terrace('build', self.path(name), '-o', store, '--force', '--drop', 'colour')
+            self.assertIn('2 attributes have no value', result.stderr)
+
     def test_build_takes_folders_lists_and_patterns(self):
         folder = self.path('parts')
         os.makedirs(os.path.join(folder, 'more'))

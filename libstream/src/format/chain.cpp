@@ -124,6 +124,7 @@ class Chain final : public PointSource {
       }
       const Progress progress = part.source->progress();
       nodata_ += progress.nodata;
+      empty_values_ += progress.empty_values;
       withheld_ += progress.withheld;
       excluded_ += progress.excluded;
       lost_ += progress.lost;
@@ -137,6 +138,7 @@ class Chain final : public PointSource {
   Progress progress() const override {
     Progress progress{.points = delivered_,
                       .nodata = nodata_,
+                      .empty_values = empty_values_,
                       .withheld = withheld_,
                       .excluded = excluded_,
                       .lost = lost_};
@@ -148,6 +150,7 @@ class Chain final : public PointSource {
     if (part.source) {
       const Progress inside = part.source->progress();
       progress.nodata += inside.nodata;
+      progress.empty_values += inside.empty_values;
       progress.withheld += inside.withheld;
       progress.excluded += inside.excluded;
       progress.lost += inside.lost;
@@ -202,8 +205,8 @@ class Chain final : public PointSource {
   bool narrowed_ = false;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
-  std::uint64_t delivered_ = 0, nodata_ = 0, withheld_ = 0, excluded_ = 0, lost_ = 0,
-                done_bytes_ = 0, total_bytes_ = 0;
+  std::uint64_t delivered_ = 0, nodata_ = 0, empty_values_ = 0, withheld_ = 0, excluded_ = 0,
+                lost_ = 0, done_bytes_ = 0, total_bytes_ = 0;
   bool sizes_known_ = true;
 };
 

@@ -20,10 +20,12 @@ std::string_view trim(std::string_view line) {
 
 std::vector<std::string_view> split_fields(std::string_view line, char separator) {
   std::vector<std::string_view> fields;
-  line = trim(line);
+  if (separator != '\t') line = trim(line);
   if (separator != ' ') {
     for (;;) {
-      line = trim_left(line);
+      while (!line.empty() && is_blank(line.front()) && line.front() != separator) {
+        line.remove_prefix(1);
+      }
       std::size_t from = 0;
       if (line.starts_with('"')) {
         // Where a quote is doubled, the quoted text goes on.

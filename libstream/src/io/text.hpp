@@ -23,7 +23,7 @@ inline std::string_view trim_left(std::string_view line) {
 /// `line` without the blanks at both ends.
 std::string_view trim(std::string_view line);
 /// The fields of a line, with surrounding blanks removed. The separator ' ' means runs of blanks;
-/// others do not count inside a field in double quotes.
+/// others do not count inside a field in double quotes, and two of them enclose an empty field.
 std::vector<std::string_view> split_fields(std::string_view line, char separator);
 /// `field` without the single or double quotes around it.
 std::string_view unquoted(std::string_view field);

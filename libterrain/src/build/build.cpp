@@ -352,6 +352,10 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   outcome.top = result.top;
   outcome.level_points = result.level_points;
   outcome.level_clusters = result.level_clusters;
+  if (so_far.empty_values > 0) {
+    context.say(std::to_string(so_far.empty_values) +
+                " attributes have no value in their file; they are NaN");
+  }
   if (so_far.withheld > 0) {
     context.say(std::to_string(so_far.withheld) +
                 " points are marked as withheld in their file; they are kept, with the mark");

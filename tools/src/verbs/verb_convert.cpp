@@ -91,6 +91,7 @@ class ConvertCommand : public Command {
     Summary summary;
     summary.json = {{"points", writer->points()},
                     {"nodata", source->progress().nodata},
+                    {"empty_values", source->progress().empty_values},
                     {"excluded", source->progress().excluded},
                     {"lost", source->progress().lost}};
     summary.add_cost(watch);
@@ -100,6 +101,10 @@ class ConvertCommand : public Command {
     if (done.nodata > 0 && !info.grid) {
       left_out +=
           (left_out.empty() ? "" : ", ") + with_commas(done.nodata) + " lacked a coordinate";
+    }
+    if (done.empty_values > 0) {
+      left_out += (left_out.empty() ? "" : ", ") + with_commas(done.empty_values) +
+                  " attributes without a value are NaN";
     }
     summary.text = output_ + ": " + counted(writer->points(), "point") +
                    (left_out.empty() ? "" : " (" + left_out + ")") + ", " +

@@ -168,7 +168,7 @@ class Sum {
 };
 
 struct Contents {
-  std::uint64_t points = 0, nodata = 0, withheld = 0;
+  std::uint64_t points = 0, nodata = 0, empty_values = 0, withheld = 0;
   stream::Box3 stored, world;
   double mean = 0;  ///< stored coordinate 2
 };
@@ -189,6 +189,7 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
     contents.points += block.size();
   });
   contents.nodata = source.progress().nodata;
+  contents.empty_values = source.progress().empty_values;
   contents.withheld = source.progress().withheld;
   if (upright) contents.world = world_box(placement, contents.stored);
   if (contents.points > 0) contents.mean = heights.value() / static_cast<double>(contents.points);
@@ -278,6 +279,7 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
   json["version"] = nullptr;
   json["points"] = contents.points;
   json["nodata"] = contents.nodata;
+  if (contents.empty_values > 0) json["empty_values"] = contents.empty_values;
   if (contents.withheld > 0) json["withheld"] = contents.withheld;
   if (info.octree) {
     json["octree"] = {{"spacing", info.octree->spacing},
@@ -320,6 +322,10 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
     text += "octree:    " + with_commas(info.octree->nodes) + " nodes of " +
             std::to_string(info.octree->depths) + " depths, the root's points " +
             readable_number(info.octree->spacing, 6) + " apart\n";
+  }
+  if (contents.empty_values > 0) {
+    text += "empty:     " + with_commas(contents.empty_values) +
+            " attributes without a value, which are NaN\n";
   }
   if (contents.withheld > 0) {
     text += "withheld:  " + with_commas(contents.withheld) + " of them\n";

@@ -63,6 +63,8 @@ struct Progress {
   /// Left out: cells without data; of XYZ, CSV, PLY, meshes and arrays points (entities) of which a
   /// coordinate is NaN (in text also an empty field or NA). Infinite coordinates are errors.
   std::uint64_t nodata = 0;
+  /// Attributes of the points that their text leaves empty or NA: they are NaN.
+  std::uint64_t empty_values = 0;
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
   /// Points left out by Selection::where, region and resolution, whether they were read or not; of

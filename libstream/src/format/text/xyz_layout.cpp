@@ -110,8 +110,31 @@ void name_attributes(const std::vector<std::string_view>& names, TextLayout& lay
   }
 }
 
-std::vector<std::string_view> header_names(std::string_view line) {
-  std::vector<std::string_view> names = split_fields(line, separator_of(line));
+/// True for "1 2" but not "1" or "New York".
+bool is_several_numbers(std::string_view field) {
+  const std::vector<std::string_view> words = split_fields(field, ' ');
+  return words.size() > 1 && std::all_of(words.begin(), words.end(), [](std::string_view word) {
+           double value = 0;
+           const char* const end = word.data() + word.size();
+           return parse_real(word.data(), end, value) == end;
+         });
+}
+
+/// True if tabs separate the first line of numbers and the header, if there is one: the fields of
+/// one of them are then complete (the name of the first may be missing).
+bool is_separated_by_tabs(std::string_view header, std::string_view line) {
+  const std::vector<std::string_view> fields = split_fields(line, '\t');
+  if (fields.size() < 3 || std::any_of(fields.begin(), fields.end(), is_several_numbers)) {
+    return false;
+  }
+  const auto empty = [](std::string_view field) { return field.empty(); };
+  if (header.empty()) return std::none_of(fields.begin(), fields.end(), empty);
+  const std::vector<std::string_view> names = split_fields(header, '\t');
+  return names.size() == fields.size() && std::none_of(names.begin() + 1, names.end(), empty);
+}
+
+std::vector<std::string_view> header_names(std::string_view line, char separator) {
+  std::vector<std::string_view> names = split_fields(line, separator);
   for (std::string_view& name : names) name = unquoted(name);
   return names;
 }
@@ -137,6 +160,15 @@ std::string_view comment_text(std::string_view comment) {
 }  // namespace
 
 bool is_comment(std::string_view line) { return line.starts_with('#') || line.starts_with("//"); }
+
+std::vector<std::string_view> split_row(std::string_view line, const TextLayout& layout) {
+  std::vector<std::string_view> fields = split_fields(line, layout.separator);
+  if (layout.separator == '\t' && fields.size() != layout.columns) {
+    std::vector<std::string_view> words = split_fields(line, ' ');
+    if (words.size() == layout.columns) return words;
+  }
+  return fields;
+}
 
 char separator_of(std::string_view line) {
   // A quote that no other closes is one of a name's characters.
@@ -168,10 +200,10 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
                    .cause = lines.number() == 0 ? "the file is empty" : "there are no points in it",
                    .remedy = "each line needs three numbers: x, y and z"});
     }
-    line = trim(line);
-    if (line.empty()) continue;
-    if (is_comment(line)) {
-      last_comment = comment_text(line);
+    const std::string_view text = trim(line);
+    if (text.empty()) continue;
+    if (is_comment(text)) {
+      last_comment = comment_text(text);
       if (layout.comments.size() < kMaxComments) layout.comments.push_back(last_comment);
       continue;
     }
@@ -183,6 +215,12 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
     break;
   }
   layout.separator = separator_of(line);
+  const std::string& title = header_line != 0 ? header : last_comment;
+  if (layout.separator == ' ' && separator_of(title) == ' ' &&
+      (is_separated_by_tabs(title, line) || (header_line == 0 && is_separated_by_tabs({}, line)))) {
+    layout.separator = '\t';
+  }
+  const char between_names = layout.separator == '\t' ? '\t' : separator_of(title);
   layout.columns = split_fields(line, layout.separator).size();
   const std::string where = "line " + std::to_string(lines.number());
   if (layout.columns < 3) {
@@ -199,11 +237,12 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
                  .cause = "has " + std::to_string(layout.columns) + " columns",
                  .remedy = "at most " + std::to_string(TextLayout::kMaxColumns) + " are read"});
   }
-  if (header_line == 0 && is_header_comment(header_names(last_comment), layout.columns)) {
+  if (header_line == 0 &&
+      is_header_comment(header_names(last_comment, between_names), layout.columns)) {
     header = last_comment;
     layout.comments.pop_back();
   }
-  const std::vector<std::string_view> names = header_names(header);
+  const std::vector<std::string_view> names = header_names(header, between_names);
   if (header_line != 0 && names.size() != layout.columns) {
     throw Error({.file = file,
                  .where = where,

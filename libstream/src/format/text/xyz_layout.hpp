@@ -16,7 +16,7 @@ namespace terrace::stream {
 struct TextLayout {
   static constexpr std::size_t kMaxColumns = 1000;
 
-  char separator = ' ';  ///< ',' or ';', or ' ' for runs of blanks and tabs
+  char separator = ' ';  ///< ',', ';' or a tab, or ' ' for runs of blanks and tabs
   std::size_t columns = 0;
   std::array<std::size_t, 3> xyz{0, 1, 2};  ///< columns of the coordinates
   std::vector<std::size_t> attributes;      ///< the other columns, in order
@@ -25,6 +25,9 @@ struct TextLayout {
   std::vector<std::string> comments;        ///< before the first point
 };
 
+/// The fields of a line. Where tabs do not give as many fields as there are columns, runs of blanks
+/// and tabs separate them, as in a table that is aligned by hand.
+std::vector<std::string_view> split_row(std::string_view line, const TextLayout& layout);
 /// ';' if the line has one, else ',' if it has one, else ' '; what is in double quotes does not
 /// count.
 char separator_of(std::string_view line);

@@ -72,10 +72,15 @@ constexpr std::int64_t kMostOfDouble = std::int64_t{1} << 53;
 
 /// A column by its first fields.
 struct ColumnContent {
-  bool whole = true;  ///< all are integers
+  bool whole = true;   ///< all that are not empty are integers
+  bool empty = false;  ///< some are
   bool large = false, negative = false, unsigned_alone = false;
 
   void add(std::string_view field) {
+    if (is_missing_value(field)) {
+      empty = true;
+      return;
+    }
     whole = whole && is_integer(field);
     if (!whole) return;
     double bits = 0;
@@ -89,7 +94,7 @@ struct ColumnContent {
     }
   }
   [[nodiscard]] ScalarType type() const {
-    if (!whole || !(large || unsigned_alone) || (unsigned_alone && negative)) {
+    if (!whole || empty || !(large || unsigned_alone) || (unsigned_alone && negative)) {
       return ScalarType::f64;
     }
     return unsigned_alone ? ScalarType::u64 : ScalarType::i64;
@@ -97,11 +102,14 @@ struct ColumnContent {
 };
 
 /// Reads numbers of these types that fill the line. False if anything is wrong with it.
-/// kSeparator is ',' or ';', or ' ' for runs of blanks. kReal: all types are f64.
+/// kSeparator is ',', ';' or a tab, or ' ' for runs of blanks. kReal: all types are f64.
 template <char kSeparator, bool kReal>
 bool parse_row(const char* at, const char* end, std::span<const ScalarType> types, double* row) {
+  const auto is_skipped = [](char c) {
+    return is_blank(c) && (kSeparator == ' ' || c != kSeparator);
+  };
   for (std::size_t i = 0;; ++i) {
-    while (at != end && is_blank(*at)) ++at;
+    while (at != end && is_skipped(*at)) ++at;
     if constexpr (kReal) {
       at = parse_real(at, end, row[i]);
     } else {
@@ -109,7 +117,7 @@ bool parse_row(const char* at, const char* end, std::span<const ScalarType> type
     }
     if (at == nullptr) return false;
     const char* const number_end = at;
-    while (at != end && is_blank(*at)) ++at;
+    while (at != end && is_skipped(*at)) ++at;
     if (i + 1 == types.size()) return at == end;
     if constexpr (kSeparator == ' ') {
       if (at == number_end) return false;
@@ -129,6 +137,8 @@ ParseRow row_parser(char separator) {
       return &parse_row<',', kReal>;
     case ';':
       return &parse_row<';', kReal>;
+    case '\t':
+      return &parse_row<'\t', kReal>;
     default:
       return &parse_row<' ', kReal>;
   }
@@ -185,9 +195,10 @@ class XyzSource final : public PointSource {
     while (count < block_points_ && lines_.next(line)) {
       const char* const begin = line.data();
       const char* const end = begin + line.size();
+      empty_fields_ = 0;
       if (!parse_row_(begin, end, types_, row_.data())) {
-        line = trim_left(line);
-        if (line.empty() || is_comment(line)) continue;
+        const std::string_view text = trim_left(line);
+        if (text.empty() || is_comment(text)) continue;
         if (!parse_fields(line)) refuse(line);
       }
       const Point3 point{row_[ix], row_[iy], row_[iz]};
@@ -197,6 +208,7 @@ class XyzSource final : public PointSource {
         ++nodata_;
         continue;
       }
+      empty_values_ += empty_fields_;
       block.positions[count] = point;
       for (const std::size_t column : layout_.attributes) {
         if (whole_[column] && std::abs(row_[column]) >= static_cast<double>(kMostOfDouble)) {
@@ -215,7 +227,7 @@ class XyzSource final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_, .nodata = nodata_, .fraction = 0.0};
+    Progress progress{.points = delivered_, .nodata = nodata_, .empty_values = empty_values_};
     if (input_.size() && *input_.size() > 0) {
       progress.fraction =
           std::min(1.0, static_cast<double>(input_.offset()) / static_cast<double>(*input_.size()));
@@ -233,10 +245,10 @@ class XyzSource final : public PointSource {
     std::vector<ColumnContent> contents(layout_.columns);
     while (!head.empty()) {
       const std::size_t end = std::min(head.find_first_of("\r\n"), head.size());
-      const std::string_view line = trim_left(head.substr(0, end));
+      const std::string_view line = head.substr(0, end), text = trim_left(line);
       head.remove_prefix(std::min(end + 1, head.size()));
-      if (line.empty() || is_comment(line)) continue;
-      const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
+      if (text.empty() || is_comment(text)) continue;
+      const std::vector<std::string_view> fields = split_row(line, layout_);
       if (fields.size() != layout_.columns) break;
       for (const std::size_t i : layout_.attributes) contents[i].add(unquoted(fields[i]));
     }
@@ -255,24 +267,27 @@ class XyzSource final : public PointSource {
 
   /// Throws: Error if the column has an integer that its double is not.
   void check_exact(std::string_view line, std::size_t column) const {
-    const std::string_view field = unquoted(split_fields(line, layout_.separator)[column]);
+    const std::string_view field = unquoted(split_row(line, layout_)[column]);
     if (!is_integer(field) || is_exact(field, row_[column])) return;
     throw Error({.file = input_.name(),
                  .where = "line " + std::to_string(lines_.number()),
                  .cause = "column " + std::to_string(column + 1) + ", " + in_quotes(field) +
                           ", is an integer that a double does not hold",
-                 .remedy = "columns become integers of 64 bits if all are and one of the first "
-                           "lines of the first file has one so large: let this line come first, "
-                           "or leave the column out (`drop` of build and convert)"});
+                 .remedy = "columns become integers of 64 bits if all are, none is empty, and one "
+                           "of the first lines of the first file has one so large: let this line "
+                           "come first, or leave the column out (`drop` of build and convert)"});
   }
 
-  /// Reads a line of fields of which some are in quotes, or text that nobody needs.
+  /// Reads a line of fields of which some are empty, in quotes, or text that nobody needs.
   bool parse_fields(std::string_view line) {
-    const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
+    const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) return false;
     for (std::size_t i = 0; i < fields.size(); ++i) {
       if (parse_field(fields[i], types_[i], row_[i])) continue;
-      if (!optional_[i] && !(is_coordinate(i) && is_missing_value(fields[i]))) return false;
+      if (!optional_[i]) {
+        if (types_[i] != ScalarType::f64 || !is_missing_value(fields[i])) return false;
+        if (!is_coordinate(i)) ++empty_fields_;
+      }
       row_[i] = std::numeric_limits<double>::quiet_NaN();
     }
     return true;
@@ -294,7 +309,7 @@ class XyzSource final : public PointSource {
                    .cause = std::move(cause),
                    .remedy = std::move(remedy)});
     };
-    const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
+    const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {
       fail("has " + std::to_string(fields.size()) + " columns, the lines before have " +
                std::to_string(layout_.columns),
@@ -305,20 +320,20 @@ class XyzSource final : public PointSource {
       const std::string column = "column " + std::to_string(i + 1);
       const bool coordinate = is_coordinate(i);
       double value = 0;
-      if (!parse_field(field, types_[i], value) && !optional_[i] &&
-          !(coordinate && is_missing_value(field))) {
-        const bool comma = field.find(',') != field.npos;
-        if (types_[i] != ScalarType::f64 && !field.empty()) {
-          fail(column + ", " + in_quotes(field) + ", is not an integer that " +
-                   std::string(name_of(types_[i])) + " holds, as those before are",
+      const bool real = types_[i] == ScalarType::f64, missing = is_missing_value(field);
+      if (!parse_field(field, types_[i], value) && !optional_[i] && !(real && missing)) {
+        const std::string cause =
+            column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
+        if (!real) {
+          fail(cause + " an integer that " + std::string(name_of(types_[i])) +
+                   " holds, as those before are",
                "correct it, or leave the column out (`drop` of build and convert)");
         }
-        fail(column + (field.empty()
-                           ? " is empty"
-                           : ", " + in_quotes(field) + ", is not a number that a double holds"),
-             comma        ? "write numbers with a decimal point"
-             : coordinate ? "write numbers, or NA where there is none"
-                          : "correct it, or leave the column out (`drop` of build and convert)");
+        fail(cause + " a number that a double holds",
+             field.find(',') != field.npos ? "write numbers with a decimal point"
+             : coordinate                  ? "write numbers, or nothing or NA where there is none"
+                          : "write numbers, or nothing or NA where there is none, or leave the "
+                            "column out (`drop` of build and convert)");
       }
       if (coordinate && std::isinf(value)) {
         fail(column + " is " + std::string(field) + ", but a coordinate must be finite",
@@ -339,7 +354,8 @@ class XyzSource final : public PointSource {
   std::vector<ScalarType> types_;  ///< of the columns: f64, i64 or u64
   std::vector<bool> whole_;        ///< columns of doubles that seem to be integers
   SourceInfo info_;
-  std::uint64_t delivered_ = 0, nodata_ = 0;
+  std::uint64_t delivered_ = 0, nodata_ = 0, empty_values_ = 0;
+  std::uint64_t empty_fields_ = 0;  ///< attributes of the row that are empty
 };
 
 /// True for text whose first line that is no comment, or the one after a header, begins a table of
