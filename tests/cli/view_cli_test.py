@@ -189,6 +189,78 @@ class ViewTest(Stores):
         self.fail('it does not recover')
 
 
+class ReplacedTest(Stores):
+    def test_a_store_that_is_replaced(self):
+        """The new one is served, to connections that are open too; a download under way goes on with the old one."""
+        def build(*args):
+            done = terrace('build', ALPS, '-o', self.store, '-q', '--force', *args)
+            self.assertEqual(done.returncode, 0, done.stderr)
+
+        def ask(connection, path, lines=''):
+            connection.sendall(f'GET {path} HTTP/1.1\r\n{lines}\r\n'.encode())
+            head = b''
+            while not head.endswith(b'\r\n\r\n'):
+                head += connection.recv(1)
+            status, *fields = head.decode().strip().split('\r\n')
+            return int(status.split()[1]), dict(field.split(': ', 1) for field in fields)
+
+        def receive(connection, size):
+            data = b''
+            while len(data) < size:
+                piece = connection.recv(size - len(data))
+                self.assertTrue(piece)
+                data += piece
+            return data
+
+        def file(name):
+            with open(os.path.join(self.store, name), 'rb') as data:
+                return data.read()
+
+        build('--block', '1000')
+        server = subprocess.Popen([TERRACE, 'view', self.store, '--no-open'], stderr=subprocess.PIPE, text=True)
+        try:
+            port = int(re.search(r'127\.0\.0\.1:(\d+)', server.stderr.readline()).group(1))
+            first, second = (socket.create_connection(('127.0.0.1', port), timeout=20) for _ in range(2))
+            self.addCleanup(first.close)
+            self.addCleanup(second.close)
+            url, name = '/stores/alps/', 'level-0.0.clusters'
+            old = file(name)
+            _, fields = ask(first, url + name)
+            self.assertEqual(int(fields['Content-Length']), len(old))
+            build('--block', '2000')
+            new = file(name)
+            self.assertNotEqual(new, old)
+            status, fresh = ask(second, url + name, f'Range: bytes=0-99\r\nIf-None-Match: {fields["ETag"]}\r\n')
+            self.assertEqual((status, fresh['Content-Range']), (206, f'bytes 0-99/{len(new)}'))
+            self.assertNotEqual(fresh['ETag'], fields['ETag'])
+            self.assertEqual(receive(second, 100), new[:100])
+            self.assertEqual(receive(first, len(old)), old)
+            for path, expected in [('manifest.json', file('manifest.json')), (name, new)]:
+                _, head = ask(first, url + path)
+                self.assertEqual(receive(first, int(head['Content-Length'])), expected)
+            _, head = ask(first, '/stores.json')
+            checksum = json.loads(receive(first, int(head['Content-Length'])))['stores'][0]['checksum']
+            self.assertTrue(fresh['ETag'].startswith(f'"{checksum}-'))
+            # While there is none, or a damaged one, the last one is served; and then the next.
+            os.rename(self.store, self.path('away'))
+            self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fresh['ETag'])
+            self.assertEqual(receive(second, 100), new[:100])
+            os.mkdir(self.store)
+            with open(os.path.join(self.store, 'manifest.json'), 'w') as manifest:
+                manifest.write('{')
+            self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fresh['ETag'])
+            self.assertEqual(receive(second, 100), new[:100])
+            shutil.rmtree(self.store)
+            build('--block', '1000')
+            self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fields['ETag'])
+            self.assertEqual(receive(second, 100), old[:100])
+        finally:
+            server.send_signal(signal.SIGINT)
+            code = server.wait(10)
+            server.stderr.close()
+        self.assertEqual(code, 0)
+
+
 class ViewErrorTest(Stores):
     def test_errors(self):
         self.assertEqual(terrace('view').returncode, 2)

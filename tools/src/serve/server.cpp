@@ -35,7 +35,8 @@ constexpr std::size_t kPiece = std::size_t{64} * 1024;
 /// One connection: a request, its answer, and so on.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(tcp::socket socket, const Site& site, const ServerLimits& limits, std::size_t& open)
+  Session(tcp::socket socket, const std::function<const Site&()>& site, const ServerLimits& limits,
+          std::size_t& open)
       : stream_(std::move(socket)), site_(site), limits_(limits), open_(open) {
     ++open_;
   }
@@ -89,7 +90,7 @@ class Session : public std::enable_shared_from_this<Session> {
                               .range = field(http::field::range),
                               .if_range = field(http::field::if_range),
                               .if_none_match = field(http::field::if_none_match)},
-                             site_);
+                             site_());
     reply.close = reply.close || !request.keep_alive();
     answer(std::move(reply), request.method() == http::verb::head);
   }
@@ -127,7 +128,7 @@ class Session : public std::enable_shared_from_this<Session> {
   }
 
   beast::tcp_stream stream_;
-  const Site& site_;
+  const std::function<const Site&()>& site_;
   const ServerLimits& limits_;
   std::size_t& open_;
   beast::flat_buffer buffer_;
@@ -141,7 +142,8 @@ class Session : public std::enable_shared_from_this<Session> {
 }  // namespace
 
 struct Server::Impl {
-  Impl(const Site& given, const ServerLimits& given_limits) : site(given), limits(given_limits) {}
+  Impl(std::function<const Site&()> given, const ServerLimits& given_limits)
+      : site(std::move(given)), limits(given_limits) {}
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
@@ -167,7 +169,7 @@ struct Server::Impl {
     });
   }
 
-  const Site& site;
+  std::function<const Site&()> site;
   ServerLimits limits;
   std::size_t open = 0;
   asio::io_context context{1};
@@ -175,8 +177,8 @@ struct Server::Impl {
   asio::steady_timer timer{context}, pause{context};
 };
 
-Server::Server(const Site& site, std::uint16_t port, const ServerLimits& limits)
-    : impl_(std::make_unique<Impl>(site, limits)) {
+Server::Server(std::function<const Site&()> site, std::uint16_t port, const ServerLimits& limits)
+    : impl_(std::make_unique<Impl>(std::move(site), limits)) {
   try {
     const tcp::endpoint here(asio::ip::address_v4::loopback(), port);
     impl_->acceptor.open(here.protocol());

@@ -22,8 +22,8 @@ struct ServerLimits {
 /// thread, and no client holds it: all waiting is for the operating system.
 class Server {
  public:
-  /// port 0: any that is free. Throws: stream::Error if it is taken.
-  Server(const Site& site, std::uint16_t port, const ServerLimits& limits = {});
+  /// site: asked for each request. port 0: any that is free. Throws: stream::Error if it is taken.
+  Server(std::function<const Site&()> site, std::uint16_t port, const ServerLimits& limits = {});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 #include <zlib.h>
 
 #include "serve/viewer_files.hpp"
@@ -206,6 +207,40 @@ Site make_site(std::span<const stream::Store> stores) {
   add_text(site, "stores.json",
            Json{{"format", "terrace-stores"}, {"version", 1}, {"stores", list}}.dump(1) + "\n");
   return site;
+}
+
+LiveSite::LiveSite(std::vector<std::string> paths,
+                   std::function<stream::Store(const std::string& path)> open)
+    : paths_(std::move(paths)), open_(std::move(open)), stamps_(stamps()), site_(made()) {}
+
+const Site& LiveSite::now() {
+  std::vector<Stamp> found = stamps();
+  if (found == stamps_) return site_;
+  try {
+    Site site = made();
+    // Else a store was replaced meanwhile, and the files may be those of two.
+    if (stamps() == found) site_ = std::move(site);
+  } catch (const stream::Error&) {
+  }
+  stamps_ = std::move(found);
+  return site_;
+}
+
+std::vector<LiveSite::Stamp> LiveSite::stamps() const {
+  std::vector<Stamp> stamps(paths_.size());
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    struct stat status {};
+    if (::stat((paths_[i] + "/manifest.json").c_str(), &status) != 0) continue;
+    stamps[i] = {static_cast<std::int64_t>(status.st_dev), static_cast<std::int64_t>(status.st_ino),
+                 status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+  }
+  return stamps;
+}
+
+Site LiveSite::made() const {
+  std::vector<stream::Store> stores;
+  for (const std::string& path : paths_) stores.push_back(open_(path));
+  return make_site(stores);
 }
 
 }  // namespace terrace::tools

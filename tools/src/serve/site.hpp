@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -31,6 +33,30 @@ using Site = std::map<std::string, Resource>;
 /// the folders, made unique. Files are opened here and stay open. Throws: stream::Error, also if a
 /// file of a store is a link.
 Site make_site(std::span<const stream::Store> stores);
+
+/// The site of stores, made anew when one of them has been replaced. An answer under way keeps the
+/// files that it began with.
+class LiveSite {
+ public:
+  /// open: opens the store at a path. Throws: stream::Error.
+  LiveSite(std::vector<std::string> paths,
+           std::function<stream::Store(const std::string& path)> open);
+
+  /// The site of the stores that are at their paths now; the last one while one of them is missing
+  /// or cannot be served. Throws: stream::Stopped if a store is to stop.
+  const Site& now();
+
+ private:
+  /// What tells the manifest of a store from another at its path.
+  using Stamp = std::array<std::int64_t, 5>;
+  [[nodiscard]] std::vector<Stamp> stamps() const;
+  [[nodiscard]] Site made() const;
+
+  std::vector<std::string> paths_;
+  std::function<stream::Store(const std::string& path)> open_;
+  std::vector<Stamp> stamps_;  ///< before the stores were opened last
+  Site site_;
+};
 
 /// The name of each store in a site.
 std::vector<std::string> site_names(std::span<const stream::Store> stores);

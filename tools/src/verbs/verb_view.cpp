@@ -49,13 +49,12 @@ class ViewCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    std::vector<stream::Store> stores;
-    for (const std::string& path : stores_) stores.push_back(open_store(path));
-    const Site site = make_site(stores);
-    Server server(site, static_cast<std::uint16_t>(port_));
+    LiveSite site(stores_, [](const std::string& path) { return open_store(path); });
+    Server server([&site]() -> const Site& { return site.now(); },
+                  static_cast<std::uint16_t>(port_));
     const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
     common.say(address + " shows " +
-               (stores.size() == 1 ? "the store" : std::to_string(stores.size()) + " stores") +
+               (stores_.size() == 1 ? "the store" : std::to_string(stores_.size()) + " stores") +
                " until Ctrl-C");
     if (!no_open_ && !open_browser(address)) {
       common.say("there is no xdg-open to open a browser: open the address yourself");
@@ -63,7 +62,7 @@ class ViewCommand final : public Command {
     const Stopwatch watch;
     server.run([] { return interrupted(); });
     Summary summary;
-    summary.json = {{"address", address}, {"stores", stores.size()}};
+    summary.json = {{"address", address}, {"stores", stores_.size()}};
     summary.add_cost(watch);
     return summary;
   }
