@@ -8,20 +8,21 @@ import {join, normalize} from 'node:path';
 const SLOW = 1500;
 const TYPES = {html: 'text/html', js: 'text/javascript', css: 'text/css', json: 'application/json', wasm: 'application/wasm'};
 
-/// Serves `folder` on a free port. `fault(request)` may return 'whole', 'short', 'missing', 'error', 'replaced',
-/// 'damaged', 'slow' or 'dead' for a request {path, range}; log lists all requests.
+/// Serves `folder` on a free port. `fault(request)` may return 'whole', 'short', 'packed', 'missing', 'error',
+/// 'replaced', 'damaged', 'slow' or 'dead' for a request {path, range, method}; log lists all requests.
 export async function serveSite(folder) {
   const log = [];
   const site = {log, fault: () => null};
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://x').pathname));
-    const entry = {path, range: request.headers.range ?? null, status: 0, bytes: 0};
+    const entry = {path, range: request.headers.range ?? null, method: request.method, status: 0, bytes: 0};
     log.push(entry);
     const fault = site.fault(entry);
     const file = join(folder, path === '/' ? 'index.html' : path);
     const send = (status, headers, begin, end) => {
       entry.status = status;
       response.writeHead(status, headers);
+      if (request.method === 'HEAD') return response.end();
       if (begin === undefined || end < begin) return response.end();
       entry.bytes = end - begin + 1;
       const stream = createReadStream(file, {start: begin, end});
@@ -51,6 +52,7 @@ export async function serveSite(folder) {
       if (first >= size) return send(416, {'Content-Range': `bytes */${size}`});
       const told = fault === 'replaced' ? size + 1 : size;
       const headers = {...type, 'Content-Range': `bytes ${first}-${last}/${told}`, 'Cache-Control': 'no-store'};
+      if (fault === 'packed') headers['Content-Encoding'] = 'gzip';
       if (fault === 'short') {
         // The connection ends in the middle of what was announced.
         response.writeHead(206, {...headers, 'Content-Length': last - first + 1});

@@ -5,7 +5,7 @@ import {join} from 'node:path';
 import vm from 'node:vm';
 
 /// fetch() of the files of a folder under http://folder/, with ranges. `fault(request, response)` may change what
-/// comes (undefined: nothing ever), `latency` milliseconds after the request; `log` is of all requests, with the number of those
+/// comes (undefined: nothing ever; a null body: the answer breaks off), `latency` milliseconds after the request; `log` is of all requests, with the number of those
 /// made before that were still `unanswered`, without those made at once with it.
 export function folderFetch(folder, fault = (_, response) => response, latency = 1) {
   const log = [];
@@ -27,7 +27,7 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
                         {status: 206, headers: {'Content-Range': `bytes ${first}-${first + body.length - 1}/${size}`}, body});
   };
   const fetch = async (url, options = {}) => {
-    const request = {path: new URL(url).pathname, range: options.headers?.Range, cache: options.cache};
+    const request = {path: new URL(url).pathname, range: options.headers?.Range, method: options.method ?? 'GET', cache: options.cache};
     request.unanswered = [...waiting.values()].filter(other => other !== batch).length;
     log.push(request);
     waiting.set(request, batch);
@@ -40,13 +40,15 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
     if (response === undefined) {
       await new Promise((_, reject) => options.signal.addEventListener('abort', () => reject(new DOMException('aborted', 'AbortError'))));
     }
-    const bytes = Uint8Array.from(response.body);
     return {
       status: response.status,
       ok: response.status >= 200 && response.status < 300,
       headers: new Headers(response.headers),
       body: null,
-      arrayBuffer: async () => bytes.buffer
+      arrayBuffer: async () => {
+        if (response.body === null) throw new TypeError('terminated');
+        return Uint8Array.from(response.body).buffer;
+      }
     };
   };
   return {fetch, log};

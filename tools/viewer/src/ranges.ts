@@ -242,15 +242,26 @@ export class Ranges {
     try {
       return await this.answer(range, watch);
     } catch (error) {
+      // Browsers do not say why they read nothing, and a part that is compressed they do not read.
+      if (!(error instanceof FetchFault) &&
+          await fetch(this.url(range), {method: 'HEAD', signal: watch.signal}).then(() => true, () => false)) {
+        throw new FetchFault(
+            `${range.file}: the server answers, but a part of the file cannot be read: the connection breaks off, or the server ` +
+                'compresses parts (Content-Encoding). Turn its compression off for the files of stores.',
+            false);
+      }
       throw watch.fault(range.file, error);
     } finally {
       watch.end();
     }
   }
+  private url({file}: ByteRange): string {
+    return this.base + encodeURIComponent(file);
+  }
   private async answer(range: ByteRange, watch: Watch): Promise<Uint8Array> {
     const last = range.offset + range.bytes - 1;
     ++this.stats.requests;
-    const response = await fetch(this.base + encodeURIComponent(range.file), {
+    const response = await fetch(this.url(range), {
       headers: {Range: `bytes=${range.offset}-${last}`},
       cache: this.fresh ? 'reload' : 'default',
       signal: watch.signal
