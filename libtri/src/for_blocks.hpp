@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -41,6 +42,8 @@ void for_blocks(std::size_t count, std::size_t block, unsigned threads, Make mak
     for (std::size_t i = 1; i < used; ++i) others.emplace_back(run);
   } catch (const std::system_error&) {
     // The system grants no more threads. The existing ones do the same work.
+  } catch (const std::bad_alloc&) {
+    // Nor memory for one. Not thrown: those that run would never be joined.
   }
   run();
   for (std::thread& other : others) other.join();
