@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -290,6 +291,43 @@ TEST(StoreBuild, TakesASourceOfTheCaller) {
     FAIL() << "a store without points";
   } catch (const stream::Error& error) {
     EXPECT_EQ(error.parts().file, "<points>");
+  }
+}
+
+// Most of the work may be left when the last point is read: blocks wait for every thread.
+TEST(StoreBuild, StopsAfterTheLastPointWasRead) {
+  const tests::TemporaryFolder folder;
+  std::vector<stream::Point3> points;
+  for (int i = 0; i < 3100; ++i) {
+    points.push_back({i * 7919 % 10007 / 16.0, i * 104729 % 10009 / 16.0, i % 7 / 4.0});
+  }
+  stream::MemoryPoints columns;
+  columns.info.files = {"<points>"};
+  columns.count = points.size();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    columns.info.coordinates[axis].name = std::string(1, "xyz"[axis]);
+    columns.coordinates[axis] = {reinterpret_cast<const std::byte*>(&points[0][axis]),
+                                 std::ptrdiff_t{sizeof(stream::Point3)}};
+  }
+  BuildRequest request;
+  // No stop ends the reading.
+  request.open = [&columns](const stream::SourceOptions&) {
+    return stream::open_memory(columns, {});
+  };
+  request.order = stream::Order::stream;
+  request.store = folder.path() / "store";
+  request.block_points = 500;
+  for (const unsigned threads : {1u, 4u}) {
+    std::stop_source stop;
+    Context context;
+    context.threads = threads;
+    context.stop = stop.get_token();
+    context.progress = [&](const Progress& progress) {
+      if (progress.count == points.size()) stop.request_stop();
+    };
+    EXPECT_THROW(build_store(request, context), stream::Stopped);
+    EXPECT_TRUE(stop.stop_requested());
+    EXPECT_FALSE(fs::exists(request.store));
   }
 }
 

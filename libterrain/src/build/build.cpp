@@ -289,7 +289,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   }
 
   stream::StoreWriter writer(request.store, schema, request.replace, threads);
-  StoreSink sink(writer, request.most_points == 0);
+  StoreSink sink(writer, request.most_points == 0, context.stop);
   cluster::HierarchyOptions options = clustering_of(request, schema, ground);
   options.threads = threads;
   // A full disk is told at once, even if the input's producer idles.

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/stream/error.hpp>
+
 namespace terrace::terrain {
 namespace {
 
@@ -37,6 +39,7 @@ stream::ClusteredBlock as_stored(const cluster::FinishedBlock& block,
 
 std::unique_ptr<cluster::HierarchySink::Prepared> StoreSink::prepare(
     const cluster::FinishedBlock& block) {
+  if (stop_.stop_requested()) throw stream::Stopped();
   const auto summaries = summaries_of(block);
   return std::make_unique<EncodedBlock>(writer_.encode(as_stored(block, summaries)));
 }

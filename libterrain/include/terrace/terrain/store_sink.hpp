@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <stop_token>
+#include <utility>
 
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/store.hpp>
@@ -13,9 +15,10 @@ namespace terrace::terrain {
 /// on the thread that clustered them, appended in order. The two libraries do not know each other.
 class StoreSink final : public cluster::HierarchySink {
  public:
-  /// The writer must outlive the sink. publish: false for a trial.
-  explicit StoreSink(stream::StoreWriter& writer, bool publish = true)
-      : writer_(writer), publish_(publish) {}
+  /// The writer must outlive the sink. publish: false for a trial. stop: ends the build with
+  /// stream::Stopped, on each thread after the block that it is clustering.
+  explicit StoreSink(stream::StoreWriter& writer, bool publish = true, std::stop_token stop = {})
+      : writer_(writer), publish_(publish), stop_(std::move(stop)) {}
 
   std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override;
   void commit(unsigned level, std::unique_ptr<Prepared> prepared) override;
@@ -28,6 +31,7 @@ class StoreSink final : public cluster::HierarchySink {
  private:
   stream::StoreWriter& writer_;
   bool publish_;
+  std::stop_token stop_;
   std::uint64_t store_bytes_ = 0;
 };
 
