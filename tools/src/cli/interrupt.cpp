@@ -2,6 +2,7 @@
 #include "cli/interrupt.hpp"
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -21,17 +22,18 @@
 namespace terrace::tools {
 namespace {
 
-volatile std::sig_atomic_t stop_requested = 0;
+/// Threads read it: a flag for the handler's own thread, std::sig_atomic_t, would not do.
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
 /// A pipe: the signal handler writes, a thread reads and does what a handler may not.
 std::array<int, 2> wake_pipe{-1, -1};
 
 extern "C" void on_stop_signal(int signal) {
   // A second Ctrl-C takes the default action, which ends the process.
-  if (stop_requested != 0) {
+  if (stop_requested.exchange(true)) {
     std::signal(signal, SIG_DFL);
     ::raise(signal);
   }
-  stop_requested = 1;
   const int error = errno;
   const char byte = 0;
   [[maybe_unused]] const ssize_t written = ::write(wake_pipe[1], &byte, 1);
@@ -94,7 +96,7 @@ void install_signal_handlers() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-bool interrupted() noexcept { return stop_requested != 0; }
+bool interrupted() noexcept { return stop_requested; }
 
 void check_interrupt() {
   if (interrupted()) throw stream::Stopped();
