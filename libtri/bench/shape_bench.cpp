@@ -202,16 +202,17 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     double time = 1e9;
     for (int round = 0; round < 3; ++round)
       time = std::min(time, seconds([&] { shape.restore(triangulation); }));
-    std::array<double, 2> follow{};
-    if (way.options.rule == ShapeRule::kPoles) follow = mean_of_clusters(triangulation, shape);
     const std::string how = std::string(way.name) + (std::is_same_v<Coord, double> ? " d" : " i");
     const ShapeSurface surface = shape.surface(triangulation);
     SurfaceMeasures found = measure(surface.surface);
     const ShapeParts parts = shape.parts(triangulation, surface);
     found.components = parts.components;
     found.euler_characteristic = parts.euler_characteristic;
-    print_row(name, how.c_str(), build, time, found, shape.lost_vertices().size(),
-              shape.rescued_count(), step, measures, volume, follow);
+    const std::size_t lost = shape.lost_vertices().size(), rescued = shape.rescued_count();
+    // Last, as labels that follow changes may differ from those from scratch.
+    std::array<double, 2> follow{};
+    if (way.options.rule == ShapeRule::kPoles) follow = mean_of_clusters(triangulation, shape);
+    print_row(name, how.c_str(), build, time, found, lost, rescued, step, measures, volume, follow);
   }
 }
 

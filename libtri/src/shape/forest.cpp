@@ -226,6 +226,7 @@ class Forest {
       if (sets.is_root(x)) first_roots.push_back(x);
     std::vector<std::uint32_t> roots = first_roots;
     while (list_.size() > 0) join_best(sets, roots);
+    // These first, as they are on the way of all others.
     for (const std::uint32_t x : first_roots) sets.flatten(x);
     for (std::uint32_t x = 0; x <= beyond_; ++x) sets.flatten(x);
     const std::uint32_t outside = sets.root(2 * beyond_);

@@ -170,22 +170,17 @@ class Nearby {
     for (spatial::Tetrahedron& t : tetrahedra_) {
       for (std::uint32_t& v : t.corner)
         if (v != spatial::kGhost) v = state_.local_vertex[v];
-      // The numbers are in order already; before the first, 1, comes the last, the ghost's.
+      // Local numbers are ranks already. The ghost's, 0, wraps round to the last.
       turns.push_back(turn_of(t.corner, [](std::uint32_t v) { return v - 1; }));
     }
-    for (std::size_t n = 0; n < turns.size(); ++n) {
-      const spatial::Tetrahedron t = tetrahedra_[n];
-      for (std::size_t i = 0; i < 4; ++i) {
-        const std::uint8_t from = kTurns[turns[n]].from[i];
-        const spatial::Side mate = t.mate[from];
-        const std::uint32_t other = state_.local_tetrahedron[spatial::tetrahedron_of(mate)];
-        tetrahedra_[n].corner[i] = t.corner[from];
-        tetrahedra_[n].mate[i] =
-            other == spatial::kNone
-                ? spatial::make_side(nowhere, 0)
-                : spatial::make_side(other, kTurns[turns[other]].to[spatial::index_of(mate)]);
-      }
-    }
+    const auto new_side = [&](spatial::Side mate) {
+      const std::uint32_t other = state_.local_tetrahedron[spatial::tetrahedron_of(mate)];
+      return other == spatial::kNone
+                 ? spatial::make_side(nowhere, 0)
+                 : spatial::make_side(other, kTurns[turns[other]].to[spatial::index_of(mate)]);
+    };
+    for (std::size_t n = 0; n < turns.size(); ++n)
+      tetrahedra_[n] = turned(tetrahedra_[n], kTurns[turns[n]], new_side);
     tetrahedra_.emplace_back().corner.fill(spatial::kFreeCorner);
   }
   [[nodiscard]] bool between_whole(const spatial::Tetrahedron& t) const {

@@ -39,20 +39,17 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
   for (std::uint32_t t = 0; t < slots; ++t)
     if (turn[t] != 0) result.number[t] = next[result.number[t]]++;
   result.tetrahedra.resize(count);
+  const auto new_side = [&](spatial::Side mate) {
+    const std::uint32_t other = spatial::tetrahedron_of(mate);
+    return spatial::make_side(result.number[other],
+                              kTurns[turn[other]].to[spatial::index_of(mate)]);
+  };
   for_blocks(
       slots, kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
         for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
           if (turn[t] == 0) continue;
-          spatial::Tetrahedron& to = result.tetrahedra[result.number[t]];
-          for (std::size_t i = 0; i < 4; ++i) {
-            const std::uint8_t from = kTurns[turn[t]].from[i];
-            const spatial::Side mate = tetrahedra[t].mate[from];
-            const std::uint32_t other = spatial::tetrahedron_of(mate);
-            to.corner[i] = tetrahedra[t].corner[from];
-            to.mate[i] = spatial::make_side(result.number[other],
-                                            kTurns[turn[other]].to[spatial::index_of(mate)]);
-          }
+          result.tetrahedra[result.number[t]] = turned(tetrahedra[t], kTurns[turn[t]], new_side);
         }
       });
   return result;

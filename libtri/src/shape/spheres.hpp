@@ -148,6 +148,18 @@ std::uint8_t turn_of(const std::array<std::uint32_t, 4>& corner, const Rank& ran
   return static_cast<std::uint8_t>((first & 3) << 2 | (second & 3));
 }
 
+/// A tetrahedron turned. new_side(mate): the side that a neighbour's has become.
+template <class NewSide>
+spatial::Tetrahedron turned(const spatial::Tetrahedron& t, const Turn& turn,
+                            const NewSide& new_side) {
+  spatial::Tetrahedron result;
+  for (std::size_t i = 0; i < 4; ++i) {
+    result.corner[i] = t.corner[turn.from[i]];
+    result.mate[i] = new_side(t.mate[turn.from[i]]);
+  }
+  return result;
+}
+
 /// Tetrahedra in the order of their first corners, turned. Neighbours that a bulk build has left
 /// far apart lie close together in memory then, as the vertices of both do.
 struct Renumbered {
@@ -164,7 +176,8 @@ class Spheres {
  public:
   using Side = spatial::Side;
 
-  /// Of turned tetrahedra. O(tetrahedra). Any number of threads computes the same.
+  /// The tetrahedra must be turned. O(tetrahedra). The result is the same for any number of
+  /// threads.
   Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
           unsigned threads);
 
