@@ -121,7 +121,7 @@ class FrameTest(CommandTest):
             self.assertTrue(last[-1].startswith(f'  terrace {verb} '), last[-1])
 
     def test_wrong_usage_is_2(self):
-        for args in ([], ['no-such-verb'], ['--no-such-option'], ['info'], ['info', 'a', 'b'],
+        for args in ([], ['no-such-verb'], ['--no-such-option'], ['info'], ['verify', 'a', 'b'],
                      ['info', 'a', '--no-such-option'], ['info', 'a', '--threads', '0'],
                      ['info', 'a', '--threads', 'x'], ['info', 'a', '--memory', 'lots'],
                      ['info', 'a', '--seed', '-1'], ['info', 'a', '--progress', 'maybe'],

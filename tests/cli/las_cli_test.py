@@ -153,8 +153,9 @@ class LasFormatTest(LasCase):
         path = self.put('w.las', las(1, records))
         self.assertEqual(self.info(path)['withheld'], withheld)
         self.assertIn(f'withheld:  {withheld} of them', self.run_ok('info', path).decode())
-        result = terrace('build', path, '-o', self.path('w.st'))
+        result = terrace('build', path, '-o', self.path('w.st'), '--json')
         self.assertIn(f'{withheld} points are marked as withheld', result.stderr.decode())
+        self.assertEqual(json.loads(result.stdout)['withheld'], withheld)
         self.assertEqual(self.info(self.path('w.st'))['points'], 200)
 
     def test_withheld_points_of_files_that_differ_are_counted(self):

@@ -147,6 +147,8 @@ class SelectionTest(unittest.TestCase):
                 with open(os.path.join(store, name), 'rb') as one, \
                         open(self.path(f'all.st/{name}'), 'rb') as other:
                     self.assertEqual(one.read(), other.read(), name)
+            told = json.loads(self.run_ok('info', *names, '--json'))
+            self.assertEqual((told['points'], told['files']), (20000, 2))
             # One file of them all, point by point.
             self.run_ok('convert', *names, '-o', self.path(f'parts{number}.csv'))
             with open(self.file, encoding='ascii') as one, \
@@ -155,6 +157,11 @@ class SelectionTest(unittest.TestCase):
                 self.assertEqual(first[0], second[0])
                 self.assertEqual([list(map(float, row)) for row in first[1:]],
                                  [list(map(float, row)) for row in second[1:]])
+        # A folder of several formats.
+        self.run_ok('convert', self.file, '-o', os.path.join(folder, 'more', 'all.ply'))
+        self.assertIn('or select those of a folder by --input-format', self.terrace('info', folder).stderr)
+        told = json.loads(self.run_ok('info', folder, '--input-format', 'ply', '--json'))
+        self.assertEqual((told['points'], told['files'], told['format']), (20000, 1, 'ply'))
         result = self.terrace('build', folder + '/*.las', '-o', self.path('none.st'))
         self.assertEqual(result.returncode, 1)
         self.assertIn('no file has such a name', result.stderr)
@@ -480,6 +487,9 @@ class SelectionTest(unittest.TestCase):
                 (['contour', self.path('all.st'), '-o', self.path('e.geojson'), '--interval', '1', '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
                 (['verify', self.path('all.st'), '--where', 'z > 1'], 2, 'are for tile sets'),
                 (['points', self.path('all.st'), '-o', self.path('e.csv'), '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
+                (['info', self.path('all.st'), self.file], 2, 'is a store: name it alone'),
+                (['info', self.path('all.st'), '--input-format', 'ply'], 2, '--input-format do not apply'),
+                (['mesh', self.path('all.st'), 'a', 'b', 'c', '-o', 'e.ply'], 2, "'a' and 2 more cannot be taken"),
                 (['render', self.file, '-o', self.path('e.png'), '--where', 'z > 1'], 2, 'is not a store')):
             with self.subTest(args=args):
                 result = self.terrace(*args)

@@ -204,30 +204,42 @@ class PartsAhead final : public RecordReader {
   std::vector<std::thread> threads_;
 };
 
-/// How many parts may be in memory at once.
-std::size_t slots_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigned threads) {
+/// How many readers, and how many parts at once, there is memory for.
+struct Ahead {
+  std::size_t readers = 0, slots = 0;
+};
+Ahead ahead_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigned threads) {
   constexpr std::uint64_t kReaderBytes = 4u << 20, kMostBytes = 64u << 20;
   memory_bytes = std::min(memory_bytes, kMostBytes);
-  std::uint64_t largest = 1;
+  std::uint64_t largest = 1, most_points = 1, points = 1;
   for (const RecordPart& part : parts.parts) {
-    if (part.points > kMostBytes / parts.record_bytes) return 0;
+    if (part.points > kMostBytes / parts.record_bytes) return {};
     largest = std::max(largest, part.bytes + part.points * parts.record_bytes);
+    most_points = std::max(most_points, part.points);
+    points += part.points;
   }
-  const std::uint64_t room = memory_bytes / (largest + kReaderBytes);
-  return static_cast<std::size_t>(std::min<std::uint64_t>(room, threads + 2));
+  const std::uint64_t readers = std::min<std::uint64_t>(
+      {threads, memory_bytes / (largest + kReaderBytes), parts.parts.size()});
+  // One for each reader and two that wait are enough if all are equal; while one reads the largest,
+  // the others read as many points in more parts.
+  const std::uint64_t wanted =
+      readers * std::max<std::uint64_t>(1, most_points * parts.parts.size() / points) + 2;
+  return {static_cast<std::size_t>(readers),
+          static_cast<std::size_t>(
+              std::min(wanted, (memory_bytes - readers * kReaderBytes) / largest))};
 }
 
 }  // namespace
 
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options) {
-  const std::size_t slots = slots_within(options.memory_bytes, parts, options.threads);
-  auto threads =
-      static_cast<unsigned>(std::min<std::size_t>({options.threads, slots, parts.parts.size()}));
-  if (threads <= 1) threads = 0;
+  const Ahead ahead = ahead_within(options.memory_bytes, parts, options.threads);
+  if (ahead.readers > 1) {
+    return std::make_unique<PartsAhead>(parts, static_cast<unsigned>(ahead.readers), ahead.slots,
+                                        options.on_damage);
+  }
   // What is damaged is known at the end of a part: it is read whole before any of it is given out.
-  const bool whole = options.on_damage && slots > 0;
-  if (threads == 0 && !whole) return nullptr;
-  return std::make_unique<PartsAhead>(parts, threads, threads == 0 ? 1 : slots, options.on_damage);
+  if (ahead.readers == 0 || !options.on_damage) return nullptr;
+  return std::make_unique<PartsAhead>(parts, 0, 1, options.on_damage);
 }
 
 std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts) {

@@ -124,7 +124,7 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                    .where = {},
                    .cause = "is " + other.name + ", but " + shown_name(files.front()) + " is " +
                             format.name,
-                   .remedy = "name files of one format, of a folder by that format"});
+                   .remedy = "name files of one format, or select those of a folder by `format`"});
     }
     if (is_seekable(file) || packed_format_of(file) == &format) continue;
     if (!format.streams && !format.self_contained) {

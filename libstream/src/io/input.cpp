@@ -34,16 +34,20 @@ std::map<std::string, std::unique_ptr<Input>>& heads() {
 
 int open_for_reading(const std::string& file) {
   if (file == kStandardStream) return STDIN_FILENO;
-  struct stat status {};
   // Opening a pipe without O_NONBLOCK would wait for its writer without reacting to a stop. poll()
   // waits for the writer too.
-  const bool pipe = ::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0));
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | (reads_once(file) ? O_NONBLOCK : 0));
   if (fd < 0) throw system_error(file, "cannot open", errno, "check the name and its permissions");
   return fd;
 }
 
 }  // namespace
+
+bool reads_once(const std::string& file) {
+  struct stat status {};
+  return file == kStandardStream ||
+         (::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode));
+}
 
 /// An open file, closed with the object.
 class Input::Descriptor {

@@ -78,6 +78,8 @@ void bind_build(py::module_& module) {
     result["nodata"] = outcome.nodata;
     result["excluded"] = outcome.excluded;
     result["lost"] = outcome.lost;
+    result["empty_values"] = outcome.empty_values;
+    result["withheld"] = outcome.withheld;
     result["outliers"] = outcome.outliers;
     result["bytes"] = outcome.store_bytes;
     result["reordered"] = outcome.order.reordered;

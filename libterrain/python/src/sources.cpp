@@ -2,12 +2,11 @@
 #include "sources.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <pybind11/stl.h>
+#include <terrace/stream/input.hpp>
 #include <terrace/stream/memory_source.hpp>
 #include <terrace/terrain/crs.hpp>
 #include <terrace/terrain/region.hpp>
@@ -80,14 +79,10 @@ std::string name_in(const py::dict& options, const char* key, std::string otherw
   return otherwise;
 }
 
-/// Pipes can be read only once.
 bool opens_twice(const py::object& source) {
   if (!py::isinstance<py::list>(source)) return true;
   const auto names = source.cast<std::vector<std::string>>();
-  return std::none_of(names.begin(), names.end(), [](const std::string& name) {
-    std::error_code ignored;
-    return name == "-" || std::filesystem::is_fifo(name, ignored);
-  });
+  return std::none_of(names.begin(), names.end(), stream::reads_once);
 }
 
 /// where, keep, drop, resolution and region.

@@ -10,11 +10,36 @@ inline double dot(const std::array<double, 3>& a, const std::array<double, 3>& b
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+inline std::array<double, 3> difference(const std::array<double, 3>& a,
+                                        const std::array<double, 3>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+inline std::array<double, 3> cross(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
 /// Unit vector in the direction of v; +z for the zero vector.
 inline std::array<double, 3> unit(const std::array<double, 3>& v) {
   const double length = std::sqrt(dot(v, v));
   if (!(length > 0)) return {0, 0, 1};
   return {v[0] / length, v[1] / length, v[2] / length};
 }
+
+/// How much of a surface is steeper than 60 degrees: above half of it, the triangles join the upper
+/// and the lower side of a body that was triangulated as if it were a terrain.
+class Steepness {
+ public:
+  /// `normal`: of a triangle, as long as its area, or all by the same factor longer.
+  void add(const std::array<double, 3>& normal) {
+    const double area = std::sqrt(dot(normal, normal));
+    all_ += area;
+    if (std::abs(normal[2]) < 0.5 * area) steep_ += area;
+  }
+  [[nodiscard]] bool mostly() const { return steep_ > 0.5 * all_; }
+
+ private:
+  double steep_ = 0, all_ = 0;
+};
 
 }  // namespace terrace::terrain

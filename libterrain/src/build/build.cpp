@@ -347,6 +347,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   outcome.raster = info.grid;
   outcome.excluded = so_far.excluded;
   outcome.lost = so_far.lost;
+  outcome.empty_values = so_far.empty_values;
+  outcome.withheld = so_far.withheld;
   outcome.store_bytes = sink.store_bytes();
   if (in_order != nullptr) outcome.order = in_order->report();
   outcome.top = result.top;

@@ -6,20 +6,13 @@
 #include <cmath>
 
 #include "base/portable_math.hpp"
+#include "base/vector.hpp"
 
 namespace terrace::terrain {
-namespace {
-
-stream::Point3 difference(const stream::Point3& a, const stream::Point3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
-}  // namespace
 
 stream::Point3 area_vector(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t) {
-  const stream::Point3 u = difference(mesh.positions[t[1]], mesh.positions[t[0]]);
-  const stream::Point3 v = difference(mesh.positions[t[2]], mesh.positions[t[0]]);
-  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  return cross(difference(mesh.positions[t[1]], mesh.positions[t[0]]),
+               difference(mesh.positions[t[2]], mesh.positions[t[0]]));
 }
 
 bool is_height_field(const TriangleMesh& mesh) {
@@ -32,14 +25,9 @@ bool is_height_field(const TriangleMesh& mesh) {
 }
 
 bool mostly_steep(const TriangleMesh& mesh) {
-  double steep = 0, all = 0;
-  for (const auto& t : mesh.triangles) {
-    const stream::Point3 n = area_vector(mesh, t);
-    const double area = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    all += area;
-    if (std::abs(n[2]) < 0.5 * area) steep += area;
-  }
-  return steep > 0.5 * all;
+  Steepness steepness;
+  for (const auto& t : mesh.triangles) steepness.add(area_vector(mesh, t));
+  return steepness.mostly();
 }
 
 namespace {

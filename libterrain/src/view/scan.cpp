@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include <terrace/tri/delaunay2.hpp>
 
+#include "base/vector.hpp"
 #include "terrace/terrain/store_source.hpp"
 #include "terrace/terrain/store_view.hpp"
 #include "view/view_frame.hpp"
@@ -41,7 +41,7 @@ bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
   const std::vector<tri::VertexId> vertices = triangulation.build(places);
   std::vector<double> heights(triangulation.vertex_slots());
   for (std::size_t i = 0; i < nodes.size(); ++i) heights[slot(vertices[i])] = nodes[i][2];
-  double steep = 0, all = 0;
+  Steepness steepness;
   for (const tri::TriangleId triangle : triangulation.all_triangles()) {
     std::array<stream::Point3, 3> p;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -49,15 +49,9 @@ bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
       const auto place = triangulation.point(vertex);
       p[i] = {static_cast<double>(place[0]), static_cast<double>(place[1]), heights[slot(vertex)]};
     }
-    const stream::Point3 u{p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]},
-        v{p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]};
-    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2],
-                 z = u[0] * v[1] - u[1] * v[0];
-    const double area = std::sqrt(x * x + y * y + z * z);
-    all += area;
-    if (std::abs(z) < 0.5 * area) steep += area;
+    steepness.add(cross(difference(p[1], p[0]), difference(p[2], p[0])));
   }
-  return steep > 0.5 * all;
+  return steepness.mostly();
 }
 
 }  // namespace terrace::terrain

@@ -158,6 +158,13 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   } catch (const CLI::CallForHelp&) {
     print_result(app.help());
     return kDone;
+  } catch (const CLI::ExtrasError&) {
+    // CLI11 would list them all: a pattern in the shell can stand for thousands of files.
+    const std::vector<std::string> extras = app.remaining();
+    throw UsageError(
+        "'" + extras.front() + "'" +
+        (extras.size() > 1 ? " and " + std::to_string(extras.size() - 1) + " more" : "") +
+        " cannot be taken; `terrace " + verb.name + " --help` tells what can");
   } catch (const CLI::ParseError& error) {
     throw UsageError(std::string(error.what()) + "; `terrace " + verb.name + " --help` tells more");
   }

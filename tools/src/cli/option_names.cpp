@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 38> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 39> kOptions{{
     {"band", "--band"},
     {"block_points", "--block"},
     {"cell", "--cell"},
@@ -22,6 +22,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 38> kOptions
     {"entities", "--entities"},
     {"facility_cost", "--facility-cost"},
     {"fill", "--fill"},
+    {"format", "--input-format"},
     {"geoid", "--geoid"},
     {"heights_of_colour", "--rgb"},
     {"interval", "--interval"},

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/selection_options.hpp"
 
-#include <filesystem>
 #include <iomanip>
 #include <sstream>
-#include <system_error>
 #include <utility>
 #include <vector>
+
+#include <terrace/stream/input.hpp>
 
 #include "cli/cli.hpp"
 #include "terrace/terrain/error.hpp"
@@ -68,8 +68,7 @@ terrain::RegionConversion SelectionOptions::conversion(
     std::span<const std::string> inputs, const stream::SourceOptions& reading,
     const std::optional<terrain::DatumShift>& shift) const {
   for (const std::string& input : inputs) {
-    std::error_code ignored;
-    if (input == "-" || std::filesystem::is_fifo(input, ignored)) {
+    if (stream::reads_once(input)) {
       if (region_crs_.empty()) return {};
       throw terrain::UsageError("--region-crs looks up the CRS of the input before it is read: " +
                                 input + " can be read only once; name a file");

@@ -151,6 +151,8 @@ class BuildCommand final : public Command {
                     {"excluded", outcome.excluded},
                     {"lost", outcome.lost},
                     {"outliers", outcome.outliers},
+                    {"empty_values", outcome.empty_values},
+                    {"withheld", outcome.withheld},
                     {"seconds", seconds},
                     {"points_per_second", rate},
                     {"peak_rss_bytes", peak_rss_bytes()},

@@ -248,12 +248,12 @@ std::string padded(const std::string& text, std::size_t width) {
   return std::string(width - std::min(width, text.size()), ' ') + text;
 }
 
-/// What a file of points or cells holds, found by streaming it once. Throws: stream::Error.
-Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
-                     const CommonOptions& common) {
-  const std::array<std::string, 1> files{path};
+/// What files of points or cells hold, found by streaming them once. Throws: stream::Error.
+Summary info_of_files(std::span<const std::string> files, const std::string& format,
+                      stream::HeightsOfColour colours, const CommonOptions& common) {
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.memory_bytes = common.reading_memory(),
+      stream::open_source(files, {.format = format,
+                                  .memory_bytes = common.reading_memory(),
                                   .heights_of_colour = colours,
                                   .stop = stop_token(),
                                   .blocks_ahead = 8,
@@ -276,6 +276,7 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
   summary.text_is_result = true;
   Json& json = summary.json;
   json["format"] = info.format;
+  json["files"] = info.files.size();
   json["version"] = nullptr;
   json["points"] = contents.points;
   json["nodata"] = contents.nodata;
@@ -304,6 +305,7 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
 
   std::string& text = summary.text;
   text += "format:    " + info.format;
+  if (info.files.size() > 1) text += ", " + counted(info.files.size(), "file");
   if (bytes) text += ", " + readable_bytes(*bytes);
   text += '\n';
   if (info.grid) {
@@ -412,24 +414,32 @@ Summary info_of_store(const std::string& path) {
 class InfoCommand : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("input", input_, "Store, or file of points or cells; - is standard input")
+    app.add_option("input", inputs_,
+                   "a store; or files of points or cells, as one: also a folder, @FILE with a "
+                   "name a line, or a pattern in quotes; - is standard input")
         ->required()
         ->type_name("STORE|FILE");
+    add_input_format(app, format_);
     add_heights_of_colour(app, colours_);
   }
 
   Summary run(const CommonOptions& common) override {
-    const bool ept = std::filesystem::exists(std::filesystem::path(input_) / "ept.json");
-    const bool store =
-        !ept && (std::filesystem::is_directory(input_) || stream::Store::recover(input_));
-    if (store && colours_ != stream::HeightsOfColour::none) {
-      throw UsageError("'" + input_ + "' is a store: --rgb does not apply");
+    for (const std::string& input : inputs_) {
+      if (!stream::Store::exists(input)) continue;
+      if (inputs_.size() > 1) {
+        throw UsageError("'" + input + "' is a store: name it alone");
+      }
+      if (colours_ != stream::HeightsOfColour::none || !format_.empty()) {
+        throw UsageError("'" + input + "' is a store: --rgb and --input-format do not apply");
+      }
+      return info_of_store(input);
     }
-    return store ? info_of_store(input_) : info_of_file(input_, colours_, common);
+    return info_of_files(inputs_, format_, colours_, common);
   }
 
  private:
-  std::string input_;
+  std::vector<std::string> inputs_;
+  std::string format_;
   stream::HeightsOfColour colours_ = stream::HeightsOfColour::none;
 };
 

@@ -256,7 +256,7 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
     if (selection.colours == stream::HeightsOfColour::none) return;
     throw UsageError("'" + path + "' is not a PNG: --rgb does not apply");
   };
-  if (std::filesystem::is_directory(path) || stream::Store::recover(path)) {
+  if (std::filesystem::is_directory(path) || stream::Store::exists(path)) {
     no_colours();
     return from_store(path, selection, most_cells, common);
   }

@@ -15,6 +15,9 @@ namespace terrace::stream {
 /// The name for standard input, and for standard output in writers.
 inline constexpr std::string_view kStandardStream = "-";
 
+/// Whether `file` is standard input or a pipe: bytes that can be read only once, by one reader.
+[[nodiscard]] bool reads_once(const std::string& file);
+
 class GzipStream;
 
 /// The bytes of a file, a pipe or standard input ("-") from first to last, through a window that

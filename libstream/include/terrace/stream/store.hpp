@@ -180,9 +180,9 @@ class Store {
   /// The same for files that are not in a folder: in memory, in an archive, on a server. `name`
   /// replaces the folder in messages and in path(). Throws as above, and what `files` throws.
   static Store open(const std::string& name, const OpenByName& files);
-  /// Restores the name of a store that a writer moved aside in order to replace it, if the writer
-  /// died then; returns whether it did. open() calls this.
-  static bool recover(const std::filesystem::path& path);
+  /// Whether there is a store. One that a writer moved aside in order to replace it gets its name
+  /// back, if the writer died then. open() calls this.
+  static bool exists(const std::filesystem::path& path);
 
   /// The same store for cancellable work: once `stop` is requested, every read throws Stopped, so
   /// loops that read need no check of their own.

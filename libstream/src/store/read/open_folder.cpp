@@ -15,8 +15,7 @@
 namespace terrace::stream {
 
 Store Store::open(const std::filesystem::path& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path / kManifestName, error) && !recover(path)) {
+  if (!exists(path)) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no store here",
@@ -25,8 +24,10 @@ Store Store::open(const std::filesystem::path& path) {
   return open(path.string(), [path](const std::string& name) { return open_file(path / name); });
 }
 
-bool Store::recover(const std::filesystem::path& path) {
-  return put_back_replaced(follow_links(path));
+bool Store::exists(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path / kManifestName, error) ||
+         put_back_replaced(follow_links(path));
 }
 
 }  // namespace terrace::stream

@@ -72,11 +72,13 @@ struct BuildRequest {
 
 struct BuildOutcome {
   std::uint64_t points = 0;
-  std::uint64_t nodata = 0;    ///< cells without data; points of which a coordinate is NaN
-  bool raster = false;         ///< the points are cells
-  std::uint64_t excluded = 0;  ///< points that the selection left out
-  std::uint64_t lost = 0;      ///< points in damaged parts, left out
-  std::uint64_t outliers = 0;  ///< points marked as outliers
+  std::uint64_t nodata = 0;        ///< cells without data; points of which a coordinate is NaN
+  bool raster = false;             ///< the points are cells
+  std::uint64_t excluded = 0;      ///< points that the selection left out
+  std::uint64_t lost = 0;          ///< points in damaged parts, left out
+  std::uint64_t outliers = 0;      ///< points marked as outliers
+  std::uint64_t empty_values = 0;  ///< attributes without a value in their file: NaN
+  std::uint64_t withheld = 0;      ///< points that their file marks as withheld, kept
   std::uint64_t store_bytes = 0;
   stream::OrderedSource::Report order{};  ///< how the points came, and what it took to order them
   unsigned top = 0;
