@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "ground.hpp"
 #include "portable_math.hpp"
 
 namespace terrace::cluster {
@@ -185,6 +186,17 @@ std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box) {
   if (const auto* elliptical = std::get_if<Elliptical>(&metric)) return elliptical->map();
   if (const auto* field = std::get_if<EllipticalField>(&metric)) return field->uniform_in(box);
   return std::nullopt;
+}
+
+std::optional<std::vector<Point3>> linear_points(const Metric& metric,
+                                                 std::span<const Point3> points) {
+  const std::optional<LinearMap> map = linear_map(metric, bounds_of(points));
+  if (!map) return std::nullopt;
+  std::vector<Point3> result(points.begin(), points.end());
+  if (*map != kIdentityMap) {
+    for (Point3& p : result) p = mapped(*map, p);
+  }
+  return result;
 }
 
 std::string name_of(const Metric& metric) {

@@ -407,5 +407,50 @@ TEST(KMeans, RefusesBadInput) {
   }
 }
 
+TEST(KMeans, APointStandsForEachCluster) {
+  std::mt19937_64 random(9);
+  for (int round = 0; round < 20; ++round) {
+    const std::size_t count = 1 + random() % 60, clusters = 1 + random() % 8;
+    std::vector<Point3> points(count);
+    std::vector<std::uint32_t> labels(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      // Few places, so that some are equally near.
+      for (double& v : points[i]) v = static_cast<double>(random() % 5);
+      labels[i] = static_cast<std::uint32_t>(random() % clusters);
+    }
+    const std::vector<std::uint32_t> found = nearest_to_means(points, labels, clusters);
+    ASSERT_EQ(found.size(), clusters);
+    for (std::uint32_t c = 0; c < clusters; ++c) {
+      Point3 sum{};
+      std::vector<std::uint32_t> members;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (labels[i] != c) continue;
+        members.push_back(i);
+        for (std::size_t k = 0; k < 3; ++k) sum[k] += points[i][k];
+      }
+      if (members.empty()) {
+        EXPECT_EQ(found[c], 0u);
+        continue;
+      }
+      // Squares of n times the distance: whole numbers.
+      const auto far2 = [&](std::uint32_t i) {
+        double d2 = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double d = static_cast<double>(members.size()) * points[i][k] - sum[k];
+          d2 += d * d;
+        }
+        return d2;
+      };
+      EXPECT_EQ(labels[found[c]], c);
+      for (const std::uint32_t i : members) {
+        EXPECT_LE(far2(found[c]), far2(i) * (1 + 1e-12));
+        if (i < found[c]) {
+          EXPECT_GT(far2(i) * (1 + 1e-12), far2(found[c]));
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace terrace::cluster

@@ -138,6 +138,26 @@ TEST(Metric, TheBoxesOfAFieldMayBeInAnotherFrame) {
 }
 
 // The properties that a metric declares hold for random points.
+TEST(Metric, LinearPointsAreAsFarApartAsTheMetricSays) {
+  std::mt19937_64 random(5);
+  std::vector<Point3> points(50);
+  for (Point3& p : points) p = random_point(random);
+  int linear = 0;
+  for (const Metric& metric : all_metrics()) {
+    const auto mapped = linear_points(metric, points);
+    EXPECT_EQ(mapped.has_value(), linear_map(metric, bounds_of(points)).has_value());
+    if (!mapped) continue;
+    ++linear;
+    ASSERT_EQ(mapped->size(), points.size());
+    for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+      const double d = distance(metric, points[i], points[i + 1]);
+      EXPECT_NEAR(distance(Euclidean{}, (*mapped)[i], (*mapped)[i + 1]), d, 1e-13 * d);
+    }
+  }
+  EXPECT_EQ(linear, 3);  // Euclidean and two ellipses
+  EXPECT_EQ(linear_points(Euclidean{}, points), points);
+}
+
 TEST(Metric, DeclarationsHold) {
   std::mt19937_64 random(7);
   for (const Metric& metric : all_metrics()) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -12,6 +13,7 @@
 #include "k_means/k_means_seeds.hpp"
 #include "k_means/k_means_tree.hpp"
 #include "scaling.hpp"
+#include "terrace/cluster/metric.hpp"
 #include "thread_team.hpp"
 
 namespace terrace::cluster {
@@ -233,6 +235,32 @@ KMeansResult k_means_from(std::span<const Point3> centres, std::span<const Point
   Run run(tree, team, std::move(start));
   run.iterate(options, scaling.diagonal);
   return result_of(run, scaling, scaled_weights.exponent);
+}
+
+std::vector<std::uint32_t> nearest_to_means(std::span<const Point3> points,
+                                            std::span<const std::uint32_t> labels,
+                                            std::size_t clusters) {
+  assert(labels.size() == points.size());
+  std::vector<Point3> mean(clusters, Point3{});
+  std::vector<double> count(clusters, 0.0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) mean[labels[i]][axis] += points[i][axis];
+    count[labels[i]] += 1.0;
+  }
+  for (std::size_t c = 0; c < clusters; ++c) {
+    for (double& v : mean[c]) v /= std::max(count[c], 1.0);
+  }
+  std::vector<std::uint32_t> nearest(clusters, 0);
+  std::vector<double> least(clusters, std::numeric_limits<double>::infinity());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const std::uint32_t c = labels[i];
+    const double d = distance(Euclidean{}, mean[c], points[i]);
+    if (d < least[c]) {
+      least[c] = d;
+      nearest[c] = i;
+    }
+  }
+  return nearest;
 }
 
 }  // namespace terrace::cluster

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "base/progress_report.hpp"
+
 namespace terrace::terrain {
 
 HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells)
@@ -63,6 +65,25 @@ TriangleMesh HeightGrid::mesh() const {
     }
   }
   return mesh;
+}
+
+TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
+                            const Context& context) {
+  HeightGrid grid(store.schema().columns, store.schema().rows, most_cells);
+  const ProgressReport progress(context, "points");
+  std::uint64_t points = 0;
+  for (const stream::LevelInfo& level : store.levels()) {
+    store.for_each(level.level, [&](stream::ClusterId, const stream::ClusterRecord&,
+                                    const stream::ClusterPoints& cluster) {
+      context.check_stop();
+      for (std::size_t i = 0; i < cluster.size(); ++i) {
+        if (cluster.match(i)) grid.add(cluster.positions[i]);
+      }
+      points += cluster.size();
+      progress.update(points, static_cast<double>(points) / static_cast<double>(store.points()));
+    });
+  }
+  return grid.mesh();
 }
 
 }  // namespace terrace::terrain

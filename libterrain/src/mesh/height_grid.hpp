@@ -5,7 +5,9 @@
 #include <vector>
 
 #include <terrace/stream/point.hpp>
+#include <terrace/stream/store.hpp>
 
+#include "terrace/terrain/context.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 
 namespace terrace::terrain {
@@ -34,5 +36,10 @@ class HeightGrid {
   std::vector<double> sums_;
   std::vector<std::uint32_t> counts_;
 };
+
+/// The same of all cells of a raster's store. Throws: stream::Error, stream::Stopped, what
+/// context.progress throws.
+TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
+                            const Context& context);
 
 }  // namespace terrace::terrain

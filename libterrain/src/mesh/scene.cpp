@@ -30,6 +30,18 @@ bool mostly_steep(const TriangleMesh& mesh) {
   return steepness.mostly();
 }
 
+double rms_slope(const TriangleMesh& mesh) {
+  double sum = 0, area = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 n = area_vector(mesh, t);
+    const double flat = std::abs(n[2]);
+    if (flat <= 0) continue;
+    sum += (n[0] * n[0] + n[1] * n[1]) / flat;
+    area += flat;
+  }
+  return area > 0 ? std::sqrt(sum / area) : 0;
+}
+
 namespace {
 
 constexpr std::size_t kShownHeights = 100000;

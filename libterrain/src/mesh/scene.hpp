@@ -20,6 +20,10 @@ bool is_height_field(const TriangleMesh& mesh);
 /// and the lower side of a body that was triangulated as if it were a terrain.
 bool mostly_steep(const TriangleMesh& mesh);
 
+/// Square root of the mean squared slope (rise over run) of the triangles, weighed by their area as
+/// seen from above.
+double rms_slope(const TriangleMesh& mesh);
+
 /// A sample of about 100,000 of `heights` (one per vertex), even over the area of the surface (with
 /// `flat` as seen from above), so that dense parts count no more than others. For a cloud out of a
 /// store: even over the parts of space that have points; for other clouds: over the points.

@@ -59,4 +59,21 @@ std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query, const N
   return query.within(here.place, radius, here.metric, level);
 }
 
+void write_found_points(const stream::StoreQuery& query, std::span<const stream::FoundPoint> found,
+                        stream::PointWriter& writer, const PlaceConversion& places) {
+  const stream::StoreSchema& schema = query.store().schema();
+  const std::size_t payload = schema.payload_size();
+  const std::vector<std::byte> attributes = query.attributes(found);
+  stream::PointBlock block;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    block.positions.push_back(world_point(schema, found[i].position));
+    for (const auto bytes : {std::span(attributes).subspan(i * payload, payload),
+                             std::as_bytes(std::span(&found[i].distance, 1))}) {
+      block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
+    }
+  }
+  places(block.positions);
+  if (!block.empty()) writer.append(block);
+}
+
 }  // namespace terrace::terrain

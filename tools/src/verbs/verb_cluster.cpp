@@ -85,53 +85,15 @@ struct ClusterOutcome {
 using ClusterProgress = std::function<void(double fraction)>;
 
 /// Costs, facilities and assignment of a solution.
-void take(ClusterOutcome& outcome, FacilitySolution&& solution) {
+ClusterOutcome outcome_of(FacilitySolution&& solution) {
+  ClusterOutcome outcome;
   outcome.opening_cost = solution.opening_cost;
   outcome.connection_cost = solution.connection_cost;
   outcome.outlier_cost = solution.outlier_cost;
   if (solution.lower_bound > 0.0) outcome.lower_bound = solution.lower_bound;
   outcome.representatives = std::move(solution.facilities);
   outcome.labels = std::move(solution.assignment);
-}
-
-/// The points as a linear metric sees them; nullopt if the metric is not linear on them.
-std::optional<std::vector<Point3>> mapped(const FacilityPoints& problem) {
-  const auto map = cluster::linear_map(problem.metric, cluster::bounds_of(problem.points));
-  if (!map) return std::nullopt;
-  const cluster::LinearMap& m = *map;
-  std::vector<Point3> points(problem.points.begin(), problem.points.end());
-  if (m == cluster::kIdentityMap) return points;
-  for (Point3& p : points) {
-    p = {m[0] * p[0] + m[1] * p[1] + m[2] * p[2], m[3] * p[0] + m[4] * p[1] + m[5] * p[2],
-         m[6] * p[0] + m[7] * p[1] + m[8] * p[2]};
-  }
-  return points;
-}
-
-/// For clusters that have no point of their own: the one nearest to the mean; the first of equals.
-std::vector<std::uint32_t> nearest_to_means(std::span<const Point3> points,
-                                            std::span<const std::uint32_t> labels,
-                                            std::size_t clusters) {
-  std::vector<Point3> mean(clusters, Point3{});
-  std::vector<double> count(clusters, 0.0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    for (std::size_t axis = 0; axis < 3; ++axis) mean[labels[i]][axis] += points[i][axis];
-    count[labels[i]] += 1.0;
-  }
-  for (std::size_t c = 0; c < clusters; ++c) {
-    for (double& v : mean[c]) v /= std::max(count[c], 1.0);
-  }
-  std::vector<std::uint32_t> representative(clusters, 0);
-  std::vector<double> least(clusters, std::numeric_limits<double>::infinity());
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const std::uint32_t c = labels[i];
-    const double d = cluster::distance(cluster::Euclidean{}, mean[c], points[i]);
-    if (d < least[c]) {
-      least[c] = d;
-      representative[c] = i;
-    }
-  }
-  return representative;
+  return outcome;
 }
 
 void no_channels(const FacilityPoints& problem, const char* method) {
@@ -188,15 +150,14 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
   constexpr std::size_t kFastPoints = std::size_t{1} << 24;
   if (request.strategy == FacilityStrategy::automatic && request.iterations.empty() &&
       request.batch == 1 && problem.channels.size() == 0 && std::isinf(problem.outlier_price) &&
-      problem.points.size() < kFastPoints && mapped(problem)) {
+      problem.points.size() < kFastPoints &&
+      cluster::linear_map(problem.metric, cluster::bounds_of(problem.points))) {
     options.strategy = FacilityStrategy::fast;
   }
   FacilitySolution solution = cluster::solve(problem, options);
   progress(1.0);
   solution.lower_bound = bound_of(request, problem, solution, progress);
-  ClusterOutcome outcome;
-  take(outcome, std::move(solution));
-  return outcome;
+  return outcome_of(std::move(solution));
 }
 
 /// The primal-dual method.
@@ -208,23 +169,20 @@ ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPo
       {.strategy = FacilityStrategy::greedy_stars, .memory_limit = request.memory_bytes / 3 * 2});
   solution.lower_bound =
       std::max(solution.lower_bound, bound_of(request, problem, solution, progress));
-  ClusterOutcome outcome;
-  take(outcome, std::move(solution));
-  return outcome;
+  return outcome_of(std::move(solution));
 }
 
 ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityPoints& problem) {
   no_channels(problem, "k-means");
-  std::vector<Point3> points;
-  if (std::holds_alternative<cluster::SquaredEuclidean>(problem.metric)) {
-    points.assign(problem.points.begin(), problem.points.end());
-  } else if (auto linear = mapped(problem)) {
-    points = std::move(*linear);
-  } else {
+  const bool squared = std::holds_alternative<cluster::SquaredEuclidean>(problem.metric);
+  const auto linear =
+      cluster::linear_points(squared ? cluster::Euclidean{} : problem.metric, problem.points);
+  if (!linear) {
     throw UsageError(
         "--method k-means sums squares: it takes --metric euclidean, squared, or "
         "elliptical with one region for all points");
   }
+  const std::vector<Point3>& points = *linear;
   const cluster::KMeansResult result = cluster::k_means(points, problem.weights,
                                                         {.clusters = request.k,
                                                          .seed = request.seed,
@@ -248,7 +206,7 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
     outcome.notes.push_back("k-means stopped after " + std::to_string(result.iterations) +
                             " iterations, before it had come to rest");
   }
-  outcome.representatives = nearest_to_means(points, outcome.labels, used);
+  outcome.representatives = cluster::nearest_to_means(points, outcome.labels, used);
   return outcome;
 }
 
@@ -257,12 +215,12 @@ ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const Facility
   constexpr std::size_t kMostForBound = 10'000;
   const std::uint32_t steps =
       request.bound_iterations.value_or(problem.points.size() <= kMostForBound ? 100 : 0);
-  ClusterOutcome outcome;
-  take(outcome, cluster::k_median(problem, request.k,
-                                  {.restarts = static_cast<std::uint32_t>(request.restarts),
-                                   .bound_steps = steps,
-                                   .seed = request.seed,
-                                   .threads = request.threads}));
+  ClusterOutcome outcome =
+      outcome_of(cluster::k_median(problem, request.k,
+                                   {.restarts = static_cast<std::uint32_t>(request.restarts),
+                                    .bound_steps = steps,
+                                    .seed = request.seed,
+                                    .threads = request.threads}));
   outcome.opening_cost.reset();
   return outcome;
 }
@@ -294,7 +252,8 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
   no_channels(problem, single ? "single" : "complete");
   if (!problem.weights.empty())
     throw UsageError("--weight is not for linkage: it counts no points");
-  const std::optional<std::vector<Point3>> points = mapped(problem);
+  const std::optional<std::vector<Point3>> points =
+      cluster::linear_points(problem.metric, problem.points);
   ClusterOutcome outcome;
   if (request.cuda) {
     if (!points) throw UsageError("--device cuda takes --metric euclidean or elliptical");
@@ -322,7 +281,7 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
                             std::to_string(request.k) + " clusters: there are " +
                             std::to_string(clusters));
   }
-  outcome.representatives = nearest_to_means(problem.points, outcome.labels, clusters);
+  outcome.representatives = cluster::nearest_to_means(problem.points, outcome.labels, clusters);
   return outcome;
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstddef>
-#include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,82 +23,13 @@
 #include "tables/point_table.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
-#include "terrace/terrain/detail_mesh.hpp"
+#include "terrace/terrain/detail_points.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
 namespace {
-
-/// The wanted points of some clusters, on their way to a file. An overlay's heights replace the
-/// store's, which still decide what is inside a region.
-class PointsPart final : public WantedPart {
- public:
-  /// What all parts have in common.
-  struct Job {
-    const stream::Store& store;
-    WantedPoints wanted;
-    PlaceConversion places;
-    stream::PointWriter& writer;
-    stream::Overlay* overlay = nullptr;      ///< for one thread
-    std::uint64_t replaced = 0;              ///< heights from the overlay
-    std::vector<stream::PointBlock> blocks;  ///< memory of each thread
-  };
-
-  PointsPart(Job& job, unsigned worker) : job_(job), block_(job.blocks[worker]) { block_.clear(); }
-
-  void add(stream::ClusterId id, const stream::ClusterRecord& record,
-           const stream::ClusterPoints& points) override {
-    const std::size_t payload = job_.store.schema().payload_size();
-    std::span<const stream::OverlayValue> heights;
-    if (job_.overlay != nullptr) heights = job_.overlay->find(id);
-    job_.wanted(record, points, [&](std::size_t i, stream::Point3 place) {
-      while (!heights.empty() && heights.front().index < i) heights = heights.subspan(1);
-      if (!heights.empty() && heights.front().index == i) {
-        place[2] = heights.front().value;
-        ++job_.replaced;
-      }
-      block_.positions.push_back(place);
-      const std::byte* values = points.payload.data() + i * payload;
-      block_.payload.insert(block_.payload.end(), values, values + payload);
-    });
-  }
-
-  void end() override {
-    if (block_.empty()) return;
-    job_.places(block_.positions);
-    encoded_ = job_.writer.encode(block_);
-  }
-
-  void take() override {
-    check_interrupt();
-    if (encoded_ != nullptr) job_.writer.append(std::move(encoded_));
-  }
-
- private:
-  Job& job_;
-  stream::PointBlock& block_;  ///< of this part until end()
-  stream::PointWriter::EncodedPtr encoded_;
-};
-
-/// Writes the points found near a place, in order, with the distance in metres as a further column.
-void write_found(const stream::StoreQuery& query, const std::vector<stream::FoundPoint>& found,
-                 const PlaceConversion& places, stream::PointWriter& writer) {
-  const stream::StoreSchema& schema = query.store().schema();
-  const std::size_t payload = schema.payload_size();
-  const std::vector<std::byte> attributes = query.attributes(found);
-  stream::PointBlock block;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    block.positions.push_back(world_point(schema, found[i].position));
-    for (const auto bytes : {std::span(attributes).subspan(i * payload, payload),
-                             std::as_bytes(std::span(&found[i].distance, 1))}) {
-      block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
-    }
-  }
-  places(block.positions);
-  if (!block.empty()) writer.append(block);
-}
 
 class PointsCommand final : public Command {
  public:
@@ -147,14 +76,8 @@ class PointsCommand final : public Command {
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
-    PointsPart::Job job{.store = store,
-                        .wanted = WantedPoints(store, detail),
-                        .places = places(to),
-                        .writer = *writer,
-                        .overlay = overlay ? &*overlay : nullptr,
-                        .blocks = std::vector<stream::PointBlock>(common.threads)};
-    for_each_wanted(store, detail, overlay ? 1 : common.threads,
-                    [&job](unsigned worker) { return std::make_unique<PointsPart>(job, worker); });
+    const std::uint64_t replaced = write_points(store, detail, *writer, places(to),
+                                                overlay ? &*overlay : nullptr, common.context());
     const std::uint64_t points = writer->points();
     writer->finish();
 
@@ -169,8 +92,8 @@ class PointsCommand final : public Command {
     }
     tell_rounding(*writer, summary);
     if (overlay) {
-      summary.json["overlay_values"] = job.replaced;
-      summary.text += with_commas(job.replaced) + " heights from " + overlay_ + "\n";
+      summary.json["overlay_values"] = replaced;
+      summary.text += with_commas(replaced) + " heights from " + overlay_ + "\n";
     }
     return summary;
   }
@@ -242,7 +165,7 @@ class PointsCommand final : public Command {
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
                                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
-    write_found(query, found, places(to), *writer);
+    write_found_points(query, found, *writer, places(to));
     writer->finish();
     Summary summary;
     summary.json = {{"vertices", found.size()}, {"triangles", 0}};

@@ -144,27 +144,6 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
   return input;
 }
 
-/// All cells of a raster's store, reduced.
-TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
-                           ProgressMode progress) {
-  const stream::StoreSchema& schema = store.schema();
-  HeightGrid grid(schema.columns, schema.rows, most_cells);
-  ProgressMeter meter(progress, "points");
-  std::uint64_t points = 0;
-  for (const stream::LevelInfo& level : store.levels()) {
-    store.for_each(level.level, [&](stream::ClusterId, const stream::ClusterRecord&,
-                                    const stream::ClusterPoints& cluster) {
-      check_interrupt();
-      for (std::size_t i = 0; i < cluster.size(); ++i) {
-        if (cluster.match(i)) grid.add(cluster.positions[i]);
-      }
-      points += cluster.size();
-      meter.update(points, static_cast<double>(points) / static_cast<double>(store.points()));
-    });
-  }
-  return grid.mesh();
-}
-
 /// The finest level with no more points, in clusters that reach into the region, than a picture
 /// needs.
 std::string finest_level(const stream::Store& store, const std::string& region) {
@@ -191,7 +170,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   const bool all_cells =
       selection.level == "0" || (selection.level.empty() && store.points() <= kMostCells);
   if (store.schema().grid && whole && all_cells && !selection.triangles) {
-    input.mesh = grid_of_store(store, most_cells, common.progress);
+    input.mesh = reduced_raster(store, most_cells, common.context());
     put_on_ground(input, stored, Ground(stored));
     return input;
   }
@@ -274,19 +253,6 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
     return from_mesh(std::move(*file));
   }
   return from_source(path, selection.colours, most_cells, common);
-}
-
-/// Square root of the mean squared slope (rise over run) of the triangles, weighed by area.
-double rms_slope(const TriangleMesh& mesh) {
-  double sum = 0, area = 0;
-  for (const auto& t : mesh.triangles) {
-    const stream::Point3 n = area_vector(mesh, t);
-    const double flat = std::abs(n[2]);
-    if (flat <= 0) continue;
-    sum += (n[0] * n[0] + n[1] * n[1]) / flat;
-    area += flat;
-  }
-  return area > 0 ? std::sqrt(sum / area) : 0;
 }
 
 /// Degrees of slope at a vertex with that normal.

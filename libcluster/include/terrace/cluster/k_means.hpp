@@ -66,4 +66,11 @@ struct KMeansResult {
                                         std::span<const double> weights,
                                         const KMeansOptions& options);
 
+/// A point to stand for each of `clusters` flat clusters that have no point of their own: the one
+/// nearest to the mean of its cluster, the first of equals; 0 for a cluster without points.
+/// labels: the cluster of each point, below `clusters`. O(n).
+[[nodiscard]] std::vector<std::uint32_t> nearest_to_means(std::span<const Point3> points,
+                                                          std::span<const std::uint32_t> labels,
+                                                          std::size_t clusters);
+
 }  // namespace terrace::cluster

@@ -113,6 +113,9 @@ using Metric =
 [[nodiscard]] bool obeys_triangle_inequality(const Metric& metric);
 /// The map that makes all distances between points of `box` Euclidean; nullopt if there is none.
 [[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box);
+/// The points as that map of their bounding box has them.
+[[nodiscard]] std::optional<std::vector<Point3>> linear_points(const Metric& metric,
+                                                               std::span<const Point3> points);
 
 /// The name for messages and files: "euclidean", "squared", "minkowski:P", "elliptical",
 /// "elliptical field", "custom".

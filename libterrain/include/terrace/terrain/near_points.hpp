@@ -4,9 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/store_query.hpp>
+
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 
@@ -35,5 +39,12 @@ struct NearPlace {
 [[nodiscard]] std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query,
                                                             const NearPlace& place, double radius,
                                                             unsigned level = 0);
+
+/// Appends such points to a file, in their order, with all attributes of the store and, behind
+/// them, their distance as a double. places: to the CRS of the file, unless it is the store's.
+/// Throws: stream::Error on a damaged store, for a point without a place in that CRS, or if it
+/// cannot be written.
+void write_found_points(const stream::StoreQuery& query, std::span<const stream::FoundPoint> found,
+                        stream::PointWriter& writer, const PlaceConversion& places = {});
 
 }  // namespace terrace::terrain

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/terrain/detail_points.hpp"
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace terrace::terrain {
+namespace {
+
+/// The wanted points of some clusters, on their way to a file.
+class WrittenPart final : public WantedPart {
+ public:
+  /// What all parts have in common.
+  struct Job {
+    const stream::Store& store;
+    WantedPoints wanted;
+    const PlaceConversion& places;
+    stream::PointWriter& writer;
+    const Context& context;
+    stream::Overlay* overlay = nullptr;      ///< for one thread
+    std::uint64_t replaced = 0;              ///< heights from the overlay
+    std::vector<stream::PointBlock> blocks;  ///< memory of each thread
+  };
+
+  WrittenPart(Job& job, unsigned worker) : job_(job), block_(job.blocks[worker]) { block_.clear(); }
+
+  void add(stream::ClusterId id, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) override {
+    const std::size_t payload = job_.store.schema().payload_size();
+    std::span<const stream::OverlayValue> heights;
+    if (job_.overlay != nullptr) heights = job_.overlay->find(id);
+    job_.wanted(record, points, [&](std::size_t i, stream::Point3 place) {
+      while (!heights.empty() && heights.front().index < i) heights = heights.subspan(1);
+      if (!heights.empty() && heights.front().index == i) {
+        place[2] = heights.front().value;
+        ++job_.replaced;
+      }
+      block_.positions.push_back(place);
+      const std::byte* values = points.payload.data() + i * payload;
+      block_.payload.insert(block_.payload.end(), values, values + payload);
+    });
+  }
+
+  void end() override {
+    if (block_.empty()) return;
+    job_.places(block_.positions);
+    encoded_ = job_.writer.encode(block_);
+  }
+
+  void take() override {
+    job_.context.check_stop();
+    if (encoded_ != nullptr) job_.writer.append(std::move(encoded_));
+  }
+
+ private:
+  Job& job_;
+  stream::PointBlock& block_;  ///< of this part until end()
+  stream::PointWriter::EncodedPtr encoded_;
+};
+
+}  // namespace
+
+std::uint64_t write_points(const stream::Store& store, const Detail& detail,
+                           stream::PointWriter& writer, const PlaceConversion& places,
+                           stream::Overlay* overlay, const Context& context) {
+  const unsigned threads = overlay != nullptr ? 1 : context.threads;
+  WrittenPart::Job job{.store = store,
+                       .wanted = WantedPoints(store, detail),
+                       .places = places,
+                       .writer = writer,
+                       .context = context,
+                       .overlay = overlay,
+                       .blocks = std::vector<stream::PointBlock>(threads)};
+  for_each_wanted(store, detail, threads,
+                  [&job](unsigned worker) { return std::make_unique<WrittenPart>(job, worker); });
+  return job.replaced;
+}
+
+}  // namespace terrace::terrain
