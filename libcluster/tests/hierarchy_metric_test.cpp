@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -167,6 +169,30 @@ TEST(HierarchyMetric, ChannelsOfThePayloadSeparateClusters) {
       }
     }
   }
+}
+
+TEST(HierarchyMetric, AStopEndsTheSearchOfABlock) {
+  std::mt19937_64 random(3);
+  const std::vector<Point3> points = inputs::cube(2000, random);
+  const auto distances = [&](bool stopped) {
+    std::atomic<std::uint64_t> count = 0;
+    const Metric counted = CustomMetric{[&](const Point3& a, const Point3& b) {
+                                          ++count;
+                                          return distance(Euclidean{}, a, b);
+                                        },
+                                        true, true};
+    HierarchyOptions options;
+    options.block_size = 1000;
+    options.block.effort = Effort::full;
+    options.metric = counted;
+    std::stop_source stop;
+    options.stop = stop.get_token();
+    if (stopped) stop.request_stop();
+    RecordingSink sink;
+    EXPECT_EQ(build(points, options, sink).points, points.size());
+    return count.load();
+  };
+  EXPECT_LT(4 * distances(true), distances(false));
 }
 
 TEST(HierarchyMetric, BadInputIsNamed) {

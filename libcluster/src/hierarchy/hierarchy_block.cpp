@@ -192,11 +192,13 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   options.seed = block_seed(options_.block.seed, block.level, block.number);
 
   const std::size_t most = (block.size() + 1) / 2;
-  const FacilityOptions search{.strategy = options_.strategy,
-                               .effort = options.effort,
-                               .seed = options.seed,
-                               .threads = options_.search_threads,
-                               .batch = options_.batch};
+  const FacilityOptions search{
+      .strategy = options_.strategy,
+      .effort = options.effort,
+      .seed = options.seed,
+      .threads = options_.search_threads,
+      .batch = options_.batch,
+      .progress = [this](std::size_t, std::size_t) { return !options_.stop.stop_requested(); }};
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (options_.corners.count > 1) {
       entity_cluster_.run(corners_, options_.corners.count, options_.corners.ordered, weights_,

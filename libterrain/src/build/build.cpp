@@ -292,6 +292,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   StoreSink sink(writer, request.most_points == 0, context.stop);
   cluster::HierarchyOptions options = clustering_of(request, schema, ground);
   options.threads = threads;
+  options.stop = context.stop;
   // A full disk is told at once, even if the input's producer idles.
   options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);

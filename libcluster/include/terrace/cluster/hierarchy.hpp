@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "terrace/cluster/block.hpp"
@@ -153,6 +154,9 @@ struct HierarchyOptions {
   /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
   std::function<GroundMap(const Bounds&)> ground;
   SimdPath simd = SimdPath::automatic;
+  /// Once it is requested, the local search of a block ends with what it has found so far: for work
+  /// that is given up, whose sink then throws.
+  std::stop_token stop;
   /// Called once when the work has failed, from the thread in which it failed: for an owner who
   /// waits for input and would see the exception only in the next push(). Must neither throw nor
   /// call the builder.
