@@ -196,7 +196,8 @@ void read_horizontal(const PJ* crs, CrsDefinition& definition) {
   if (type == PJ_TYPE_GEOCENTRIC_CRS) {
     throw CrsError("the CRS \"" + definition.name +
                        "\" is geocentric, with x, y and z from the middle of the earth",
-                   "take a geographic or projected one; cs2cs converts points");
+                   "take a geographic or projected one, by `crs` where a file is mistaken; cs2cs "
+                   "converts points");
   }
   if (!geographic && type != PJ_TYPE_PROJECTED_CRS) {
     throw CrsError("the CRS \"" + definition.name + "\" is neither geographic nor projected",
