@@ -14,6 +14,7 @@
 
 #include "earth/crs/crs_definition.hpp"
 #include "earth/crs/datum_change.hpp"
+#include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -42,6 +43,31 @@ TEST(CoordinateSystem, RefusesOtherText) {
                            "PROJCS[\"x\"", "GEOGCS[\"x\"]", "LOCAL_CS[\"x\",UNIT[\"metre\",1]]",
                            "[]", "GEOGCS[[[[", "(((((((((((((((((((((((((((((((((((((((((("}) {
     EXPECT_THROW(CoordinateSystem::parse(text), UsageError) << text;
+  }
+}
+
+TEST(CoordinateSystem, FilesOfArcInfosOldFormAreRead) {
+  const tests::TemporaryFolder folder;
+  const std::string path = (folder.path() / "dem.prj").string();
+  const auto code_of = [&](const std::string& text) {
+    std::ofstream(path) << text;
+    return CoordinateSystem::parse(path).crs().epsg;
+  };
+  const std::string geographic =
+      "Projection    GEOGRAPHIC\nDatum         WGS84\nUnits         DD\n";
+  EXPECT_EQ(code_of(geographic + "Zunits        METERS\nXshift 0.0\nYshift 0.0\nParameters\n"),
+            4326);
+  const std::string utm = "PROJECTION UTM\r\nUNITS METERS\r\nZUNITS NO\r\n";
+  EXPECT_EQ(code_of(utm + "ZONE 33\r\nDATUM WGS84\r\nYSHIFT 0.0\r\n"), 32633);
+  EXPECT_EQ(code_of(utm + "ZONE 18\r\nDATUM WGS84\r\nYSHIFT -10000000.0\r\n"), 32718);
+  EXPECT_EQ(code_of(utm + "ZONE 10\r\nDATUM NAD27\r\n"), 26710);
+  for (const std::string& text :
+       {utm + "DATUM WGS84\n", utm + "ZONE 61\nDATUM WGS84\n", utm + "ZONE 18\nDATUM EUR\n",
+        utm + "ZONE 18\nDATUM NAD83\nYSHIFT -10000000\n", utm + "ZONE 18\nDATUM WGS84\nXSHIFT 5\n",
+        std::string("Projection GEOGRAPHIC\nDatum WGS84\nUnits DS\n"),
+        std::string("Projection GEOGRAPHIC\nDatum WGS84\nUnits DD\nZunits FEET\n"),
+        std::string("Projection ALBERS\nDatum WGS84\nUnits METERS\n"), std::string("Projection")}) {
+    EXPECT_THROW(code_of(text), UsageError) << text;
   }
 }
 

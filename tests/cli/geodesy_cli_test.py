@@ -135,7 +135,9 @@ class GeodesyTest(unittest.TestCase):
         self.assertIn('dem.prj', error)
         with open(self.path('points.prj'), 'w', encoding='utf-8') as file:
             file.write(ESRI_UTM[:60])
-        self.assertIn('points.prj', self.refused(1, 'build', places, '-o', self.path('none')))
+        error = self.refused(1, 'build', places, '-o', self.path('none'))
+        self.assertIn('points.prj', error)
+        self.assertEqual(error.count('--crs'), 1, error)
 
     def test_a_local_system_has_a_unit_and_no_place(self):
         local = 'LOCAL_CS["site",UNIT["foot",0.3048]]'

@@ -16,8 +16,8 @@ namespace {
 
 CoordinateSystem read_sidecar(const std::string& file) {
   try {
-    return CoordinateSystem::parse(file);
-  } catch (const UsageError& error) {
+    return CoordinateSystem(definition_of_text(file));
+  } catch (const CrsError& error) {
     fail(file, error.what(), "correct or remove it, or name the system: `crs` EPSG:n");
   }
 }

@@ -4,7 +4,9 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <set>
+#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -104,6 +106,59 @@ std::string file_text(const std::string& name) {
   return text;
 }
 
+/// ArcInfo's form of a .prj file, older than WKT: lines of a key and a value. GTOPO30 and many
+/// ASCII grids have one.
+constexpr std::string_view kArcInfoKey = "projection";
+
+bool is_arcinfo(std::string_view text) {
+  return plain_name(text.substr(0, kArcInfoKey.size())) == kArcInfoKey;
+}
+
+/// Throws: CrsError for all but longitudes and latitudes in degrees, and UTM in metres.
+CrsDefinition definition_of_arcinfo(const std::string& text) {
+  std::map<std::string, std::string> values;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string key, value;
+    words >> key >> value;
+    values.emplace(plain_name(key), value);
+  }
+  struct Datum {
+    const char* name;
+    int geographic, north, south;  ///< codes; those of UTM are of zone 0
+  };
+  constexpr std::array<Datum, 4> kDatums{{{"wgs84", 4326, 32600, 32700},
+                                          {"wgs72", 4322, 32200, 32300},
+                                          {"nad83", 4269, 26900, 0},
+                                          {"nad27", 4267, 26700, 0}}};
+  const auto word = [&](const char* key) { return plain_name(values[key]); };
+  const auto number = [&](const char* key) {
+    const std::string& value = values[key];
+    double parsed = 0;
+    std::from_chars(value.data(), value.data() + value.size(), parsed);
+    return parsed;
+  };
+  const auto datum = std::find_if(kDatums.begin(), kDatums.end(),
+                                  [&](const Datum& one) { return word("datum") == one.name; });
+  const std::string heights = word("zunits");
+  if (datum != kDatums.end() && (heights.empty() || heights == "no" || heights == "meters") &&
+      number("xshift") == 0) {
+    const bool utm = word("projection") == "utm" && word("units") == "meters";
+    constexpr double kSouth = -10000000;  // metres
+    const double shift = number("yshift"), zone = number("zone");
+    const int first = shift == 0 ? datum->north : shift == kSouth ? datum->south : 0;
+    if (word("projection") == "geographic" && word("units") == "dd" && shift == 0) {
+      return definition_of_epsg(datum->geographic);
+    }
+    if (utm && first != 0 && zone >= 1 && zone <= 60) {
+      return definition_of_epsg(first + static_cast<int>(zone));
+    }
+  }
+  throw CrsError("of ArcInfo's old form, only GEOGRAPHIC in DD and UTM in METERS are read",
+                 "name the system by its code: `crs` EPSG:n");
+}
+
 }  // namespace
 
 void set_vertical_epsg(CrsDefinition& definition, int code) {
@@ -159,6 +214,7 @@ CrsDefinition definition_of_epsg(int code) {
 CrsDefinition definition_of_wkt(const std::string& text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   const std::string plain = text.starts_with(kByteOrderMark) ? text.substr(3) : text;
+  if (is_arcinfo(plain)) return definition_of_arcinfo(plain);
   proj_complaint();
   const ProjObject crs = proj_crs_of_text(
       plain.starts_with('+') && plain.find("+type=crs") == plain.npos ? plain + " +type=crs"
