@@ -177,7 +177,7 @@ TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
             "outside"},
            {message(source("", "small.tif")), "19 x 10"},
            {message(source("", "none.tif")), "none.tif"},
-           {message(source("", "a.vrt")), "a.vrt"},  // itself
+           {message(source("", "a.vrt")), "a.vrt: is a virtual raster inside another"},  // itself
            {message("<SimpleSource/>"), "names no file"},
            {message(all, "<SRS>" + deep), "nested too deeply"},
            {message(all, "<unclosed>"), "not XML"},

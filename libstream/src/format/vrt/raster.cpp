@@ -34,6 +34,12 @@
 namespace terrace::stream {
 namespace {
 
+bool recognise_vrt(std::span<const std::byte> head) {
+  return std::string_view(reinterpret_cast<const char*>(head.data()), head.size())
+             .substr(0, 512)
+             .find("<VRTDataset") != std::string_view::npos;
+}
+
 /// A raster of any format but VRT, told by content, then by ending.
 std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions& options) {
   struct Kind {
@@ -51,6 +57,13 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
        {&binary_grid_format, &open_binary_grid}}};
   constexpr std::size_t kTellingBytes = 4096;
   const std::vector<char> head = peek_head(file, kTellingBytes, {});
+  if (recognise_vrt(std::as_bytes(std::span(head)))) {
+    throw Error({.file = file,
+                 .where = {},
+                 .cause = "is a virtual raster inside another, which is not read",
+                 .remedy = "name the rasters of both: gdalbuildvrt, or make a GeoTIFF of it: "
+                           "gdal_translate FILE out.tif"});
+  }
   for (const Kind& kind : kKinds) {
     if (kind.format().recognise(std::as_bytes(std::span(head)))) return kind.open(file, options);
   }
@@ -336,12 +349,6 @@ class VrtRaster final : public Raster {
 
 std::unique_ptr<Raster> open_vrt(const std::string& file, const RasterOptions& options) {
   return std::make_unique<VrtRaster>(file, options);
-}
-
-bool recognise_vrt(std::span<const std::byte> head) {
-  return std::string_view(reinterpret_cast<const char*>(head.data()), head.size())
-             .substr(0, 512)
-             .find("<VRTDataset") != std::string_view::npos;
 }
 
 std::unique_ptr<PointSource> open_vrt_points(std::span<const std::string> files,
