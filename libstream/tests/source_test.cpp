@@ -115,7 +115,9 @@ TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
 TEST_F(Source, RefusesWhatItDoesNotKnow) {
   const std::string prose = put("readme", "This is a text of 3 lines\nwith 1 2 3\nin it\n");
   EXPECT_NE(refusal({prose}).find("neither content nor name"), std::string::npos);
-  EXPECT_NE(refusal({put("empty", "")}).find("empty: the file is empty"), std::string::npos);
+  EXPECT_NE(refusal({put("x.gtx", std::string(50, '\1'))}).find("gdal_translate"),
+            std::string::npos);
+  EXPECT_NE(refusal({put("empty", "")}).find("empty: the file is empty; fetch"), std::string::npos);
   EXPECT_NE(refusal({put("e.csv", "")}).find("e.csv: the file is empty"), std::string::npos);
   EXPECT_THROW(refusal({prose}, {.format = "lax"}), std::invalid_argument);
   EXPECT_NE(refusal({(folder_.path() / "none.xyz").string()}).find("No such file"),
@@ -135,6 +137,8 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
       {"\x89HDF\r\n\x1a\n"s, "HDF5", "gdalinfo"},
       {"CDF\1"s, "NetCDF", "gdal_translate"},
       {"\0\0\0\x0cjP  \r\n"s, "JPEG 2000", "gdal_translate"},
+      {"NITF02.10", "NITF", "gdal_translate"},
+      {"binterr1.3", "VTP", "gdal_translate"},
       {"\0\0\x27\x0a\0\0\0\0"s, "shapefile", "ogr2ogr"},
       {geopackage, "GeoPackage", "gdal_translate"},
       {"\n<!DOCTYPE HTML>", "HTML", "download"},

@@ -99,7 +99,10 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
       {.file = shown_name(file),
        .where = {},
        .cause = head.empty() ? "the file is empty" : "neither content nor name tell its format",
-       .remedy = "name the format: " + known_formats()});
+       .remedy = head.empty() ? "fetch or write the file again"
+                              : "convert a raster (gdal_translate FILE out.tif), or name the "
+                                "format: " +
+                                    known_formats()});
 }
 
 /// Lets go of pipes that were looked at but not opened.
