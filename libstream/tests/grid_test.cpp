@@ -190,6 +190,28 @@ TEST_F(Grids, FloatGridsHaveTheirOwnHeader) {
   }
 }
 
+TEST_F(Grids, TilesOfGtopo30AreBinaryGrids) {
+  put("E020N40.DEM", std::string("\x00\x05\xd8\xf1\xff\xff\x01\x00\x00\x01\x00\x02", 12));
+  put("E020N40.HDR",
+      "BYTEORDER      M\nLAYOUT       BIL\nNROWS         2\nNCOLS         3\nNBANDS        1\n"
+      "NBITS         16\nBANDROWBYTES         6\nTOTALROWBYTES        6\nBANDGAPBYTES         0\n"
+      "NODATA        -9999\nULXMAP        20.25\nULYMAP        39.75\nXDIM          0.5\n"
+      "YDIM          0.5\n");
+  const std::vector<std::string> files{path("E020N40.DEM")};
+  const auto source = open_source(files);
+  EXPECT_EQ(source->info().format, "binary-grid");
+  EXPECT_EQ(source->info().world.xy, (std::array<double, 6>{0.5, 0, 20.25, 0, -0.5, 39.75}));
+  std::vector<double> heights;
+  for (PointBlock block; source->next(block);) {
+    for (const Point3& p : block.positions) heights.push_back(p[2]);
+  }
+  std::sort(heights.begin(), heights.end());
+  EXPECT_EQ(heights, (std::vector<double>{-1, 1, 2, 5, 256}));
+  // Without its header it can only be one of the USGS.
+  std::filesystem::remove(path("E020N40.HDR"));
+  EXPECT_THROW(open_source(files), Error);
+}
+
 TEST_F(Grids, BinaryHeadersAreChecked) {
   const auto refused = [&](const std::string& header, const std::string& why) {
     put("a.bil", std::string(100, '\0'));

@@ -12,6 +12,7 @@
 #include "format/ept/metadata.hpp"
 #include "format/foreign_format.hpp"
 #include "format/formats.hpp"
+#include "format/grid/binary_grid.hpp"
 #include "format/input_files.hpp"
 #include "format/selection.hpp"
 #include "format/spooled_source.hpp"
@@ -209,6 +210,8 @@ const Format* format_of_name(const std::string& file) {
   if (is_ept_name(file)) return &ept_format();
   if (const Format* const packed = packed_format_of(file)) return packed;
   const std::string ending = ending_of(file);
+  // Of GTOPO30 and SRTM30; those of the USGS have no header beside them.
+  if (ending == ".dem" && !binary_header_of(file).empty()) return &binary_grid_format();
   return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
 }
 

@@ -23,16 +23,6 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMostHeaderBytes = 64u << 10;
 
-fs::path header_of(const std::string& file) {
-  for (const char* ending : {".hdr", ".HDR"}) {
-    const fs::path path = fs::path(file).replace_extension(ending);
-    std::error_code ignored;
-    if (fs::is_regular_file(path, ignored)) return path;
-  }
-  refuse_grid(file, {}, "has no header beside it (.hdr)",
-              "fetch that too: it tells size, type and place of the grid");
-}
-
 std::string text_of(const fs::path& path) {
   const std::unique_ptr<ByteSource> bytes = open_file(path);
   if (bytes->size() > kMostHeaderBytes) {
@@ -85,6 +75,15 @@ std::unique_ptr<PointSource> open_binary_points(std::span<const std::string> fil
 bool recognise_nothing(std::span<const std::byte>) { return false; }
 
 }  // namespace
+
+fs::path binary_header_of(const std::string& file) {
+  for (const char* ending : {".hdr", ".HDR"}) {
+    fs::path path = fs::path(file).replace_extension(ending);
+    std::error_code ignored;
+    if (fs::is_regular_file(path, ignored)) return path;
+  }
+  return {};
+}
 
 GridHeader read_binary_header(const std::string& file, std::string_view text) {
   GridHeader header(file);
@@ -141,7 +140,11 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
 }
 
 std::unique_ptr<Raster> open_binary_grid(const std::string& file, const RasterOptions& options) {
-  const fs::path beside = header_of(file);
+  const fs::path beside = binary_header_of(file);
+  if (beside.empty()) {
+    refuse_grid(file, {}, "has no header beside it (.hdr)",
+                "fetch that too: it tells size, type and place of the grid");
+  }
   const GridHeader header = read_binary_header(beside.string(), text_of(beside));
   const bool floats = lower_case(fs::path(file).extension().string()) == ".flt";
   return open_plain_grid(describe_binary_grid(file, header, floats, options.band), open_file(file));

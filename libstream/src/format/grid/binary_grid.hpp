@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -9,10 +10,13 @@
 
 namespace terrace::stream {
 
-/// ESRI's binary grids: rows of samples in NAME.flt, .bil, .bip or .bsq, described by NAME.hdr.
-/// Throws: Error.
+/// ESRI's binary grids: rows of samples in NAME.flt, .bil, .bip, .bsq or .dem, described by
+/// NAME.hdr. Throws: Error.
 std::unique_ptr<Raster> open_binary_grid(const std::string& file,
                                          const RasterOptions& options = {});
+
+/// The header beside a binary grid; empty if there is none.
+std::filesystem::path binary_header_of(const std::string& file);
 
 /// The keys and values of a header's lines. file: for messages.
 GridHeader read_binary_header(const std::string& file, std::string_view text);
