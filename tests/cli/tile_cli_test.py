@@ -339,6 +339,22 @@ class TileTest(TileTestCase):
         verdict = self.verify('edge', '--store', self.path('edge.terrace'), '--vertical', 'ellipsoidal')
         self.assertEqual(verdict['problems'], [])
 
+    def test_longitudes_may_lead_around_the_globe_many_times(self):
+        side, cell, west, north = 40, 0.1, 1000, 10
+        heights = [500 + 200 * math.sin(i % side / 7) * math.cos(i // side / 5) for i in range(side * side)]
+        write_tiff(self.path('many.tif'), side, side, heights, west, north, cell, {1024: 2, 1025: 1, 2048: 4326})
+        self.assertEqual(terrace('build', self.path('many.tif'), '-o', self.path('many.terrace')).returncode, 0)
+        samples = [(west - 1080 + cell * (i % side + 0.5), north - cell * (i // side + 0.5), height)
+                   for i, height in enumerate(heights)]
+        self.tile(self.path('many.terrace'), 'many', '--max-error', 2)
+        tiles = TileSet(self.path('many'))
+        tiles.check()
+        for zoom, (error, missed) in tiles.errors(samples).items():
+            self.assertEqual(missed, 0)
+            self.assertLessEqual(error, 2 * 2 ** (tiles.layer['maxzoom'] - zoom) * 1.000001)
+        verdict = self.verify('many', '--store', self.path('many.terrace'), '--vertical', 'ellipsoidal')
+        self.assertEqual(verdict['problems'], [])
+
     def test_normals_at_the_poles_point_upward(self):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('poles'), '--vertical', 'orthometric',
                          '--normals', '--zoom', '0-2')

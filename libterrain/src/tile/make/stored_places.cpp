@@ -256,7 +256,12 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
     windows.push_back(around);
   };
   if (crs_.is_geographic()) {
-    for (int turn = -2; turn <= 2; ++turn) {
+    // Those that may reach the store. Of one that goes around again and again the first will do.
+    constexpr int kMostTurns = 5;
+    const double first = std::floor(first_longitude_ / turn_ - 0.5),
+                 last = std::ceil(last_longitude_ / turn_ + 0.5);
+    for (int i = 0; i < kMostTurns && first + i <= last; ++i) {
+      const double turn = first + i;
       std::array<Point2, 4> places;
       for (unsigned k = 0; k < 4; ++k) {
         places[k] = between(low, high, k & 1, k >> 1, 1);
