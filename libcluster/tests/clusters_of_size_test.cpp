@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <algorithm>
+#include <limits>
 #include <random>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -59,6 +61,12 @@ TEST(ClustersOfSize, ThreadsDoNotMatter) {
 TEST(ClustersOfSize, FewPointsAreOneCluster) {
   for (const std::size_t n : {1u, 50u, 10000u}) {
     EXPECT_EQ(clusters_of_size(uniform_points(n), 10000, 1, 1), std::vector<std::uint32_t>(n, 0));
+  }
+}
+
+TEST(ClustersOfSize, SizesThatMakeNoSenseAreRefused) {
+  for (const double size : {0.0, -80.0, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW((void)clusters_of_size(uniform_points(20), size, 1, 1), std::invalid_argument);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+#include <stdexcept>
 #include <tuple>
 #include <utility>
 
@@ -109,6 +110,7 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
 std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, double size,
                                             std::uint64_t seed, unsigned threads,
                                             const std::function<void(std::uint64_t)>& progress) {
+  if (!(size > 0)) throw std::invalid_argument("the size of clusters must be above 0");
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   HierarchyOptions options;

@@ -220,6 +220,9 @@ class Streams(unittest.TestCase):
         self.assertEqual(terrace.clusters_of_size(np.zeros((0, 2)), 5).shape, (0,))
         with self.assertRaises(ValueError):
             terrace.clusters_of_size([[np.nan, 0]], 5)
+        for size in (0, -80, np.nan):
+            with self.assertRaises(ValueError):
+                terrace.clusters_of_size(points, size)
 
 
 class KMeans(unittest.TestCase):

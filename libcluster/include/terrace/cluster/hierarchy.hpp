@@ -217,7 +217,7 @@ class HierarchyBuilder {
 /// about 100 points end, so smaller sizes give these, and up to 10,000 points are one cluster.
 /// Returns the cluster of each point, numbered from 0 without gaps; the same for any number of
 /// threads. progress, if any, is called with the points done; what it throws ends the work. Throws:
-/// as HierarchyBuilder::push(). O(n log n).
+/// std::invalid_argument unless size is above 0; as HierarchyBuilder::push(). O(n log n).
 [[nodiscard]] std::vector<std::uint32_t> clusters_of_size(
     std::span<const Point3> points, double size, std::uint64_t seed, unsigned threads = 1,
     const std::function<void(std::uint64_t)>& progress = {});
