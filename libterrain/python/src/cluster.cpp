@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <type_traits>
@@ -279,6 +280,13 @@ struct Entities {
     count = static_cast<std::size_t>(given.shape(0));
     corners = static_cast<std::size_t>(given.shape(1));
     places = points3_of(given.attr("reshape")(-1, given.shape(2)));
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      for (const double coordinate : places[i]) {
+        if (std::isfinite(coordinate)) continue;
+        throw py::value_error("entity " + std::to_string(i / corners) +
+                              " has a coordinate that is not finite; leave it out");
+      }
+    }
   }
   [[nodiscard]] std::span<const cluster::Point3> operator[](std::size_t i) const {
     return std::span(places).subspan(i * corners, corners);

@@ -353,6 +353,10 @@ class Facilities(unittest.TestCase):
                       lambda: terrace.cluster(np.zeros((0, 2, 3)))):
             with self.assertRaises(ValueError):
                 wrong()
+        flat[2, 1, 0] = np.nan
+        for wrong in (lambda: terrace.entity_distances(flat), lambda: terrace.cluster(flat)):
+            with self.assertRaisesRegex(ValueError, 'entity 2 has a coordinate'):
+                wrong()
 
     def test_channels_are_axes(self):
         points = np.random.default_rng(25).random((200, 3))
