@@ -23,10 +23,11 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
 
     samples: points or a raster in memory, as build() takes them: shape (n, 3), or (rows, columns) with ``transform``, a
     Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN
-    and ``nodata`` in it are no samples. quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more
-    time. duplicates: which of several points at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. For
-    points: ``min_angle``, degrees, below which removal makes no triangle; frame: shape (k, 3), a convex polygon,
-    counter-clockwise, in place of their hull, kept exactly; points outside do not count.
+    and ``nodata`` in it are no samples, nor are points with a coordinate that is NaN. quality: 'greedy', 'removal' or
+    'fitted', each with fewer triangles and more time. duplicates: which of several points at one place counts: 'all',
+    'min', 'max', 'mean', 'first', 'error'. For points: ``min_angle``, degrees up to 30, below which removal makes no
+    triangle; frame: shape (k, 3), a convex polygon, counter-clockwise, in place of their hull, kept exactly; points
+    outside do not count.
 
     Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us
     per vertex inserted. Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than
@@ -48,7 +49,9 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
         raise TypeError('bounded_mesh() takes arrays; build() takes files')
     if 'columns' in source:
         frame = np.empty((0, 3)) if frame is None else as_rows(frame, 'frame', (3,))
-        return BoundedMesh(*_core.tin_of_points(*map(_values, source['columns']), bound, most, quality, duplicates, float(min_angle), frame))
+        coordinates = np.array([_values(column) for column in source['columns']])
+        coordinates = coordinates[:, ~np.isnan(coordinates).any(axis=0)]
+        return BoundedMesh(*_core.tin_of_points(*coordinates, bound, most, quality, duplicates, float(min_angle), frame))
     if frame is not None:
         raise ValueError('`frame` is for points')
     a, b, c, d, e, f = source['transform']

@@ -129,7 +129,7 @@ class MeshesOfArrays(unittest.TestCase):
         for wrong, options in ((flat, {}), (flat, {'max_error': 1, 'max_points': 9}), (flat, {'max_error': -1}),
                                (flat, {'max_error': np.nan}), (flat, {'max_points': 3}),
                                (flat, {'max_error': 1, 'quality': 'best'}),
-                               (flat, {'max_error': 1, 'transform': (1, 1, 0, -1, 1, 0)}), ([[0, 0, np.nan]], {'max_error': 1})):
+                               (flat, {'max_error': 1, 'transform': (1, 1, 0, -1, 1, 0)}), ([[0, 0, np.inf]], {'max_error': 1})):
             with self.assertRaises(ValueError):
                 terrace.bounded_mesh(wrong, **options)
         with self.assertRaises(TypeError):
