@@ -114,6 +114,11 @@ def _xarray(array, transform, crs, nodata):
     return transform, crs, nodata
 
 
+def _alone(kind, transform, nodata, attributes):
+    if transform is not None or nodata is not None or attributes is not None:
+        raise ValueError(f'`transform`, `nodata` and `attributes` are not for {kind}')
+
+
 def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
     """(what the compiled half takes, the CRS as text or None)"""
     if attributes is not None and not hasattr(attributes, 'items'):
@@ -154,7 +159,10 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         nodata = getattr(given, 'nodata', None) if nodata is None else nodata
         return (_raster(as_array(filled(samples), 'the raster'), given.transform if transform is None else transform, nodata, '<raster>', scale, offset),
                 crs_text(crs or getattr(given, 'crs', None)))
+    if hasattr(given, 'columns') and all(axis in given.columns for axis in 'xyz'):  # a pandas.DataFrame, or another frame
+        given = {name: given[name] for name in given.columns}
     if isinstance(given, dict):
+        _alone('columns', transform, nodata, attributes)
         wrong = [axis for axis in 'xyz' if axis not in given]
         if wrong:
             raise ValueError(f'points have x, y and z: {", ".join(wrong)} is missing')
@@ -164,8 +172,7 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
                        '<dict>'), crs_text(crs)
     array = as_array(filled(given), 'the source')
     if array.dtype.names:
-        if transform is not None or nodata is not None or attributes is not None:
-            raise ValueError('`transform`, `nodata` and `attributes` are not for structured arrays')
+        _alone('structured arrays', transform, nodata, attributes)
         return _records(array.reshape(-1), array.dtype.names, '<array>'), crs_text(crs)
     if array.ndim not in (2, 3):
         raise ValueError(f'a source array has the shape (n, 3): points, or (rows, columns): a raster, not {array.shape}')

@@ -72,8 +72,8 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     a mosaic), or what is in memory:
 
     - an array of shape (n, 3): points, with ``attributes`` (a dict of columns) beside them;
-    - a structured array with fields x, y, z (or X, Y, Z) and further ones, a dict of columns, a ``laspy.LasData`` or its
-      ``points``, also part of them;
+    - a structured array with fields x, y, z (or X, Y, Z) and further ones, a dict of columns, a
+      ``pandas.DataFrame`` with such columns, a ``laspy.LasData`` or its ``points``, also part of them;
     - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f from
       columns and rows of corners to x and y, as rasterio's) and ``nodata``. An array of three columns is a
       raster if ``transform`` is given;

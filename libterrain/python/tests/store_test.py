@@ -336,6 +336,19 @@ class Sources(StoreCase):
         self.assert_same(records, self.scan, **options)
         columns = dict(zip('xyz', self.points.T), **{'class': self.classes})
         self.assert_same(columns, self.scan, **options)
+
+        class Frame:  # as pandas.DataFrame, which as an array is all its columns
+            columns = ('class', 'x', 'y', 'z')
+
+            def __getitem__(self, name):
+                return records[name]
+
+            def __array__(self, *_):
+                return np.column_stack([self[name] for name in self.columns])
+        self.assert_same(Frame(), self.scan, **options)
+        for wrong in ({'attributes': {'more': self.classes}}, {'nodata': 0}, {'transform': TRANSFORM}):
+            with self.assertRaisesRegex(ValueError, 'are not for columns'):
+                self.built(columns, **wrong)
         wide = np.zeros((2 * len(self.points), 5))
         wide[::2, 1:4] = self.points
         more = {'class': self.classes}
