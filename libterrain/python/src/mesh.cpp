@@ -122,6 +122,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   const terrain::BoundedMeshResult outcome = Job(how).run(
       [&](const terrain::Context& context) { return write_bounded_mesh(store, options, context); });
   py::dict result;
+  result["triangles"] = outcome.triangles;
   result["max_error"] = outcome.max_error;
   result["rms_error"] = outcome.rms_error;
   result["samples"] = outcome.samples;

@@ -458,6 +458,8 @@ class Store:
 
         def make(name):
             measured = _core.bounded_mesh(self._core, name, options, how)
+            if measured['triangles'] == 0:  # such a file is not read as a mesh
+                return BoundedMesh(np.empty((0, 3)), np.empty((0, 3), np.uint32), measured)
             return BoundedMesh(*_core.read_mesh(name)[:2], measured)
 
         if path is not None:

@@ -139,6 +139,23 @@ class Meshes(StoreCase):
             error[near[held]] = np.minimum(error[near[held]], abs(weights[held] @ corners[:, 2] - samples[near[held], 2]))
         self.assertLessEqual(error.max(), 1.0 + 1e-6)
 
+    def test_a_store_without_a_triangle_has_an_empty_mesh(self):
+        line = np.repeat(np.arange(5.0), 3).reshape(-1, 3)
+        with terrace.build(line, self.path('line')) as store:
+            for options in ({}, {'path': self.path('line.ply')}, {'path': self.path('line.glb')}):
+                mesh = store.bounded_mesh(1, **options)
+                self.assertEqual((mesh.vertices.shape, mesh.triangles.shape), ((0, 3), (0, 3)))
+                self.assertEqual((mesh.samples, mesh.uncovered, mesh.max_error), (5, 5, 0))
+
+    def test_points_without_a_coordinate_do_not_count(self):
+        points = np.random.default_rng(3).random((300, 3))
+        holed = np.insert(points, [0, 7, 300], [[np.nan, 0, 0], [0, np.nan, 0], [0, 0, np.nan]], axis=0)
+        mesh, expected = terrace.bounded_mesh(holed, 0.1), terrace.bounded_mesh(points, 0.1)
+        np.testing.assert_array_equal(mesh.vertices, expected.vertices)
+        self.assertEqual(mesh.samples, 300)
+        with self.assertRaises(ValueError):
+            terrace.bounded_mesh(np.where(holed > 0.99, np.inf, holed), 0.1)
+
     def test_the_surface_of_a_ball(self):
         random = np.random.default_rng(4).normal(size=(5000, 3))
         ball = 100 * random / np.linalg.norm(random, axis=1)[:, None]
