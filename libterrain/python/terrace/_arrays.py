@@ -83,12 +83,14 @@ def as_labels(labels):
     return np.unique(labels, return_inverse=True)[1].reshape(labels.shape).astype(np.uint32)
 
 
-def whole(value, what, least=0):
-    """A whole number. Raises: TypeError, ValueError."""
+def whole(value, what, least=0, bits=64):
+    """A whole number that an unsigned integer of so many bits holds. Raises: TypeError, ValueError."""
     try:
         number = value.__index__()
     except AttributeError:
         raise TypeError(f'`{what}` is a whole number, not {value!r}') from None
     if number < least:
         raise ValueError(f'`{what}` is at least {least}, not {number}')
+    if number >= 2 ** bits:
+        raise ValueError(f'`{what}` is below 2^{bits}, not {number}')
     return number

@@ -13,7 +13,7 @@ from ._job import job
 
 
 def _threads(threads):
-    return 0 if threads is None else whole(threads, 'threads', 1)
+    return 0 if threads is None else whole(threads, 'threads', 1, bits=32)
 
 
 def _weights(weights):
@@ -88,7 +88,8 @@ def flat_clusters(rows, *, count=None, height=None):
     """
     if (count is None) == (height is None):
         raise ValueError('flat_clusters() needs either `count` or `height`')
-    return _core.cut(as_rows(rows, 'the linkage', (4,)), None if count is None else whole(count, 'count', 1), height)
+    return _core.cut(as_rows(rows, 'the linkage', (4,)), None if count is None else whole(count, 'count', 1),
+                     None if height is None else float(height))
 
 
 @dataclass(frozen=True)

@@ -279,7 +279,7 @@ class Delaunay2(_Delaunay):
         by default; those on the hull and with a neighbour beyond stay. Raises: ValueError. Sources: G. Taubin, 1995;
         C. Tomasi, R. Manduchi, 1998."""
         return _core.smooth(self._euclidean(), as_numbers(values, 'values'), None if vertices is None else _handles(vertices),
-                            method, whole(iterations, 'iterations'), float(strength), float(pass_band), float(edge_height))
+                            method, whole(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height))
 
     def quality(self, values, datum=0.0, *, bins=16):
         """Angles (degrees) and edges in the plane, areas, and the volumes between the surface and ``datum``.

@@ -69,5 +69,5 @@ def job(progress=None, threads=None, memory=None):
         progress = None
     if progress is not None and not callable(progress):
         raise TypeError('`progress` is None, True or a function')
-    return (progress, notes.info, 0 if threads is None else whole(threads, 'threads', 1),
+    return (progress, notes.info, 0 if threads is None else whole(threads, 'threads', 1, bits=32),
             0 if memory is None else whole(memory, 'memory', 1))

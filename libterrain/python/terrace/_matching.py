@@ -98,7 +98,7 @@ def matching(points, *, labels=None, exact_limit=500_000, window=50_000, rounds=
     points = as_rows(points, 'points')
     match = _core.match_points3 if points.shape[1] == 3 else _core.match_points2
     return Matching(*match(points, as_labels(labels), whole(exact_limit, 'exact_limit', 1), whole(window, 'window', 4),
-                           whole(rounds, 'rounds'), float(tolerance), _threads(threads)))
+                           whole(rounds, 'rounds', bits=32), float(tolerance), _threads(threads)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -149,4 +149,4 @@ def edge_matching(edges, weights, count=None):
 
 
 def _threads(threads):
-    return 0 if threads is None else whole(threads, 'threads', 1)
+    return 0 if threads is None else whole(threads, 'threads', 1, bits=32)

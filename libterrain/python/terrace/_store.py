@@ -61,7 +61,7 @@ def real_values(records, attributes):
 
 
 def _smoothing(method='laplacian', iterations=10, strength=0.5, pass_band=0.1, edge_height=0.0):
-    return method, whole(iterations, 'iterations'), float(strength), float(pass_band), float(edge_height)
+    return method, whole(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height)
 
 
 def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=None, progress=None, threads=None,
@@ -238,7 +238,7 @@ class Store:
         focuses, cluster = self._focuses(focus), self._cluster(cluster, region, focus)
         if level is None:
             level = cluster[0] if cluster else 0
-        records = self._core.points(whole(level, 'level'), as_region(region), focuses, where or '', cluster,
+        records = self._core.points(whole(level, 'level', bits=32), as_region(region), focuses, where or '', cluster,
                                     (crs_text(crs) or ''), job(progress, threads))
         return real_values(records, self._info['attributes'])
 
@@ -248,21 +248,21 @@ class Store:
             return None
         if region is not None or len(focus):
             raise ValueError('give either `cluster` or `region` and `focus`')
-        cluster = tuple(whole(number, 'cluster') for number in cluster)
+        cluster = tuple(cluster)
         if len(cluster) != 2:
             raise ValueError('`cluster` is a pair of its level and its number there')
-        return cluster
+        return whole(cluster[0], 'cluster', bits=32), whole(cluster[1], 'cluster')
 
     @staticmethod
     def _focuses(focus):
-        return [(as_region(place), whole(level, 'level')) for place, level in focus]
+        return [(as_region(place), whole(level, 'level', bits=32)) for place, level in focus]
 
     def clusters(self, level=0, *, progress=None, threads=None):
         """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS that
         hold all points below, a little more than they need), error (metres; no point below is farther from the
         representative), descendants (points of level 0 below), members. The number of a row is that of
         ``points(cluster=(level, number))``."""
-        made = self._core.clusters(whole(level, 'level'), job(progress, threads))
+        made = self._core.clusters(whole(level, 'level', bits=32), job(progress, threads))
         return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
 
     def count(self, box):
@@ -292,7 +292,7 @@ class Store:
         """
         if (box is None) == (near is None):
             raise ValueError('query() needs either `box` or `near`')
-        level = whole(level, 'level')
+        level = whole(level, 'level', bits=32)
         if box is not None:
             if k is not None or radius is not None:
                 raise ValueError('`k` and `radius` go with `near`')
@@ -305,7 +305,7 @@ class Store:
         return real_values(self._core.near(place, k, radius, level, where), self._info['attributes'])
 
     def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):
-        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, whole(level, 'level'), max_edge, (crs_text(crs) or ''),
+        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, whole(level, 'level', bits=32), max_edge, (crs_text(crs) or ''),
                             job(progress, threads, memory))
 
     def heights(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
@@ -339,7 +339,7 @@ class Store:
         """
         def make(name):
             _core.write_raster(self._core, name, value, cell, as_region(region), (crs_text(crs) or ''), method,
-                               whole(level, 'level'), max_edge, replace, job(progress, threads, memory))
+                               whole(level, 'level', bits=32), max_edge, replace, job(progress, threads, memory))
             return read_raster(name)
 
         if path is not None:
@@ -358,7 +358,7 @@ class Store:
         """
         if hasattr(line, '__geo_interface__'):
             line = np.asarray([place[:2] for place in line.__geo_interface__['coordinates']])
-        return _core.profile(self._core, as_rows(line, 'line', (2,)), step, method, whole(level, 'level'), max_edge,
+        return _core.profile(self._core, as_rows(line, 'line', (2,)), step, method, whole(level, 'level', bits=32), max_edge,
                              job(progress, threads))
 
     def contours(self, interval, *, level=0, max_edge=None, region=None, lonlat=None, progress=None, threads=None,
@@ -371,7 +371,7 @@ class Store:
         Returns: a FeatureCollection (a dict, with ``__geo_interface__``) of LineStrings, each with its height as the
         property ``elev``; higher ground is on a line's right. Raises: Error if longitudes and latitudes are not known.
         """
-        text, own = _core.contours(self._core, float(interval), whole(level, 'level'), max_edge, as_region(region),
+        text, own = _core.contours(self._core, float(interval), whole(level, 'level', bits=32), max_edge, as_region(region),
                                    None if lonlat is None else bool(lonlat), job(progress, threads, memory))
         if own and lonlat is None:
             notes.info('contours are in the store\'s own x and y: nothing leads from its CRS to WGS 84')
@@ -405,7 +405,7 @@ class Store:
         for name, path in (('overlay', overlay), ('save', save_overlay)):
             if path is not None:
                 heights[name] = os.fspath(path)
-        return Mesh(*_core.mesh(self._core, whole(level, 'level'), as_region(region), self._focuses(focus), where or '', cluster,
+        return Mesh(*_core.mesh(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '', cluster,
                                 metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
 
     def lines(self, level=0, region=None, where=None, *, focus=(), progress=None, threads=None, memory=None):
@@ -415,7 +415,7 @@ class Store:
         float64 arrays of shape (n, 3), n >= 2; the number of each in the order in which they were read, int64): a line of which
         something is not wanted comes in several. Raises: ValueError for a store of something else. All in memory.
         """
-        vertices, begins, numbers = _core.lines(self._core, whole(level, 'level'), as_region(region), self._focuses(focus),
+        vertices, begins, numbers = _core.lines(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus),
                                                 where or '', job(progress, threads, memory))
         return np.split(vertices, begins[1:-1]) if len(numbers) else [], numbers
 
@@ -426,7 +426,7 @@ class Store:
         the scan does not go all round, the surface is open. With ``tetrahedra`` (vertices, float64, shape (n, 3);
         those inside the closed surface, uint32, shape (m, 4)). Source: J. Skala, section 8.3.
         """
-        made = _core.surface(self._core, whole(level, 'level'), as_region(region), where or '', bool(tetrahedra),
+        made = _core.surface(self._core, whole(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
                              job(progress, threads, memory))
         return made if tetrahedra else Mesh(*made)
 
@@ -482,7 +482,7 @@ class Store:
         """
         given = checked(options, _TILE_OPTIONS, 'tiles')
         if zooms is not None:
-            given['first_zoom'], given['last_zoom'] = (whole(zoom, 'zooms') for zoom in zooms)
+            given['first_zoom'], given['last_zoom'] = (whole(zoom, 'zooms', bits=32) for zoom in zooms)
         return _core.write_tiles(self._core, os.fspath(folder), given, job(progress, threads, memory))
 
     def verify(self, *, progress=None, threads=None):

@@ -64,7 +64,7 @@ def rotate_tree(tree, lower, upper=None, *, passes=16):
     lower = as_rows(lower, 'lower')
     upper = lower if upper is None else as_rows(upper, 'upper', lower.shape[1:])
     rotate = _core.rotate_tree3 if lower.shape[1] == 3 else _core.rotate_tree2
-    return rotate(_children(tree, lower), lower, upper, whole(passes, 'passes'))
+    return rotate(_children(tree, lower), lower, upper, whole(passes, 'passes', bits=32))
 
 
 def _children(tree, points):

@@ -110,7 +110,7 @@ class View:
         delta = self._core.frame(
             {'position': position, 'direction': direction, 'up': up, 'fov': fov, 'width': width, 'height': height,
              'ground_height': None if ground_height is None else float(ground_height), 'matrix': matrix, 'pixel_error': pixel_error,
-             'ground_error': ground_error, 'focus': [(_box(box), whole(level, 'level')) for box, level in focus],
+             'ground_error': ground_error, 'focus': [(_box(box), whole(level, 'level', bits=32)) for box, level in focus],
              'regions': [(_box(box), float(error)) for box, error in regions]}, float(seconds))
         if self._first:
             whole_mesh = self._core.whole()
@@ -129,7 +129,7 @@ class View:
         """Keeps a cluster, (level, number), expanded (True) or collapsed (False) whatever the camera asks; None leaves
         it to the camera. Raises: ValueError for one that the store does not have."""
         level, number = cluster
-        self._core.pin(whole(level, 'cluster'), whole(number, 'cluster'), None if expanded is None else bool(expanded))
+        self._core.pin(whole(level, 'cluster', bits=32), whole(number, 'cluster'), None if expanded is None else bool(expanded))
 
     def attributes(self, vertices):
         """The attributes of vertices as they are stored, a structured array. Raises: ValueError for a vertex that is
@@ -176,7 +176,7 @@ class Multiresolution:
             raise TypeError(f'a model is of a terrace.Store, not of {type(store).__name__}')
         self._top = store.top
         kind = _core.GridModel if store.info['grid'] else _core.PointModel
-        self._core = kind(store._core, store.top if level is None else whole(level, 'level'), self._focuses(focus))
+        self._core = kind(store._core, store.top if level is None else whole(level, 'level', bits=32), self._focuses(focus))
 
     @staticmethod
     def _flat(box):
@@ -185,12 +185,12 @@ class Multiresolution:
 
     @classmethod
     def _focuses(cls, focus):
-        return [(cls._flat(box), whole(level, 'level')) for box, level in focus]
+        return [(cls._flat(box), whole(level, 'level', bits=32)) for box, level in focus]
 
     @staticmethod
     def _cluster(cluster):
-        level, number = (whole(value, 'cluster') for value in cluster)
-        return level, number
+        level, number = cluster
+        return whole(level, 'cluster', bits=32), whole(number, 'cluster')
 
     def expand(self, cluster):
         """Adds the members of a cluster that is below an expanded one or the root."""
@@ -202,16 +202,16 @@ class Multiresolution:
 
     def refine(self, box, level):
         """Afterwards all points of ``level`` and above inside a box (min x, min y, max x, max y) are there."""
-        return MeshDelta(**self._core.set_region(self._flat(box), whole(level, 'level'), True, False))
+        return MeshDelta(**self._core.set_region(self._flat(box), whole(level, 'level', bits=32), True, False))
 
     def coarsen(self, box, level):
         """Collapses the clusters below ``level`` that lie inside a box."""
-        return MeshDelta(**self._core.set_region(self._flat(box), whole(level, 'level'), False, True))
+        return MeshDelta(**self._core.set_region(self._flat(box), whole(level, 'level', bits=32), False, True))
 
     def set_detail(self, level, *, focus=()):
         """All points of ``level`` and above, and in each focus, a pair (box, level), those of its level; and no others
         but those that share their clusters."""
-        return MeshDelta(**self._core.set_detail(whole(level, 'level'), self._focuses(focus)))
+        return MeshDelta(**self._core.set_detail(whole(level, 'level', bits=32), self._focuses(focus)))
 
     def snapshot(self):
         """All that there is now, as a MeshDelta that adds it."""

@@ -274,6 +274,18 @@ class Stores(StoreCase):
         with self.assertRaises(ValueError):
             terrace.build(self.points, self.path('new'), crs='EPSG:999999')
 
+    def test_numbers_that_are_too_large_are_told_by_name(self):
+        for name, call in (('level', lambda: self.scan.points(level=2 ** 32)), ('cluster', lambda: self.scan.points(cluster=(2 ** 32, 0))),
+                           ('cluster', lambda: self.scan.points(cluster=(0, 2 ** 64))), ('k', lambda: self.scan.query(near=(0, 0), k=2 ** 64)),
+                           ('threads', lambda: self.scan.verify(threads=2 ** 32)), ('memory', lambda: self.scan.surface(memory=2 ** 64)),
+                           ('most_points', lambda: self.scan.level_within(2 ** 64)), ('zooms', lambda: self.scan.tiles('', (0, 2 ** 32))),
+                           ('iterations', lambda: self.scan.mesh(smoothing={'iterations': 2 ** 32})),
+                           ('seed', lambda: terrace.kmeans(self.points, 3, seed=2 ** 64)), ('rounds', lambda: terrace.matching(self.points, rounds=2 ** 32)),
+                           ('threads', lambda: terrace.linkage(self.points, threads=2 ** 32)),
+                           ('passes', lambda: terrace.rotate_tree([[0, 1]], [[0, 0], [1, 1]], passes=2 ** 32))):
+            with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` is below 2\\^(32|64)'):
+                call()
+
     def test_a_store_may_be_closed_while_others_ask(self):
         failures = []
         for _ in range(10):
