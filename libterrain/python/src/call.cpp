@@ -76,7 +76,9 @@ Job::Job(const py::tuple& how) : progress_(how[0]), note_(how[1]) {
     };
   }
   if (!note_.is_none()) {
-    context_.note = [this](const std::string& line) { call_python([&] { note_(line); }); };
+    context_.note = [this](const std::string& line) {
+      call_python([&] { note_(message_of(line)); });
+    };
   }
 }
 

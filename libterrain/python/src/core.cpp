@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core.hpp"
 
+#include <array>
+#include <cstddef>
 #include <exception>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include <terrace/stream/error.hpp>
 #include <terrace/terrain/error.hpp>
@@ -15,6 +20,18 @@ namespace {
 
 py::handle error_type;  // terrace.Error, kept by the module
 
+/// Parameters that the libraries and the module call by different names.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kParameters{{
+    {"`channel`", "`channels`"},
+    {"`format`", "`input_format`"},
+    {"`memory_bytes`", "`memory`"},
+    {"`own_crs`", "`lonlat=False`"},
+    {"`region_crs`", "`crs`"},
+    {"`shift`", "`datum_shift`"},
+    {"`to_crs`", "`crs`"},
+    {"`zoom`", "`zooms`"},
+}};
+
 /// The library's errors as Python's: a failed system call as OSError of its kind, other faults of
 /// data as terrace.Error, values that make no sense as ValueError.
 void translate(std::exception_ptr thrown) {
@@ -22,17 +39,18 @@ void translate(std::exception_ptr thrown) {
     std::rethrow_exception(thrown);
   } catch (const stream::Error& error) {
     if (error.parts().error_number != 0) {
-      const py::tuple arguments = py::make_tuple(error.parts().error_number, error.what());
+      const py::tuple arguments =
+          py::make_tuple(error.parts().error_number, message_of(error.what()));
       PyErr_SetObject(PyExc_OSError, arguments.ptr());
     } else {
-      PyErr_SetString(error_type.ptr(), error.what());
+      PyErr_SetObject(error_type.ptr(), message_of(error.what()).ptr());
     }
   } catch (const tri::HierarchyError& error) {
-    PyErr_SetString(error_type.ptr(), error.what());
+    PyErr_SetObject(error_type.ptr(), message_of(error.what()).ptr());
   } catch (const terrain::UsageError& error) {
-    PyErr_SetString(PyExc_ValueError, error.what());
+    PyErr_SetObject(PyExc_ValueError, message_of(error.what()).ptr());
   } catch (const std::filesystem::filesystem_error& error) {
-    const py::tuple arguments = py::make_tuple(error.code().value(), error.what());
+    const py::tuple arguments = py::make_tuple(error.code().value(), message_of(error.what()));
     PyErr_SetObject(PyExc_OSError, arguments.ptr());
   } catch (const py::cast_error&) {
     PyErr_SetString(PyExc_TypeError, "an argument has a type that cannot be used here");
@@ -42,6 +60,20 @@ void translate(std::exception_ptr thrown) {
 }
 
 }  // namespace
+
+py::str text_of(std::string_view text) {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
+}
+
+py::str message_of(std::string text) {
+  for (const auto& [name, own] : kParameters) {
+    for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos; at += own.size()) {
+      text.replace(at, name.size(), own);
+    }
+  }
+  return text_of(text);
+}
 
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled half of terrace; use the package terrace.";

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+#include <string_view>
+
 #include <pybind11/pybind11.h>
 
 /// The compiled half of the Python module: conversions and calls only. One source per concept adds
@@ -9,6 +12,12 @@
 namespace terrace::python {
 
 namespace py = pybind11;
+
+/// Text that may name files, whose bytes need not be UTF-8: others become what os.fsdecode() makes
+/// of them.
+py::str text_of(std::string_view text);
+/// A message of the libraries, whose parameters are called as users of the module know them.
+py::str message_of(std::string text);
 
 void bind_build(py::module_& module);
 void bind_store(py::module_& module);

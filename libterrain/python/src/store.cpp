@@ -56,7 +56,7 @@ py::dict info_of(const OpenStore& open) {
   const Extent extent = released([&] { return extent_of(store); });
   const stream::Box3 box = world_box(schema, extent.bounds);
   py::dict info;
-  info["path"] = store.path().string();
+  info["path"] = text_of(store.path().string());
   info["points"] = extent.points.front();
   info["bytes"] = store.bytes();
   info["format"] = schema.format;

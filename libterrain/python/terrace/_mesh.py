@@ -29,7 +29,7 @@ class Mesh:
         triangles; OSError; Error."""
         path = os.fspath(path)
         with open(path, 'rb'):  # what is not there is an error of the system
-            return Mesh(*_core.read_mesh(path))
+            return Mesh(*_core.read_mesh(os.fsencode(path)))
 
     def save(self, path, replace=False):
         """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk, whole or not at all; or .svg, a picture from above."""
@@ -38,7 +38,7 @@ class Mesh:
             with open(path, 'w' if replace else 'x', encoding='ascii') as file:
                 file.write(self._svg(len(self.triangles)))
             return
-        _core.write_mesh(path, *self._parts(), bool(replace))
+        _core.write_mesh(os.fsencode(path), *self._parts(), bool(replace))
 
     def _parts(self):
         vertices = as_rows(self.vertices, 'vertices', (3,))

@@ -92,6 +92,5 @@ def write_points(path, points, *, transform=None, crs=None, nodata=None, attribu
     {'points': 2, 'nodata': 0, 'rounding': 0.0}
     """
     source, given = _reading(points, transform, crs, nodata, attributes, options, 'write_points')
-    path = os.fspath(path)
-    written, missing, rounding = _core.write_points(source, given, path, format or '', bool(replace), job(progress, threads))
+    written, missing, rounding = _core.write_points(source, given, os.fsencode(path), format or '', bool(replace), job(progress, threads))
     return {'points': written, 'nodata': missing, 'rounding': rounding}

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rasters that a store gives."""
 
+import os
+
 import numpy as np
 
 from . import _core
@@ -42,7 +44,7 @@ class Raster:
 
 
 def read_raster(path):
-    samples, valid, centres, crs = _core.read_geotiff(path)
+    samples, valid, centres, crs = _core.read_geotiff(os.fsencode(path))
     if samples.dtype.kind == 'f':
         samples[valid == 0] = np.nan
     a, b, c, d, e, f = centres

@@ -134,7 +134,7 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
     if isinstance(given, (list, tuple)) and all(isinstance(name, (str, os.PathLike)) for name in given):
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('`transform`, `nodata` and `attributes` are for arrays: files have their own')
-        return [os.fspath(name) for name in given], crs_text(crs)
+        return [os.fsencode(name) for name in given], crs_text(crs)
     records = getattr(given, 'points', given)
     if hasattr(records, 'point_format') and hasattr(records, 'scales'):  # laspy.LasData, or its points
         return (_records(records, list(records.point_format.dimension_names), '<laspy>', records.scales, records.offsets),

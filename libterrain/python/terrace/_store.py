@@ -121,7 +121,7 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     path = os.fspath(store)
     if os.path.lexists(path) and not given.get('replace'):
         raise FileExistsError(errno.EEXIST, 'exists already; give another name or replace=True', path)
-    _core.build(source, path, given, job(progress, threads, memory))
+    _core.build(source, os.fsencode(path), given, job(progress, threads, memory))
     return Store.open(path)
 
 
@@ -140,7 +140,7 @@ class Store:
         """Opens the store in a folder. Raises: FileNotFoundError; Error if it is damaged or of a newer version."""
         path = os.fspath(path)
         try:
-            return cls(_core.OpenStore(path))
+            return cls(_core.OpenStore(os.fsencode(path)))
         except _core.Error as error:
             if not os.path.lexists(path):
                 raise FileNotFoundError(errno.ENOENT, 'there is no store here', path) from error
@@ -338,7 +338,7 @@ class Store:
         Returns: a Raster: ``values``, ``transform``, ``crs``.
         """
         def make(name):
-            _core.write_raster(self._core, name, value, cell, as_region(region), (crs_text(crs) or ''), method,
+            _core.write_raster(self._core, os.fsencode(name), value, cell, as_region(region), (crs_text(crs) or ''), method,
                                whole(level, 'level', bits=32), max_edge, replace, job(progress, threads, memory))
             return read_raster(name)
 
@@ -404,7 +404,7 @@ class Store:
             heights['smoothing'] = _smoothing(**({'method': smoothing} if isinstance(smoothing, str) else smoothing))
         for name, path in (('overlay', overlay), ('save', save_overlay)):
             if path is not None:
-                heights[name] = os.fspath(path)
+                heights[name] = os.fsencode(path)
         return Mesh(*_core.mesh(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '', cluster,
                                 metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
 
@@ -457,16 +457,16 @@ class Store:
         how = job(progress, threads, memory)
 
         def make(name):
-            measured = _core.bounded_mesh(self._core, name, options, how)
+            measured = _core.bounded_mesh(self._core, os.fsencode(name), options, how)
             if measured['triangles'] == 0:  # such a file is not read as a mesh
                 return BoundedMesh(np.empty((0, 3)), np.empty((0, 3), np.uint32), measured)
-            return BoundedMesh(*_core.read_mesh(name)[:2], measured)
+            return BoundedMesh(*_core.read_mesh(os.fsencode(name))[:2], measured)
 
         if path is not None:
             path = os.fspath(path)
             if path.endswith('.ply'):
                 return make(path)
-            _core.bounded_mesh(self._core, path, options, how)
+            _core.bounded_mesh(self._core, os.fsencode(path), options, how)
         with tempfile.TemporaryDirectory() as folder:
             return make(os.path.join(folder, 'mesh.ply'))
 
@@ -483,7 +483,7 @@ class Store:
         given = checked(options, _TILE_OPTIONS, 'tiles')
         if zooms is not None:
             given['first_zoom'], given['last_zoom'] = (whole(zoom, 'zooms', bits=32) for zoom in zooms)
-        return _core.write_tiles(self._core, os.fspath(folder), given, job(progress, threads, memory))
+        return _core.write_tiles(self._core, os.fsencode(folder), given, job(progress, threads, memory))
 
     def verify(self, *, progress=None, threads=None):
         """Checks every byte and invariant. Returns: a list of faults, empty if the store is sound."""

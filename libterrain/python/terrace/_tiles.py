@@ -19,6 +19,6 @@ def verify_tiles(folder, store=None, *, max_error=None, vertical='recorded', geo
     terrace.Error if layer.json cannot be read; ValueError for a folder without tiles."""
     if store is not None and not isinstance(store, Store):
         raise TypeError(f'`store` is a Store, not {store!r}')
-    return _core.check_tiles(os.fspath(folder), None if store is None else store._core,
+    return _core.check_tiles(os.fsencode(folder), None if store is None else store._core,
                              None if max_error is None else float(max_error), vertical,
-                             '' if geoid is None else os.fspath(geoid), job(progress, threads, memory))
+                             '' if geoid is None else os.fsencode(geoid), job(progress, threads, memory))

@@ -286,6 +286,15 @@ class Stores(StoreCase):
             with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` is below 2\\^(32|64)'):
                 call()
 
+    def test_parameters_have_the_names_of_the_module(self):
+        for name, kind, call in (('radius', ValueError, lambda: self.scan.query(near=(0, 0), radius=-1)),
+                                 ('memory', terrace.Error, lambda: terrace.build(self.points, self.path('small'), memory=1000)),
+                                 ('zooms', ValueError, lambda: self.raster.tiles(self.path('deep'), (0, 99), vertical='ignore')),
+                                 ('channels', (ValueError, terrace.Error), lambda: terrace.build(
+                                     self.points, self.path('small'), channels=[('none', 1.0)]))):
+            with self.subTest(name), self.assertRaisesRegex(kind, f'`{name}`'):
+                call()
+
     def test_a_store_may_be_closed_while_others_ask(self):
         failures = []
         for _ in range(10):
@@ -575,6 +584,28 @@ class Paths(StoreCase):
                 terrace.build('cloud', '')
         finally:
             os.chdir(here)
+
+    def test_names_need_not_be_utf_8(self):
+        name = os.fsdecode(b'h\xf6he')
+        path = self.path(name)
+        with terrace.build(self.points, path) as store:
+            self.assertEqual(store.info['path'], path)
+            self.assertEqual(len(store), len(self.points))
+            repr(store)
+        with terrace.Store.open(path) as store:
+            self.assertEqual(len(store), len(self.points))
+        terrace.write_points(path + '.csv', self.points)
+        self.assertEqual(len(terrace.read_points(path + '.csv')), len(self.points))
+        mesh = self.raster.bounded_mesh(4, path=path + '.ply')
+        mesh.save(path + '.obj')
+        self.assertEqual(len(terrace.Mesh.read(path + '.obj').triangles), len(mesh.triangles))
+        self.assertEqual(self.raster.raster(path=path + '.tif').shape, self.samples.shape)
+        tiles = self.raster.tiles(path + '-tiles', (0, 8), vertical='ignore')
+        self.assertEqual(terrace.verify_tiles(path + '-tiles', self.raster, vertical='ignore')['tiles'], tiles['tiles'])
+        for missing in (terrace.Store.open, terrace.read_points, terrace.Mesh.read):
+            with self.assertRaises(FileNotFoundError) as raised:
+                missing(path + '-none')
+            self.assertIn(name, raised.exception.filename or raised.exception.strerror)
 
 
 class Lines(StoreCase):

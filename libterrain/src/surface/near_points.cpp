@@ -53,7 +53,7 @@ std::vector<stream::FoundPoint> nearest_points(stream::StoreQuery& query, const 
 std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query, const NearPlace& place,
                                               double radius, unsigned level) {
   if (!(radius >= 0.0) || !std::isfinite(radius)) {
-    throw UsageError("`within` needs a radius of 0 or more");
+    throw UsageError("`radius` must be 0 or more");
   }
   const Local here = local(query.store(), place, level);
   return query.within(here.place, radius, here.metric, level);

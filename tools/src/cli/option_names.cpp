@@ -37,6 +37,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 39> kOptions
     {"near", "--near"},
     {"outlier_price", "--outlier-price"},
     {"own_crs", "--own-crs"},
+    {"radius", "--within"},
     {"region", "--region"},
     {"region_crs", "--region-crs"},
     {"replace", "--force"},
@@ -48,7 +49,6 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 39> kOptions
     {"vertical", "--vertical"},
     {"water", "--water"},
     {"where", "--where"},
-    {"within", "--within"},
     {"zoom", "--zoom"},
 }};
 
