@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -179,6 +180,12 @@ TEST(MemorySource, RastersSkipCellsWithoutData) {
   }
   EXPECT_TRUE(expected.empty());
   EXPECT_EQ(source->progress().nodata, 8U * 18U);
+}
+
+TEST(MemorySource, EachAttributeHasAColumn) {
+  MemoryPoints points = points_of_rows({});
+  points.attributes.emplace_back();
+  EXPECT_THROW((void)open_memory(points), std::invalid_argument);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -325,6 +326,14 @@ TEST(ToWorld, LeavesPointsWithoutTransformBitForBit) {
   const auto before = block.positions;
   to_world({}, block);
   EXPECT_TRUE(same_bits(block.positions, before));
+}
+
+TEST(OpenSource, RefusesNoNamesAndBlocksOfNoPoints) {
+  EXPECT_THROW((void)open_source({}), std::invalid_argument);
+  SourceOptions options;
+  options.block_points = 0;
+  EXPECT_THROW((void)open_source(std::vector<std::string>{"points.xyz"}, options),
+               std::invalid_argument);
 }
 
 TEST(Formats, HaveNamesReadersAndDistinctEndings) {

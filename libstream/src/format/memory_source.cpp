@@ -2,9 +2,10 @@
 #include "terrace/stream/memory_source.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 
@@ -24,7 +25,11 @@ class ColumnSource final : public PointSource {
  public:
   ColumnSource(MemoryPoints points, const SourceOptions& options)
       : points_(std::move(points)), block_points_(std::max<std::size_t>(options.block_points, 1)) {
-    assert(points_.attributes.size() == points_.info.attributes.size());
+    if (points_.attributes.size() != points_.info.attributes.size()) {
+      throw std::invalid_argument("there are " + std::to_string(points_.attributes.size()) +
+                                  " columns of " + std::to_string(points_.info.attributes.size()) +
+                                  " attributes");
+    }
     points_.info.points = points_.count;
     if (options.crs) points_.info.crs = *options.crs;
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -117,7 +116,6 @@ struct HeadScope {
 /// What open_source() does but for reading ahead.
 std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                                        const SourceOptions& options) {
-  assert(!files.empty() && options.block_points > 0);
   const HeadScope scope;
   const Format& format = format_of(files.front(), options);
   bool spooled = false;
@@ -217,6 +215,8 @@ const Format* format_of_name(const std::string& file) {
 
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options) {
+  if (names.empty()) throw std::invalid_argument("there is no file to open");
+  if (options.block_points == 0) throw std::invalid_argument("block_points must be above 0");
   const std::vector<std::string> files = input_files(names, options.format);
   if (options.blocks_ahead == 0) return open_here(files, options);
   // The reading ends with the source too, not by the caller's stop alone.

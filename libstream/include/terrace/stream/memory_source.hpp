@@ -42,7 +42,7 @@ struct MemoryRaster {
 /// The points in their order. options: block_points, crs, selection and reading ahead count.
 /// Those of which a coordinate is NaN are left out and counted as nodata.
 /// Throws: Error for a selection that does not suit; in next() for an infinite coordinate, naming
-/// the point.
+/// the point; std::invalid_argument unless each attribute has a column.
 std::unique_ptr<PointSource> open_memory(MemoryPoints points, const SourceOptions& options = {});
 
 /// The samples as points, as from points_of(). Samples without data are those that equal

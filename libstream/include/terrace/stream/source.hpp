@@ -179,7 +179,7 @@ struct SourceOptions {
 /// relative to its folder, without blank lines and those that begin with #; a name with *, ? or
 /// [...] that is not an existing file for the files that match the pattern, in which a part ** of
 /// the path stands for any number of folders. Throws: Error, Stopped;
-/// std::invalid_argument for a format that is not known.
+/// std::invalid_argument for a format that is not known, without a name, or for blocks of 0 points.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 
