@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,13 +18,22 @@
 namespace terrace::python {
 namespace {
 
+/// The heights of vertices. Throws: ValueError unless there is one for each number of vertex.
+template <class Mesh>
+std::span<const double> heights_of(std::span<const double> values, const Mesh& mesh) {
+  if (values.size() >= mesh.vertex_slots()) return values;
+  throw py::value_error("there are " + std::to_string(values.size()) + " `values` for " +
+                        std::to_string(mesh.vertex_slots()) +
+                        " numbers of vertices; by_vertex() puts them in order");
+}
+
 py::array heights(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& places,
                   const std::string& method, unsigned threads) {
   const tri::Interpolation how = interpolation_named(method);
-  const auto values = numbers_of(given, "heights");
+  const auto values = numbers_of(given, "values");
   const auto asked = rows_of<2>(places, "places");
   return to_array(shared.read(asked.size(), [&](const auto& mesh) {
-    return heights_at(mesh, values, asked, how, threads);
+    return heights_at(mesh, heights_of(values, mesh), asked, how, threads);
   }));
 }
 
@@ -66,11 +76,9 @@ py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const st
 
 /// Rows of min angle, aspect, area, surface area, volume above, volume below.
 py::array triangle_quality(SharedDelaunay2& shared, const Array<double>& given, double datum) {
-  const auto values = numbers_of(given, "heights");
+  const auto values = numbers_of(given, "values");
   return to_array(shared.read(0, [&](const auto& mesh) {
-    if (values.size() < mesh.vertex_slots()) {
-      throw std::invalid_argument("there are fewer heights than vertices");
-    }
+    (void)heights_of(values, mesh);
     std::vector<std::array<double, 6>> rows;
     for (const tri::TriangleId t : mesh.all_triangles()) {
       const tri::TriangleQuality of = tri::triangle_quality(mesh, values, t, datum);
@@ -84,10 +92,10 @@ py::array triangle_quality(SharedDelaunay2& shared, const Array<double>& given, 
 py::dict distances(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& points,
                    const std::string& method, unsigned threads) {
   const tri::Interpolation how = interpolation_named(method);
-  const auto values = numbers_of(given, "heights");
+  const auto values = numbers_of(given, "values");
   const auto samples = rows_of<3>(points, "samples");
   const tri::VerticalDistances made = shared.read(samples.size(), [&](const auto& mesh) {
-    return vertical_distances(mesh, values, samples, how, threads);
+    return vertical_distances(mesh, heights_of(values, mesh), samples, how, threads);
   });
   py::dict result;
   result["count"] = made.count;
@@ -106,12 +114,13 @@ py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
   const auto how = named<GradientFrom>(
       method, "method",
       {{"linear", GradientFrom::kTriangles}, {"natural", GradientFrom::kNaturalNeighbours}});
-  const auto values = numbers_of(given, "heights");
+  const auto values = numbers_of(given, "values");
   const auto asked = rows_of<2>(places, "places");
   return to_array(shared.read(asked.size(), [&](const auto& mesh) {
     std::vector<std::array<double, 2>> rows;
     rows.reserve(asked.size());
-    for (const tri::Gradient& g : gradients_at(mesh, values, asked, how, threads)) {
+    for (const tri::Gradient& g :
+         gradients_at(mesh, heights_of(values, mesh), asked, how, threads)) {
       rows.push_back({g.x, g.y});
     }
     return rows;
@@ -127,7 +136,7 @@ py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
                                       .strength = strength,
                                       .pass_band = pass_band,
                                       .edge_height = edge_height};
-  const auto values = numbers_of(given, "heights");
+  const auto values = numbers_of(given, "values");
   std::span<const std::int32_t> only;
   if (vertices) only = numbers_of(*vertices, "vertices");
   return to_array(shared.read(values.size() * iterations, [&](const auto& mesh) {
@@ -138,7 +147,7 @@ py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
       region = shared.checked(only);
     }
     std::vector<double> result(values.begin(), values.end());
-    for (const auto& [vertex, height] : smooth(mesh, values, region, options)) {
+    for (const auto& [vertex, height] : smooth(mesh, heights_of(values, mesh), region, options)) {
       result[slot(vertex)] = height;
     }
     return result;
@@ -147,9 +156,10 @@ py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
 
 py::dict quality(SharedDelaunay2& shared, const Array<double>& given, double datum,
                  std::size_t bins) {
-  const auto values = numbers_of(given, "heights");
-  const tri::MeshQuality made =
-      shared.read(0, [&](const auto& mesh) { return mesh_quality(mesh, values, datum, bins); });
+  const auto values = numbers_of(given, "values");
+  const tri::MeshQuality made = shared.read(0, [&](const auto& mesh) {
+    return mesh_quality(mesh, heights_of(values, mesh), datum, bins);
+  });
   py::dict result;
   result["triangles"] = made.triangles;
   result["min_angle"] = made.min_angle_degrees;

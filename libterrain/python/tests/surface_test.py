@@ -249,6 +249,11 @@ class Interpolation(unittest.TestCase):
     def test_misuse(self):
         mesh = terrace.Delaunay2(self.xy)
         z = mesh.by_vertex(self.z)
+        short, samples = z[:-5], np.zeros((1, 3))
+        for wrong in (lambda: mesh.heights(short, self.asked), lambda: mesh.gradients(short, self.asked), lambda: mesh.smooth(short),
+                      lambda: mesh.quality(short), lambda: mesh.triangle_quality(short), lambda: mesh.vertical_distances(short, samples)):
+            with self.assertRaisesRegex(ValueError, '`values`.*by_vertex'):
+                wrong()
         for wrong in (lambda: mesh.by_vertex(self.z[:-1]), lambda: mesh.heights(z[:-5], self.asked),
                       lambda: mesh.heights(z, [[np.nan, 0]]), lambda: mesh.heights(z, self.asked, 'cubic'),
                       lambda: mesh.gradients(z, self.asked, 'nearest'), lambda: mesh.smooth(z, strength=2.0),
