@@ -56,7 +56,7 @@ def region(given):
     if isinstance(given, dict):
         try:
             polygons = _polygons(given)
-        except (KeyError, IndexError, TypeError, AttributeError) as fault:
+        except (KeyError, IndexError, TypeError, AttributeError, RecursionError) as fault:
             raise ValueError('`region` is not GeoJSON of polygons') from fault
         if not polygons:
             raise ValueError('`region` has no polygons')

@@ -286,6 +286,12 @@ class Stores(StoreCase):
             with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` is below 2\\^(32|64)'):
                 call()
 
+    def test_a_region_that_is_nested_without_end_is_refused(self):
+        endless = {'type': 'GeometryCollection'}
+        endless['geometries'] = [endless]
+        with self.assertRaisesRegex(ValueError, 'not GeoJSON'):
+            self.scan.points(endless)
+
     def test_parameters_have_the_names_of_the_module(self):
         for name, kind, call in (('radius', ValueError, lambda: self.scan.query(near=(0, 0), radius=-1)),
                                  ('memory', terrace.Error, lambda: terrace.build(self.points, self.path('small'), memory=1000)),
