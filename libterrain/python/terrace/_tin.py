@@ -49,8 +49,10 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
         raise TypeError('bounded_mesh() takes arrays; build() takes files')
     if 'columns' in source:
         frame = np.empty((0, 3)) if frame is None else as_rows(frame, 'frame', (3,))
-        coordinates = np.array([_values(column) for column in source['columns']])
-        coordinates = coordinates[:, ~np.isnan(coordinates).any(axis=0)]
+        coordinates = [_values(column) for column in source['columns']]
+        known = ~(np.isnan(coordinates[0]) | np.isnan(coordinates[1]) | np.isnan(coordinates[2]))
+        if not known.all():
+            coordinates = [column[known] for column in coordinates]
         return BoundedMesh(*_core.tin_of_points(*coordinates, bound, most, quality, duplicates, float(min_angle), frame))
     if frame is not None:
         raise ValueError('`frame` is for points')
