@@ -407,6 +407,12 @@ TEST(KMeans, RefusesBadInput) {
   }
 }
 
+TEST(KMeans, APointOfItsOwnStandsForAClusterBeyondAllNumbers) {
+  const std::vector<Point3> points{{0, 0, 0}, {1.7e308, 0, 0}, {1.6e308, 0, 0}};
+  EXPECT_EQ(nearest_to_means(points, std::vector<std::uint32_t>{0, 1, 1}, 2),
+            (std::vector<std::uint32_t>{0, 1}));
+}
+
 TEST(KMeans, APointStandsForEachCluster) {
   std::mt19937_64 random(9);
   for (int round = 0; round < 20; ++round) {

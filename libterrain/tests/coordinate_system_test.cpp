@@ -66,6 +66,7 @@ TEST(CoordinateSystem, FilesOfArcInfosOldFormAreRead) {
         utm + "ZONE 18\nDATUM NAD83\nYSHIFT -10000000\n", utm + "ZONE 18\nDATUM WGS84\nXSHIFT 5\n",
         std::string("Projection GEOGRAPHIC\nDatum WGS84\nUnits DS\n"),
         std::string("Projection GEOGRAPHIC\nDatum WGS84\nUnits DD\nZunits FEET\n"),
+        std::string("Projection GEOGRAPHIC\nDatum WGS84\nUnits DD\nYshift +10000000\n"),
         std::string("Projection ALBERS\nDatum WGS84\nUnits METERS\n"), std::string("Projection")}) {
     EXPECT_THROW(code_of(text), UsageError) << text;
   }

@@ -255,7 +255,8 @@ std::vector<std::uint32_t> nearest_to_means(std::span<const Point3> points,
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const std::uint32_t c = labels[i];
     const double d = distance(Euclidean{}, mean[c], points[i]);
-    if (d < least[c]) {
+    // Where sums overflow, no distance is finite: the first point then stands for the cluster.
+    if (d < least[c] || labels[nearest[c]] != c) {
       least[c] = d;
       nearest[c] = i;
     }

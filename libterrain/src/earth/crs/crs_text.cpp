@@ -133,11 +133,12 @@ CrsDefinition definition_of_arcinfo(const std::string& text) {
                                           {"nad83", 4269, 26900, 0},
                                           {"nad27", 4267, 26700, 0}}};
   const auto word = [&](const char* key) { return plain_name(values[key]); };
+  // What is no number is refused like a number that is not known.
   const auto number = [&](const char* key) {
     const std::string& value = values[key];
     double parsed = 0;
-    std::from_chars(value.data(), value.data() + value.size(), parsed);
-    return parsed;
+    const char* const end = value.data() + value.size();
+    return value.empty() || std::from_chars(value.data(), end, parsed).ptr == end ? parsed : NAN;
   };
   const auto datum = std::find_if(kDatums.begin(), kDatums.end(),
                                   [&](const Datum& one) { return word("datum") == one.name; });
