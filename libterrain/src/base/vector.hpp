@@ -26,20 +26,4 @@ inline std::array<double, 3> unit(const std::array<double, 3>& v) {
   return {v[0] / length, v[1] / length, v[2] / length};
 }
 
-/// How much of a surface is steeper than 60 degrees: above half of it, the triangles join the upper
-/// and the lower side of a body that was triangulated as if it were a terrain.
-class Steepness {
- public:
-  /// `normal`: of a triangle, as long as its area, or all by the same factor longer.
-  void add(const std::array<double, 3>& normal) {
-    const double area = std::sqrt(dot(normal, normal));
-    all_ += area;
-    if (std::abs(normal[2]) < 0.5 * area) steep_ += area;
-  }
-  [[nodiscard]] bool mostly() const { return steep_ > 0.5 * all_; }
-
- private:
-  double steep_ = 0, all_ = 0;
-};
-
 }  // namespace terrace::terrain

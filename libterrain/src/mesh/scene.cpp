@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/portable_math.hpp"
+#include "base/steepness.hpp"
 #include "base/vector.hpp"
 
 namespace terrace::terrain {

@@ -6,6 +6,7 @@
 
 #include <terrace/tri/delaunay2.hpp>
 
+#include "base/steepness.hpp"
 #include "base/vector.hpp"
 #include "terrace/terrain/store_source.hpp"
 #include "terrace/terrain/store_view.hpp"
