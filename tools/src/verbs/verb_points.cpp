@@ -23,6 +23,7 @@
 #include "tables/point_table.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/detail_points.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
