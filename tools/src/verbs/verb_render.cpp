@@ -20,6 +20,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
 #include "cli/output.hpp"
+#include "cli/selection_options.hpp"
 #include "earth/ground.hpp"
 #include "mesh/height_grid.hpp"
 #include "mesh/scene.hpp"

@@ -14,6 +14,7 @@
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
+#include "cli/selection_options.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tile_check.hpp"
 #include "verbs/verbs.hpp"
