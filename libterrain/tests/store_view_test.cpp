@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/terrain/store_view.hpp"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <random>
@@ -260,6 +263,137 @@ TEST_F(StoreViews, MeshesOfALevelHaveNoTrianglesOverGaps) {
     tri::Delaunay2<double> delaunay;
     for (const stream::Point3& p : mesh.positions) delaunay.insert({p[0], p[1]});
     EXPECT_EQ(mesh.triangles.size(), delaunay.triangle_count());
+  }
+}
+
+using Places = std::vector<Point2>;
+
+/// The part of a convex polygon to the left of a line.
+Places left_of(const Point2& from, const Point2& to, const Places& polygon) {
+  const auto side = [&](const Point2& p) {
+    return (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0]);
+  };
+  Places result;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point2 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double at_a = side(a), at_b = side(b);
+    if (at_a >= 0) result.push_back(a);
+    if ((at_a > 0 && at_b < 0) || (at_a < 0 && at_b > 0)) {
+      const double part = at_a / (at_a - at_b);
+      result.push_back({a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])});
+    }
+  }
+  return result;
+}
+
+double area_of(const Places& polygon) {
+  double twice = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point2 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    twice += a[0] * b[1] - a[1] * b[0];
+  }
+  return twice / 2;
+}
+
+/// How much of a triangle is over squares of four samples with data, or over the half of a square
+/// that has three.
+template <class HasData>
+double area_with_data(const Places& triangle, const HasData& has_data) {
+  std::array<double, 2> low{HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL};
+  for (const Point2& p : triangle) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  double area = 0;
+  for (double y = low[1]; y < high[1]; ++y) {
+    for (double x = low[0]; x < high[0]; ++x) {
+      Places piece;
+      for (const Point2& corner : Places{{x, y}, {x + 1, y}, {x + 1, y + 1}, {x, y + 1}}) {
+        if (has_data(corner)) piece.push_back(corner);
+      }
+      if (piece.size() < 3) continue;
+      Places part = triangle;
+      for (std::size_t i = 0; i < piece.size(); ++i) {
+        part = left_of(piece[i], piece[(i + 1) % piece.size()], part);
+      }
+      area += area_of(part);
+    }
+  }
+  return area;
+}
+
+// By the definition of the surface, whatever the ellipses are and wherever data is missing: no
+// triangle reaches over cells without data, and all of the land is covered once.
+TEST_F(StoreViews, MeshesByAMetricCoverWhatMeshesWithoutCover) {
+  std::mt19937 random(5);
+  const auto number = [&](double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random);
+  };
+  for (int round = 0; round < 4; ++round) {
+    SCOPED_TRACE(round);
+    // Scattered voids, lakes, and a sea with a rugged coast.
+    const double share = number(0, 0.1), radius = number(5, 60), coast = number(150, 290);
+    std::vector<bool> data;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      for (std::uint32_t column = 0; column < kColumns; ++column) {
+        const bool lake = std::hypot(column - 90.0, row - 120.0) < radius;
+        const bool sea = column + 9 * std::sin(row / 4.0) > coast;
+        data.push_back(!lake && !sea && number(0, 1) > share);
+      }
+    }
+    const auto has_data = [&](std::uint32_t column, std::uint32_t row) {
+      return static_cast<bool>(data[row * kColumns + column]);
+    };
+    const stream::Store store =
+        build("voids" + std::to_string(round), {1, 0, 0, 0, -1, 0}, 32632, has_data);
+    for (int turn = 0; turn < 3; ++turn) {
+      const std::string path = (folder_.path() / "metric.json").string();
+      std::ofstream(path) << R"({"regions":[{"box":[40,-200,250,-20],"semi_axes":[)"
+                          << number(1, turn == 2 ? 30 : 4) << R"(,1],"angle":)" << number(0, 180)
+                          << R"(},{"semi_axes":[)" << number(1, 3) << R"(,1],"angle":)"
+                          << number(0, 180) << "}]}";
+      DetailMeshOptions options;
+      options.metric = MetricChoice::parse("elliptical:" + path);
+      for (unsigned level = 0; level <= store.top(); ++level) {
+        const TriangleMesh plain = detail_mesh(store, {.level = level});
+        const TriangleMesh mesh = detail_mesh(store, {.level = level}, options);
+        EXPECT_EQ(mesh.positions.size(), plain.positions.size());
+        EXPECT_EQ(mesh.triangles.size(), plain.triangles.size());
+        if (level > 0) continue;
+        double covered = 0, over_voids = 0, land = 0;
+        std::size_t slanted = 0;
+        for (const auto& corners : mesh.triangles) {
+          Places triangle;
+          double length = 0;
+          for (const std::uint32_t corner : corners) {
+            const stream::Point3& p = mesh.positions[corner];
+            triangle.push_back({std::round(p[0]), std::round(p[1])});
+            length = std::max(length, std::hypot(triangle.back()[0] - triangle[0][0],
+                                                 triangle.back()[1] - triangle[0][1]));
+          }
+          slanted += length > 1.5;
+          const double area = area_of(triangle);
+          ASSERT_GT(area, 0);
+          covered += area;
+          over_voids += area - area_with_data(triangle, [&](const Point2& p) {
+                          return has_data(static_cast<std::uint32_t>(p[0]),
+                                          static_cast<std::uint32_t>(-p[1]));
+                        });
+        }
+        for (const auto& corners : plain.triangles) {
+          Places triangle;
+          for (const std::uint32_t corner : corners) {
+            triangle.push_back({plain.positions[corner][0], plain.positions[corner][1]});
+          }
+          land += area_of(triangle);
+        }
+        EXPECT_NEAR(covered, land, 1e-6);
+        EXPECT_NEAR(over_voids, 0, 1e-6);
+        if (turn == 2) EXPECT_GT(slanted, 1000u);
+      }
+    }
   }
 }
 

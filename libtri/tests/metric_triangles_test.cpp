@@ -142,6 +142,25 @@ TYPED_TEST(MetricTriangles, AreOfThePointsAlone) {
   }
 }
 
+TYPED_TEST(MetricTriangles, CoverWhatTheTrianglesThatTakePartCover) {
+  for (const PointSet kind : kPointSets) {
+    SCOPED_TRACE(name(kind));
+    const auto points = make_points<TypeParam>(kind, 600, 44);
+    Delaunay2<TypeParam> triangulation;
+    triangulation.build(points);
+    const MetricField2 field = three_regions(points);
+    const auto takes_part = [](TriangleId id) { return slot(id) % 7 != 3; };
+    std::vector<Corners> before;
+    for (const TriangleId id : triangulation.all_triangles()) {
+      if (takes_part(id)) before.push_back(corners_of(triangulation, triangulation.vertices(id)));
+    }
+    std::sort(before.begin(), before.end());
+    check(before, corners_of_all(triangulation, metric_triangles(triangulation, field, takes_part)),
+          field);
+    if (this->HasFailure()) return;
+  }
+}
+
 TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
   std::vector<LinearMap2> maps = lower_maps();
   maps.push_back(ellipse_map(7, 1, 25));

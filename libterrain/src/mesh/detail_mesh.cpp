@@ -253,12 +253,17 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
     // Points without a triangle (fewer than three, or all on one line) are written all the same.
     for (const tri::VertexId v : triangulation.all_vertices()) number_of(v);
   }
-  const auto add = [&](std::array<tri::VertexId, 3> corners) {
-    if constexpr (std::is_same_v<decltype(triangulation.point(corners[0])),
-                                 std::array<std::int32_t, 2>>) {
-      const auto place = [&](std::size_t i) { return triangulation.point(corners[i]); };
-      if (collapsed && collapsed->leave_gap({place(0), place(1), place(2)})) return;
+  // The rule for gaps is one for Delaunay triangles, so it comes before the metric.
+  const auto has_data = [&](tri::TriangleId t) {
+    const auto corners = triangulation.vertices(t);
+    const auto place = [&](std::size_t i) { return triangulation.point(corners[i]); };
+    if constexpr (std::is_same_v<decltype(place(0)), std::array<std::int32_t, 2>>) {
+      return !(collapsed && collapsed->leave_gap({place(0), place(1), place(2)}));
+    } else {
+      return true;
     }
+  };
+  const auto add = [&](std::array<tri::VertexId, 3> corners) {
     if (mirrored) std::swap(corners[1], corners[2]);
     if (region &&
         !region->touches({position(corners[0]), position(corners[1]), position(corners[2])})) {
@@ -267,9 +272,11 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
     mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
   };
   if (field) {
-    for (const auto& corners : tri::metric_triangles(triangulation, *field)) add(corners);
+    for (const auto& corners : tri::metric_triangles(triangulation, *field, has_data)) add(corners);
   } else {
-    for (const tri::TriangleId t : triangulation.all_triangles()) add(triangulation.vertices(t));
+    for (const tri::TriangleId t : triangulation.all_triangles()) {
+      if (has_data(t)) add(triangulation.vertices(t));
+    }
   }
   return mesh;
 }

@@ -10,10 +10,11 @@
 
 namespace terrace::terrain {
 
-/// Whether a triangle spans samples without data, in a triangulation of some clusters of a raster:
-/// its corners are not neighbours in columns and rows, and its centroid is farther than a cell from
-/// the boxes of all clusters that are not expanded. A sample within a cell of the centroid is
-/// either in such a box or a vertex, so that a raster without gaps has no such triangle.
+/// Whether a triangle spans samples without data, in the Delaunay triangulation, without a metric,
+/// of some clusters of a raster: its corners are not neighbours in columns and rows, and its
+/// centroid is farther than a cell from the boxes of all clusters that are not expanded. A sample
+/// within a cell of the centroid is either in such a box or a vertex, so that a raster without gaps
+/// has no such triangle.
 ///
 /// far(cells): whether the columns and rows within a cell of a place, with heights {0, 0}, are free
 /// of such boxes.

@@ -23,9 +23,9 @@ class Flips {
  public:
   template <class Triangulation>
   Flips(const Triangulation& triangulation, const MetricField2& field,
-        const std::optional<Box3>& window)
+        const TriangleFilter& takes_part)
       : point_(triangulation.vertex_slots()), region_(triangulation.vertex_slots(), kNoRegion) {
-    if (!window) mesh_.triangle.reserve(triangulation.triangle_count());
+    if (!takes_part) mesh_.triangle.reserve(triangulation.triangle_count());
     // The dense number of each participating triangle.
     std::vector<std::uint32_t> number(triangulation.triangle_slots(), kNone);
     for (const TriangleId id : triangulation.all_triangles()) {
@@ -34,7 +34,7 @@ class Flips {
         const auto p = triangulation.point(v);
         point_[slot(v)] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
       }
-      if (window && !meets(*window, corners)) continue;
+      if (takes_part && !takes_part(id)) continue;
       number[slot(id)] = static_cast<std::uint32_t>(mesh_.triangle.size());
       mesh_.triangle.push_back({{slot(corners[0]), slot(corners[1]), slot(corners[2])}, {}});
     }
@@ -96,16 +96,6 @@ class Flips {
  private:
   using Point = EllipticalKernel::Point;
 
-  [[nodiscard]] bool meets(const Box3& window, const std::array<VertexId, 3>& corners) const {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const auto [least, most] =
-          std::minmax({point_[slot(corners[0])][axis], point_[slot(corners[1])][axis],
-                       point_[slot(corners[2])][axis]});
-      if (!(least <= window.max[axis] && window.min[axis] <= most)) return false;
-    }
-    return true;
-  }
-
   void find_regions(const MetricField2& field, const LinearMap2& given) {
     std::map<LinearMap2, std::uint32_t> known;
     for (const Triangle& t : mesh_.triangle) {
@@ -148,19 +138,42 @@ class Flips {
 template <class Triangulation>
 std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& triangulation,
                                                       const MetricField2& field,
-                                                      const std::optional<Box3>& window) {
-  Flips flips(triangulation, field, window);
+                                                      const TriangleFilter& takes_part) {
+  Flips flips(triangulation, field, takes_part);
   flips.run();
   return flips.result();
 }
 
+template <class Triangulation>
+std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& triangulation,
+                                                      const MetricField2& field,
+                                                      const Box3& window) {
+  return metric_triangles(triangulation, field, [&](TriangleId id) {
+    const auto corners = triangulation.vertices(id);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto at = [&](std::size_t i) {
+        return static_cast<double>(triangulation.point(corners[i])[axis]);
+      };
+      const auto [least, most] = std::minmax({at(0), at(1), at(2)});
+      if (!(least <= window.max[axis] && window.min[axis] <= most)) return false;
+    }
+    return true;
+  });
+}
+
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<std::int32_t>&,
                                                                const MetricField2&,
-                                                               const std::optional<Box3>&);
+                                                               const TriangleFilter&);
+template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<std::int32_t>&,
+                                                               const MetricField2&, const Box3&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
                                                                const MetricField2&,
-                                                               const std::optional<Box3>&);
+                                                               const TriangleFilter&);
+template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
+                                                               const MetricField2&, const Box3&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(
-    const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const std::optional<Box3>&);
+    const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const TriangleFilter&);
+template std::vector<std::array<VertexId, 3>> metric_triangles(
+    const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const Box3&);
 
 }  // namespace terrace::tri

@@ -36,7 +36,8 @@ struct HeightOptions {
 struct DetailMeshOptions {
   HeightOptions heights{};
   /// Elliptical: triangles within a region suit its metric on the ground (see
-  /// tri::metric_triangles); outside all regions nothing changes.
+  /// tri::metric_triangles); outside all regions nothing changes. What triangles cover, and how
+  /// many there are, does not depend on the metric.
   MetricChoice metric{};
 };
 

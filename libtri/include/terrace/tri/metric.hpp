@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -142,6 +141,9 @@ using MetricField3 = MetricField<3>;
 extern template class MetricField<2>;
 extern template class MetricField<3>;
 
+/// Chooses triangles of a triangulation; empty: all of them.
+using TriangleFilter = std::function<bool(TriangleId)>;
+
 /// The triangles of a triangulation after flipping edges to suit a field of metrics (7.4, figures
 /// 7.15 and 7.16). Vertices and hull are those of the triangulation, which is not changed; every
 /// triangle is counter-clockwise, starts with its lexicographically smallest corner, and has a
@@ -161,12 +163,13 @@ extern template class MetricField<3>;
 /// and the volume below the surface of squared lengths in that region's metric decreases. So no
 /// particular order and no guard is needed. In-circle tests are exact on the given coordinates.
 ///
-/// window: triangles whose bounding box does not meet it are left out beforehand, and the edges
-/// next to those stay; only x and y count. The guarantees then apply to the triangles of the
-/// window.
+/// takes_part: triangles for which it is false are left out beforehand, such as those over places
+/// without data, and the edges next to them stay. The result covers what the other triangles cover,
+/// with as many triangles; the guarantees apply to those. It is called once for each triangle.
+/// window: leaves out the triangles whose bounding box does not meet it; only x and y count.
 ///
 /// Throws: std::invalid_argument if the field gives a map at a vertex that is not a metric, and
-/// whatever the field throws. The map is evaluated once per vertex (of the window). Costs O(n)
+/// whatever the field throws. The map is evaluated once per vertex of these triangles. Costs O(n)
 /// besides the flips; O(n^2) flips are possible, but there are few unless ellipses are extreme.
 /// Holds about 120 bytes per vertex while it runs, including the result.
 ///
@@ -174,7 +177,10 @@ extern template class MetricField<3>;
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field,
-    const std::optional<Box3>& window = std::nullopt);
+    const TriangleFilter& takes_part = {});
+template <class Triangulation>
+[[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
+    const Triangulation& triangulation, const MetricField2& field, const Box3& window);
 
 struct MetricTetrahedra {
   /// In order (see Delaunay3); which corner comes first has no meaning.
