@@ -1,23 +1,39 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the build into a temporary folder; then every public header must compile with nothing but
-# its own library's pkg-config flags, and consumer.cpp, which uses all five, must build and run.
+# Installs the build into a temporary folder and uses it from there, away from its prefix, as programs of others do:
+# - no installed text file names the source or the build folder, or a library by its absolute path;
+# - every public header compiles with nothing but its own library's pkg-config flags;
+# - consumer.cpp, which uses all five libraries, links by pkg-config and runs;
+# - the CMake lines of each library's README build and run use_LIBRARY.cpp.
+# The same CMake projects are then built with shared libraries (see below).
 # Usage: install_test.sh BUILD SOURCE PREFIX LIBDIR STATIC-OR-SHARED COMPILER...
 set -eu
 build=$1 source=$2 prefix=$3 libdir=$4 kind=$5
 shift 5
+libraries='stream cluster matching tri terrain'
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 meson install -C "$build" --no-rebuild --quiet --destdir "$folder/root"
 installed=$folder/root$prefix
 export PKG_CONFIG_PATH="$installed/$libdir/pkgconfig"
+# Elsewhere than at its prefix, whether the build was set up with relocatable files or not.
 flags() { pkg-config --define-variable=prefix="$installed" "$@"; }
+fail() { echo "install_test: $*"; exit 1; }
 
-for library in stream cluster matching tri terrain; do
+# No path of the machine that built it.
+! grep -rIlF -e "$source" -e "$build" "$installed" || fail 'these installed files name the source or the build folder'
+for library in $libraries; do
+  if sed -E '/^prefix=/d; s/\$\{[a-z]+\}[^ ]*//g' "$installed/$libdir/pkgconfig/terrace-$library.pc" | grep -E '(^|[ =])(-[LI])?/'; then
+    fail "terrace-$library.pc has an absolute path"
+  fi
+done
+! grep -E '[" ;]/' "$installed/$libdir"/cmake/terrace/*.cmake || fail 'the CMake package has an absolute path'
+
+for library in $libraries; do
   (cd "$source/lib$library/include" && find . -name '*.hpp') | sed 's,^\./,,' | sort >"$folder/expected"
   (cd "$installed/include" && find "terrace/$library" -name '*.hpp') | sort >"$folder/found"
-  diff "$folder/expected" "$folder/found" || { echo "the installed headers of $library differ"; exit 1; }
+  diff "$folder/expected" "$folder/found" || fail "the installed headers of $library differ"
   sed 's,.*,#include <&>,' "$folder/found" >"$folder/headers.cpp"
   # shellcheck disable=SC2046  # flags are words
   "$@" $(flags --cflags "terrace-$library") -fsyntax-only "$folder/headers.cpp"
@@ -29,3 +45,61 @@ if [ "$kind" = static ]; then static=--static; else static=; fi
   $(flags --cflags --libs $static terrace-terrain terrace-stream terrace-cluster terrace-matching terrace-tri)
 mkdir "$folder/work"
 LD_LIBRARY_PATH="$installed/$libdir" "$folder/consumer" "$folder/work"
+
+command -v cmake >/dev/null || fail 'cmake is missing'
+# with_cmake NAME PREFIX: each ```cmake block of each README makes a program of its own of one project. Anything that is
+# found elsewhere than in PREFIX would hide a fault, so the project is configured without other packages of terrace.
+with_cmake() {
+  project=$folder/project-$1
+  mkdir "$project"
+  cat >"$project/CMakeLists.txt" <<'CMAKE'
+cmake_minimum_required(VERSION 3.16)
+project(stranger CXX)
+CMAKE
+  for library in $libraries; do
+    awk -v stem="$project/${library}_" '/^```cmake$/ { n += 1; file = stem n ".cmake"; next } /^```$/ { file = "" } file { print > file }' \
+      "$source/lib$library/README.md"
+    [ -f "$project/${library}_2.cmake" ] || fail "lib$library/README.md does not have two blocks of CMake"
+    for block in "$project/${library}"_*.cmake; do
+      target=$(basename "$block" .cmake)
+      mkdir "$project/$target"
+      {
+        echo "add_executable($target \"$source/tests/install/use_$library.cpp\")"
+        sed "s/my_program/$target/" "$block"
+      } >"$project/$target/CMakeLists.txt"
+      echo "add_subdirectory($target)" >>"$project/CMakeLists.txt"
+    done
+  done
+  PKG_CONFIG_PATH="$2/$libdir/pkgconfig" cmake -S "$project" -B "$project/build" -DCMAKE_PREFIX_PATH="$2" \
+    -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE= -Wdev -Werror=dev >"$project/log" 2>&1 &&
+    cmake --build "$project/build" --parallel 2 >>"$project/log" 2>&1 || { tail -n 60 "$project/log"; fail "$1"; }
+  for block in "$project"/*_[0-9].cmake; do
+    target=$(basename "$block" .cmake)
+    LD_LIBRARY_PATH="$2/$libdir" "$project/build/$target/$target" || fail "$1: $target failed"
+  done
+}
+for compiler; do case $compiler in *ccache) ;; *) break ;; esac; done
+with_cmake "$kind" "$installed"
+
+# A build of shared libraries differs in its lists of what programs link. Its libraries are made of the objects at hand.
+if [ "$kind" = static ]; then
+  meson setup "$folder/shared-build" "$source" -Ddefault_library=shared -Dprefix="$prefix" -Dlibdir="$libdir" -Dterrace_tests=disabled \
+    -Dterrace_python=disabled -Dterrace_bench=disabled -Dbuildtype=plain >"$folder/log" 2>&1 || { tail -n 30 "$folder/log"; exit 1; }
+  shared=$folder/shared/$libdir
+  mkdir -p "$shared/cmake/terrace" "$shared/pkgconfig"
+  cp -R "$installed/include" "$folder/shared/"
+  cp "$folder"/shared-build/meson-private/terrace-*.pc "$shared/pkgconfig"
+  cp "$folder"/shared-build/cmake/*.cmake "$shared/cmake/terrace"
+  for library in stream cluster matching tri terrain; do
+    case $library in
+      terrain) siblings='-lterracestream -lterracecluster -lterracetri' ;;
+      *) siblings= ;;
+    esac
+    name=$(sed -n "s/.*terrace_file_$library \"\(.*\)\".*/\1/p" "$shared/cmake/terrace/terrace-config.cmake")
+    # shellcheck disable=SC2046,SC2086
+    "$@" -shared -o "$shared/$name" -Wl,-soname,"$name" -Wl,--whole-archive "$installed/$libdir/libterrace$library.a" \
+      -Wl,--no-whole-archive -L"$shared" $siblings $(flags --libs-only-l "terrace-$library" | tr ' ' '\n' | grep -v '^-lterrace')
+    ln -s "$name" "$shared/libterrace$library.so"
+  done
+  with_cmake shared "$folder/shared"
+fi

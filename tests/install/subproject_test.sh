@@ -27,36 +27,7 @@ executable('use_$library', 'use_$library.cpp', override_options : 'unity=off',
   dependencies : dependency('terrace-$library'))
 BUILD
 done
-cat >"$folder/use_stream.cpp" <<'CODE'
-#include <terrace/stream/source.hpp>
-int main() { return terrace::stream::size_of(terrace::stream::ScalarType::f64) == 8 ? 0 : 1; }
-CODE
-cat >"$folder/use_cluster.cpp" <<'CODE'
-#include <terrace/cluster/block.hpp>
-int main() {
-  terrace::cluster::BlockClustering result;
-  const std::vector<terrace::cluster::Point3> points{{1, 2, 3}};
-  terrace::cluster::BlockClusterer().run(points, {}, {}, result);
-  return result.facilities.size() == 1 ? 0 : 1;
-}
-CODE
-cat >"$folder/use_matching.cpp" <<'CODE'
-#include <terrace/matching/assignment.hpp>
-int main() { return terrace::matching::assign(std::vector<double>{3.0}, 1, 1).cost == 3.0 ? 0 : 1; }
-CODE
-cat >"$folder/use_tri.cpp" <<'CODE'
-#include <terrace/tri/delaunay2.hpp>
-int main() {
-  terrace::tri::Delaunay2<int> triangulation;
-  triangulation.insert({1, 2});
-  return triangulation.vertex_count() == 1 ? 0 : 1;
-}
-CODE
-
-cat >"$folder/use_terrain.cpp" <<'CODE'
-#include <terrace/terrain/context.hpp>
-int main() { return terrace::terrain::Context{.memory_bytes = 3}.memory_or(7) == 3 ? 0 : 1; }
-CODE
+cp "$source"/tests/install/use_*.cpp "$folder"
 
 for library in stream cluster matching tri terrain; do
   meson setup "$folder/alone-$library" "$source/lib$library" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
