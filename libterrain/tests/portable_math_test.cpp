@@ -31,6 +31,14 @@ TEST(PortableMath, LengthsAgreeWithTheLibrary) {
   EXPECT_TRUE(std::isnan(portable_hypot(1, NAN)));
 }
 
+TEST(PortableMath, GivesNanForNanAndInfinity) {
+  for (const double x : {double{NAN}, double{INFINITY}, double{-INFINITY}}) {
+    EXPECT_TRUE(std::isnan(portable_sin_degrees(x)));
+    EXPECT_TRUE(std::isnan(portable_cos_degrees(x)));
+  }
+  EXPECT_TRUE(std::isnan(portable_exp(NAN)));
+}
+
 TEST(PortableMath, IsExactWhereTheValueIs) {
   EXPECT_EQ(portable_cos_degrees(90), 0.0);
   EXPECT_EQ(portable_cos_degrees(-270), 0.0);

@@ -85,6 +85,7 @@ inline constexpr double kLn2High = 0x1.62e42fefa0000p-1, kLn2Low = 0x1.cf79abc9e
 
 /// e^x, within 1e-15 relative for |x| <= 700; clamped beyond.
 inline double exponential(double x) {
+  if (std::isnan(x)) return x;
   x = std::clamp(x, -700.0, 700.0);
   // x = k ln 2 + r with |r| <= ln(2) / 2.
   const double k = std::nearbyint(x * 1.4426950408889634074);

@@ -36,6 +36,7 @@ double cos_series(double x) {
 double portable_sin_degrees(double degrees) {
   // fmod and the subtraction of multiples of 90 are exact, so the reduction loses nothing.
   double angle = std::fmod(degrees, 360.0);
+  if (std::isnan(angle)) return angle;  // NaN or infinite input
   const double quarter = std::nearbyint(angle / 90.0);
   angle -= quarter * 90.0;
   switch (static_cast<int>(quarter) & 3) {
@@ -52,6 +53,7 @@ double portable_sin_degrees(double degrees) {
 
 double portable_cos_degrees(double degrees) {
   double angle = std::fmod(degrees, 360.0);
+  if (std::isnan(angle)) return angle;  // NaN or infinite input
   const double quarter = std::nearbyint(angle / 90.0);
   angle -= quarter * 90.0;
   switch (static_cast<int>(quarter) & 3) {
@@ -67,6 +69,7 @@ double portable_cos_degrees(double degrees) {
 }
 
 double portable_exp(double x) {
+  if (std::isnan(x)) return x;
   x = std::clamp(x, -700.0, 700.0);
   // x = k ln 2 + r with |r| <= ln(2)/2.
   const double k = std::nearbyint(x * 1.4426950408889634074);

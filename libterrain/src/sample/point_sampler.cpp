@@ -51,8 +51,9 @@ std::uint64_t place_on_curve(const StoredBox& box, const Point2& place) {
   std::uint64_t at = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const double size = box.max[k] - box.min[k];
-    const double share = size > 0 ? (place[k] - box.min[k]) / size : 0.0;
-    auto bits = static_cast<std::uint64_t>(std::clamp(share, 0.0, 1.0) * 65535);
+    const double share = (place[k] - box.min[k]) / size;
+    // `share > 0` also excludes NaN, of boxes without a size or too large for a number.
+    auto bits = static_cast<std::uint64_t>(share > 0 ? std::min(share, 1.0) * 65535 : 0.0);
     bits = (bits | bits << 8) & 0x00FF00FFU;
     bits = (bits | bits << 4) & 0x0F0F0F0FU;
     bits = (bits | bits << 2) & 0x33333333U;

@@ -36,7 +36,10 @@ WindowTree::WindowTree(const stream::Store& store, unsigned level, std::size_t p
   const double each =
       static_cast<double>(store.levels()[level].points) /
       static_cast<double>(std::max<std::uint64_t>(store.levels()[counted].points, 1));
-  const auto most = static_cast<std::size_t>(std::max(1.0, static_cast<double>(points) / each));
+  // A level without points has nothing to divide.
+  const double sampled = each > 0 ? static_cast<double>(points) / each : 0.0;
+  const auto most = static_cast<std::size_t>(
+      std::clamp(sampled, 1.0, static_cast<double>(std::max<std::size_t>(sample.size(), 1))));
   const StoredBox all{{store.bounds().min[0], store.bounds().min[1]},
                       {store.bounds().max[0], store.bounds().max[1]}};
   split(all, sample, each, most, 0);
