@@ -78,9 +78,7 @@ void unpack_samples(const PackedSamples& packed, const std::byte* from, std::siz
       } else if (is_float) {
         value = static_cast<T>(float_from_24(native_24(from + 3 * number)));
       } else {
-        std::uint32_t raw = packed.bits == 24
-                                ? native_24(from + 3 * number)
-                                : bits_at(from, std::uint64_t{number} * packed.bits, packed.bits);
+        const std::uint32_t raw = bits_at(from, std::uint64_t{number} * packed.bits, packed.bits);
         if (packed.sample_format == SAMPLEFORMAT_INT) {  // the highest bit is the sign
           const unsigned unused = 32 - packed.bits;
           value = static_cast<T>(static_cast<std::int32_t>(raw << unused) >> unused);

@@ -20,7 +20,8 @@ bool is_native(const PackedSamples& packed);
 
 /// Widens `count` packed samples to native values; the first is sample number `first` of the row
 /// `from`, each further one `step` samples later. Integers of odd widths are packed from the
-/// highest bit on; those of 24 bits, and floats of 16 and 24 bits, are native multi-byte values.
+/// highest bit on, as GDAL writes and reads them; so are those of 24 bits, although libtiff swaps
+/// their bytes in files of the other byte order. Floats of 16 and 24 bits are native values.
 void unpack_samples(const PackedSamples& packed, const std::byte* from, std::size_t first,
                     std::size_t step, std::size_t count, std::byte* out);
 
