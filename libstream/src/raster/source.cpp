@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "raster/order.hpp"
@@ -49,6 +50,10 @@ SourceInfo source_info(const RasterInfo& raster, const SourceOptions& options) {
   info.points = raster.columns * raster.rows;
   info.nodata = raster.nodata;
   info.comments = raster.comments;
+  for (const std::string& note : raster.notes) {
+    info.comments.push_back(note);
+    info.note += (info.note.empty() ? "" : "; ") + note;
+  }
   return info;
 }
 

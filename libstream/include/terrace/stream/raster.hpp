@@ -29,6 +29,8 @@ struct RasterInfo {
   /// a mosaic, that of its largest file.
   std::uint64_t held_bytes = 0;
   std::vector<std::string> comments;
+  /// Comments that also a reader who does not ask for them should see: see SourceInfo::note.
+  std::vector<std::string> notes{};
 };
 
 /// A rectangle of cells.
@@ -49,7 +51,7 @@ struct CellBuffer {
 ///
 /// Cells without data are those that equal the file's nodata value, those in blocks that a file
 /// with a nodata value omits, those that are NaN or infinite, and those of a GeoTIFF whose
-/// transparency mask is 0.
+/// transparency mask is 0. The nodata value is that of RasterOptions, if it has one.
 class Raster {
  public:
   virtual ~Raster() = default;
@@ -72,22 +74,29 @@ struct RasterOptions {
   /// Cache size for decoded blocks of which a window has used only a part.
   std::uint64_t cache_bytes = 16u << 20;
   HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< see SourceOptions
+  /// The nodata value as text, which overrides that of the file; empty text: no value has no data.
+  std::optional<std::string> nodata{};
 };
+
+/// The fraction of a cell by which the cells of a member may be off those of the whole: it is then
+/// placed on the nearest cell, and a note says so if that is beyond kSameCell.
+inline constexpr double kNearestCell = 0.05, kSameCell = 1e-3;
 
 /// Opens a GeoTIFF: strips and tiles, classic and BigTIFF, every codec of the installed libtiff,
 /// integers and floats of up to 64 bits, any band. Overviews are skipped. Never maps the file.
 ///
 /// `world` maps to the sample's position, which is the centre of the cell for PixelIsArea. A file
-/// without georeferencing is a plain grid of unit cells, y = -row; a comment reports this. A file
-/// that is referenced only by several tie points is refused. Throws: Error.
+/// without georeferencing is placed by its world file (.tfw, .tifw, .wld); without that it is a
+/// plain grid of unit cells, y = -row, which a comment reports. A file that is referenced only by
+/// several tie points is refused. Throws: Error.
 std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOptions& options = {});
 
 /// Reopens a member of a mosaic.
 using RasterOpener = std::function<std::unique_ptr<Raster>(const std::string& file)>;
 
 /// Several rasters as one: where they overlap, the valid sample of the last named wins. They must
-/// agree in sample (type, scale, offset), cell size and phase (to 1/1000 cell) and in CRS, unless
-/// `crs` tells that of all. Files on both sides of the antimeridian are joined there, by longitudes
+/// agree in sample (type, scale, offset), cell size and phase (to kNearestCell) and in CRS, unless
+/// `crs` gives that of all. Files on both sides of the antimeridian are joined there, by longitudes
 /// beyond 180, if all together are then at most half a turn wide. Keeps at most `open_at_once` of
 /// them open, which together hold at most `open_bytes` (RasterInfo::held_bytes; one may always be
 /// open). Throws: Error naming two files and the difference, or if the union has 2^30 columns or

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "format/geotiff/tags.hpp"
 #include "format/geotiff/unpack.hpp"
 
 namespace terrace::stream {
@@ -261,9 +262,10 @@ bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
   return any;
 }
 
-/// A block the file leaves out has no data; where the file knows no such thing, it is zero.
+/// A block that the file leaves out has no data, even if the file's nodata value is overridden. It
+/// is zero in a file without a nodata value.
 bool GeoTiffBlocks::fill_sparse(const Part& part, const CellBuffer& out) {
-  if (nodata_.value) return false;
+  if (nodata_.value || !handle_.text(kGdalNodata).empty()) return false;
   wide_.assign(part.columns * size_of(layout_.type), std::byte{0});
   bool any = false;
   for (std::uint32_t row = 0; row < part.rows; ++row) {

@@ -7,7 +7,9 @@
 #include <string_view>
 
 #include "format/geotiff/tags.hpp"
+#include "format/world_file.hpp"
 #include "raster/plain_world.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -49,17 +51,16 @@ std::optional<double> number_in(std::string_view text) {
   return value;
 }
 
-}  // namespace
-
-WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
-                                 std::vector<std::string>& comments) {
+/// The place that the file itself gives; nullopt if it gives none, or only ground control points.
+std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
+                                            std::vector<std::string>& comments) {
   const auto matrix = handle.doubles(kModelTransformation);
   const auto scale = handle.doubles(kModelPixelScale);
   const auto tie = handle.doubles(kModelTiepoint);
   const double to_sample =
       keys.number(kGTRasterType).value_or(kPixelIsArea) == kPixelIsPoint ? 0.0 : 0.5;
 
-  // As GDAL does, scale and tie point go before a matrix if a file has both against the rules.
+  // As in GDAL, scale and tie point override a matrix if a file has both against the rules.
   if (scale.size() >= 2 && tie.size() >= 6) {
     if (!all_finite(scale) || !all_finite(tie)) {
       handle.fail("ModelPixelScale", "is not finite", kSetAnew);
@@ -79,14 +80,52 @@ WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& key
     }
     return shifted(world, to_sample);
   }
-  if (tie.size() > 6) {
-    handle.fail("ModelTiepoint",
-                "has " + std::to_string(tie.size() / 6) +
-                    " ground control points instead of a transformation",
-                "rectify it first: gdalwarp");
+  return std::nullopt;
+}
+
+/// Notes that a world file places the raster elsewhere than the file itself does.
+void compare_with_world_file(const std::string& file, RasterInfo& info) {
+  std::optional<WorldFile> beside;
+  try {
+    beside = world_file_of(file);
+  } catch (const Error&) {
+    return;  // it does not count
   }
-  comments.push_back(kNoGeoreferencing);
-  return kPlainWorld;
+  if (!beside) return;
+  const auto &m = info.world.xy, &n = beside->world.xy;
+  const double cell = std::max(std::hypot(m[0], m[3]), std::hypot(m[1], m[4]));
+  double most = 0;
+  for (const double c : {0.0, static_cast<double>(info.columns)}) {
+    for (const double r : {0.0, static_cast<double>(info.rows)}) {
+      for (const std::size_t i : {std::size_t{0}, std::size_t{3}}) {
+        most = std::max(
+            most, std::abs((m[i] - n[i]) * c + (m[i + 1] - n[i + 1]) * r + m[i + 2] - n[i + 2]));
+      }
+    }
+  }
+  if (most <= kNearestCell * cell) return;
+  info.notes.push_back(beside->name + " places the raster elsewhere than " + file +
+                       " itself, which counts; remove the wrong one");
+}
+
+}  // namespace
+
+void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo& info) {
+  if (const auto own = own_transform(handle, keys, info.comments)) {
+    info.world = *own;
+    compare_with_world_file(handle.file(), info);
+    return;
+  }
+  info.world = kPlainWorld;
+  info.comments.push_back(kNoGeoreferencing);
+  place_by_world_file(handle.file(), info);
+  const std::size_t points = handle.doubles(kModelTiepoint).size() / 6;
+  if (points > 1 && info.world == kPlainWorld) {
+    handle.fail(
+        "ModelTiepoint",
+        "has " + std::to_string(points) + " ground control points instead of a transformation",
+        "rectify it first: gdalwarp");
+  }
 }
 
 BandMetadata band_metadata(const std::string& xml, unsigned band) {

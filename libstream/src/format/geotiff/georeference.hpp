@@ -7,15 +7,15 @@
 
 #include "format/geotiff/handle.hpp"
 #include "format/geotiff/keys.hpp"
-#include "terrace/stream/source.hpp"
+#include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
 
-/// The transform from column and row to the sample's position, from pixel scale and tie point or
-/// from the matrix. Resolved oddities are added to `comments`. Throws: Error for values that are
+/// Sets the transform from column and row to the sample's position, from pixel scale and tie point,
+/// from the matrix, or else from a world file. Resolved oddities are added to the comments, a world
+/// file that differs to the notes. `info` has the size already. Throws: Error for values that are
 /// not finite, a degenerate matrix, or several tie points only.
-WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
-                                 std::vector<std::string>& comments);
+void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo& info);
 
 /// The contents of GDAL_METADATA for one band (counted from 0).
 struct BandMetadata {

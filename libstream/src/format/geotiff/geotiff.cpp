@@ -74,7 +74,8 @@ class GeoTiffRaster final : public Raster {
   GeoTiffRaster(const std::string& file, const RasterOptions& options)
       : handle_(file, options.memory_bytes),
         layout_(geotiff_layout(handle_, options.band)),
-        nodata_(NodataRule::parse(handle_.text(kGdalNodata), layout_.type)),
+        nodata_text_(options.nodata.value_or(handle_.text(kGdalNodata))),
+        nodata_(NodataRule::parse(nodata_text_, layout_.type)),
         blocks_(handle_, layout_, nodata_, options.memory_bytes, options.cache_bytes),
         mask_(GeoTiffMask::find(handle_, layout_, options)) {
     if (mask_ != nullptr) blocks_.set_mask(mask_->blocks());
@@ -98,7 +99,7 @@ class GeoTiffRaster final : public Raster {
     const GeoKeys keys(handle_.shorts(kGeoKeyDirectory), handle_.doubles(kGeoDoubleParams),
                        handle_.text(kGeoAsciiParams));
     info_.crs = crs_of(keys);
-    info_.world = geotiff_transform(handle_, keys, info_.comments);
+    place_geotiff(handle_, keys, info_);
     info_.nodata = nodata_.value;
     describe_sample();
     std::uint16_t extra = 0;
@@ -110,7 +111,7 @@ class GeoTiffRaster final : public Raster {
                                "a nodata value: gdalwarp -dstnodata");
     }
     if (nodata_.unmatched) {
-      info_.comments.push_back("nodata " + handle_.text(kGdalNodata) + " is no value of type " +
+      info_.comments.push_back("nodata " + nodata_text_ + " is no value of type " +
                                std::string(name_of(layout_.type)));
     }
     info_.comments.insert(info_.comments.end(), keys.faults().begin(), keys.faults().end());
@@ -135,6 +136,7 @@ class GeoTiffRaster final : public Raster {
 
   GeoTiffHandle handle_;
   GeoTiffLayout layout_;
+  std::string nodata_text_;
   NodataRule nodata_;
   GeoTiffBlocks blocks_;
   std::unique_ptr<GeoTiffMask> mask_;

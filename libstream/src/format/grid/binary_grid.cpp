@@ -14,6 +14,7 @@
 
 #include "format/formats.hpp"
 #include "format/raster_points.hpp"
+#include "format/world_file.hpp"
 #include "io/text.hpp"
 
 namespace terrace::stream {
@@ -37,9 +38,12 @@ ScalarType sample_type_of(const GridHeader& header, bool floats) {
   const std::uint64_t bits = header.count("nbits", floats ? 32 : 8);
   const std::string kind = lower_case(header.text("pixeltype"));
   const bool has_floats = kind.empty() ? floats : kind.starts_with('f');
-  // Without a word on signs a negative nodata value tells that there are some.
+  // Without a pixel type, a negative nodata value shows that the integers are signed.
+  const auto has_negative_nodata = [&] {
+    return NodataRule::parse(header.text("nodata"), ScalarType::f64).value.value_or(0) < 0;
+  };
   const bool is_signed =
-      kind.empty() ? header.has("nodata") && header.number("nodata") < 0 : kind.starts_with('s');
+      kind.empty() ? !has_floats && has_negative_nodata() : kind.starts_with('s');
   if (has_floats && bits == 32) return ScalarType::f32;
   if (has_floats && bits == 64) return ScalarType::f64;
   if (!has_floats && bits == 8) return is_signed ? ScalarType::i8 : ScalarType::u8;
@@ -147,7 +151,10 @@ std::unique_ptr<Raster> open_binary_grid(const std::string& file, const RasterOp
   }
   const GridHeader header = read_binary_header(beside.string(), text_of(beside));
   const bool floats = lower_case(fs::path(file).extension().string()) == ".flt";
-  return open_plain_grid(describe_binary_grid(file, header, floats, options.band), open_file(file));
+  PlainGrid grid = describe_binary_grid(file, header, floats, options.band);
+  if (options.nodata) set_nodata(*options.nodata, grid);
+  place_by_world_file(file, grid.info);
+  return open_plain_grid(std::move(grid), open_file(file));
 }
 
 const Format& binary_grid_format() {

@@ -2,19 +2,15 @@
 #include "format/grid/height_map.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <span>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -23,18 +19,14 @@
 #include "format/formats.hpp"
 #include "format/grid/plain_grid.hpp"
 #include "format/raster_points.hpp"
-#include "io/line_reader.hpp"
-#include "io/number.hpp"
+#include "format/world_file.hpp"
 #include "io/spool.hpp"
-#include "io/text.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 
 namespace terrace::stream {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// No sample that is made of colours has this value: they have 24 bits.
 constexpr std::uint32_t kNoColour = std::numeric_limits<std::uint32_t>::max();
@@ -202,38 +194,6 @@ std::unique_ptr<Spool> decode_colours(const std::string& file, std::uint32_t col
   return spool;
 }
 
-/// The six numbers of a world file lead from column and row to the centre of a cell.
-std::optional<WorldTransform> world_of(const std::string& file) {
-  for (const char* ending : {".pgw", ".pngw", ".wld", ".PGW", ".PNGW", ".WLD"}) {
-    const fs::path path = fs::path(file).replace_extension(ending);
-    std::error_code ignored;
-    if (!fs::is_regular_file(path, ignored)) continue;
-    Input input(path.string());
-    LineReader lines(input);
-    std::array<double, 6> numbers{};
-    std::string_view line;
-    for (double& number : numbers) {
-      const bool more = lines.next(line);
-      line = more ? trim(line) : std::string_view();
-      if (line.empty() ||
-          parse_real(line.data(), line.data() + line.size(), number) != line.data() + line.size() ||
-          !std::isfinite(number)) {
-        throw Error({.file = path.string(),
-                     .where = "line " + std::to_string(lines.number()),
-                     .cause = "a world file has six numbers, one a line",
-                     .remedy = "correct it"});
-      }
-    }
-    const auto [a, d, b, e, c, f] = numbers;
-    const double area = a * e - b * d;
-    if (!std::isfinite(area) || area == 0) {
-      refuse_grid(path.string(), {}, "does not map cells to distinct places", "correct it");
-    }
-    return WorldTransform{{a, b, c, d, e, f}};
-  }
-  return std::nullopt;
-}
-
 /// Refuses what is larger than the file can hold, and rows that do not fit memory.
 void check_size(const std::string& file, const PngHead& image, std::uint64_t packed,
                 std::uint64_t row_bytes, std::uint64_t memory_bytes) {
@@ -292,16 +252,14 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
   std::string nodata;
   if (!grey) nodata = std::to_string(kNoColour);
   if (image.transparent_grey) nodata = std::to_string(*image.transparent_grey);
+  if (options.nodata) nodata = *options.nodata;
   PlainGrid grid = plain_grid("png", file, image.columns, image.rows, type, nodata);
   check_size(file, image, bytes->size(), grid.row_bytes, options.memory_bytes);
   constexpr std::uint64_t kOfInflate = 512u << 10;
   grid.info.held_bytes = kOfInflate + 3 * grid.row_bytes;
-  if (const auto world = world_of(file)) {
-    grid.info.world = *world;
-  } else {
-    grid.info.world = kPlainWorld;
-    grid.info.comments.push_back(kNoGeoreferencing);
-  }
+  grid.info.world = kPlainWorld;
+  grid.info.comments.push_back(kNoGeoreferencing);
+  place_by_world_file(file, grid.info);
   if (grey) {
     return open_packed_grid(std::move(grid),
                             [file, row = grid.row_bytes] { return decode_rows(file, row); });
@@ -320,7 +278,7 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
 }
 
 const Format& png_format() {
-  // What a world file would say, `cell` and `crs` can.
+  // `cell` and `crs` can replace a world file.
   static const Format format{.name = "png",
                              .endings = {".png"},
                              .self_contained = true,

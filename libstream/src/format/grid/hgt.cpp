@@ -133,19 +133,21 @@ bool recognise_hgt(std::span<const std::byte> head) {
   return false;
 }
 
-PlainGrid describe_packed_tile(const std::string& file, const PackedFile& packed) {
+PlainGrid describe_packed_tile(const std::string& file, const PackedFile& packed,
+                               const std::optional<std::string>& nodata) {
   constexpr std::uint64_t kUnpacking = 1u << 20;
   PlainGrid grid = describe_tile(file, packed.name, packed.size);
+  if (nodata) set_nodata(*nodata, grid);
   grid.info.held_bytes = kUnpacking;
   return grid;
 }
 
 /// The tiles of a zip archive: the only one, or a mosaic.
-std::unique_ptr<Raster> open_archive(const std::string& file, std::uint64_t memory_bytes) {
+std::unique_ptr<Raster> open_archive(const std::string& file, const RasterOptions& options) {
   const auto archive = std::make_shared<const ZipArchive>(file);
   const std::vector<PackedFile> tiles = archive->find(kEnding);
-  const auto open_tile = [file, archive](const PackedFile& tile) {
-    return open_packed_grid(describe_packed_tile(file, tile),
+  const auto open_tile = [file, archive, nodata = options.nodata](const PackedFile& tile) {
+    return open_packed_grid(describe_packed_tile(file, tile, nodata),
                             [archive, tile] { return archive->unpack(tile); });
   };
   if (tiles.size() == 1) return open_tile(tiles.front());
@@ -161,7 +163,7 @@ std::unique_ptr<Raster> open_archive(const std::string& file, std::uint64_t memo
       [by_name = std::move(by_name), open_tile](const std::string& name) {
         return open_tile(by_name.at(name));
       },
-      std::nullopt, kOpenAtOnce, memory_bytes);
+      std::nullopt, kOpenAtOnce, options.memory_bytes);
 }
 
 std::unique_ptr<PointSource> open_hgt_points(std::span<const std::string> files,
@@ -176,16 +178,17 @@ std::unique_ptr<Raster> open_hgt(const std::string& file, const RasterOptions& o
   std::unique_ptr<ByteSource> bytes = open_file(file);
   switch (packing_of(*bytes)) {
     case Packing::zip:
-      return open_archive(file, options.memory_bytes);
+      return open_archive(file, options);
     case Packing::gzip: {
       const PackedFile packed = find_in_gzip(file);
-      return open_packed_grid(describe_packed_tile(file, packed),
+      return open_packed_grid(describe_packed_tile(file, packed, options.nodata),
                               [file, packed] { return unpack_gzip(file, packed); });
     }
     case Packing::none:
       break;
   }
   PlainGrid grid = describe_tile(file, {}, bytes->size());
+  if (options.nodata) set_nodata(*options.nodata, grid);
   return open_plain_grid(std::move(grid), std::move(bytes));
 }
 

@@ -107,14 +107,19 @@ PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t 
   grid.info.columns = columns;
   grid.info.rows = rows;
   grid.info.sample = {.name = "height", .type = type};
-  grid.nodata = NodataRule::parse(nodata, type);
-  grid.info.nodata = grid.nodata.value;
-  if (grid.nodata.unmatched) {
-    grid.info.comments.push_back("nodata " + nodata + " is no value of type " +
-                                 std::string(name_of(type)));
-  }
+  set_nodata(nodata, grid);
   grid.row_bytes = columns * size_of(type);
   return grid;
+}
+
+void set_nodata(const std::string& text, PlainGrid& grid) {
+  const ScalarType type = grid.info.sample.type;
+  grid.nodata = NodataRule::parse(text, type);
+  grid.info.nodata = grid.nodata.value;
+  if (grid.nodata.unmatched) {
+    grid.info.comments.push_back("nodata " + text + " is not a value of type " +
+                                 std::string(name_of(type)));
+  }
 }
 
 void check_band(const std::string& file, int band, std::uint64_t bands) {

@@ -39,6 +39,9 @@ inline constexpr std::uint64_t kDeflateGrowth = 1032;
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,
                      std::uint64_t rows, ScalarType type, const std::string& nodata = {});
 
+/// Sets the nodata value from a file's text; empty: none.
+void set_nodata(const std::string& text, PlainGrid& grid);
+
 /// Throws: Error if there is no band with that number, counted from 1.
 void check_band(const std::string& file, int band, std::uint64_t bands);
 
