@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -475,6 +476,69 @@ TEST_F(Grids, AsciiGridsInAnyLines) {
   expect_same(*open_ascii_grid(file, {}, ScalarType::f64), *open_ascii_grid(file));
 }
 
+TEST_F(Grids, WordsForNoData) {
+  const std::string head = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n";
+  const auto valid = [&](const std::string& nodata, const std::string& cells) {
+    return read_whole(*open_ascii_grid(put("a.asc", head + nodata + cells))).valid;
+  };
+  const std::vector<std::uint8_t> first{0, 1, 1, 1, 1, 0};
+  for (const char* const word : {"null", "NULL", "nan", "-nan", "1.#QNAN", "-1.#IND00", "1.#INF",
+                                 "-1.#INF", "NA", "n/a", "nodata", "*"}) {
+    const std::string cells = std::string(word) + " 2 3 4 5 " + word + "\n";
+    EXPECT_EQ(valid("NODATA_value -9999\n", cells), first) << word;
+    EXPECT_EQ(valid(std::string("NODATA_value ") + word + "\n", cells), first) << word;
+    EXPECT_EQ(valid("", cells), first) << word;
+  }
+  // The word of the header, whatever it is.
+  EXPECT_EQ(valid("NODATA_value hole\n", "hole 2 3 4 5 hole"), first);
+  EXPECT_NE(refusal_of(put("a.asc", head + "1 2 3 4 hole 6")).find("'hole' is not a number"),
+            std::string::npos);
+  EXPECT_NE(refusal_of(put("a.asc", head + "1 2 3 4 5.#X 6")), "");
+  // In the header of a binary grid too.
+  std::vector<float> floats{1, 2, std::numeric_limits<float>::quiet_NaN()};
+  put("b.flt", std::string(reinterpret_cast<const char*>(floats.data()), 12));
+  for (const char* const word : {"nan", "null", "-1.#QNAN", "-9999"}) {
+    put("b.hdr", std::string("ncols 3\nnrows 1\nnodata_value ") + word + "\n");
+    EXPECT_EQ(read_whole(*open_binary_grid(path("b.flt"), {})).valid,
+              (std::vector<std::uint8_t>{1, 1, 0}));
+  }
+}
+
+TEST_F(Grids, GrassAsciiGridsAreWhatGdalReads) {
+  const std::string head =
+      "north: 4928010\nsouth: 4928000.5\neast: 609020\nwest: 609000\n"
+      "rows: 3\ncols: 4\n";
+  const std::string cells = "1 2 3 4\n5 6 7 8\n9 10 11.5 -12\n";
+  const std::string file = put("g.asc", head + cells);
+  if (has_gdal()) {
+    run("gdal_translate -q -of GTiff g.asc g.tif");
+    expect_same(*open_ascii_grid(file), *open_geotiff(path("g.tif")));
+  }
+  // By content, not by name.
+  EXPECT_EQ(open_one(put("g.txt", head + cells))->info().format, "ascii-grid");
+  const WholeRaster whole = read_whole(*open_ascii_grid(
+      put("h.asc",
+          "rows: 2\ncols: 3\nnorth: 45:30:36N\nsouth: 44.5S\neast: 3E\nwest: 3W\nnull: void\n"
+          "type: float\nmultiplier: 0.5\nvoid 2 3\n4 * 6\n")));
+  const std::array<double, 6> world{2, 0, -2, 0, -45.005, 23.0075};
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(whole.info.world.xy[i], world[i], 1e-12);
+  EXPECT_EQ(whole.info.sample.scale, 0.5);
+  EXPECT_EQ(whole.valid, (std::vector<std::uint8_t>{0, 1, 1, 1, 0, 1}));
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"north: 4928010\n", ""},
+           {"north: 4928010\n", "north: 4928000\n"},
+           {"north: 4928010\n", "north: 45:\n"},
+           {"north: 4928010\n", "north: 4:5:6:7N\n"},
+           {"north: 4928010\n", "north: N\n"},
+           {"cols: 4", "cols: 0"},
+           {"cols: 4\n", ""},
+           {"rows: 3\n", "rows: 3\nmultiplier: 0\n"}}) {
+    std::string bad = head + cells;
+    bad.replace(bad.find(from), from.size(), to);
+    EXPECT_NE(refusal_of(put("b.asc", bad)), "") << to;
+  }
+}
+
 TEST_F(Grids, AsciiGridsMakeMosaics) {
   const auto tile = [&](const std::string& name, int x, const std::string& numbers) {
     return put(name, "ncols 2\nnrows 2\nxllcorner " + std::to_string(x) +
@@ -512,9 +576,9 @@ TEST_F(Grids, DamagedAsciiGridsAreRefused) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {head + "1 2 3 4 5", "holds 5 numbers where 3 x 2 are due"},
       {head + "1 2 3 4 5 6 7", "holds more numbers"},
-      {head + "1 2 3 4 x 6", "row 1, column 1: 'x' is no number"},
-      {head + "1 2 3 4 1,2,3 6", "'1,2,3' is no number"},
-      {head + "1 2 3 4 5 6x", "'6x' is no number"},
+      {head + "1 2 3 4 x 6", "row 1, column 1: 'x' is not a number"},
+      {head + "1 2 3 4 1,2,3 6", "'1,2,3' is not a number"},
+      {head + "1 2 3 4 5 6x", "'6x' is not a number"},
       {head, "holds 0 numbers"},
       {head + "1 2 3 " + std::string(100000, '4'), "1,024 characters"},
       {"ncols 1000000000\nnrows 1000000000\ncellsize 1\n1 2 3", "more than fit into"},

@@ -17,6 +17,7 @@
 #include "format/grid/grid_header.hpp"
 #include "format/grid/plain_grid.hpp"
 #include "format/raster_points.hpp"
+#include "format/world_file.hpp"
 #include "io/number.hpp"
 #include "io/spool.hpp"
 #include "io/text.hpp"
@@ -28,16 +29,35 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::string_view kFormat = "ascii-grid";
-constexpr std::array<std::string_view, 9> kKeys{
-    "ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy"};
+constexpr std::array<std::string_view, 15> kKeys{
+    "ncols",    "nrows",  "xllcorner", "xllcenter", "yllcorner", "yllcenter",
+    "cellsize", "dx",     "dy",                                             // of ESRI
+    "north:",   "south:", "east:",     "west:",     "rows:",     "cols:"};  // of GRASS
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
+/// key: in lower case.
+bool is_word(std::string_view word, std::string_view key) {
+  return std::equal(word.begin(), word.end(), key.begin(), key.end(),
+                    [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b; });
+}
+
 bool is_key(std::string_view word) {
-  return std::any_of(kKeys.begin(), kKeys.end(), [&](std::string_view key) {
-    return std::equal(word.begin(), word.end(), key.begin(), key.end(),
-                      [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b; });
-  });
+  return std::any_of(kKeys.begin(), kKeys.end(),
+                     [&](std::string_view key) { return is_word(word, key); });
+}
+
+/// A word for a cell without data, as 12D, GRASS, R and others write it, or NaN or infinity as the
+/// C library of Windows does.
+bool is_void_word(std::string_view word) {
+  constexpr std::array<std::string_view, 6> kWords{"null", "*", "na", "n/a", "nodata", "no_data"};
+  if (std::any_of(kWords.begin(), kWords.end(),
+                  [&](std::string_view known) { return is_word(word, known); })) {
+    return true;
+  }
+  if (word.find(".#") == std::string_view::npos) return false;
+  const std::optional<double> value = NodataRule::parse(std::string(word), ScalarType::f64).value;
+  return value && !std::isfinite(*value);
 }
 
 /// The words of a text between white space, whatever the lengths of its lines.
@@ -95,11 +115,38 @@ const char* parse_sample(std::string_view word, double& value) {
   return copied == nullptr ? nullptr : word.data() + (copied - copy);
 }
 
+/// A coordinate in GRASS's header: a number, or degrees like 45:30:15.5N. nullopt if it is neither.
+std::optional<double> grass_coordinate(std::string_view text) {
+  double value = 0;
+  if (parse_real(text.data(), text.data() + text.size(), value) == text.data() + text.size()) {
+    return std::isfinite(value) ? std::optional(value) : std::nullopt;
+  }
+  if (text.empty()) return std::nullopt;
+  const char last = text.back();
+  const bool negative = last == 'S' || last == 's' || last == 'W' || last == 'w';
+  if (!negative && last != 'N' && last != 'n' && last != 'E' && last != 'e') return std::nullopt;
+  text.remove_suffix(1);
+  double sum = 0;
+  for (double unit = 1; unit > 1e-4 && !text.empty(); unit /= 60) {
+    const std::string_view part = text.substr(0, text.find(':'));
+    if (part.empty() ||
+        parse_real(part.data(), part.data() + part.size(), value) != part.data() + part.size()) {
+      return std::nullopt;
+    }
+    sum += unit * value;
+    text.remove_prefix(std::min(part.size() + 1, text.size()));
+  }
+  if (!text.empty() || !std::isfinite(sum)) return std::nullopt;
+  return negative ? -sum : sum;
+}
+
 /// An ASCII grid that is being read.
 class AsciiReader {
  public:
-  AsciiReader(const std::string& file, const std::stop_token& stop)
-      : input_(file, stop), stop_(stop), words_(input_), header_(input_.name()) {
+  /// nodata: see RasterOptions.
+  AsciiReader(const std::string& file, const std::stop_token& stop,
+              const std::optional<std::string>& nodata)
+      : input_(file, stop), stop_(stop), words_(input_), header_(input_.name()), given_(nodata) {
     constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
     word_ = words_.next();
     if (word_.starts_with(kByteOrderMark)) word_.remove_prefix(kByteOrderMark.size());
@@ -107,10 +154,11 @@ class AsciiReader {
       key = word_;
       header_.set(key, words_.next());
     }
+    if (header_.has("rows:") || header_.has("cols:")) translate_grass_header();
     columns_ = header_.count("ncols");
     rows_ = header_.count("nrows");
     if (header_.has("byteorder")) {
-      header_.fail({}, "is the header of a binary grid", "name the .flt or .bil beside it");
+      header_.fail({}, "is the header of a binary grid", "name the .flt or .bil next to it");
     }
     if (!header_.has("cellsize") && !(header_.has("dx") && header_.has("dy"))) {
       header_.fail("cellsize", "is missing");
@@ -130,10 +178,12 @@ class AsciiReader {
     PlainGrid grid = plain_grid(std::string(kFormat), input_.name(), columns_, rows_, type);
     grid.info.nodata = nodata().value;
     grid.info.world = header_.world(rows_, grid.info.comments);
+    grid.info.sample.scale = scale_;
     return grid;
   }
   [[nodiscard]] NodataRule nodata() const {
-    NodataRule rule = NodataRule::parse(header_.text("nodata_value"), ScalarType::f64);
+    NodataRule rule =
+        NodataRule::parse(given_.value_or(header_.text("nodata_value")), ScalarType::f64);
     // The lowest float stands for no data where programs compute with floats; with how many digits
     // it is written may differ between head and cells.
     constexpr double kNoHeight = 1e38;
@@ -157,9 +207,14 @@ class AsciiReader {
                      "fetch the file again; it is cut short");
       }
       if (parse_sample(word_, value) != word_.data() + word_.size()) {
-        header_.fail("row " + std::to_string(cell / columns_) + ", column " +
-                         std::to_string(cell % columns_),
-                     in_quotes(word_) + " is no number", "correct it");
+        if (is_void(word_)) {
+          value = std::numeric_limits<double>::quiet_NaN();
+        } else {
+          header_.fail("row " + std::to_string(cell / columns_) + ", column " +
+                           std::to_string(cell % columns_),
+                       in_quotes(word_) + " is not a number",
+                       "correct it, or name it as the NODATA_value if it means no data");
+        }
       }
       if (!take(value)) return;
     }
@@ -172,10 +227,44 @@ class AsciiReader {
   }
 
  private:
-  static bool is_keyword(std::string_view word) {
+  [[nodiscard]] bool is_void(std::string_view word) const {
+    return is_void_word(word) || (!word.empty() && (word == header_.text("nodata_value") ||
+                                                    word == header_.text("null:")));
+  }
+  [[nodiscard]] bool is_keyword(std::string_view word) const {
     double number = 0;  // "nan" and "inf" are numbers
     return !word.empty() && is_letter(word.front()) &&
-           parse_sample(word, number) != word.data() + word.size();
+           parse_sample(word, number) != word.data() + word.size() && !is_void(word);
+  }
+  /// Sets ESRI's keys from GRASS's (r.out.ascii): the borders of the grid instead of its cells.
+  void translate_grass_header() {
+    const auto coordinate = [&](const char* key) {
+      if (!header_.has(key)) header_.fail(key, "is missing");
+      const std::optional<double> value = grass_coordinate(header_.text(key));
+      if (!value) header_.fail(key, "is " + in_quotes(header_.text(key)) + ", not a coordinate");
+      return *value;
+    };
+    const auto set = [&](const char* key, double value) {
+      std::string text;
+      append_number(text, value);
+      header_.set(key, text);
+    };
+    const double north = coordinate("north:"), south = coordinate("south:"),
+                 east = coordinate("east:"), west = coordinate("west:");
+    const std::uint64_t columns = header_.count("cols:"), rows = header_.count("rows:");
+    if (columns == 0 || rows == 0) header_.fail("rows:", "the grid does not have a cell");
+    const double width = (east - west) / static_cast<double>(columns);
+    const double height = (north - south) / static_cast<double>(rows);
+    if (!(width > 0 && height > 0)) header_.fail("north:", "the borders enclose no area");
+    header_.set("ncols", header_.text("cols:"));
+    header_.set("nrows", header_.text("rows:"));
+    set("dx", width);
+    set("dy", height);
+    set("ulxmap", west + width / 2);
+    set("ulymap", north - height / 2);
+    header_.set("nodata_value", header_.has("null:") ? header_.text("null:") : "*");
+    scale_ = header_.number("multiplier:").value_or(1);
+    if (scale_ == 0) header_.fail("multiplier:", "is zero");
   }
 
   static constexpr std::uint64_t kCheckEvery = 1u << 16;
@@ -184,6 +273,8 @@ class AsciiReader {
   std::stop_token stop_;
   Words words_;
   GridHeader header_;
+  std::optional<std::string> given_;
+  double scale_ = 1;
   std::string_view word_;
   std::uint64_t columns_ = 0, rows_ = 0;
 };
@@ -295,24 +386,27 @@ std::unique_ptr<PointSource> open_ascii_points(std::span<const std::string> file
 }  // namespace
 
 std::unique_ptr<Raster> open_ascii_grid(const std::string& file, const std::stop_token& stop,
-                                        std::optional<ScalarType> known) {
-  AsciiReader reader(file, stop);
+                                        std::optional<ScalarType> known,
+                                        const std::optional<std::string>& nodata) {
+  AsciiReader reader(file, stop, nodata);
   if (known) {
     PlainGrid grid = reader.grid(*known);
     grid.info.files = {file};
-    return open_packed_grid(std::move(grid), [file, stop, type = *known] {
-      AsciiReader again(file, stop);
+    place_by_world_file(file, grid.info);
+    return open_packed_grid(std::move(grid), [file, stop, type = *known, nodata] {
+      AsciiReader again(file, stop, nodata);
       return spooled_samples(again, type).first;
     });
   }
   auto [bytes, type] = spooled_samples(reader, ScalarType::f32);
   PlainGrid grid = reader.grid(type);
   grid.info.files = {file};
+  place_by_world_file(file, grid.info);
   return open_plain_grid(std::move(grid), std::move(bytes));
 }
 
 ScalarType type_of_ascii_grid(const std::string& file, const std::stop_token& stop) {
-  AsciiReader reader(file, stop);
+  AsciiReader reader(file, stop, {});
   const NodataRule nodata = reader.nodata();
   ScalarType type = ScalarType::f32;
   reader.read([&](double value) {
