@@ -174,15 +174,15 @@ TEST(Mosaic, KeepsOpenWhatFitsIntoItsMemory) {
 TEST(Mosaic, RefusesWhatDoesNotFit) {
   const std::vector<std::byte> samples(8 * 8 * 8);
   {
-    Files files;  // shifted by a hundredth of a cell
+    Files files;  // shifted by a tenth of a cell
     files.add(at(0, 0), samples);
-    files.add(at(80.1, 0), samples);
+    files.add(at(81, 0), samples);
     expect_misfit(files);
   }
   {
     Files files;  // another cell size
     files.add(at(0, 0), samples);
-    files.add(at(80, 0, 10.01), samples);
+    files.add(at(80, 0, 10.1), samples);
     expect_misfit(files);
   }
   {
@@ -217,7 +217,20 @@ TEST(Mosaic, AMillimetreOfACellDoesNotMatter) {
   Files files;
   files.add(at(0, 0), samples);
   files.add(at(80.005, -0.005, 10.0005), samples);
-  EXPECT_EQ(open_mosaic(files.names(), plain_opener())->info().columns, 16u);
+  const std::unique_ptr<Raster> mosaic = open_mosaic(files.names(), plain_opener());
+  EXPECT_EQ(mosaic->info().columns, 16u);
+  EXPECT_TRUE(mosaic->info().notes.empty());
+}
+
+TEST(Mosaic, AFewHundredthsOfACellAreNoted) {
+  const std::vector<std::byte> samples(8 * 8 * 2);
+  Files files;
+  files.add(at(0, 0), samples);
+  files.add(at(80.03, -0.4), samples);
+  const RasterInfo info = open_mosaic(files.names(), plain_opener())->info();
+  EXPECT_EQ(info.columns, 16u);
+  ASSERT_EQ(info.notes.size(), 1u);
+  EXPECT_NE(info.notes[0].find("0.04 of a cell"), std::string::npos) << info.notes[0];
 }
 
 TEST(Mosaic, TheCrsMustAgreeUnlessTheCallerKnowsIt) {

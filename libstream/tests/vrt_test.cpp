@@ -88,7 +88,7 @@ TEST_F(Vrt, HasTheCellsThatGdalMakesOfIt) {
     // Without any, as the files say, one for all, another in the whole, only in the whole.
     const std::vector<std::string> ways{"", "-srcnodata 4", "-srcnodata 4 -vrtnodata 4",
                                         "-srcnodata 4 -vrtnodata -7", "-vrtnodata 5"};
-    std::string options = own_nodata ? "" : ways[random() % ways.size()];
+    std::string options = ways[random() % ways.size()];
     if (random() % 2 == 0) options += " -te 1100 4600 1550 4950";
     const std::string vrt = path("a.vrt"), tif = path("whole.tif");
     ASSERT_EQ(std::system(("gdalbuildvrt -q -overwrite " + options + " '" + vrt + "'" + files +
@@ -112,6 +112,77 @@ TEST_F(Vrt, HasTheCellsThatGdalMakesOfIt) {
       std::erase_if(some, [](const Point3& cell) { return cell[2] == 0; });
       EXPECT_EQ(some, all) << options;
     }
+  }
+}
+
+TEST_F(Vrt, ItsNodataOverridesThatOfItsFiles) {
+  std::mt19937_64 random(11);
+  put_tiff("a.tif", 0, 0, 20, 10, "3", 9, random);
+  random.seed(11);
+  put_tiff("all.tif", 0, 0, 20, 10, "", 9, random);
+  const auto cells = [&](const std::string& file) { return sorted_cells(read_file(file)); };
+  const std::vector<Point3> all = cells(path("all.tif"));
+  ASSERT_EQ(all.size(), 200U);
+  const auto without = [&](double value) {
+    std::vector<Point3> some = all;
+    std::erase_if(some, [&](const Point3& cell) { return cell[2] == value; });
+    return some;
+  };
+  const std::string body = "<SourceFilename relativeToVRT=\"1\">a.tif</SourceFilename>";
+  // As gdalbuildvrt -srcnodata 5 writes it, with and without a value of the whole.
+  const std::string complex = "<ComplexSource>" + body + "<NODATA>5</NODATA></ComplexSource>";
+  EXPECT_EQ(cells(put_vrt("<NoDataValue>5</NoDataValue>" + complex)), without(5));
+  EXPECT_EQ(cells(put_vrt(complex)), without(5));
+  // As gdal_translate -a_nodata 5 writes it.
+  EXPECT_EQ(cells(put_vrt("<NoDataValue>5</NoDataValue>" + source(""))), without(5));
+  // Without any, those of the files count, and a note says so.
+  const AllPoints undeclared = read_file(put_vrt(source("")));
+  EXPECT_EQ(sorted_cells(undeclared), without(3));
+  EXPECT_NE(undeclared.info.note.find("a.tif, 3, counts"), std::string::npos)
+      << undeclared.info.note;
+  EXPECT_EQ(read_file(put_vrt(complex)).info.note, "");
+}
+
+TEST_F(Vrt, SourcesAFewHundredthsOfACellOffAreOnTheNearestCells) {
+  if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
+  std::mt19937_64 random(12);
+  put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"xOff='0' yOff='0' xSize='9' ySize='7'",
+            "xOff='3.003' yOff='2.003' xSize='9' ySize='7'"},
+           {"xOff='2.01' yOff='0' xSize='9' ySize='7'",
+            "xOff='3' yOff='-0.02' xSize='9.001' ySize='7'"}}) {
+    const std::string vrt = put_vrt("<NoDataValue>-1</NoDataValue>" + source(rects(from, to)));
+    ASSERT_EQ(
+        std::system(("gdal_translate -q '" + vrt + "' '" + path("whole.tif") + "' >/dev/null 2>&1")
+                        .c_str()),
+        0);
+    const AllPoints found = read_file(vrt);
+    // GDAL fills the cells that a source touches, too.
+    const std::vector<Point3> cells = sorted_cells(found);
+    const std::vector<Point3> all = sorted_cells(read_file(path("whole.tif")));
+    EXPECT_EQ(cells.size(), 63U);
+    EXPECT_TRUE(std::includes(all.begin(), all.end(), cells.begin(), cells.end()));
+    EXPECT_NE(found.info.note.find("nearest"), std::string::npos) << found.info.note;
+  }
+  const std::string whole = "xOff='1' yOff='0' xSize='9' ySize='7'";
+  EXPECT_EQ(read_file(put_vrt(source(rects(whole, whole)))).info.note, "");
+}
+
+TEST_F(Vrt, ItsCrsMayBeACode) {
+  std::mt19937_64 random(13);
+  put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
+  const auto crs = [&](const std::string& text) {
+    return read_file(put_vrt(source(""), "<SRS>" + text + "</SRS>")).info.crs;
+  };
+  EXPECT_EQ(crs("EPSG:32632").epsg, 32632);
+  EXPECT_EQ(crs("\n epsg:25832+7837 ").epsg, 25832);
+  EXPECT_EQ(crs("EPSG:25832+7837").vertical_epsg, 7837);
+  // Other spellings are read with the WKT.
+  for (const char* const text :
+       {"EPSG:", "EPSG:12x", "EPSG:1+", "EPSG:99999999999", "ESRI:54030"}) {
+    EXPECT_EQ(crs(text).wkt, text);
+    EXPECT_EQ(crs(text).epsg, 0);
   }
 }
 

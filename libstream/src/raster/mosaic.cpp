@@ -16,7 +16,6 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::uint64_t kMostMosaicCells = 1u << 30;
-constexpr double kPhase = 1e-3;  // cells
 constexpr std::size_t kMostWkt = std::size_t{64} << 10;
 
 std::string shown(double value) {
@@ -37,7 +36,7 @@ std::string all_digits(double value) {
                          const std::string& what, const std::string& remedy) {
   throw Error({.file = other,
                .where = {},
-               .cause = "does not fit to " + first + ": " + what,
+               .cause = "does not match " + first + ": " + what,
                .remedy = remedy});
 }
 
@@ -56,8 +55,9 @@ struct Member {
   std::uint64_t held_bytes = 0;
 };
 
-/// All four corners must lie on cells of the first raster, so cell sizes and rotation agree, too.
-Member placed(const RasterInfo& first, const RasterInfo& other) {
+/// All four corners must be on cells of the first raster, to kNearestCell, so cell sizes and
+/// rotation agree too. off: the largest distance of a corner from its cell, in cells.
+Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
   const std::string &a = first.files.front(), &b = other.files.front();
   const auto& m = other.world.xy;
   const auto corner = [&](double c, double r) {
@@ -70,14 +70,19 @@ Member placed(const RasterInfo& first, const RasterInfo& other) {
   for (const auto& [c, r] :
        {std::pair(width, 0.0), std::pair(0.0, height), std::pair(width, height)}) {
     const auto at = corner(c, r);
-    if (!(std::abs(at[0] - origin[0] - c) <= kPhase && std::abs(at[1] - origin[1] - r) <= kPhase)) {
+    const double stretch =
+        std::max(std::abs(at[0] - origin[0] - c), std::abs(at[1] - origin[1] - r));
+    off = std::max({off, std::abs(at[0] - column - c), std::abs(at[1] - row - r)});
+    if (!(stretch <= kNearestCell)) {
       differ(a, b,
              "cells of " + all_digits(m[0]) + " x " + all_digits(m[4]) + " where the other has " +
                  all_digits(first.world.xy[0]) + " x " + all_digits(first.world.xy[4]),
              align);
     }
   }
-  if (!(std::abs(origin[0] - column) <= kPhase && std::abs(origin[1] - row) <= kPhase)) {
+  const double shift = std::max(std::abs(origin[0] - column), std::abs(origin[1] - row));
+  off = std::max(off, shift);
+  if (!(shift <= kNearestCell)) {
     differ(a, b,
            "its cells are shifted by " + shown(origin[0] - column) + ", " + shown(origin[1] - row) +
                " of a cell",
@@ -158,7 +163,7 @@ std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
       crs.geographic || (crs.wkt.starts_with("GEOG") && crs.wkt.find("0.01745329") != crs.wkt.npos);
   if (!geographic || !degrees || m[1] != 0 || m[3] != 0 || !(m[0] > 0)) return 0;
   const double columns = 360 / m[0];
-  const bool whole = columns < 0x1p31 && std::abs(columns - std::round(columns)) <= kPhase;
+  const bool whole = columns < 0x1p31 && std::abs(columns - std::round(columns)) <= kSameCell;
   return whole ? static_cast<std::int64_t>(std::round(columns)) : 0;
 }
 
@@ -208,6 +213,8 @@ class Mosaic final : public Raster {
       : opener_(std::move(opener)), open_at_once_(open_at_once), open_bytes_(open_bytes) {
     assert(!files.empty());
     std::optional<RasterInfo> first;
+    double farthest = 0;
+    std::string farthest_file;
     for (const std::string& file : files) {
       const std::unique_ptr<Raster> raster = opener_(file);
       // A member may be a part of its file.
@@ -222,13 +229,27 @@ class Mosaic final : public Raster {
         check_samples(*first, info);
         if (!crs) check_crs(*first, info);
       }
-      members_.push_back(placed(*first, info));
+      double off = 0;
+      members_.push_back(placed(*first, info, off));
+      if (off > farthest) {
+        farthest = off;
+        farthest_file = file;
+      }
+      for (const std::string& line : info.notes) {
+        if (notes_.size() < kMostComments) notes_.push_back(line);
+      }
       for (const std::string& comment : info.comments) {
         std::string line = file;
         note(line.append(": ").append(comment));
       }
     }
+    if (farthest > kSameCell) {
+      notes_.push_back("the cells of " + farthest_file + " are up to " + shown(farthest) +
+                       " of a cell off those of " + files.front() +
+                       ", and are placed on the nearest ones");
+    }
     unite(*first, crs.value_or(first->crs));
+    info_.notes = std::move(notes_);
   }
 
   [[nodiscard]] const RasterInfo& info() const override { return info_; }
@@ -266,8 +287,9 @@ class Mosaic final : public Raster {
     std::unique_ptr<Raster> raster;
   };
 
+  static constexpr std::size_t kMostComments = 16;
+
   void note(std::string comment) {
-    constexpr std::size_t kMostComments = 16;
     if (info_.comments.size() < kMostComments) info_.comments.push_back(std::move(comment));
   }
 
@@ -346,7 +368,7 @@ class Mosaic final : public Raster {
   std::size_t open_at_once_;
   std::uint64_t open_bytes_, held_bytes_ = 0;
   RasterInfo info_;
-  std::vector<std::string> files_;  ///< of info_, until it is complete
+  std::vector<std::string> files_, notes_;  ///< of info_, until it is complete
   std::vector<Member> members_;
   std::list<Open> open_;  // the latest used first
 };

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/vrt/document.hpp"
 
+#include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "format/geotiff/georeference.hpp"
@@ -34,7 +38,16 @@ class VrtReader {
     read_band(root);
   }
 
-  VrtDocument document() && { return {std::move(info_), std::move(sources_), nodata_}; }
+  VrtDocument document() && {
+    if (farthest_ > kSameCell) {
+      std::ostringstream note;
+      note.precision(2);
+      note << file_ << ": its sources are up to " << farthest_
+           << " of a cell off its cells, and are placed on the nearest ones";
+      info_.notes.push_back(note.str());
+    }
+    return {std::move(info_), std::move(sources_), nodata_};
+  }
 
  private:
   static constexpr std::string_view kAsGeoTiff =
@@ -104,7 +117,7 @@ class VrtReader {
   void read_place(const XmlElement& root) {
     info_.format = "vrt";
     info_.files = {file_};
-    if (const XmlElement* const srs = root.child("SRS")) info_.crs.wkt = trim(srs->text);
+    if (const XmlElement* const srs = root.child("SRS")) info_.crs = crs_of_srs(srs->text);
     const XmlElement* const transform = root.child("GeoTransform");
     if (transform == nullptr) {
       info_.world = kPlainWorld;
@@ -181,7 +194,7 @@ class VrtReader {
     }
   }
 
-  VrtSource source_of(const XmlElement& element) const {
+  VrtSource source_of(const XmlElement& element) {
     VrtSource source;
     for (const XmlElement& part : element.children) {
       if (part.name == "SourceFilename") {
@@ -194,8 +207,7 @@ class VrtReader {
         if (!(band >= 1 && band < 65536)) fail("SourceBand", "is no number of a band");
         source.band = static_cast<int>(band);
       } else if (part.name == "NODATA") {
-        source.simple = false;
-        source.nodata = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
+        source.nodata = std::string(trim(part.text));
       } else if ((part.name == "ScaleRatio" && number(part.text, part.name) == 1) ||
                  (part.name == "ScaleOffset" && number(part.text, part.name) == 0)) {
         continue;
@@ -210,7 +222,7 @@ class VrtReader {
   }
 
   /// Whole cells, as many on either side.
-  void place(const XmlElement& element, VrtSource& source) const {
+  void place(const XmlElement& element, VrtSource& source) {
     struct Rect {
       std::array<double, 4> v{};
     };
@@ -222,10 +234,12 @@ class VrtReader {
       for (std::size_t i = 0; i < 4; ++i) {
         const double value = number(found->attribute(kNames[i]), name);
         r.v[i] = std::round(value);
-        if (std::abs(value - r.v[i]) > 1e-6) {
+        const double off = std::abs(value - r.v[i]);
+        if (off > kNearestCell) {
           fail(name, "does not lie on whole cells: its source would be resampled",
                "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
         }
+        farthest_ = std::max(farthest_, off);
         if (!(r.v[i] >= (i < 2 ? 0 : 1)) || r.v[i] >= static_cast<double>(kMostVrtCells)) {
           fail(name, "lies outside of the raster", kAsGeoTiff);
         }
@@ -258,10 +272,35 @@ class VrtReader {
   int bands_ = 0;  ///< that have come to their end
   RasterInfo info_;
   NodataRule nodata_;
+  double farthest_ = 0;  ///< that a source is off the whole's cells, in cells
   std::vector<VrtSource> sources_;
 };
 
 }  // namespace
+
+Crs crs_of_srs(std::string_view text) {
+  while (!text.empty() && is_white_space(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_white_space(text.back())) text.remove_suffix(1);
+  Crs crs;
+  constexpr std::string_view kEpsg = "epsg:";
+  if (lower_case(std::string(text.substr(0, kEpsg.size()))) == kEpsg) {
+    int horizontal = 0, vertical = 0;
+    const char *at = text.data() + kEpsg.size(), *const end = text.data() + text.size();
+    const auto code = [&](int& value) {
+      const auto [rest, error] = std::from_chars(at, end, value);
+      at = rest;
+      return error == std::errc{} && value > 0;
+    };
+    const bool read = code(horizontal) && (at == end || (*at++ == '+' && code(vertical)));
+    if (read && at == end) {
+      crs.epsg = horizontal;
+      crs.vertical_epsg = vertical;
+      return crs;
+    }
+  }
+  crs.wkt = text;
+  return crs;
+}
 
 VrtDocument read_vrt(const std::string& file, int band) { return VrtReader(file, band).document(); }
 

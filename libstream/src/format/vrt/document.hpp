@@ -2,15 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "raster/nodata.hpp"
 #include "terrace/stream/raster.hpp"
 
 /// GDAL's virtual rasters (VRT) as far as they are mosaics: files whose cells coincide with those
-/// of the whole. Elements that would compute samples (resampling, scaling, masks, pixel functions,
-/// warping) are refused by name.
+/// of the whole, to kNearestCell. Elements that would compute samples (resampling, scaling, masks,
+/// pixel functions, warping) are refused by name.
 
 namespace terrace::stream {
 
@@ -18,8 +20,9 @@ namespace terrace::stream {
 struct VrtSource {
   std::string file{};
   int band = 1;
-  bool simple = true;  ///< replaces what is below, with or without data
-  NodataRule nodata{};
+  /// The only nodata value of the source that counts, whatever its file has. Without it the source
+  /// replaces what is below, with or without data.
+  std::optional<std::string> nodata{};
   std::uint64_t from_column = 0, from_row = 0;  ///< of the source
   std::uint64_t column = 0, row = 0, columns = 0, rows = 0;
 };
@@ -30,6 +33,9 @@ struct VrtDocument {
   std::vector<VrtSource> sources{};  ///< in order of precedence, topmost last
   NodataRule nodata{};               ///< of the whole
 };
+
+/// The CRS of an SRS element, as a code ("EPSG:n", "EPSG:n+m") or else as text of any spelling.
+Crs crs_of_srs(std::string_view text);
 
 /// Reads the description; its sources are not opened. band: counted from 1. Throws: Error if it is
 /// not a VRT or not supported.

@@ -25,6 +25,7 @@
 #include "format/grid/usgs_dem.hpp"
 #include "format/raster_points.hpp"
 #include "format/vrt/document.hpp"
+#include "io/number.hpp"
 #include "io/peek.hpp"
 #include "raster/nodata.hpp"
 #include "raster/overlay.hpp"
@@ -50,7 +51,9 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
       {{&geotiff_format, &open_geotiff},
        {&hgt_format, &open_hgt},
        {&ascii_grid_format,
-        [](const std::string& name, const RasterOptions&) { return open_ascii_grid(name); }},
+        [](const std::string& name, const RasterOptions& how) {
+          return open_ascii_grid(name, {}, {}, how.nodata);
+        }},
        {&usgs_dem_format,
         [](const std::string& name, const RasterOptions&) { return open_usgs_dem(name); }},
        {&png_format, &open_height_map},
@@ -141,11 +144,12 @@ class VrtRaster final : public Raster {
     held_.resize(sources_.size());
     options_.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
     for (std::size_t i = 0; i < sources_.size(); ++i) {
-      const std::unique_ptr<Raster> raster = open(sources_[i]);
+      const std::unique_ptr<Raster> raster = open(sources_[i], std::nullopt);
       held_[i] = raster->info().held_bytes;
       direct_ = direct_ && is_direct(sources_[i], raster->info());
       info_.held_bytes = std::max(info_.held_bytes, held_[i]);
-      if (i == 0 && info_.crs.wkt.empty()) {
+      note_own_nodata(sources_[i], raster->info());
+      if (i == 0 && info_.crs.wkt.empty() && info_.crs.epsg == 0) {
         const std::string unit = info_.crs.vertical_unit;
         info_.crs = raster->info().crs;
         if (!unit.empty()) info_.crs.vertical_unit = unit;
@@ -222,9 +226,24 @@ class VrtRaster final : public Raster {
     std::unique_ptr<Raster> raster;
   };
 
-  [[nodiscard]] std::unique_ptr<Raster> open(const VrtSource& source) const {
+  /// To GDAL, the nodata value of a file is a height in a mosaic that declares none. Here it has no
+  /// data all the same.
+  void note_own_nodata(const VrtSource& source, const RasterInfo& file) {
+    if (source.nodata || nodata_.value || !file.nodata || noted_) return;
+    noted_ = true;
+    std::string value;
+    append_number(value, *file.nodata);
+    info_.notes.push_back(info_.files.front() + ": declares no nodata value, so that of " +
+                          source.file + ", " + value +
+                          ", counts; GDAL takes such cells for heights");
+  }
+
+  /// nodata: see RasterOptions.
+  [[nodiscard]] std::unique_ptr<Raster> open(const VrtSource& source,
+                                             const std::optional<std::string>& nodata) const {
     RasterOptions options = options_;
     options.band = source.band;
+    options.nodata = nodata;
     std::unique_ptr<Raster> raster = open_member(source.file, options);
     const ScalarType type = info_.sample.type;
     const bool reals = type == ScalarType::f32 || type == ScalarType::f64;
@@ -262,7 +281,9 @@ class VrtRaster final : public Raster {
       held_bytes_ -= held_[open_.back().source];
       open_.pop_back();
     }
-    open_.push_front({source, open(sources_[source])});
+    std::optional<std::string> nodata = sources_[source].nodata;
+    if (!nodata && nodata_.value) nodata = "";  // applied to all sources when they are composed
+    open_.push_front({source, open(sources_[source], nodata)});
     held_bytes_ += held_[source];
     return *open_.front().raster;
   }
@@ -278,11 +299,13 @@ class VrtRaster final : public Raster {
 
   /// True if of the source only the cells count that its file has data for, each with its value.
   [[nodiscard]] bool is_direct(const VrtSource& source, const RasterInfo& file) const {
-    const bool whole = nodata_.value == file.nodata || !nodata_.value;
-    if (!source.simple) return source.nodata.value == file.nodata && whole;
+    if (source.nodata) {
+      const NodataRule rule = NodataRule::parse(*source.nodata, info_.sample.type);
+      return !nodata_.value || nodata_.value == rule.value;
+    }
     const bool holes =
         file.nodata || info_.sample.type == ScalarType::f32 || info_.sample.type == ScalarType::f64;
-    return !holes && whole;
+    return !holes && !nodata_.value;
   }
 
   /// Lays all sources over one another, then what has data over `out`: a source may take back what
@@ -322,12 +345,11 @@ class VrtRaster final : public Raster {
     for (std::size_t row = 0; row < rows; ++row) {
       const std::byte* const samples = part_.data() + row * columns * bytes;
       const std::uint8_t* const has_data = part_valid_.data() + row * columns;
-      if (!source.simple) mask(samples, columns, source.nodata, opaque_);
       mask(samples, columns, nodata_, data_);
       const std::size_t to =
           static_cast<std::size_t>((meeting->row + row) * window.columns + meeting->column);
       for (std::size_t i = 0; i < columns; ++i) {
-        if (!source.simple && (has_data[i] == 0 || opaque_[i] == 0)) continue;
+        if (source.nodata && has_data[i] == 0) continue;
         const bool good = has_data[i] != 0 && data_[i] != 0;
         valid_[to + i] = good ? 1 : 0;
         if (good) std::memcpy(samples_.data() + (to + i) * bytes, samples + i * bytes, bytes);
@@ -342,9 +364,10 @@ class VrtRaster final : public Raster {
   std::vector<std::uint64_t> held_;  ///< bytes, by source
   std::list<Open> open_;             ///< the last used first
   std::uint64_t open_bytes_, held_bytes_ = 0;
+  bool noted_ = false;  ///< see note_own_nodata()
   bool direct_ = true;  ///< sources lie over one another as they are
   std::vector<std::byte> samples_, part_, ignored_;
-  std::vector<std::uint8_t> valid_, part_valid_, opaque_, data_;
+  std::vector<std::uint8_t> valid_, part_valid_, data_;
 };
 
 std::unique_ptr<Raster> open_vrt(const std::string& file, const RasterOptions& options) {
