@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "format/geotiff/georeference.hpp"
+#include "format/vrt/document.hpp"
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
@@ -55,29 +56,39 @@ XmlElement read_pam(const std::string& file) {
   });
 }
 
+/// What a sidecar says of a band; nullptr for nothing.
+const XmlElement* band_of(const XmlElement& root, const RasterOptions& options) {
+  // The samples of colours are not those that the sidecar describes.
+  if (options.heights_of_colour != HeightsOfColour::none) return nullptr;
+  const auto found =
+      std::find_if(root.children.begin(), root.children.end(), [&](const XmlElement& band) {
+        return band.name == kPamBand && finite_number(band.attribute("band")) == options.band;
+      });
+  return found == root.children.end() ? nullptr : &*found;
+}
+
+/// As in GDAL, the sidecar of a GeoTIFF overrides the file in place, CRS, nodata value and unit.
+/// Those of other formats only add to their files.
+bool is_overridden(const RasterInfo& info) { return info.format == "geotiff"; }
+
 class WithAuxXml final : public Raster {
  public:
-  WithAuxXml(std::unique_ptr<Raster> raster, const std::string& sidecar,
-             const RasterOptions& options)
-      : raster_(std::move(raster)), info_(raster_->info()) {
-    XmlElement root;
-    try {
-      root = read_pam(sidecar);
-    } catch (const Error& error) {
-      info_.comments.push_back(std::string("left aside: ") + error.what());
-      return;
-    }
-    if (root.name != "PAMDataset") return;
-    const XmlElement* const srs = root.child("SRS");
-    if (srs != nullptr && lacks_crs(info_.crs)) info_.crs.wkt = trim(srs->text);
+  /// own_nodata: of the file alone, where `raster` was opened with that of the sidecar. band: of
+  /// the root, or null.
+  WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, const XmlElement& root,
+             std::optional<double> own_nodata, const XmlElement* band)
+      : raster_(std::move(raster)),
+        info_(raster_->info()),
+        sidecar_(std::move(sidecar)),
+        overrides_(is_overridden(info_)) {
+    if (const XmlElement* const srs = root.child("SRS")) read_crs(crs_of_srs(srs->text));
     if (const XmlElement* const place = root.child("GeoTransform")) read_place(place->text);
-    // The samples of colours are not those that the file says something of.
-    if (options.heights_of_colour != HeightsOfColour::none) return;
-    for (const XmlElement& band : root.children) {
-      if (band.name == kPamBand && finite_number(band.attribute("band")) == options.band) {
-        read_band(band);
-      }
-    }
+    if (band != nullptr) read_band(*band, own_nodata);
+  }
+  /// With a comment alone.
+  WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, std::string comment)
+      : raster_(std::move(raster)), info_(raster_->info()), sidecar_(std::move(sidecar)) {
+    info_.comments.push_back(std::move(comment));
   }
 
   [[nodiscard]] const RasterInfo& info() const override { return info_; }
@@ -116,8 +127,32 @@ class WithAuxXml final : public Raster {
  private:
   static constexpr std::uint64_t kStripRows = 256;
 
+  /// Whether what the sidecar says counts, of something that the file may say as well. Notes that
+  /// the two differ.
+  bool takes(bool file_says_it, bool differs, bool overrides, const std::string& what) {
+    if (!file_says_it) return true;
+    if (differs) {
+      info_.notes.push_back(sidecar_ + ": its " + what + " differs from that of the file; " +
+                            (overrides ? "the sidecar" : "the file") + " counts, as in GDAL");
+    }
+    return overrides;
+  }
+
+  void read_crs(Crs crs) {
+    if (crs.epsg == 0 && crs.wkt.empty()) return;
+    const Crs& own = info_.crs;
+    const bool has_own = !lacks_crs(own);
+    if (has_own && own.epsg == crs.epsg && own.wkt == crs.wkt) return;
+    if (!takes(has_own, crs.epsg == 0 || crs.epsg != own.epsg, overrides_, "CRS")) return;
+    // The sidecar may say nothing of heights.
+    if (crs.vertical_epsg == 0 && crs.wkt.find("VERT") == std::string::npos) {
+      crs.vertical_epsg = own.vertical_epsg;
+    }
+    crs.vertical_unit = own.vertical_unit;
+    info_.crs = std::move(crs);
+  }
+
   void read_place(const std::string& text) {
-    if (info_.world != kPlainWorld) return;
     const std::vector<std::string_view> words = split_fields(trim(text), ',');
     std::array<double, 6> g{};
     for (std::size_t i = 0; i < g.size(); ++i) {
@@ -127,50 +162,104 @@ class WithAuxXml final : public Raster {
     }
     const double area = g[1] * g[5] - g[2] * g[4];
     if (!std::isfinite(area) || area == 0) return;
+    constexpr std::array<double, 6> kNoPlace{0, 1, 0, 0, 0, 1};  // as of a file without a place
+    if (g == kNoPlace) return;
     // From the corner of the first cell to its middle.
-    info_.world.xy = {g[1], g[2], g[0] + 0.5 * (g[1] + g[2]),
-                      g[4], g[5], g[3] + 0.5 * (g[4] + g[5])};
+    const WorldTransform world{
+        {g[1], g[2], g[0] + 0.5 * (g[1] + g[2]), g[4], g[5], g[3] + 0.5 * (g[4] + g[5])}};
+    if (!takes(info_.world != kPlainWorld, !is_near(world), overrides_, "place")) return;
+    info_.world = world;
     std::erase(info_.comments, kNoGeoreferencing);
   }
 
-  void read_band(const XmlElement& band) {
+  /// Within rounding of its numbers.
+  [[nodiscard]] bool is_near(const WorldTransform& world) const {
+    const auto &a = info_.world.xy, &b = world.xy;
+    const double cell = std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[3]), std::abs(a[4])});
+    const auto columns = static_cast<double>(info_.columns), rows = static_cast<double>(info_.rows);
+    return std::abs(a[0] - b[0]) * columns + std::abs(a[1] - b[1]) * rows +
+               std::abs(a[3] - b[3]) * columns + std::abs(a[4] - b[4]) * rows +
+               std::abs(a[2] - b[2]) + std::abs(a[5] - b[5]) <=
+           kSameCell * cell;
+  }
+
+  void read_band(const XmlElement& band, std::optional<double> own_nodata) {
     Channel& sample = info_.sample;
-    if (const XmlElement* const nodata = band.child("NoDataValue"); nodata && !info_.nodata) {
-      nodata_ = NodataRule::parse(nodata->text, sample.type);
-      info_.nodata = nodata_->value;
-      constexpr std::uint64_t kWindowColumns = 4096;  // of most windows
-      info_.held_bytes +=
-          std::min(info_.columns, kWindowColumns) * kStripRows * (size_of(sample.type) + 1);
+    if (const XmlElement* const nodata = band.child("NoDataValue")) {
+      read_nodata(nodata->text, own_nodata);
     }
-    if (sample.scale == 1 && sample.offset == 0) {
-      const auto number = [&](const char* name, double otherwise) {
-        const XmlElement* const element = band.child(name);
-        return element != nullptr ? finite_number(element->text).value_or(otherwise) : otherwise;
-      };
-      const double scale = number("Scale", 1);
-      if (scale != 0) sample.scale = scale;
-      sample.offset = number("Offset", 0);
+    const auto number = [&](const char* name, double otherwise) {
+      const XmlElement* const element = band.child(name);
+      return element != nullptr ? finite_number(element->text).value_or(otherwise) : otherwise;
+    };
+    const double scale = number("Scale", 1), offset = number("Offset", 0);
+    if (scale != 0 && (scale != 1 || offset != 0) &&
+        takes(sample.scale != 1 || sample.offset != 0,
+              scale != sample.scale || offset != sample.offset, false, "scale and offset")) {
+      sample.scale = scale;
+      sample.offset = offset;
     }
-    if (const XmlElement* const unit = band.child("UnitType"); unit && sample.unit.empty()) {
-      sample.unit = info_.crs.vertical_unit = canonical_unit(std::string(trim(unit->text)));
+    if (const XmlElement* const element = band.child("UnitType")) {
+      const std::string unit = canonical_unit(std::string(trim(element->text)));
+      if (!unit.empty() &&
+          takes(!sample.unit.empty(), unit != sample.unit, overrides_, "unit of heights")) {
+        sample.unit = info_.crs.vertical_unit = unit;
+      }
     }
+  }
+
+  void read_nodata(const std::string& text, std::optional<double> own) {
+    const NodataRule rule = NodataRule::parse(text, info_.sample.type);
+    if (!rule.value) return;
+    const bool same = own == rule.value || (own && std::isnan(*own) && std::isnan(*rule.value));
+    const bool taken = takes(own.has_value(), !same, overrides_, "nodata value");
+    // One that overrides the file's has been applied in opening it.
+    if (!taken || overrides_) return;
+    nodata_ = rule;
+    info_.nodata = nodata_->value;
+    constexpr std::uint64_t kWindowColumns = 4096;  // of most windows
+    info_.held_bytes +=
+        std::min(info_.columns, kWindowColumns) * kStripRows * (size_of(info_.sample.type) + 1);
   }
 
   std::unique_ptr<Raster> raster_;
   RasterInfo info_;
-  std::optional<NodataRule> nodata_;  ///< besides that of the file
+  std::string sidecar_;
+  bool overrides_ = false;            ///< see is_overridden()
+  std::optional<NodataRule> nodata_;  ///< of the sidecar, applied to the file's samples
   std::vector<std::byte> samples_;
   std::vector<std::uint8_t> valid_;
 };
 
 }  // namespace
 
-std::unique_ptr<Raster> with_aux_xml(std::unique_ptr<Raster> raster, const std::string& file,
-                                     const RasterOptions& options) {
+std::unique_ptr<Raster> open_with_aux_xml(const OpenRaster& open, const std::string& file,
+                                          const RasterOptions& options) {
   const std::string sidecar = file + ".aux.xml";
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(sidecar, ignored)) return raster;
-  return std::make_unique<WithAuxXml>(std::move(raster), sidecar, options);
+  std::unique_ptr<Raster> raster = open(file, options);
+  // GDAL has no sidecars of virtual rasters.
+  if (raster->info().format == "vrt" || !std::filesystem::is_regular_file(sidecar, ignored)) {
+    return raster;
+  }
+  XmlElement root;
+  try {
+    root = read_pam(sidecar);
+  } catch (const Error& error) {
+    return std::make_unique<WithAuxXml>(std::move(raster), sidecar,
+                                        std::string("left aside: ") + error.what());
+  }
+  if (root.name != "PAMDataset") return raster;
+  const std::optional<double> own = raster->info().nodata;
+  const XmlElement* const band = band_of(root, options);
+  const XmlElement* const nodata = band != nullptr ? band->child("NoDataValue") : nullptr;
+  if (nodata != nullptr && is_overridden(raster->info()) &&
+      NodataRule::parse(nodata->text, raster->info().sample.type).value) {
+    RasterOptions overridden = options;
+    overridden.nodata = nodata->text;
+    raster = open(file, overridden);
+  }
+  return std::make_unique<WithAuxXml>(std::move(raster), sidecar, root, own, band);
 }
 
 }  // namespace terrace::stream

@@ -4,14 +4,16 @@
 #include <memory>
 #include <string>
 
+#include "format/raster_points.hpp"
 #include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
 
-/// The raster of a file with what the file lacks and GDAL keeps beside it, in FILE.aux.xml: CRS,
-/// place, and of the band nodata value, scale, offset and unit. A sidecar that cannot be read is
-/// told of in a comment.
-std::unique_ptr<Raster> with_aux_xml(std::unique_ptr<Raster> raster, const std::string& file,
-                                     const RasterOptions& options);
+/// Opens a raster and applies what GDAL keeps next to it in FILE.aux.xml: CRS, place, and of the
+/// band nodata value, scale, offset and unit. As in GDAL, the sidecar overrides a GeoTIFF, except
+/// for scale and offset; to files of other formats it adds what they lack, and virtual rasters have
+/// none. Notes name what differs. A comment reports a sidecar that cannot be read.
+std::unique_ptr<Raster> open_with_aux_xml(const OpenRaster& open, const std::string& file,
+                                          const RasterOptions& options);
 
 }  // namespace terrace::stream

@@ -54,7 +54,7 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
   raster.cache_bytes = window / 6;
   const auto open_one = [open, cell = options.cell](const std::string& file,
                                                     const RasterOptions& how) {
-    std::unique_ptr<Raster> found = with_aux_xml(open(file, how), file, how);
+    std::unique_ptr<Raster> found = open_with_aux_xml(open, file, how);
     if (cell > 0) found = std::make_unique<WithCells>(std::move(found), cell);
     return found;
   };
