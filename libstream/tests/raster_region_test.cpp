@@ -14,6 +14,7 @@
 #include <optional>
 #include <random>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -309,6 +310,59 @@ TEST(RasterRegion, FilesGiveThePointsInside) {
   const Progress progress = part->progress();
   EXPECT_EQ(progress.points, found.size());
   EXPECT_EQ(progress.points + progress.nodata + progress.excluded, 97u * 83);
+}
+
+/// All void; calls back for every window.
+class VoidRaster final : public Raster {
+ public:
+  VoidRaster(std::uint64_t columns, std::uint64_t rows, std::function<void()> on_window)
+      : on_window_(std::move(on_window)) {
+    info_.files = {"void.vrt"};
+    info_.columns = columns;
+    info_.rows = rows;
+    info_.sample.type = ScalarType::i16;
+  }
+  [[nodiscard]] const RasterInfo& info() const override { return info_; }
+  bool read_over(const CellWindow&, const CellBuffer&) override {
+    on_window_();
+    return false;
+  }
+
+ private:
+  std::function<void()> on_window_;
+  RasterInfo info_;
+};
+
+TEST(RasterPoints, AStopEndsTheSearchForCellsWithData) {
+  std::stop_source stop;
+  int windows = 0;
+  const auto source = points_of(std::make_unique<VoidRaster>(1u << 24, 1u << 24,
+                                                             [&] {
+                                                               if (++windows == 3)
+                                                                 stop.request_stop();
+                                                             }),
+                                {.stop = stop.get_token()});
+  PointBlock block;
+  EXPECT_THROW(source->next(block), Stopped);
+  EXPECT_EQ(windows, 3);
+}
+
+TEST(RasterPoints, MoreCellsThanCanBeReadAreRefused) {
+  const auto open = [](std::uint64_t columns, const std::optional<Box3>& region) {
+    SourceOptions options;
+    options.selection.region = region;
+    return points_of(std::make_unique<VoidRaster>(columns, (1u << 30) - 1, [] {}), options);
+  };
+  EXPECT_NO_THROW(open(1u << 18, std::nullopt));
+  try {
+    open((1u << 18) + 1, std::nullopt);
+    ADD_FAILURE() << "more than 2^48 cells";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("262145 x 1073741823 cells"), std::string::npos)
+        << error.what();
+  }
+  // A part may be small enough.
+  EXPECT_NO_THROW(open((1u << 30) - 1, Box3{{0, 0, -1e9}, {1000, 1000, 1e9}}));
 }
 
 }  // namespace

@@ -5,10 +5,12 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 
 #include "raster/order.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
 #include "with_type.hpp"
 
@@ -97,13 +99,27 @@ std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t 
   return size < block || end <= begin ? size : end - begin;
 }
 
+/// Throws: Error if there are more cells than a store has room for: no reading would come to an
+/// end.
+void check_count(const SourceInfo& info, const CellWindow& crop) {
+  constexpr std::uint64_t kMostReadableCells = std::uint64_t{1} << 48;
+  if (cells_of(crop) <= kMostReadableCells) return;
+  throw Error({.file = info.files.front(),
+               .where = {},
+               .cause = "has " + std::to_string(crop.columns) + " x " + std::to_string(crop.rows) +
+                        " cells, more than the 2^48 that can be read",
+               .remedy = "select a part (`region`, gdal_translate -srcwin), or correct its size"});
+}
+
 class RasterSource final : public PointSource {
  public:
   RasterSource(std::unique_ptr<Raster> raster, const SourceOptions& options)
       : raster_(std::move(raster)),
         info_(source_info(raster_->info(), options)),
         crop_(cells_in(info_, options.selection.region)),
+        stop_(options.stop),
         block_points_(std::clamp<std::size_t>(options.block_points, 1, kMostBlockPoints)) {
+    check_count(info_, crop_);
     progress_.excluded = *info_.points - cells_of(crop_);
     if (cells_of(crop_) == 0) {
       row_ = info_.rows;  // there is nothing to read
@@ -133,6 +149,7 @@ class RasterSource final : public PointSource {
   bool next(PointBlock& block) override {
     block.clear();
     while (block.empty()) {
+      if (stop_.stop_requested()) throw Stopped();
       if (next_tile_ == order_.size() && !next_window()) return false;
       if (next_tile_ < order_.size()) emit(order_[next_tile_++], block);
     }
@@ -258,6 +275,7 @@ class RasterSource final : public PointSource {
   std::unique_ptr<Raster> raster_;
   SourceInfo info_;  ///< columns and rows count from the crop's first cell
   CellWindow crop_;  ///< of the file, around Selection::region
+  std::stop_token stop_;
   std::size_t block_points_;
   double aspect_ = 1;
   GridSize window_size_;
