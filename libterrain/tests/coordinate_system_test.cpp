@@ -210,17 +210,95 @@ TEST(CoordinateSystem, WktOfOtherDialects) {
 
 TEST(CoordinateSystem, WktThatContradictsItselfIsRefused) {
   const std::string good = CoordinateSystem::parse("EPSG:32632").crs().wkt;
-  EXPECT_NO_THROW(definition_of_wkt(good));
+  EXPECT_NO_THROW(definition_of_contents(good));
   const auto broken = [&good](const std::string& from, const std::string& to) {
     std::string text = good;
     text.replace(text.find(from), from.size(), to);
     return text;
   };
-  EXPECT_THROW(definition_of_wkt(broken("0.9996", "0.9999")), ContradictoryCrs);
-  EXPECT_THROW(definition_of_wkt(broken("origin\",9,", "origin\",15,")), ContradictoryCrs);
-  EXPECT_THROW(definition_of_wkt(broken("298.257223563", "297")), ContradictoryCrs);
-  EXPECT_THROW(definition_of_wkt(broken("AXIS[\"(E)\",east", "AXIS[\"(W)\",west")), CrsError);
-  EXPECT_THROW(definition_of_wkt(broken("0.9996", "nan")), CrsError);
+  EXPECT_THROW(definition_of_contents(broken("0.9996", "0.9999")), ContradictoryCrs);
+  EXPECT_THROW(definition_of_contents(broken("origin\",9,", "origin\",15,")), ContradictoryCrs);
+  EXPECT_THROW(definition_of_contents(broken("298.257223563", "297")), ContradictoryCrs);
+  EXPECT_THROW(definition_of_contents(broken("AXIS[\"(E)\",east", "AXIS[\"(W)\",west")), CrsError);
+  EXPECT_THROW(definition_of_contents(broken("0.9996", "nan")), CrsError);
+}
+
+TEST(CoordinateSystem, AFileMaySpellACrsAsItLikes) {
+  const auto title = [](const std::string& text) {
+    try {
+      return definition_of_contents(text).title();
+    } catch (const CrsError& error) {
+      return std::string("refused: ") + error.what();
+    }
+  };
+  for (const char* const text :
+       {"EPSG:32632", "epsg:32632", "\xEF\xBB\xBF EPSG:32632\r\n", "urn:ogc:def:crs:EPSG::32632",
+        "urn:x-ogc:def:crs:EPSG:6.9:32632", "http://www.opengis.net/def/crs/EPSG/0/32632",
+        "https://opengis.net/def/crs/EPSG/0/32632", "+proj=utm +zone=32 +datum=WGS84",
+        "+init=epsg:32632", "WGS 84 / UTM zone 32N"}) {
+    EXPECT_EQ(title(text), "EPSG:32632 (WGS 84 / UTM zone 32N)") << text;
+  }
+  for (const char* const text : {"WGS84", "EPSGA:4326"}) {
+    EXPECT_EQ(title(text), "EPSG:4326 (WGS 84)") << text;
+  }
+  EXPECT_EQ(title("WGS72"), "EPSG:4322 (WGS 72)");
+  EXPECT_EQ(title("NAD83(HARN)"), "EPSG:4152 (NAD83(HARN))");
+  for (const char* const text :
+       {"CRS:84", "OGC:CRS84", "http://opengis.net/def/crs/OGC/1.3/CRS84"}) {
+    EXPECT_EQ(title(text).find("refused"), std::string::npos) << text;
+  }
+  EXPECT_EQ(definition_of_contents("EPSG:25832+7837").vertical_epsg, 7837);
+  EXPECT_EQ(title(" \n"), "refused: the definition is empty");
+  // It does not lead to another file.
+  const tests::TemporaryFolder folder;
+  const std::string file = (folder.path() / "a.prj").string();
+  std::ofstream(file) << "EPSG:32632";
+  EXPECT_EQ(definition_of_text(file).epsg(), 32632);
+  EXPECT_EQ(title(file).find("refused"), 0U);
+  EXPECT_EQ(local_crs_in(file), std::nullopt);
+}
+
+TEST(CoordinateSystem, WktMayHaveParentheses) {
+  for (const std::string& brackets : {CoordinateSystem::parse("EPSG:32632").crs().wkt,
+                                      CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt}) {
+    std::string text = brackets;
+    bool quoted = false;
+    for (char& c : text) {
+      if (c == '"') quoted = !quoted;
+      if (!quoted && c == '[') c = '(';
+      if (!quoted && c == ']') c = ')';
+    }
+    EXPECT_EQ(definition_of_contents(text).title(), definition_of_contents(brackets).title());
+    EXPECT_EQ(definition_of_text(text).wkt, definition_of_contents(brackets).wkt);
+  }
+}
+
+TEST(CoordinateSystem, TextThatTakesLongToReadIsRefused) {
+  const auto repeated = [](const std::string& text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  const auto refusal = [](const std::string& text) {
+    try {
+      definition_of_contents(text);
+    } catch (const CrsError& error) {
+      EXPECT_THROW(definition_of_text(text), CrsError);
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string nested =
+      repeated("{\"type\":\"BoundCRS\",\"source_crs\":", 3200) + "1" + repeated("}", 3200);
+  EXPECT_NE(refusal(nested).find("longer than 64 KiB"), std::string::npos);
+  EXPECT_NE(refusal(nested.substr(0, 60000)).find("nested too deeply"), std::string::npos);
+  EXPECT_NE(refusal(repeated("A[", 40)).find("nested too deeply"), std::string::npos);
+  EXPECT_NE(refusal(repeated("A(\"", 40)), "");
+  const std::string members = "{\"type\":\"GeographicCRS\",\"datum_ensemble\":{\"members\":[" +
+                              repeated("{\"name\":\"a\"},", 3000) + "1]}}";
+  EXPECT_NE(refusal(members).find("too many parts"), std::string::npos);
+  // Brackets in quotes are text.
+  EXPECT_EQ(refusal("{\"type\":\"" + repeated("[\\\"", 600)).find("parts"), std::string::npos);
 }
 
 constexpr char kOwnDatum[] =

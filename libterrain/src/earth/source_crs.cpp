@@ -14,28 +14,37 @@ namespace {
   throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
 }
 
-CoordinateSystem read_sidecar(const std::string& file) {
+/// Nothing for a local system, which `local` is set to.
+std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std::string& contents,
+                                             std::optional<stream::Crs>& local) {
   try {
-    return CoordinateSystem(definition_of_text(file));
+    return CoordinateSystem(definition_of_contents(contents));
+  } catch (const LocalCrs& error) {
+    local = error.crs();
+    return std::nullopt;
   } catch (const CrsError& error) {
     fail(file, error.what(), "correct or remove it, or name the system: `crs` EPSG:n");
   }
 }
 
 /// What the .prj files say, which must be one thing. local: a system that has no place on earth.
+/// note: what the user should know of them.
 std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& info,
                                                    std::string& name,
-                                                   std::optional<stream::Crs>& local) {
+                                                   std::optional<stream::Crs>& local,
+                                                   std::string& note) {
   std::optional<CoordinateSystem> system;
   for (const std::string& file : info.files) {
     const std::string sidecar = stream::prj_beside(file);
     if (sidecar.empty()) continue;
-    if (const auto own = local_crs_named(sidecar)) {
-      local = own;
+    const std::string contents = contents_of_file(sidecar);
+    if (contents.empty()) {
+      note = sidecar + " is empty and says nothing of the CRS";
       continue;
     }
-    const CoordinateSystem other = read_sidecar(sidecar);
-    if (system && !system->same_places(other)) {
+    const std::optional<CoordinateSystem> other = read_sidecar(sidecar, contents, local);
+    if (!other) continue;
+    if (system && !system->same_places(*other)) {
       fail(sidecar, "its CRS is not that of " + name,
            "convert one of the files, or name the CRS of all: `crs` EPSG:n");
     }
@@ -70,12 +79,14 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     return found;
   }
   std::string sidecar;
-  std::optional<stream::Crs> local = local_crs_named(info.crs.wkt);
+  std::optional<stream::Crs> local;
   if (!found.system) {
-    if (!local) found.system = system_of_sidecars(info, sidecar, local);
+    local = local_crs_in(info.crs.wkt);
+    if (!local) found.system = system_of_sidecars(info, sidecar, local, found.note);
   } else if (!info.crs.geo_keys.empty()) {
     // A file that tells its own CRS needs no other; one beside it must not say anything else.
-    const std::optional<CoordinateSystem> other = system_of_sidecars(info, sidecar, local);
+    const std::optional<CoordinateSystem> other =
+        system_of_sidecars(info, sidecar, local, found.note);
     if (other && !other->same_places(*found.system)) {
       fail(file,
            "its CRS is " + found.system->title() + ", that of " + sidecar + " is " + other->title(),

@@ -30,6 +30,12 @@ class ContradictoryCrs : public CrsError {
   using CrsError::CrsError;
 };
 
+/// A text that is not the definition or name of a system.
+class UnreadableCrs : public CrsError {
+ public:
+  using CrsError::CrsError;
+};
+
 /// A local (engineering) system, which has a unit but no place on the earth.
 class LocalCrs : public CrsError {
  public:
@@ -85,16 +91,22 @@ struct CrsDefinition {
   [[nodiscard]] std::string title() const;
 };
 
-/// What the user writes, or a file holds: a code, a name, WKT, PROJJSON, a PROJ string.
-/// Throws: CrsError.
+/// What the user writes: anything that a file may hold (see definition_of_contents), or the name of
+/// a file. Throws: CrsError.
 CrsDefinition definition_of_text(const std::string& text);
+/// What a file holds, which never leads to another file: WKT (version 1, OGC's, GDAL's and ESRI's,
+/// or 2), PROJJSON, a PROJ string, a code such as "EPSG:32632+5773", "ESRI:54030", a URN or URL of
+/// the OGC, or a name. Text of more than 64 KiB, 512 parts or 32 levels is refused. Throws:
+/// CrsError.
+CrsDefinition definition_of_contents(const std::string& text);
+/// The contents of such a file, without a byte order mark and white space around them; of a larger
+/// file only as much as shows that it is too large.
+std::string contents_of_file(const std::string& name);
 /// The local system that such a text describes; nothing if it is another or none.
 std::optional<stream::Crs> local_crs_named(const std::string& text);
+std::optional<stream::Crs> local_crs_in(const std::string& contents);
 /// The system of an EPSG code: geographic, projected or compound. Throws: CrsError.
 CrsDefinition definition_of_epsg(int code);
-/// The system that WKT (version 1, OGC's, GDAL's and ESRI's, or 2), PROJJSON or a PROJ string
-/// describes. Throws: CrsError.
-CrsDefinition definition_of_wkt(const std::string& text);
 /// Sets the vertical part from the code of a vertical system. Throws: CrsError.
 void set_vertical_epsg(CrsDefinition& definition, int code);
 /// Leaves what heights refer to unsaid.

@@ -18,11 +18,41 @@
 namespace terrace::terrain {
 namespace {
 
+/// Of the text of a definition.
+constexpr std::size_t kMostCrsText = std::size_t{64} << 10;
+
 /// Codes that are not EPSG's but widespread.
 int alias_of(int code) {
   constexpr std::array<int, 3> kWebMercator{900913, 102100, 102113};
   return std::find(kWebMercator.begin(), kWebMercator.end(), code) != kWebMercator.end() ? 3857
                                                                                          : code;
+}
+
+/// Throws: CrsError for text that is longer, has more parts or is nested more deeply than any
+/// definition. PROJ looks up many parts in its database, and its time and memory grow with the
+/// square of the depth.
+void check_extent(std::string_view text) {
+  constexpr int kDeepest = 32, kMostParts = 512;
+  const char* const remedy = "name the system by its code: `crs` EPSG:n";
+  if (text.size() > kMostCrsText) {
+    throw CrsError("the definition is longer than 64 KiB", remedy);
+  }
+  const bool json = text.starts_with('{');
+  bool quoted = false;
+  int depth = 0, parts = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') {
+      quoted = !quoted;
+    } else if (quoted) {
+      if (json && c == '\\') ++i;
+    } else if (c == '[' || c == '(' || c == '{') {
+      if (++depth > kDeepest) throw CrsError("the definition is nested too deeply", remedy);
+      if (++parts > kMostParts) throw CrsError("the definition has too many parts", remedy);
+    } else if (c == ']' || c == ')' || c == '}') {
+      --depth;
+    }
+  }
 }
 
 /// The number behind "EPSG:", of which `rest` is what follows; 0 if there is none.
@@ -53,14 +83,26 @@ std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
   return definition;
 }
 
-/// "ESRI:54030", "OGC:CRS84", "urn:ogc:def:crs:EPSG::4326"; nothing if it is not such a text.
+/// "ESRI:54030", "OGC:CRS84", "urn:ogc:def:crs:EPSG::4326",
+/// "http://www.opengis.net/def/crs/EPSG/0/4326"; nullptr if the text is none of them.
 ProjObject crs_of_authority(const std::string& text) {
-  if (text.starts_with("urn:ogc:def:crs:")) {
-    return ProjObject(proj_create(proj_context(), text.c_str()));
+  if (text.starts_with("urn:")) return ProjObject(proj_create(proj_context(), text.c_str()));
+  constexpr std::string_view kPath = "opengis.net/def/crs/";
+  if (const std::size_t at = text.find(kPath); text.starts_with("http") && at != text.npos) {
+    const std::string rest = text.substr(at + kPath.size());
+    const std::size_t first = rest.find('/'), last = rest.rfind('/');
+    if (first == rest.npos || first == last) return nullptr;
+    return proj_crs_of_code(rest.substr(0, first), rest.substr(last + 1));
   }
   const std::size_t colon = text.find(':');
   if (colon == text.npos || colon == 0) return nullptr;
-  return proj_crs_of_code(text.substr(0, colon), text.substr(colon + 1));
+  std::string authority = text.substr(0, colon), code = text.substr(colon + 1);
+  if (authority == "EPSGA") authority = "EPSG";
+  if (authority == "CRS") {  // as WMS has it
+    authority = "OGC";
+    code = "CRS" + code;
+  }
+  return proj_crs_of_code(authority, code);
 }
 
 /// The system of exactly that name (case aside). Throws: CrsError if several have it.
@@ -96,13 +138,40 @@ ProjObject crs_of_name(const std::string& text) {
   return only;
 }
 
-std::string file_text(const std::string& name) {
-  std::ifstream file(name, std::ios::binary);
-  std::string text;
-  constexpr std::size_t kMost = 1 << 20;
-  text.resize(kMost);
-  file.read(text.data(), kMost);
-  text.resize(static_cast<std::size_t>(file.gcount()));
+/// Without a byte order mark, and white space and zeros at both ends.
+std::string without_padding(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF", kPadding(" \t\r\n\0", 5);
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  const std::size_t first = text.find_first_not_of(kPadding);
+  if (first == text.npos) return {};
+  return std::string(text.substr(first, text.find_last_not_of(kPadding) - first + 1));
+}
+
+/// True for WKT, with brackets or parentheses, PROJJSON and PROJ strings, which no name of a system
+/// or file looks like.
+bool is_formal(std::string_view text) {
+  if (text.starts_with('+') || text.find_first_of("[{") != text.npos) return true;
+  // "NAD83(HARN)" is a name.
+  const std::size_t open = text.find('(');
+  const std::size_t next = open == text.npos ? open : text.find_first_not_of(" \t\r\n", open + 1);
+  return next != text.npos && text[next] == '"';
+}
+
+/// A formal definition as PROJ takes it.
+std::string proj_text(std::string text) {
+  constexpr std::string_view kEsri = "ESRI::";
+  if (text.starts_with(kEsri)) text.erase(0, kEsri.size());
+  if (text.starts_with('+'))
+    return text.find("+type=crs") == text.npos ? text + " +type=crs" : text;
+  // PROJ reads brackets alone where ISO 19162 allows parentheses too.
+  if (text.find_first_of("[({") < text.size() && text[text.find_first_of("[({")] == '(') {
+    bool quoted = false;
+    for (char& c : text) {
+      if (c == '"') quoted = !quoted;
+      if (!quoted && c == '(') c = '[';
+      if (!quoted && c == ')') c = ']';
+    }
+  }
   return text;
 }
 
@@ -212,18 +281,37 @@ CrsDefinition definition_of_epsg(int code) {
   return read_crs(crs.get());
 }
 
-CrsDefinition definition_of_wkt(const std::string& text) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  const std::string plain = text.starts_with(kByteOrderMark) ? text.substr(3) : text;
+std::string contents_of_file(const std::string& name) {
+  std::ifstream file(name, std::ios::binary);
+  std::string text(kMostCrsText + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return without_padding(text);
+}
+
+CrsDefinition definition_of_contents(const std::string& text) {
+  std::string plain = without_padding(text);
+  // Spellings of codes that PROJ does not read.
+  constexpr std::string_view kInit = "+init=";
+  if (plain.starts_with(kInit) && plain.find(' ') == plain.npos) plain.erase(0, kInit.size());
+  if (plain == "WGS72") plain = "EPSG:4322";
+  const char* const remedy = "correct the text, or name the system by its code: `crs` EPSG:n";
+  if (plain.empty()) throw CrsError("the definition is empty", remedy);
+  check_extent(plain);
   if (is_arcinfo(plain)) return definition_of_arcinfo(plain);
   proj_complaint();
-  const ProjObject crs = proj_crs_of_text(
-      plain.starts_with('+') && plain.find("+type=crs") == plain.npos ? plain + " +type=crs"
-                                                                      : plain);
+  ProjObject crs;
+  if (is_formal(plain)) {
+    crs = proj_crs_of_text(proj_text(plain));
+  } else {
+    if (const auto definition = definition_of_codes(plain)) return *definition;
+    crs = crs_of_authority(plain);
+    if (crs == nullptr) crs = crs_of_name(plain);
+    if (crs != nullptr) return read_crs(crs.get());
+  }
   if (crs == nullptr) {
     const std::string why = proj_complaint();
-    throw CrsError("the definition cannot be read" + (why.empty() ? "" : ": " + why),
-                   "correct the text, or name the system by its code: `crs` EPSG:n");
+    throw UnreadableCrs("the definition cannot be read" + (why.empty() ? "" : ": " + why), remedy);
   }
   CrsDefinition definition = read_crs(crs.get());
   settle_code(definition);
@@ -231,15 +319,15 @@ CrsDefinition definition_of_wkt(const std::string& text) {
 }
 
 CrsDefinition definition_of_text(const std::string& text) {
+  if (is_formal(text)) return definition_of_contents(text);
   if (std::optional<CrsDefinition> definition = definition_of_codes(text)) return *definition;
-  if (text.find_first_of("[{") != text.npos || text.starts_with('+')) {
-    return definition_of_wkt(text);
-  }
-  if (std::ifstream(text)) return definition_of_wkt(file_text(text));
-  if (!text.empty() && plain_name(text.substr(0, 5)) != "epsg") {
-    ProjObject crs = crs_of_authority(text);
-    if (crs == nullptr) crs = crs_of_name(text);
-    if (crs != nullptr) return read_crs(crs.get());
+  if (std::ifstream(text)) return definition_of_contents(contents_of_file(text));
+  try {
+    if (!text.empty() && plain_name(text.substr(0, 5)) != "epsg") {
+      return definition_of_contents(text);
+    }
+  } catch (const UnreadableCrs&) {
+    // Said below, with all that can be written.
   }
   throw CrsError(
       "is not a CRS",
@@ -253,7 +341,18 @@ std::optional<stream::Crs> local_crs_named(const std::string& text) {
   } catch (const LocalCrs& local) {
     return local.crs();
   } catch (const CrsError&) {
-    // Said by whoever uses the text.
+    // The caller reports it when it uses the text.
+  }
+  return std::nullopt;
+}
+
+std::optional<stream::Crs> local_crs_in(const std::string& contents) {
+  try {
+    definition_of_contents(contents);
+  } catch (const LocalCrs& local) {
+    return local.crs();
+  } catch (const CrsError&) {
+    // The caller reports it when it uses the text.
   }
   return std::nullopt;
 }
@@ -273,7 +372,7 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
       });
   if (!wkt.empty()) {
     try {
-      definition = definition_of_wkt(wkt);
+      definition = definition_of_contents(wkt);
     } catch (const LocalCrs&) {
       return std::nullopt;
     }
