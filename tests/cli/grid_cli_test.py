@@ -172,6 +172,49 @@ class GridTest(unittest.TestCase):
         self.assertEqual(told.returncode, 0)
         self.assertIn(b'left.png.aux.xml', told.stdout + told.stderr)
 
+    def test_an_empty_prj_says_nothing(self):
+        path = self.ascii_grid()
+        for content in (b'', b' \r\n', b'\xef\xbb\xbf'):
+            with open(self.path('a.prj'), 'wb') as file:
+                file.write(content)
+            result = self.terrace('build', path, '-o', self.path('a.terrace'), '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(b'a.prj is empty', result.stderr)
+        self.assertIsNone(self.json_of('info', self.path('a.terrace'))['crs'])
+        with open(self.path('a.prj'), 'w') as file:
+            file.write('not a CRS')
+        self.assertEqual(self.terrace('build', path, '-o', self.path('b.terrace')).returncode, 1)
+
+    def test_cells_that_cannot_be_told_apart(self):
+        for x, cell in ((0, 1e-300), (500000, 1e-12), (0, 1e200)):
+            path = self.ascii_grid(x, 0, cell)
+            result = self.terrace('build', path, '-o', self.path('a.terrace'))
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(b'a.asc: the places of its cells', result.stderr)
+            self.assertNotIn(b'tmp', result.stderr.replace(self.folder.encode(), b''))
+            self.assertEqual(sorted(os.listdir(self.folder)), ['a.asc'])
+
+    def test_undeclared_voids_are_noted(self):
+        with open(self.path('a.asc'), 'w') as file:
+            file.write('ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 -3.4028235e+38\n3 -3.4028235e+38\n')
+        for verb, name in (('build', 'a.terrace'), ('convert', 'a.csv')):
+            result = self.terrace(verb, self.path('a.asc'), '-o', self.path(name))
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(b'2 cells have heights beyond 1e30', result.stderr)
+            self.assertIn(b'NODATA_value -3.4028235e+38', result.stderr)
+        self.assertIn('2 cells', self.json_of('info', self.path('a.asc'))['comments'][-1])
+        result = self.terrace('convert', self.path('a.csv'), '-o', self.path('b.csv'))
+        self.assertIn(b"--where 'z > -1e30'", result.stderr)
+        self.assertEqual(self.json_of('convert', self.path('a.csv'), '-o', self.path('c.csv'), '--where',
+                                      'z > -1e30')['points'], 2)
+        # With the remedy there are none.
+        with open(self.path('a.asc')) as file:
+            text = file.read()
+        with open(self.path('a.asc'), 'w') as file:
+            file.write('NODATA_value -3.4028235e+38\n' + text)
+        result = self.terrace('build', self.path('a.asc'), '-o', self.path('b.terrace'))
+        self.assertNotIn(b'1e30', result.stderr)
+
     def same_store(self, one, other):
         for name in sorted(os.listdir(self.path(one))):
             with open(self.path(f'{one}/{name}'), 'rb') as a, open(self.path(f'{other}/{name}'), 'rb') as b:

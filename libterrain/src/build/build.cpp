@@ -21,6 +21,7 @@
 #include "base/damage_report.hpp"
 #include "base/progress_report.hpp"
 #include "base/stored_entities.hpp"
+#include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
 #include "build/clustering.hpp"
 #include "earth/crs/crs_definition.hpp"
@@ -155,6 +156,38 @@ double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
   return length(1) / length(0);
 }
 
+/// Throws: stream::Error if cells of a raster, or steps of a cloud's coordinates, are too small or
+/// too large for their places to be told apart. The store of such a source could not be read.
+void check_cells(const stream::SourceInfo& info) {
+  const std::array<double, 6>& m = info.world.xy;
+  const double area = m[0] * m[4] - m[1] * m[3];
+  bool apart = std::isfinite(area) && area != 0 && std::isfinite(m[2]) && std::isfinite(m[5]);
+  if (info.grid && apart) {
+    const auto last = [](std::uint64_t cells) { return static_cast<double>(cells - 1); };
+    const auto same = [&](double column, double row, double next_column, double next_row) {
+      const stream::Point3 a = world_point(info, {column, row, 0});
+      const stream::Point3 b = world_point(info, {next_column, next_row, 0});
+      return a[0] == b[0] && a[1] == b[1];
+    };
+    for (const double row : {0.0, last(info.rows)}) {
+      for (const double column : {0.0, last(info.columns)}) {
+        if (info.columns > 1) apart &= !same(column, row, column == 0 ? 1 : column - 1, row);
+        if (info.rows > 1) apart &= !same(column, row, column, row == 0 ? 1 : row - 1);
+      }
+    }
+  }
+  if (apart) return;
+  throw stream::Error(
+      {.file = info.files.empty() ? std::string() : info.files.front(),
+       .where = {},
+       .cause = std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
+                " cannot be told apart: steps of " + number_text(std::hypot(m[0], m[3])) + " x " +
+                number_text(std::hypot(m[1], m[4])) + " from " + number_text(m[2]) + ", " +
+                number_text(m[5]),
+       .remedy = info.grid ? "correct the size of its cells: gdal_edit.py -a_ullr"
+                           : "correct the scale of its coordinates"});
+}
+
 /// The first points of a source.
 class FirstPoints final : public stream::PointSource {
  public:
@@ -240,6 +273,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     source = std::make_unique<FirstPoints>(std::move(source), request.most_points);
   }
   const stream::SourceInfo info = source->info();
+  check_cells(info);
   // Found by whoever asks first. PROJ takes tens of milliseconds to open its database, in which the
   // first points are read.
   const std::shared_future<Located> located =
@@ -298,6 +332,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   cluster::HierarchyBuilder builder(options, sink);
 
   stream::PointBlock block;
+  UndeclaredVoids voids(info);
   std::vector<std::byte> marked;
   stream::Progress so_far;
   // The reading ends for two reasons: the context's, or a failure that push() tells.
@@ -310,6 +345,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     }
   };
   while (next()) {
+    voids.add(block);
     if (payload_bytes > info.payload_size()) {  // room for the mark
       append_zero_byte(block.payload, info.payload_size(), block.positions.size(), marked);
       builder.push(block.positions, marked);
@@ -365,6 +401,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   }
   tell_spooled(info, context);
   if (!info.note.empty()) context.say(info.note);
+  if (const std::string note = voids.note(); !note.empty()) context.say(note);
   damage.tell(context);
   tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);

@@ -13,6 +13,7 @@
 
 #include "base/damage_report.hpp"
 #include "base/ordered_work.hpp"
+#include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
@@ -69,6 +70,7 @@ class ConvertCommand : public Command {
                                                    .lattice = lattice_of(info)},
                                                   writing);
     writing_within_memory(*writer, output_, memory, held);
+    UndeclaredVoids voids(info);
     ProgressMeter meter(common.progress, "points");
     std::vector<stream::PointBlock> blocks(common.threads);
     each_in_order(
@@ -80,12 +82,15 @@ class ConvertCommand : public Command {
           return &blocks[worker];
         },
         [&](unsigned, stream::PointBlock* block) {
+          voids.add(*block);
           stream::to_world(info, *block);
           return writer->encode(*block);
         },
         [&](stream::PointWriter::EncodedPtr points) { writer->append(std::move(points)); });
     writer->finish();
     tell_spooled(info, common.context());
+    if (!info.note.empty()) common.say(info.note);
+    if (const std::string note = voids.note(); !note.empty()) common.say(note);
     damage.tell(common.context());
 
     Summary summary;

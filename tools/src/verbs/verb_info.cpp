@@ -6,11 +6,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "base/stored_entities.hpp"
+#include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
@@ -170,7 +173,8 @@ class Sum {
 struct Contents {
   std::uint64_t points = 0, nodata = 0, empty_values = 0, withheld = 0;
   stream::Box3 stored, world;
-  double mean = 0;  ///< stored coordinate 2
+  double mean = 0;      ///< stored coordinate 2
+  std::string comment;  ///< on heights; empty: none
 };
 
 Contents stream_through(stream::PointSource& source, const CommonOptions& common) {
@@ -180,6 +184,7 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
   const bool upright = info.world.xy[1] == 0 && info.world.xy[3] == 0;
   Contents contents;
   Sum heights;
+  UndeclaredVoids voids(info);
   for_each_block(source, common, [&](const stream::PointBlock& block) {
     for (const stream::Point3& p : block.positions) {
       contents.stored.include(p);
@@ -187,7 +192,9 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
       if (!upright) contents.world.include(world_point(placement, p));
     }
     contents.points += block.size();
+    voids.add(block);
   });
+  contents.comment = with_option_names(voids.note());
   contents.nodata = source.progress().nodata;
   contents.empty_values = source.progress().empty_values;
   contents.withheld = source.progress().withheld;
@@ -299,7 +306,9 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   }
   json["channels"] = channels_of(info);
   json["parameters"] = Json::object();
-  json["comments"] = info.comments;
+  std::vector<std::string> comments = info.comments;
+  if (!contents.comment.empty()) comments.push_back(contents.comment);
+  json["comments"] = comments;
   const std::optional<std::uint64_t> bytes = bytes_of(info);
   json["bytes"] = bytes ? Json(*bytes) : Json(nullptr);
 
@@ -340,7 +349,7 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
     text += heights_line(json["height"]["min"], json["height"]["max"], json["height"]["mean"]);
   }
   text += channels_line(info);
-  for (const std::string& comment : info.comments)
+  for (const std::string& comment : comments)
     text += "comment:   " + printable_line(comment) + '\n';
   return summary;
 }
