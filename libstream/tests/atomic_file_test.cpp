@@ -185,5 +185,98 @@ TEST(AtomicFile, AFileMayHaveTheLongestName) {
 
 TEST(AtomicFile, RefusesADevice) { EXPECT_THROW(AtomicFile("/dev/null", true), Error); }
 
+/// Only files and folders that say "ours".
+Naming if_ours() {
+  return {[](const fs::path& there) {
+    return content(fs::is_directory(there) ? there / "mark" : there).starts_with("ours");
+  }};
+}
+
+TEST(AtomicFile, LooksAgainAtWhatItReplaces) {
+  const TempFolder folder;
+  const fs::path target = folder.path() / "out.bin";
+  std::ofstream(target) << "ours, old";
+  AtomicFile file(target, if_ours());
+  file.write("ours, new");
+  std::ofstream(target) << "a stranger's";
+  EXPECT_THROW(file.commit(), Error);
+  EXPECT_EQ(content(target), "a stranger's");
+  AtomicFile again(target, if_ours());
+  again.write("ours, new");
+  fs::remove(target);
+  fs::create_directory(target);
+  EXPECT_THROW(again.commit(), Error);
+  EXPECT_TRUE(fs::is_directory(target));
+  fs::remove(target);
+  again = AtomicFile(target, if_ours());
+  again.write("ours, new");
+  std::ofstream(target) << "ours, meanwhile";
+  again.commit();
+  EXPECT_EQ(content(target), "ours, new");
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(OutputGroup, GivesAllNamesOrNone) {
+  const TempFolder folder;
+  const fs::path a = folder.path() / "a", b = folder.path() / "b", c = folder.path() / "c";
+  const auto write = [&](bool stranger) {
+    OutputGroup group;
+    for (const fs::path& target : {a, b, c}) {
+      Naming naming = if_ours();
+      naming.group = &group;
+      AtomicFile file(target, naming);
+      file.write("ours, new");
+      file.commit();
+    }
+    if (stranger) std::ofstream(c) << "a stranger's";
+    group.commit();
+  };
+  std::ofstream(b) << "ours, old";
+  EXPECT_THROW(write(true), Error);
+  EXPECT_FALSE(fs::exists(a));
+  EXPECT_EQ(content(b), "ours, old");
+  EXPECT_EQ(content(c), "a stranger's");
+  EXPECT_EQ(entries(folder.path()), 2);
+  fs::remove(c);
+  write(false);
+  for (const fs::path& target : {a, b, c}) EXPECT_EQ(content(target), "ours, new");
+  EXPECT_EQ(entries(folder.path()), 3);
+}
+
+TEST(OutputGroup, ThatIsNotCommittedLeavesNothing) {
+  const TempFolder folder;
+  {
+    OutputGroup group;
+    Naming naming;
+    naming.group = &group;
+    AtomicFile file(folder.path() / "a", naming);
+    file.write("new");
+    file.commit();
+    EXPECT_EQ(entries(folder.path()), 1);
+  }
+  EXPECT_EQ(entries(folder.path()), 0);
+}
+
+TEST(AtomicFolder, AppearsWholeAndReplacesOnlyWhatIsOurs) {
+  const TempFolder parent;
+  const fs::path target = parent.path() / "site";
+  const auto write = [&](const std::string& text) {
+    AtomicFolder folder(target, "mark", if_ours());
+    fs::create_directories(folder.folder() / "deep" / "deeper");
+    std::ofstream(folder.folder() / "deep" / "deeper" / "file") << text;
+    std::ofstream(folder.folder() / "mark") << "ours";
+    EXPECT_NE(folder.folder(), target);
+    folder.commit();
+  };
+  write("first");
+  write("second");
+  EXPECT_EQ(content(target / "deep" / "deeper" / "file"), "second");
+  EXPECT_EQ(entries(parent.path()), 1);
+  std::ofstream(target / "mark") << "a stranger's";
+  EXPECT_THROW(write("third"), Error);
+  EXPECT_EQ(content(target / "deep" / "deeper" / "file"), "second");
+  EXPECT_EQ(entries(parent.path()), 1);
+}
+
 }  // namespace
 }  // namespace terrace::stream

@@ -85,7 +85,7 @@ bool write_image(const Image& image, Output& output) {
   return true;
 }
 
-void write_file(const std::filesystem::path& path, const Image& image, bool replace,
+void write_file(const std::filesystem::path& path, const Image& image, const Naming& replace,
                 const std::stop_token& stop) {
   const auto refuse = [&](std::string cause) {
     throw Error({.file = path.string(), .where = {}, .cause = std::move(cause), .remedy = {}});
@@ -106,7 +106,7 @@ void write_file(const std::filesystem::path& path, const Image& image, bool repl
 }  // namespace
 
 void write_png(const std::filesystem::path& path, std::size_t width, std::size_t height,
-               int channels, std::span<const std::uint8_t> pixels, bool replace,
+               int channels, std::span<const std::uint8_t> pixels, const Naming& replace,
                const std::stop_token& stop) {
   assert(channels >= 1 && channels <= 4);
   assert(pixels.size() == width * height * static_cast<std::size_t>(channels));
@@ -124,7 +124,7 @@ void write_png(const std::filesystem::path& path, std::size_t width, std::size_t
 }
 
 void write_png_grey16(const std::filesystem::path& path, std::size_t width, std::size_t height,
-                      std::span<const std::uint16_t> samples, bool replace,
+                      std::span<const std::uint16_t> samples, const Naming& replace,
                       const std::stop_token& stop) {
   assert(samples.size() == width * height);
   write_file(path,

@@ -2,6 +2,7 @@
 #include "terrace/stream/atomic_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cerrno>
 #include <cstring>
@@ -16,6 +17,7 @@
 #include <unistd.h>
 
 #include "io/file_size_signal.hpp"
+#include "io/placement.hpp"
 #include "io/temporary.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -49,7 +51,8 @@ struct AtomicFile::Impl {
   fs::path target;  ///< as given
   fs::path place;   ///< after following symbolic links
   fs::path temporary;
-  bool replace = false;
+  Naming naming;
+  Placement placement;  ///< once complete
   int descriptor = -1;
   std::uint64_t flushed = 0;  // bytes in the file; the buffer continues there
   std::vector<std::byte> buffer;
@@ -75,10 +78,7 @@ struct AtomicFile::Impl {
                    .cause = "exists and is not a regular file",
                    .remedy = "choose another name"});
     }
-    if (!replace) fail_because_it_exists();
-  }
-
-  [[noreturn]] void fail_because_it_exists() const {
+    if (naming.replace) return;
     throw Error({.file = target.string(),
                  .where = {},
                  .cause = "exists already",
@@ -125,36 +125,24 @@ struct AtomicFile::Impl {
     buffer.clear();
   }
 
-  void publish() {
-    if (replace) {
-      if (::rename(temporary.c_str(), place.c_str()) != 0)
-        fail("cannot be renamed into place", errno);
-      return;
-    }
-    // Linking, unlike renaming, fails if the name has been taken meanwhile.
-    if (::link(temporary.c_str(), place.c_str()) == 0) {
-      ::unlink(temporary.c_str());
-      return;
-    }
-    if (errno == EEXIST) fail_because_it_exists();
-    check_target();  // a file system without hard links: check, then rename
-    if (::rename(temporary.c_str(), place.c_str()) != 0)
-      fail("cannot be renamed into place", errno);
+  void complete() {
+    flush();
+    if (::fsync(descriptor) != 0) fail("cannot be synced", errno);
+    placement = Placement(target, place, temporary, naming);
   }
 
-  /// Makes the new name durable; a folder that cannot be opened or synced is not an error.
-  void sync_folder() const {
-    const int folder_descriptor =
-        ::open(folder_of(place).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (folder_descriptor < 0) return;
-    ::fsync(folder_descriptor);
-    ::close(folder_descriptor);
+  /// After put_together(): the temporary name is gone or that of what has been replaced. The
+  /// descriptor is closed last, so that the lock outlives the name.
+  void finish() {
+    const fs::path old = placement.replaced();
+    if (!old.empty()) ::unlink(old.c_str());
+    ::close(std::exchange(descriptor, -1));
   }
 };
 
-AtomicFile::AtomicFile(const fs::path& target, bool replace) : impl_(std::make_unique<Impl>()) {
+AtomicFile::AtomicFile(const fs::path& target, Naming naming) : impl_(std::make_shared<Impl>()) {
   impl_->target = target;
-  impl_->replace = replace;
+  impl_->naming = std::move(naming);
   if (!target.has_filename()) {
     throw Error({.file = target.string(),
                  .where = {},
@@ -212,18 +200,28 @@ std::uint64_t AtomicFile::size() const { return impl_->flushed + impl_->buffer.s
 
 void AtomicFile::commit() {
   assert(impl_->descriptor >= 0);
-  Impl& impl = *impl_;
-  impl.flush();
-  if (::fsync(impl.descriptor) != 0) impl.fail("cannot be synced", errno);
-  impl.publish();
-  // From here on the temporary file's name is gone: the descriptor is only closed, and last, so
-  // that the lock outlives the name.
-  const int descriptor = std::exchange(impl.descriptor, -1);
-  if (::close(descriptor) != 0 && errno != EINTR) impl.fail("cannot be closed", errno);
-  impl.sync_folder();
+  impl_->complete();
+  if (impl_->naming.group != nullptr) {
+    impl_->naming.group->files_.push_back(impl_);
+    return;
+  }
+  const std::array<Placement*, 1> alone{&impl_->placement};
+  put_together(alone);
+  impl_->finish();
 }
 
 const fs::path& AtomicFile::target() const { return impl_->target; }
+
+OutputGroup::OutputGroup() = default;
+OutputGroup::~OutputGroup() = default;
+
+void OutputGroup::commit() {
+  std::vector<Placement*> outputs;
+  for (const auto& file : files_) outputs.push_back(&file->placement);
+  put_together(outputs);
+  for (const auto& file : files_) file->finish();
+  files_.clear();
+}
 
 void remove_abandoned(const fs::path& target) { sweep_temporaries(follow_links(target)); }
 

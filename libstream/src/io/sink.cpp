@@ -28,7 +28,7 @@ bool may_wait(int descriptor) {
 
 }  // namespace
 
-Sink::Sink(const std::string& path, bool replace, const std::stop_token& stop) {
+Sink::Sink(const std::string& path, const Naming& replace, const std::stop_token& stop) {
   if (path != kStandardStream) {
     file_.emplace(path, replace);
   } else if (may_wait(STDOUT_FILENO)) {

@@ -8,6 +8,7 @@
 #include <set>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -84,15 +85,29 @@ FileLock lock_of_dead(const fs::path& temporary) {
   }
 }
 
-/// Whether a folder is still a complete store: its manifest is removed first.
-bool has_manifest(const fs::path& folder) {
+/// Whether a folder is still complete: its mark is removed first.
+bool has_mark(const fs::path& folder, const std::string& mark) {
   std::error_code ignored;
-  return fs::is_regular_file(folder / kManifestName, ignored);
+  return fs::is_regular_file(folder / mark, ignored);
 }
 
-bool put_back(const fs::path& replaced, const fs::path& target) {
-  if (!nothing_at(target) || !has_manifest(replaced)) return false;
+bool put_back(const fs::path& replaced, const fs::path& target, const std::string& mark) {
+  if (!nothing_at(target) || !has_mark(replaced, mark)) return false;
   return rename_exclusively(replaced, target) == 0;
+}
+
+/// As fs::remove_all(), which keeps a descriptor open for each folder on the way.
+void remove_tree(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(fs::symlink_status(path, error))) {
+    std::vector<fs::path> entries;
+    for (fs::directory_iterator entry(path, error); !error && entry != fs::directory_iterator();
+         entry.increment(error)) {
+      entries.push_back(entry->path());
+    }
+    for (const fs::path& entry : entries) remove_tree(entry);
+  }
+  fs::remove(path, error);
 }
 
 }  // namespace
@@ -117,18 +132,20 @@ std::string temporary_name(const fs::path& target, int attempt) {
   return attempt == 0 ? name : name + '-' + std::to_string(attempt);
 }
 
-void sweep_temporaries(const fs::path& target) {
+void sweep_temporaries(const fs::path& target, const std::string& mark) {
   for (const std::string& name : temporaries_of(target)) {
     const fs::path temporary = folder_of(target) / name;
     const FileLock lock = lock_of_dead(temporary);
     if (!lock.exclusive()) continue;
     const fs::path replaced = with_ending(temporary, kReplacedEnding);
-    put_back(replaced, target);
+    put_back(replaced, target, mark);
     // Unless no other file has the name and restoring it has failed.
-    if (!nothing_at(target) || !has_manifest(replaced)) remove_store_folder(replaced);
+    if (!nothing_at(target) || !has_mark(replaced, mark)) remove_marked_folder(replaced, mark);
     // A file is removed with its lock.
     std::error_code ignored;
-    if (fs::is_directory(fs::symlink_status(temporary, ignored))) remove_store_folder(temporary);
+    if (fs::is_directory(fs::symlink_status(temporary, ignored))) {
+      remove_marked_folder(temporary, mark);
+    }
   }
 }
 
@@ -140,7 +157,7 @@ bool put_back_replaced(fs::path target) {
     const fs::path replaced = with_ending(temporary, kReplacedEnding);
     if (nothing_at(replaced)) continue;
     const FileLock lock = lock_of_dead(temporary);
-    if (lock.exclusive() && put_back(replaced, target)) return true;
+    if (lock.exclusive() && put_back(replaced, target, kManifestName)) return true;
   }
   return false;
 }
@@ -150,16 +167,26 @@ int rename_exclusively(const fs::path& from, const fs::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
 #endif
-  // Without this check an empty folder that has just appeared would be replaced; anything else
-  // would not.
+  // Linking, unlike renaming, fails if the name is taken. Folders have one name only.
+  std::error_code ignored;
+  if (!fs::is_directory(fs::symlink_status(from, ignored))) {
+    if (::link(from.c_str(), to.c_str()) == 0) {
+      ::unlink(from.c_str());
+      return 0;
+    }
+    if (errno == EEXIST) return EEXIST;
+  }
   if (!nothing_at(to)) return EEXIST;
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
-void remove_store_folder(const fs::path& folder) noexcept {
-  std::error_code ignored;
-  fs::remove(folder / kManifestName, ignored);
-  fs::remove_all(folder, ignored);
+void remove_marked_folder(const fs::path& folder, const std::string& mark) noexcept {
+  try {
+    std::error_code ignored;
+    fs::remove(folder / mark, ignored);
+    remove_tree(folder);
+  } catch (...) {  // no memory for the names
+  }
 }
 
 }  // namespace terrace::stream

@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <string>
 
-/// Where files and stores are written before they have their names, and how they are cleaned up if
-/// the writer is killed. A file being written is `.NAME.tmp-PID` and is itself locked; a store is a
-/// folder of that name with the lock file `.NAME.tmp-PID.lock` next to it. The store that it
-/// replaces is briefly `.NAME.tmp-PID-old`, under the same lock.
+/// Where files and folders are written before they have their names, and how they are cleaned up if
+/// the writer is killed. A file being written is `.NAME.tmp-PID` and is itself locked; a folder has
+/// that name and the lock file `.NAME.tmp-PID.lock` next to it. What it replaces gets the temporary
+/// name in exchange, or is briefly `.NAME.tmp-PID-old` under the same lock.
 
 namespace terrace::stream {
 
@@ -21,17 +21,18 @@ std::filesystem::path folder_of(const std::filesystem::path& target);
 /// The name of this process's temporary file for `target`; `attempt` distinguishes several.
 std::string temporary_name(const std::filesystem::path& target, int attempt);
 
-/// Cleans up after dead writers of `target`: a store that was moved aside and whose name is still
+/// Cleans up after dead writers of `target`: a folder that was moved aside and whose name is still
 /// free gets its name back, everything else is removed. Files that cannot be locked or removed
-/// stay.
-void sweep_temporaries(const std::filesystem::path& target);
-/// Only the first part. Returns whether `target` has its store back.
+/// stay. mark: the file that makes a folder complete.
+void sweep_temporaries(const std::filesystem::path& target,
+                       const std::string& mark = kManifestName);
+/// Only the first part, for stores. Returns whether `target` has its store back.
 bool put_back_replaced(std::filesystem::path target);
 
 /// rename() that refuses an existing target; returns errno.
 int rename_exclusively(const std::filesystem::path& from, const std::filesystem::path& to);
-/// Removes the folder of a store, its manifest first: if this is interrupted, the rest is not taken
-/// for a store. Never throws.
-void remove_store_folder(const std::filesystem::path& folder) noexcept;
+/// Removes a folder, its mark first: if this is interrupted, the rest is not taken for complete.
+/// Needs one descriptor at a time. Never throws.
+void remove_marked_folder(const std::filesystem::path& folder, const std::string& mark) noexcept;
 
 }  // namespace terrace::stream

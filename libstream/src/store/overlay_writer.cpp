@@ -71,13 +71,13 @@ struct OverlayWriter::Impl {
 };
 
 OverlayWriter::OverlayWriter(const std::filesystem::path& path, const Store& store,
-                             const std::string& channel, bool replace) {
+                             const std::string& channel, Naming replace) {
   if (channel.size() > kMostOverlayNameBytes) {
     throw std::invalid_argument("the channel of an overlay has a name of " +
                                 std::to_string(channel.size()) + " bytes, at most 65535 fit");
   }
   impl_ = std::make_unique<Impl>(
-      Impl{.file = AtomicFile(path, replace), .store = store, .channel = channel});
+      Impl{.file = AtomicFile(path, std::move(replace)), .store = store, .channel = channel});
   // The counts follow when they are known.
   impl_->file.write(as_bytes(impl_->header()));
 }

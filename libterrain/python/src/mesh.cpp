@@ -114,7 +114,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
   set("max_error", options.max_error);
   set("max_points", options.max_points);
-  set("replace", options.writer.replace);
+  set("replace", options.writer.replace.replace);
   options.region = region_of(given["region"], store);
   options.quality = quality_named(given["quality"].cast<std::string>());
   options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());

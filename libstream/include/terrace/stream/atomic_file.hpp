@@ -1,14 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
+
+/// Outputs that appear under their names complete and synced, or not at all.
+///
+/// An output is written and synced under a temporary name, then renamed, then its folder is synced.
+/// What it replaces is kept until that has succeeded; if a step fails, the renames are undone. So
+/// after an Error every name has what it had before, and without one the new output is on the disk.
+/// A file system that says that it cannot sync folders, and a folder that may not be read, are not
+/// errors.
 
 namespace terrace::stream {
+
+class OutputGroup;
+
+/// How an output takes its name. Converts from bool: whether it may replace what has the name.
+struct Naming {
+  Naming() = default;
+  template <std::same_as<bool> Bool>  // not from pointers, and so not from functions
+  Naming(Bool replace_any) : replace(replace_any) {}
+  Naming(std::function<bool(const std::filesystem::path&)> may_go)
+      : replace(true), is_ours(std::move(may_go)) {}
+
+  bool replace = false;
+  /// Only what this accepts is replaced; empty: anything. Asked at the moment of replacement, of
+  /// the very file or folder that has the name then, which may have a temporary name meanwhile.
+  std::function<bool(const std::filesystem::path&)> is_ours{};
+  /// Files only: the file gets its name by commit() of the group, which must outlive the writer.
+  OutputGroup* group = nullptr;
+};
 
 /// A file that appears under its name complete and synced, or not at all.
 ///
@@ -26,9 +57,9 @@ namespace terrace::stream {
 /// (SIGXFSZ is blocked); some appear only in `commit()`. Not thread-safe.
 class AtomicFile {
  public:
-  /// Throws: Error if `target` exists and `replace` is false, if it exists and is not a regular
+  /// Throws: Error if `target` exists and may not be replaced, if it exists and is not a regular
   /// file, or if its folder is not writable.
-  explicit AtomicFile(const std::filesystem::path& target, bool replace = false);
+  explicit AtomicFile(const std::filesystem::path& target, Naming naming = {});
   ~AtomicFile();
   AtomicFile(AtomicFile&&) noexcept;
   AtomicFile& operator=(AtomicFile&&) noexcept;
@@ -44,11 +75,59 @@ class AtomicFile {
   /// Bytes so far.
   [[nodiscard]] std::uint64_t size() const;
 
-  /// Publishes the file; afterwards the object only has its name. Without `replace`, a file that
-  /// has appeared under the name meanwhile is kept, and that is an Error.
+  /// Publishes the file, or syncs it and leaves that to its group; afterwards the object only has
+  /// its name. A file that has appeared under the name meanwhile and may not be replaced is kept,
+  /// and that is an Error.
   void commit();
 
   [[nodiscard]] const std::filesystem::path& target() const;
+
+ private:
+  friend class OutputGroup;
+  struct Impl;
+  std::shared_ptr<Impl> impl_;
+};
+
+/// Several files of one run that get their names together: all are new, or all are old. Only a
+/// process that dies between two renames leaves some of both.
+class OutputGroup {
+ public:
+  OutputGroup();
+  /// Files that have not got their names are removed.
+  ~OutputGroup();
+  OutputGroup(const OutputGroup&) = delete;
+  OutputGroup& operator=(const OutputGroup&) = delete;
+
+  /// Gives all files whose commit() has been called their names. Throws: Error; every name then has
+  /// what it had before.
+  void commit();
+
+ private:
+  friend class AtomicFile;
+  std::vector<std::shared_ptr<AtomicFile::Impl>> files_;
+};
+
+/// A folder that appears under its name complete and synced, or not at all.
+///
+/// The caller writes and syncs files in folder(), at last the one whose presence makes the folder
+/// complete, the mark. `commit()` syncs the folders and renames; an object destroyed before that
+/// removes the folder. A killed writer's folder is removed by the next writer of the same target.
+/// Two names are exchanged in one step where the file system can do that; elsewhere nothing has the
+/// name for a moment, and if the process dies then, the next writer restores the old folder's name.
+class AtomicFolder {
+ public:
+  /// `target` may be a link: the folder is or will be where it leads. Throws: Error if that cannot
+  /// be a folder's name or a folder cannot be made next to it. What exists is checked by commit().
+  AtomicFolder(std::filesystem::path target, std::string mark, Naming naming = {});
+  ~AtomicFolder();
+  AtomicFolder(const AtomicFolder&) = delete;
+  AtomicFolder& operator=(const AtomicFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& folder() const;
+  /// After following links.
+  [[nodiscard]] const std::filesystem::path& target() const;
+  /// Throws: Error; the target is then unchanged.
+  void commit();
 
  private:
   struct Impl;

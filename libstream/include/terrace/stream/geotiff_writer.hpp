@@ -9,6 +9,7 @@
 #include <span>
 #include <stop_token>
 
+#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::stream {
@@ -36,7 +37,7 @@ struct GeoTiffOptions {
   std::uint32_t tile = 256;  ///< columns and rows of a tile, a multiple of 16
   GeoTiffOverviews overviews = GeoTiffOverviews::none;
   unsigned threads = 1;    ///< that compress tiles; they do not change the file
-  bool replace = false;    ///< an existing file
+  Naming replace{};        ///< of an existing file
   std::stop_token stop{};  ///< ends commit() of a file with overviews, with Stopped
 };
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/store.hpp"
 
 /// The overlay: a file next to a store with other values for some of its points, such as smoothed
@@ -33,7 +34,7 @@ class OverlayWriter {
   /// store must outlive the writer. Throws: Error if `path` exists and `replace` is false, or
   /// cannot be written; std::invalid_argument for a name of more than 65,535 bytes.
   OverlayWriter(const std::filesystem::path& path, const Store& store, const std::string& channel,
-                bool replace = false);
+                Naming replace = {});
   ~OverlayWriter();
   OverlayWriter(OverlayWriter&&) noexcept;
   OverlayWriter& operator=(OverlayWriter&&) noexcept;

@@ -7,6 +7,8 @@
 #include <span>
 #include <stop_token>
 
+#include "terrace/stream/atomic_file.hpp"
+
 namespace terrace::stream {
 
 /// Writes a PNG image of 8 bits per channel, rows from top to bottom, without padding.
@@ -16,12 +18,12 @@ namespace terrace::stream {
 /// `replace`. "-" is standard output; `stop` ends a wait for its reader.
 /// Throws: Error if the image is empty or larger than 2^31 - 1 on a side, or cannot be written.
 void write_png(const std::filesystem::path& path, std::size_t width, std::size_t height,
-               int channels, std::span<const std::uint8_t> pixels, bool replace = false,
+               int channels, std::span<const std::uint8_t> pixels, const Naming& replace = {},
                const std::stop_token& stop = {});
 
 /// The same for one channel of 16 bits: `samples` are width * height values.
 void write_png_grey16(const std::filesystem::path& path, std::size_t width, std::size_t height,
-                      std::span<const std::uint16_t> samples, bool replace = false,
+                      std::span<const std::uint16_t> samples, const Naming& replace = {},
                       const std::stop_token& stop = {});
 
 }  // namespace terrace::stream

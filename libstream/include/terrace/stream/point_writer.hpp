@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::stream {
@@ -75,7 +76,7 @@ struct WriterOptions {
   /// "laz" (LAS 1.4), and "copc" (".copc.laz"; written in finish(), through a temporary file next
   /// to it). Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
-  bool replace = false;  ///< replace an existing file instead of refusing it
+  Naming replace{};  ///< of an existing file, which is refused unless given
   /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
   /// Stopped.
   std::stop_token stop{};

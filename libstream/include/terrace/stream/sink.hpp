@@ -22,7 +22,7 @@ class Sink {
  public:
   /// replace: an existing file. stop: ends a wait for the reader of standard output. Throws: as
   /// AtomicFile.
-  Sink(const std::string& path, bool replace, const std::stop_token& stop = {});
+  Sink(const std::string& path, const Naming& replace, const std::stop_token& stop = {});
   ~Sink();
   Sink(const Sink&) = delete;
   Sink& operator=(const Sink&) = delete;

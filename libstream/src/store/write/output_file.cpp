@@ -77,13 +77,4 @@ void OutputFile::finish() {
   if (::close(fd_.release()) != 0) throw failed(path_, "cannot close");
 }
 
-void sync_folder(const std::filesystem::path& folder) {
-  Descriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!fd.open()) throw failed(folder, "cannot open");
-  // Some file systems cannot sync a folder and say so: nothing is lost by that.
-  if (::fsync(fd.get()) != 0 && errno != EINVAL && errno != ENOTSUP) {
-    throw failed(folder, "cannot sync");
-  }
-}
-
 }  // namespace terrace::stream::store

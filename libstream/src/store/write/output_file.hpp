@@ -52,7 +52,4 @@ class OutputFile {
   std::uint32_t checksum_ = 0;
 };
 
-/// fsync of a folder. Throws: Error.
-void sync_folder(const std::filesystem::path& folder);
-
 }  // namespace terrace::stream::store

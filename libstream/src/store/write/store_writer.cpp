@@ -5,7 +5,7 @@
 
 #include "spares.hpp"
 #include "store/write/level_writer.hpp"
-#include "store/write/staging.hpp"
+#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/store.hpp"
 
@@ -40,9 +40,20 @@ class StoreWriter::Encoded {
 
 void StoreWriter::EncodedDeleter::operator()(Encoded* block) const { delete block; }
 
+namespace {
+
+Naming naming_of(bool replace) {
+  if (!replace) return {};
+  return {looks_like_store};
+}
+
+}  // namespace
+
 struct StoreWriter::Impl {
   Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old, unsigned threads)
-      : schema(std::move(given)), replace(replace_old), team(threads), staging(path) {}
+      : schema(std::move(given)),
+        team(threads),
+        staging(path, kManifestName, naming_of(replace_old)) {}
 
   SharedTablesPtr tables(unsigned level) {
     const std::lock_guard lock(mutex);
@@ -52,9 +63,8 @@ struct StoreWriter::Impl {
   std::uint64_t append(EncodedPtr encoded, bool root);
 
   StoreSchema schema;
-  bool replace;
   ThreadTeam team;  ///< for training
-  Staging staging;
+  AtomicFolder staging;
   std::vector<std::unique_ptr<LevelWriter>> levels;
   std::uint64_t points = 0;
   double height_sum = 0.0;
@@ -206,7 +216,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   OutputFile file(path);
   file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   file.finish();
-  if (publish) w.staging.publish(w.replace);
+  if (publish) w.staging.commit();
   return bytes + text.size();
 }
 

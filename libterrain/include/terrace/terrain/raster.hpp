@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "terrace/terrain/context.hpp"
@@ -24,7 +25,7 @@ struct RasterRequest {
   std::optional<Region> region{};      ///< in the store's CRS
   std::optional<Transformation> to{};  ///< to the output's CRS if it is not the store's
   std::string output;                  ///< a GeoTIFF
-  bool replace = false;
+  stream::Naming replace{};            ///< of an existing file
 };
 
 struct RasterOutcome {

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/placement.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "io/temporary.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace fs = std::filesystem;
+namespace {
+
+/// rename() in one step of two existing names; returns errno.
+int exchange([[maybe_unused]] const fs::path& a, [[maybe_unused]] const fs::path& b) {
+#ifdef RENAME_EXCHANGE
+  return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0 ? 0 : errno;
+#else
+  return ENOSYS;
+#endif
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(fs::symlink_status(path, ignored));
+}
+
+}  // namespace
+
+Placement::Placement(fs::path shown, fs::path place, fs::path temporary, Naming naming)
+    : shown_(std::move(shown)),
+      place_(std::move(place)),
+      temporary_(std::move(temporary)),
+      naming_(std::move(naming)) {}
+
+fs::path Placement::aside() const { return fs::path(temporary_).concat(kReplacedEnding); }
+
+fs::path Placement::replaced() const {
+  if (state_ == State::exchanged) return temporary_;
+  return state_ == State::aside ? aside() : fs::path();
+}
+
+bool Placement::may_replace(const fs::path& old) const noexcept {
+  try {
+    // A file replaces files, a folder replaces folders: after an exchange `temporary_` is the old
+    // output, and the new one has the place.
+    const fs::path& ours = old == temporary_ ? place_ : temporary_;
+    const bool same_kind =
+        is_folder(ours) ? is_folder(old) : fs::is_regular_file(fs::symlink_status(old));
+    return same_kind && (!naming_.is_ours || naming_.is_ours(old));
+  } catch (...) {
+    return false;  // what cannot be looked at is not ours
+  }
+}
+
+void Placement::fail(int error_number) const {
+  throw system_error(shown_.string(), "cannot be renamed into place", error_number);
+}
+
+void Placement::fail_because_it_exists() const {
+  throw Error({.file = shown_.string(),
+               .where = {},
+               .cause = "exists already",
+               .remedy = "remove it, choose another name, or ask to replace it",
+               .error_number = EEXIST});
+}
+
+void Placement::fail_because_it_is_foreign() const {
+  throw Error({.file = shown_.string(),
+               .where = {},
+               .cause = "exists and was not written by terrace, so it is not replaced",
+               .remedy = "move it away or choose another name",
+               .error_number = EEXIST});
+}
+
+/// False if the name is free by now. Throws: Error.
+bool Placement::put_by_exchange() {
+  const int number = exchange(temporary_, place_);
+  if (number == ENOENT) return false;
+  if (number == EINVAL || number == ENOSYS) return put_by_steps();
+  if (number != 0) fail(number);
+  state_ = State::exchanged;
+  // Something else may have taken the name since it was looked at.
+  if (may_replace(temporary_)) return true;
+  undo();
+  fail_because_it_is_foreign();
+}
+
+/// For file systems that cannot exchange names.
+bool Placement::put_by_steps() {
+  const fs::path old = aside();
+  if (!is_folder(temporary_)) {
+    // A file is replaced by one rename. A second name keeps the old one until all has gone well.
+    const bool kept = ::link(place_.c_str(), old.c_str()) == 0;
+    const bool ours = may_replace(kept ? old : place_);
+    if (!ours || ::rename(temporary_.c_str(), place_.c_str()) != 0) {
+      const int why = errno;
+      if (kept) ::unlink(old.c_str());
+      if (!ours) fail_because_it_is_foreign();
+      fail(why);
+    }
+    state_ = kept ? State::aside : State::gone;
+    return true;
+  }
+  if (::rename(place_.c_str(), old.c_str()) != 0) {
+    if (errno == ENOENT) return false;
+    fail(errno);
+  }
+  const bool ours = may_replace(old);
+  const int number = ours ? rename_exclusively(temporary_, place_) : 0;
+  if (!ours || number != 0) {
+    rename_exclusively(old, place_);
+    if (!ours) fail_because_it_is_foreign();
+    fail(number);
+  }
+  state_ = State::aside;
+  return true;
+}
+
+void Placement::put() {
+  // The name may be taken or become free between two steps.
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    const int number = rename_exclusively(temporary_, place_);
+    if (number == 0) {
+      state_ = State::alone;
+      return;
+    }
+    if (number != EEXIST && number != ENOTEMPTY && number != ENOTDIR && number != EISDIR) {
+      fail(number);
+    }
+    if (!naming_.replace) fail_because_it_exists();
+    if (!may_replace(place_)) {
+      std::error_code ignored;
+      if (fs::exists(fs::symlink_status(place_, ignored))) fail_because_it_is_foreign();
+      continue;
+    }
+    if (put_by_exchange()) return;
+  }
+  fail(EBUSY);
+}
+
+void Placement::undo() noexcept {
+  switch (state_) {
+    case State::alone:
+      rename_exclusively(place_, temporary_);
+      break;
+    case State::exchanged:
+      exchange(temporary_, place_);
+      break;
+    case State::aside:
+      if (is_folder(place_)) ::rename(place_.c_str(), temporary_.c_str());
+      ::rename(aside().c_str(), place_.c_str());
+      break;
+    case State::waiting:
+    case State::gone:
+      break;
+  }
+  state_ = State::waiting;
+}
+
+void put_together(std::span<Placement* const> outputs) {
+  std::size_t put = 0;
+  try {
+    std::set<fs::path> folders;
+    for (; put < outputs.size(); ++put) {
+      outputs[put]->put();
+      folders.insert(folder_of(outputs[put]->place()));
+    }
+    for (const fs::path& folder : folders) sync_folder(folder);
+  } catch (...) {
+    while (put > 0) outputs[--put]->undo();
+    throw;
+  }
+}
+
+void sync_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  int number = descriptor < 0 ? errno : 0;
+  if (descriptor >= 0) {
+    if (::fsync(descriptor) != 0) number = errno;
+    ::close(descriptor);
+  }
+  // One that may be written but not read cannot be opened.
+  if (number == 0 || (descriptor < 0 ? number == EACCES : number == EINVAL || number == ENOTSUP)) {
+    return;
+  }
+  throw system_error(folder.string(), "this folder cannot be synced", number,
+                     "check the disk; the output keeps what it had before");
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "terrace/stream/atomic_file.hpp"
+
+namespace terrace::stream {
+
+/// A complete and synced output, file or folder, under a temporary name in the folder of the name
+/// that it is to get.
+class Placement {
+ public:
+  Placement() = default;
+  /// shown: the output's name in messages. `place` does not end in a link.
+  Placement(std::filesystem::path shown, std::filesystem::path place,
+            std::filesystem::path temporary, Naming naming);
+
+  [[nodiscard]] const std::filesystem::path& place() const { return place_; }
+  [[nodiscard]] const std::filesystem::path& shown() const { return shown_; }
+  [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
+
+  /// Renames; what has been replaced is kept. Throws: Error, and then nothing has changed.
+  void put();
+  /// Gives the name back to what had it. The output has its temporary name again.
+  void undo() noexcept;
+  /// Where the old output is after put(); empty if there was none.
+  [[nodiscard]] std::filesystem::path replaced() const;
+  [[nodiscard]] bool done() const { return state_ != State::waiting; }
+
+ private:
+  enum class State : std::uint8_t {
+    waiting,
+    alone,      ///< nothing has been replaced
+    exchanged,  ///< the old output has the temporary name
+    aside,      ///< the old output has the temporary name with kReplacedEnding
+    gone,       ///< the old output could not be kept
+  };
+
+  [[nodiscard]] std::filesystem::path aside() const;
+  [[nodiscard]] bool may_replace(const std::filesystem::path& old) const noexcept;
+  bool put_by_exchange();
+  bool put_by_steps();
+  [[noreturn]] void fail(int error_number) const;
+  [[noreturn]] void fail_because_it_exists() const;
+  [[noreturn]] void fail_because_it_is_foreign() const;
+
+  std::filesystem::path shown_, place_, temporary_;
+  Naming naming_;
+  State state_ = State::waiting;
+};
+
+/// Gives all of them their names and syncs their folders. Throws: Error; then all names have what
+/// they had before.
+void put_together(std::span<Placement* const> outputs);
+
+/// fsync of a folder that may be read; one that cannot be synced by its file system counts as
+/// synced. Throws: Error.
+void sync_folder(const std::filesystem::path& folder);
+
+}  // namespace terrace::stream
