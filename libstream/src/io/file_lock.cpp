@@ -43,12 +43,7 @@ FileLock::FileLock(const std::filesystem::path& path) : path_(path) {
     }
     // A holder may have removed the name between our open and our lock: then our lock is on a file
     // that others will not find.
-    struct stat ours {
-    }, named{};
-    if (::fstat(descriptor_, &ours) == 0 && ::stat(path.c_str(), &named) == 0 &&
-        ours.st_ino == named.st_ino && ours.st_dev == named.st_dev) {
-      return;
-    }
+    if (has_name()) return;
     ::close(std::exchange(descriptor_, -1));
   }
 }
@@ -68,6 +63,13 @@ FileLock& FileLock::operator=(FileLock&& other) noexcept {
     made_ = other.made_;
   }
   return *this;
+}
+
+bool FileLock::has_name() const {
+  struct stat ours {
+  }, named{};
+  return ::fstat(descriptor_, &ours) == 0 && ::stat(path_.c_str(), &named) == 0 &&
+         ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
 }
 
 void FileLock::release() noexcept {

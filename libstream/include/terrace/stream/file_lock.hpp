@@ -24,6 +24,8 @@ class FileLock {
   [[nodiscard]] bool held() const { return descriptor_ >= 0; }
   /// As held(), and guaranteed by the file system.
   [[nodiscard]] bool exclusive() const { return held() && exclusive_; }
+  /// Whether the locked file still has its name: not if its folder has been moved or replaced.
+  [[nodiscard]] bool has_name() const;
   /// Removes the file and releases the lock.
   void release() noexcept;
 

@@ -86,12 +86,23 @@ bool holds_others(const std::string& folder) {
                      [](const auto& entry) { return entry.path().filename() != kLockName; });
 }
 
+/// False also for a file that cannot be read.
+bool is_our_layer(const std::string& path) {
+  try {
+    return !read_layer(path).fingerprint.empty();
+  } catch (const stream::Error&) {
+    return false;
+  }
+}
+
 /// An identical file is not touched.
 void write_layer(const std::string& path, const std::string& text) {
   const std::vector<std::byte> before = read_tile_file(path);
   const auto bytes = std::as_bytes(std::span(text));
   if (std::equal(before.begin(), before.end(), bytes.begin(), bytes.end())) return;
-  stream::AtomicFile file(path, true);
+  // Another program may have put its own there since the run began.
+  stream::AtomicFile file(path,
+                          {[](const fs::path& there) { return is_our_layer(there.string()); }});
   file.write(text);
   file.commit();
 }
@@ -111,6 +122,9 @@ class TileFolder {
 
   /// Where links lead.
   [[nodiscard]] const std::string& path() const { return path_; }
+  /// Throws: stream::Error if the folder has been moved away while the run lasted, and what has its
+  /// name now is another one.
+  void check_same() const;
 
  private:
   std::string path_;
@@ -151,6 +165,14 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
   }
   stream::remove_abandoned(layer_path);
   stream::remove_abandoned(journal_path);
+}
+
+void TileFolder::check_same() const {
+  if (lock_.has_name()) return;
+  throw stream::Error({.file = path_,
+                       .where = {},
+                       .cause = "has been moved or replaced by another program in the meantime",
+                       .remedy = "run again, with a folder that stays"});
 }
 
 TileFolder::~TileFolder() {
@@ -217,6 +239,7 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
   if (request.resume && !request.replace) refuse_another(layer_path, fingerprint);
   TileSetWriter writer(surfaces, options, context, layer_path);
   writer.write_zooms();
+  folder.check_same();
   writer.finish();
 
   TileLayer layer;
