@@ -279,6 +279,242 @@ class FileCrashTest(CrashCase):
         self.die_everywhere(old, smooth(3), check, least=6)
 
 
+class TogetherTest(CrashCase):
+    """A run that fails, whatever step fails, leaves every name as it was; one that does not has replaced all."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.run_ok('build', cls.input('a.tif'), '-o', cls.input('a.terrace'))
+        with open(cls.input('p.xyz'), 'w', encoding='ascii') as file:
+            file.writelines(f'{i % 15} {i // 15} {i % 3}\n' for i in range(100))
+
+    def cluster(self, height):
+        return ('cluster', self.input('p.xyz'), '--method', 'single', '--height', height, '-o', 'o.csv',
+                '--labels', 'l.txt', '--dendrogram', 't.csv')
+
+    def mesh(self, steps):
+        return ('mesh', self.input('a.terrace'), '--smooth', f'taubin:{steps}', '-o', 'm.ply',
+                '--save-overlay', 'm.overlay')
+
+    def build(self, dem):
+        return ('build', self.input(dem), '-o', 's', '--block', '100', '--threads', '1')
+
+    COMMANDS = {
+        'points': (('synth', 'uniform', '--points', '50', '-o', 'p.ply'),
+                   ('synth', 'uniform', '--points', '60', '-o', 'p.ply')),
+        'raster': (('synth', 'dem', '--size', '20x20', '-o', 'd.tif'),
+                   ('synth', 'dem', '--size', '30x20', '-o', 'd.tif')),
+    }
+
+    def commands(self):
+        return {**self.COMMANDS, 'cluster': (self.cluster('1.1'), self.cluster('3')),
+                'mesh': (self.mesh(2), self.mesh(3)), 'build': (self.build('a.tif'), self.build('b.tif'))}
+
+    def made(self, command):
+        folder = self.start()
+        result = terrace(*command, cwd=folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return folder
+
+    def fail_everywhere(self, start, command, new, exchange=True):
+        before = everything(start)
+        failed = 0
+        for step in range(1, ENDLESS):
+            shutil.rmtree(self.folder)
+            shutil.copytree(start, self.folder)
+            if os.path.exists(self.input('steps')):
+                os.remove(self.input('steps'))
+            result = terrace(*command, cwd=self.folder, env=self.environment(step, 'fail', exchange))
+            with open(self.input('steps'), encoding='ascii') as file:
+                steps = file.read().split()
+            if len(steps) < step:
+                break
+            with self.subTest(step=step, name=steps[step - 1]):
+                if steps[step - 1] in ('sync', 'rename', 'link'):
+                    self.assertNotEqual(result.returncode, 0)
+                    self.assertIn('Input/output error', result.stderr)
+                if result.returncode == 0:
+                    self.assertEqual(everything(self.folder), new)
+                else:
+                    failed += 1
+                    self.assertEqual(result.returncode, 1, result.stderr)
+                    self.assertEqual(everything(self.folder), before)
+        self.assertGreater(failed, 2)
+
+    def test_a_failed_sync_or_rename_changes_nothing(self):
+        for name, (old, command) in self.commands().items():
+            new = everything(self.made(command))
+            with self.subTest(name):
+                self.fail_everywhere(self.start(), command, new)
+            with self.subTest(name + ' --force'):
+                self.fail_everywhere(self.made(old), (*command, '--force'), new)
+
+    def test_the_next_run_cleans_up_after_a_killed_one(self):
+        for name in ('cluster', 'mesh'):
+            old, command = self.commands()[name]
+            start = self.made(old)
+            before, new = everything(start), everything(self.made(command))
+
+            def check(_):
+                for output, data in everything(self.folder).items():
+                    if not output.startswith('.'):
+                        self.assertIn(data, (before[output], new[output]))
+                self.assertLessEqual(set(before), set(everything(self.folder)))
+                result = terrace(*command, '--force', cwd=self.folder)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertEqual(everything(self.folder), new)
+
+            with self.subTest(name):
+                self.die_everywhere(start, (*command, '--force'), check, least=6)
+
+    def test_one_name_is_not_given_to_two_outputs(self):
+        result = terrace('cluster', self.input('p.xyz'), '-o', 'o.csv', '--labels', 'o.csv', cwd=self.folder)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("'o.csv' is named twice", result.stderr)
+
+
+class StrangerTest(CrashCase):
+    """--force looks at what has the name when it replaces it, not only when the run begins."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.run_ok('build', cls.input('a.tif'), '-o', cls.input('a.terrace'))
+        with open(cls.input('p.xyz'), 'w', encoding='ascii') as file:
+            file.writelines(f'{i % 15} {i // 15} {i % 3}\n' for i in range(100))
+        with open(cls.input('places.csv'), 'w', encoding='ascii') as file:
+            file.write('x,y\n1,1\n')
+
+    def before_the_names(self, command):
+        """The number of the first step that gives a name."""
+        if os.path.exists(self.input('steps')):
+            os.remove(self.input('steps'))
+        result = terrace(*command, cwd=self.folder, env=self.environment())
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.input('steps'), encoding='ascii') as file:
+            steps = file.read().split()
+        return next(i + 1 for i, step in enumerate(steps) if step == 'rename')
+
+    def run_while(self, command, change, exchange=True):
+        """Runs a command that pauses before it renames, and calls change() then."""
+        step = self.before_the_names(command)
+        process = subprocess.Popen([TERRACE, *command], cwd=self.folder, text=True,
+                                   env=self.environment(step, 'pause', exchange),
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        _, status = os.waitpid(process.pid, os.WUNTRACED)
+        self.assertTrue(os.WIFSTOPPED(status))
+        change()
+        process.send_signal(signal.SIGCONT)
+        _, error = process.communicate()
+        return process.returncode, error
+
+    def commands(self):
+        store, points = self.input('a.terrace'), self.input('p.xyz')
+        return {
+            'p.ply': ('points', store, '-o', 'p.ply'),
+            'm.obj': ('mesh', store, '-o', 'm.obj'),
+            'b.ply': ('mesh', store, '-o', 'b.ply', '--max-error', '20'),
+            'r.tif': ('raster', store, '-o', 'r.tif'),
+            'c.geojson': ('contour', store, '-o', 'c.geojson', '--interval', '50', '--own-crs'),
+            'l.csv': ('profile', store, '-o', 'l.csv', '--line', '1,1,200,-200'),
+            's.csv': ('sample', store, '-o', 's.csv', '--points', self.input('places.csv')),
+            'r.png': ('render', store, '-o', 'r.png', '--size', '32x32'),
+            'k.csv': ('cluster', points, '-o', 'k.csv'),
+            'k.txt': ('cluster', points, '--labels', 'k.txt'),
+            'pairs.csv': ('match', points, '-o', 'pairs.csv'),
+            'd.tif': ('synth', 'dem', '--size', '20x20', '-o', 'd.tif'),
+            'v.las': ('convert', points, '-o', 'v.las'),
+        }
+
+    def test_a_file_that_has_taken_the_name_stays(self):
+        for name, command in self.commands().items():
+            result = terrace(*command, cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            for kind in ('same file', 'new file', 'folder'):
+                def change():
+                    path = self.path(name)
+                    if kind != 'same file':
+                        os.rename(path, self.path('kept'))
+                    if kind == 'folder':
+                        os.mkdir(path)
+                        path = os.path.join(path, 'photo')
+                    with open(path, 'w', encoding='ascii') as file:
+                        file.write('precious')
+
+                with self.subTest(name, kind=kind):
+                    code, error = self.run_while((*command, '--force'), change)
+                    self.assertEqual(code, 1, error)
+                    self.assertIn('was not written by terrace', error)
+                    found = everything(self.folder)
+                    self.assertEqual(found.pop(name + '/photo' if kind == 'folder' else name), b'precious')
+                    self.assertLessEqual(set(found), {'kept'})
+                shutil.rmtree(self.folder)
+                os.mkdir(self.folder)
+                terrace(*command, cwd=self.folder)
+            shutil.rmtree(self.folder)
+            os.mkdir(self.folder)
+
+    def test_a_folder_that_has_taken_a_stores_name_stays(self):
+        command = ('build', self.input('b.tif'), '-o', 's', '--block', '100', '--threads', '1')
+        result = terrace(*command, cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+        def change():
+            os.rename(self.path('s'), self.path('old'))
+            os.makedirs(self.path('s/photos'))
+            with open(self.path('s/photos/1'), 'w', encoding='ascii') as file:
+                file.write('precious')
+
+        code, error = self.run_while((*command, '--force'), change)
+        self.assertEqual(code, 1, error)
+        self.assertIn('was not written by terrace', error)
+        self.assertEqual(sorted(os.listdir(self.folder)), ['old', 's'])
+        self.assertEqual(everything(self.path('s')), {'photos/1': b'precious'})
+
+    def test_tiles_are_not_removed_from_a_folder_that_is_another_one(self):
+        command = ('tile', self.input('tiles.terrace'), '-o', 't', '--vertical', 'ellipsoidal', '--threads', '1',
+                   '--zoom', '7-8')
+        Dem(40, 30, 10.13, 46.71, 0.02).write(self.input('tiles.tif'))
+        self.run_ok('build', self.input('tiles.tif'), '-o', self.input('tiles.terrace'))
+        precious = 't/0/0/0.terrain'
+
+        def change():
+            os.rename(self.path('t'), self.path('old'))
+            os.makedirs(os.path.dirname(self.path(precious)))
+            with open(self.path(precious), 'w', encoding='ascii') as file:
+                file.write('precious')
+
+        code, error = self.run_while(command, change)
+        self.assertEqual(code, 1, error)
+        with open(self.path(precious), encoding='ascii') as file:
+            self.assertEqual(file.read(), 'precious')
+
+
+class DescriptorTest(CrashCase):
+    def test_runs_without_descriptors_leave_nothing_and_name_a_file(self):
+        store = self.input('a.terrace')
+        self.run_ok('build', self.input('a.tif'), '-o', store)
+        os.mkdir(self.input('many'))
+        for i in range(30):
+            shutil.copy(self.input('a.tif'), self.input(f'many/{i}.tif'))
+        for command in (('build', self.input('many'), '-o', 's'), ('points', store, '-o', 'p.ply'),
+                        ('tile', store, '-o', 't', '--vertical', 'ignore', '--zoom', '0-2'),
+                        ('mesh', store, '-o', 'm.ply', '--max-error', '5')):
+            for limit in range(6, 24):
+                shutil.rmtree(self.folder)
+                os.mkdir(self.folder)
+                result = subprocess.run(['sh', '-c', f'ulimit -n {limit}; exec "$@"', 'sh', TERRACE, *command],
+                                        cwd=self.folder, capture_output=True, text=True, check=False)
+                with self.subTest(command[0], limit=limit):
+                    if result.returncode == 0 or 'loading shared libraries' in result.stderr:
+                        continue
+                    self.assertEqual(result.returncode, 1, result.stderr)
+                    self.assertRegex(result.stderr.splitlines()[-1], r'^terrace: [^:]')
+                    left = [name for name in os.listdir(self.folder) if command[0] != 'tile' or name != 't']
+                    self.assertEqual(left, [], result.stderr)
+
+
 class TileCrashTest(CrashCase):
     OPTIONS = ('--vertical', 'ellipsoidal', '--threads', '1', '--zoom', '7-9')
 

@@ -6,6 +6,7 @@
 //   FAULT_KIND     kill: dies by SIGKILL, a write half done, any other step not done
 //                  power: the same, and bytes that were not synced are lost
 //                  pause: sends itself SIGSTOP before the step, and goes on when continued
+//                  fail: a sync, rename or link reports EIO and does nothing; other steps are done
 //   FAULT_LOG      a file that gets the name of each step, one per line
 //   FAULT_NO_EXCHANGE  no renameat2(), as on some network disks (EINVAL)
 // Each name of a function is defined here, not one mapped to the other.
@@ -85,6 +86,7 @@ bool last_step(const char* name) {
   log_step(name);
   const char* wanted = getenv("FAULT_STEP");
   if (++steps != (wanted == nullptr ? 0 : atol(wanted))) return false;
+  if (strcmp(kind(), "fail") == 0) return false;
   if (strcmp(kind(), "pause") != 0) return true;
   raise(SIGSTOP);
   return false;
@@ -93,6 +95,15 @@ bool last_step(const char* name) {
 void step(const char* name) {
   const std::lock_guard lock(mutex);
   if (last_step(name)) die();
+}
+
+/// The same for a call that may be told to fail; then true, with errno set.
+bool step_fails(const char* name) {
+  step(name);
+  const char* wanted = getenv("FAULT_STEP");
+  if (strcmp(kind(), "fail") != 0 || wanted == nullptr || steps != atol(wanted)) return false;
+  errno = EIO;
+  return true;
 }
 
 void remember(int descriptor) {
@@ -178,7 +189,7 @@ int open64(const char* path, int flags, ...) {
 }
 
 int fsync(int fd) {
-  step("sync");
+  if (step_fails("sync")) return -1;
   const int result = next<int(int)>("fsync")(fd);
   const std::lock_guard lock(mutex);
   if (result == 0) synced(fd);
@@ -187,7 +198,7 @@ int fsync(int fd) {
 
 /// Taken to sync all file systems: the test's folder is on one of them.
 int syncfs(int fd) {
-  step("sync");
+  if (step_fails("sync")) return -1;
   const std::lock_guard lock(mutex);
   // Not the real one, which waits for what others write.
   static_cast<void>(fd);
@@ -197,7 +208,7 @@ int syncfs(int fd) {
 }
 
 int rename(const char* from, const char* to) {
-  step("rename");
+  if (step_fails("rename")) return -1;
   return next<int(const char*, const char*)>("rename")(from, to);
 }
 
@@ -207,13 +218,13 @@ int renameat2(int from_folder, const char* from, int to_folder, const char* to,
     errno = EINVAL;
     return -1;
   }
-  step("rename");
+  if (step_fails("rename")) return -1;
   return next<int(int, const char*, int, const char*, unsigned int)>("renameat2")(
       from_folder, from, to_folder, to, flags);
 }
 
 int link(const char* from, const char* to) {
-  step("link");
+  if (step_fails("link")) return -1;
   return next<int(const char*, const char*)>("link")(from, to);
 }
 

@@ -33,7 +33,7 @@ class MayReplace : public ::testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
   void expect_ours(const std::string& what) const {
-    EXPECT_NO_THROW(EXPECT_TRUE(may_replace(path_, true))) << what;
+    EXPECT_NO_THROW(EXPECT_TRUE(may_replace(path_, true).replace)) << what;
   }
   void expect_foreign(const std::string& what) const {
     EXPECT_THROW(may_replace(path_, true), stream::Error) << what;
@@ -85,12 +85,12 @@ class MayReplace : public ::testing::Test {
   std::string path_ = scratch_.path() / "output";
 };
 
-TEST_F(MayReplace, NothingIsThere) { EXPECT_FALSE(may_replace(path_, false)); }
+TEST_F(MayReplace, NothingIsThere) { EXPECT_FALSE(may_replace(path_, false).replace); }
 
 TEST_F(MayReplace, RefusesAnExistingFileWithoutForce) {
   write("1 2 3\n");
   EXPECT_THROW(may_replace(path_, false), stream::Error);
-  EXPECT_TRUE(may_replace(path_, true));
+  EXPECT_TRUE(may_replace(path_, true).replace);
 }
 
 TEST_F(MayReplace, ForceGoesByTheMarkOfEachFormat) {
@@ -212,12 +212,12 @@ TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
 TEST_F(MayReplace, ALinkIsWhatItLeadsTo) {
   const std::string link = scratch_.path() / "link";
   fs::create_symlink("output", link);
-  EXPECT_FALSE(may_replace(link, false)) << "nothing stands there yet";
+  EXPECT_FALSE(may_replace(link, false).replace) << "nothing stands there yet";
   write("a letter\n");
   EXPECT_THROW(may_replace(link, true), stream::Error);
   write("");
   EXPECT_THROW(may_replace(link, false), stream::Error);
-  EXPECT_TRUE(may_replace(link, true));
+  EXPECT_TRUE(may_replace(link, true).replace);
   fs::remove(link);
   fs::create_symlink("link", link);
   EXPECT_THROW(may_replace(link, true), stream::Error) << "in a circle";

@@ -135,12 +135,16 @@ void tell_rounding(const stream::PointWriter& writer, Summary& summary) {
                   " to fit the format\n";
 }
 
-bool may_replace(const std::string& path, bool force) {
+stream::Naming may_replace(const std::string& path, bool force) {
   namespace fs = std::filesystem;
-  if (path == "-") return false;
+  stream::Naming naming;
+  if (force) {
+    naming = {[](const fs::path& there) { return written_by_terrace(there.string()); }};
+  }
+  if (path == "-") return naming;
   std::error_code error;
   const fs::file_status status = fs::status(path, error);  // of what a link leads to
-  if (status.type() == fs::file_type::not_found) return false;
+  if (status.type() == fs::file_type::not_found) return naming;
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = path, .where = {}, .cause = cause, .remedy = remedy});
   };
@@ -153,7 +157,13 @@ bool may_replace(const std::string& path, bool force) {
     refuse("was not written by terrace, as far as its format tells, so --force does not replace it",
            "remove it yourself or name another output");
   }
-  return true;
+  return naming;
+}
+
+stream::Naming may_replace(const std::string& path, bool force, stream::OutputGroup& group) {
+  stream::Naming naming = may_replace(path, force);
+  naming.group = &group;
+  return naming;
 }
 
 stream::WriterOptions point_writer_options(const std::string& path, const std::string& format,

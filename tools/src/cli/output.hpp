@@ -7,6 +7,7 @@
 
 #include "base/file_marks.hpp"
 #include "cli/cli.hpp"
+#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/point_writer.hpp"
 
 namespace terrace::tools {
@@ -34,10 +35,13 @@ std::function<stream::Crs()> crs_to_write(stream::Crs recorded);
 void tell_rounding(const stream::PointWriter& writer, Summary& summary);
 
 /// Checks, before the work begins, that the output `path` may be written. Returns the writers'
-/// `replace`: true if there is a file, or where a link leads, and --force allows to replace it.
-/// Throws: stream::Error if something is there and `force` is false, or if it is not a file of
-/// ours.
-bool may_replace(const std::string& path, bool force);
+/// `replace`: with `force`, a file of ours, which is looked at again when it is replaced.
+/// Throws: stream::Error if something is there, or where a link leads, and `force` is false or it
+/// is not a file of ours.
+stream::Naming may_replace(const std::string& path, bool force);
+
+/// The same for one of several outputs of a run: `group` gives all of them their names.
+stream::Naming may_replace(const std::string& path, bool force, stream::OutputGroup& group);
 
 /// Options for a file of points at `path`, after may_replace(). format: the user's, or empty.
 stream::WriterOptions point_writer_options(const std::string& path, const std::string& format,

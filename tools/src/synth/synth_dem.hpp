@@ -7,6 +7,7 @@
 
 #include "base/units.hpp"
 #include "synth/fractal.hpp"
+#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::tools {
@@ -24,7 +25,7 @@ struct SynthDemOptions {
   std::uint64_t seed = 1;
   unsigned threads = 1;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20;
-  bool replace = false;
+  stream::Naming replace{};
 };
 
 /// Measurements of a fractal DEM.

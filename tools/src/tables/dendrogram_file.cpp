@@ -27,7 +27,7 @@ bool parse_row(std::string_view text, cluster::Merge& merge) {
 }  // namespace
 
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
-                      bool replace) {
+                      const stream::Naming& replace) {
   stream::Sink file(path, replace, stop_token());
   file.write(kDendrogramHead);
   file.write("\n");

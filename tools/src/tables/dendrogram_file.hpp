@@ -6,11 +6,14 @@
 
 #include <terrace/cluster/dendrogram.hpp>
 
+#include "terrace/stream/atomic_file.hpp"
+
 namespace terrace::tools {
 
 /// Writes rows "a,b,height,size" as text, SciPy's linkage matrix; "-" is standard output. Heights
 /// are the shortest decimals that read back as the same double. Throws: stream::Error.
-void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram, bool replace);
+void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
+                      const stream::Naming& replace);
 
 /// The dendrogram in a file that begins with the line "a,b,height,size"; nullopt for any other
 /// file. Throws: stream::Error, naming the line, if a row is malformed or the rows do not form a

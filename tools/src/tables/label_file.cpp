@@ -63,7 +63,8 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
   return labels;
 }
 
-void write_labels(const std::string& path, std::span<const std::uint32_t> labels, bool replace) {
+void write_labels(const std::string& path, std::span<const std::uint32_t> labels,
+                  const stream::Naming& replace) {
   std::string text;
   for (const std::uint32_t label : labels) {
     text += label == kNoCluster ? "-1" : std::to_string(label);

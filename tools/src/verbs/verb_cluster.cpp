@@ -518,10 +518,13 @@ class ClusterCommand final : public Command {
     const Stopwatch watch;
     check_usage(common);
     const MetricChoice metric = MetricChoice::parse(metric_);
+    stream::OutputGroup outputs;
     stream::WriterOptions writing;
     if (!output_.empty()) writing = point_writer_options(output_, format_, common);
-    const bool replace_labels = labels_.empty() ? false : may_replace(labels_, common.force);
-    const bool replace_tree = dendrogram_.empty() ? false : may_replace(dendrogram_, common.force);
+    writing.replace.group = &outputs;
+    stream::Naming replace_labels, replace_tree;
+    if (!labels_.empty()) replace_labels = may_replace(labels_, common.force, outputs);
+    if (!dendrogram_.empty()) replace_tree = may_replace(dendrogram_, common.force, outputs);
 
     request_.memory_bytes = common.memory_or(0);
     PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
@@ -568,6 +571,7 @@ class ClusterCommand final : public Command {
     if (!output_.empty()) {
       write_clustered(output_, writing, table, outcome, request_.memory_bytes);
     }
+    outputs.commit();
     Summary summary = summary_of(outcome, table.size(), watch);
     // Costs are a result too, unless another one goes to standard output.
     summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
@@ -618,6 +622,10 @@ class ClusterCommand final : public Command {
       throw UsageError(
           "--outlier-price, --strategy, --iterations and --batch are for --method "
           "facility");
+    }
+    for (const auto& [a, b] : {std::pair(&output_, &labels_), std::pair(&output_, &dendrogram_),
+                               std::pair(&labels_, &dendrogram_)}) {
+      if (!a->empty() && *a == *b && *a != "-") throw UsageError("'" + *a + "' is named twice");
     }
     const int on_output = (output_ == "-") + (labels_ == "-") + (dendrogram_ == "-") + common.json;
     if (on_output > 1) throw UsageError("only one thing can go to standard output");

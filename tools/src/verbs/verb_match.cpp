@@ -230,7 +230,7 @@ class MatchCommand final : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     MatchRequest request = request_of(common);
-    const bool replace = may_replace(output_, common.force);
+    const stream::Naming replace = may_replace(output_, common.force);
     const bool triangles = entities_ == "triangles";
     if (triangles && !tree_) throw UsageError("--entities triangles is for --tree");
     PointTable table = read_point_table(input_, input_format_, common.memory_or(0), common,
@@ -359,7 +359,7 @@ class MatchCommand final : public Command {
     return text;
   }
 
-  void write(const std::string& text, bool replace) const {
+  void write(const std::string& text, const stream::Naming& replace) const {
     stream::Sink file(output_, replace, stop_token());
     file.write(text);
     file.commit();

@@ -217,7 +217,8 @@ class MeshCommand final : public Command {
     const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
     const PlaceConversion places = part_.crs.places(store, common);
-    const bool replace = may_replace(output_, common.force);
+    stream::OutputGroup outputs;
+    const stream::Naming replace = may_replace(output_, common.force, outputs);
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty())
       options.heights.overlay = &overlay.emplace(open_height_overlay(overlay_, store));
@@ -225,7 +226,7 @@ class MeshCommand final : public Command {
     if (save) {
       options.heights.save =
           &writer.emplace(save_overlay_, store, store.schema().coordinates[2].name,
-                          may_replace(save_overlay_, common.force));
+                          may_replace(save_overlay_, common.force, outputs));
     }
     TriangleMesh mesh = detail_mesh(store, detail, options, common.context());
     if (mesh.positions.empty()) throw_none_inside(store, "triangle");
@@ -233,6 +234,7 @@ class MeshCommand final : public Command {
     places(mesh.positions);
     write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()});
     if (writer) writer->finish();
+    outputs.commit();
     if (looks_like_scan(store)) {
       common.say(part_.path +
                  ": most triangles are steep, as between the two sides of a body; "

@@ -300,7 +300,7 @@ class RenderCommand : public Command {
       throw UsageError("pictures of more than 20000 pixels on a side are not drawn");
     }
     const ViewDirection view = parse_view(view_);
-    const bool replace = may_replace(output_, common.force);
+    const stream::Naming replace = may_replace(output_, common.force);
 
     if (is_matching_result(input_)) return render_matching(size, view, replace, common, watch);
     if (!points_file_.empty()) {
@@ -358,7 +358,8 @@ class RenderCommand : public Command {
 
  private:
   /// Writes the picture. The summary begins with its size.
-  [[nodiscard]] Summary write(const Canvas& canvas, const ImageSize& size, bool replace) const {
+  [[nodiscard]] Summary write(const Canvas& canvas, const ImageSize& size,
+                              const stream::Naming& replace) const {
     check_interrupt();
     stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
     Summary summary;
@@ -368,8 +369,8 @@ class RenderCommand : public Command {
     return summary;
   }
 
-  Summary render_tree(const cluster::Dendrogram& tree, const ImageSize& size, bool replace,
-                      const Stopwatch& watch) {
+  Summary render_tree(const cluster::Dendrogram& tree, const ImageSize& size,
+                      const stream::Naming& replace, const Stopwatch& watch) {
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
     draw_dendrogram(tree, canvas);
     Summary summary = write(canvas, size, replace);
@@ -381,8 +382,9 @@ class RenderCommand : public Command {
     return summary;
   }
 
-  Summary render_matching(const ImageSize& size, const ViewDirection& view, bool replace,
-                          const CommonOptions& common, const Stopwatch& watch) {
+  Summary render_matching(const ImageSize& size, const ViewDirection& view,
+                          const stream::Naming& replace, const CommonOptions& common,
+                          const Stopwatch& watch) {
     if (points_file_.empty()) {
       throw UsageError("'" + input_ +
                        "' says which points belong together, not where they are: "

@@ -59,7 +59,7 @@ class SurfaceCommand final : public Command {
     const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
     const PlaceConversion places = part_.crs.places(store, common);
-    const bool replace = may_replace(output_, common.force);
+    const stream::Naming replace = may_replace(output_, common.force);
     ScanSurface surface;
     call_library(part_.path, criterion_,
                  [&] { surface = scan_surface(store, detail, options, common.context()); });
