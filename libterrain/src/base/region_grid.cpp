@@ -7,13 +7,32 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kMostGridSide = 1024, kCellsPerCorner = 10;
+constexpr std::size_t kLeastGridSide = 16, kMostGridSide = 1024, kCellsPerCorner = 10;
+/// The most cells to mark, edge by edge.
+constexpr double kMostMarks = 0x1p25;
 constexpr auto kOutside = static_cast<std::uint8_t>(Overlap::none);
 constexpr auto kRing = static_cast<std::uint8_t>(Overlap::part);
 constexpr auto kInside = static_cast<std::uint8_t>(Overlap::whole);
 static_assert(kOutside == 0 && kRing == 1 && kInside == 2, "their sums tell of all cells");
 
 }  // namespace
+
+Point2 reach_of(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high) {
+  Point2 reach{};
+  for (const Polygon& polygon : polygons) {
+    for (const std::vector<Point2>& ring : polygon) {
+      for (std::size_t i = 0; i < ring.size(); ++i) {
+        const Point2& next = ring[i + 1 == ring.size() ? 0 : i + 1];
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          if (!(high[axis] > low[axis])) continue;
+          reach[axis] +=
+              std::abs(next[axis] / 2 - ring[i][axis] / 2) / (high[axis] / 2 - low[axis] / 2);
+        }
+      }
+    }
+  }
+  return reach;
+}
 
 RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
                        const std::function<bool(const Point2&)>& inside)
@@ -31,6 +50,12 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
     }
   }
   while (side_ < kMostGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
+  // Spikes from side to side would mark the same cells again and again.
+  const Point2 reach = reach_of(polygons, low_, high_);
+  while (side_ > kLeastGridSide &&
+         (reach[0] + reach[1]) * static_cast<double>(side_) > kMostMarks) {
+    side_ /= 2;
+  }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     per_unit_[axis] = static_cast<double>(side_) / (high_[axis] - low_[axis]);
     // Points between the ends of an edge are rounded by less than this.

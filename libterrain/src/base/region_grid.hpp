@@ -10,11 +10,16 @@
 
 namespace terrace::terrain {
 
+/// How often the edges of polygons go from side to side of the box from `low` to `high`, along each
+/// axis, all taken together.
+Point2 reach_of(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high);
+
 /// Cells over polygons, each inside, outside, or crossed by a ring: classifies most places and
 /// boxes in constant time. May be used by several threads at once.
 class RegionGrid {
  public:
-  /// About ten cells per corner, from 256 x 256 to 1024 x 1024 with 5 bytes each. The polygons must
+  /// About ten cells per corner, from 256 x 256 to 1024 x 1024 with 5 bytes each; fewer where edges
+  /// cross many cells, so that the time is linear in the corners. The polygons must
   /// have finite corners. inside: called for places that lie on no ring.
   RegionGrid(const std::vector<Polygon>& polygons,
              const std::function<bool(const Point2&)>& inside);

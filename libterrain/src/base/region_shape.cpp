@@ -150,10 +150,15 @@ void require_valid(const Geos& geos, const std::vector<Polygon>& polygons,
 /// one thread at a time may ask.
 class RegionShape::Prepared {
  public:
-  explicit Prepared(const std::vector<Polygon>& polygons)
-      : tree_(geos_.own(GEOSSTRtree_create_r(geos_.context(), 10))) {
+  /// swapped: x and y change places.
+  Prepared(const std::vector<Polygon>& polygons, bool swapped)
+      : swapped_(swapped), tree_(geos_.own(GEOSSTRtree_create_r(geos_.context(), 10))) {
     for (const Polygon& polygon : polygons) {
-      shapes_.push_back(geos_.polygon(polygon));
+      Polygon turned;
+      if (swapped) {
+        for (const std::vector<Point2>& ring : polygon) turned.push_back(turn(ring));
+      }
+      shapes_.push_back(geos_.polygon(swapped ? turned : polygon));
       prepared_.push_back(geos_.own(GEOSPrepare_r(geos_.context(), shapes_.back().get())));
     }
     for (std::size_t i = 0; i < shapes_.size(); ++i) {
@@ -161,7 +166,12 @@ class RegionShape::Prepared {
     }
   }
 
-  [[nodiscard]] const Geos& geos() const { return geos_; }
+  [[nodiscard]] Geos::Geometry point(const Point2& p) const {
+    return geos_.point(swapped_ ? Point2{p[1], p[0]} : p);
+  }
+  [[nodiscard]] Geos::Geometry polygon(std::span<const Point2> corners) const {
+    return geos_.polygon(swapped_ ? std::span<const Point2>(turn(corners)) : corners);
+  }
   [[nodiscard]] bool any_meets(const Geos::Geometry& other) const {
     return any(other, GEOSPreparedIntersects_r);
   }
@@ -171,6 +181,12 @@ class RegionShape::Prepared {
   }
 
  private:
+  static std::vector<Point2> turn(std::span<const Point2> corners) {
+    std::vector<Point2> turned(corners.begin(), corners.end());
+    for (Point2& p : turned) std::swap(p[0], p[1]);
+    return turned;
+  }
+
   using Shapes = Geos::Owned<const GEOSPreparedGeometry>;
   using Predicate = char (*)(GEOSContextHandle_t, const GEOSPreparedGeometry*, const GEOSGeometry*);
 
@@ -193,6 +209,7 @@ class RegionShape::Prepared {
     return geos_.told(question.answer);
   }
 
+  bool swapped_;
   Geos geos_;
   Geos::Owned<GEOSSTRtree> tree_;
   std::vector<Geos::Geometry> shapes_;
@@ -200,6 +217,18 @@ class RegionShape::Prepared {
 };
 
 namespace {
+
+/// Whether edges go up and down more than to and fro. GEOS looks at all edges that cross the row of
+/// a place.
+bool crosses_rows(const std::vector<Polygon>& polygons) {
+  stream::Box3 box;
+  for (const Polygon& polygon : polygons) {
+    if (polygon.empty()) continue;
+    for (const Point2& p : polygon.front()) box.include(stream::Point3{p[0], p[1], 0});
+  }
+  const Point2 reach = reach_of(polygons, {box.min[0], box.min[1]}, {box.max[0], box.max[1]});
+  return reach[1] > reach[0];
+}
 
 const std::vector<Polygon>& found_valid(const std::vector<Polygon>& polygons,
                                         const std::string& file) {
@@ -211,9 +240,9 @@ const std::vector<Polygon>& found_valid(const std::vector<Polygon>& polygons,
 
 RegionShape::RegionShape(std::vector<Polygon> polygons, const std::string& file)
     : polygons_(std::move(polygons)),
+      swapped_(crosses_rows(polygons_)),
       grid_(found_valid(polygons_, file), [this](const Point2& place) {
-        return ask(
-            [&](const Prepared& shape) { return shape.any_meets(shape.geos().point(place)); });
+        return ask([&](const Prepared& shape) { return shape.any_meets(shape.point(place)); });
       }) {}
 
 RegionShape::~RegionShape() = default;
@@ -245,7 +274,7 @@ bool RegionShape::ask(const Ask& question) const {
   };
   bool answer = false;
   try {
-    if (shape == nullptr) shape = std::make_unique<Prepared>(polygons_);
+    if (shape == nullptr) shape = std::make_unique<Prepared>(polygons_, swapped_);
     answer = question(*shape);
   } catch (...) {
     put_back();
@@ -258,7 +287,7 @@ bool RegionShape::ask(const Ask& question) const {
 bool RegionShape::covers(const Point2& place) const {
   const Overlap known = grid_.overlap(place);
   if (known != Overlap::part) return known == Overlap::whole;
-  return ask([&](const Prepared& shape) { return shape.any_meets(shape.geos().point(place)); });
+  return ask([&](const Prepared& shape) { return shape.any_meets(shape.point(place)); });
 }
 
 Overlap RegionShape::overlap(const Point2& low, const Point2& high) const {
@@ -267,7 +296,7 @@ Overlap RegionShape::overlap(const Point2& low, const Point2& high) const {
   bool whole = false;
   const bool meets = ask([&](const Prepared& shape) {
     const std::array<Point2, 4> corners{low, {high[0], low[1]}, high, {low[0], high[1]}};
-    const Geos::Geometry box = shape.geos().polygon(std::span(corners));
+    const Geos::Geometry box = shape.polygon(std::span(corners));
     whole = shape.any_holds(box);
     return whole || shape.any_meets(box);
   });
@@ -279,9 +308,8 @@ bool RegionShape::touches(const std::array<Point2, 3>& triangle) const {
   const auto y = std::minmax({triangle[0][1], triangle[1][1], triangle[2][1]});
   const Overlap known = grid_.overlap({x.first, y.first}, {x.second, y.second});
   if (known != Overlap::part) return known == Overlap::whole;
-  return ask([&](const Prepared& shape) {
-    return shape.any_meets(shape.geos().polygon(std::span(triangle)));
-  });
+  return ask(
+      [&](const Prepared& shape) { return shape.any_meets(shape.polygon(std::span(triangle))); });
 }
 
 namespace {

@@ -40,6 +40,7 @@ class RegionShape {
   bool ask(const Ask& question) const;
 
   std::vector<Polygon> polygons_;
+  bool swapped_;  ///< GEOS gets y, x
   mutable std::mutex mutex_;
   mutable std::condition_variable back_;
   mutable std::vector<std::unique_ptr<Prepared>> idle_;
