@@ -7,9 +7,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/json_of_file.hpp"
 #include "base/orientation.hpp"
 #include "base/region_shape.hpp"
-#include "base/text_of_file.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
@@ -84,14 +84,10 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
 }
 
 std::vector<Polygon> read_geojson(const std::string& name) {
-  const std::optional<std::string> text = text_of_file(name);
-  if (!text) fail(name, "neither a box nor a file that can be read");
+  const auto json = json_of_file(name, kMostGeoJsonBytes, convert_to_geojson(name));
+  if (!json) fail(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
-  try {
-    collect_polygons(nlohmann::json::parse(*text), name, 0, polygons);
-  } catch (const nlohmann::json::exception& error) {
-    fail(name, std::string("not JSON (") + error.what() + ")");
-  }
+  collect_polygons(*json, name, 0, polygons);
   if (polygons.empty()) fail(name, "holds no polygon");
   return polygons;
 }

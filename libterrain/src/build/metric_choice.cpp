@@ -8,8 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/json_of_file.hpp"
 #include "base/portable_math.hpp"
-#include "base/text_of_file.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -109,22 +109,24 @@ MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
 }
 
 std::vector<MetricChoice::Region> read_regions(const std::string& file) {
-  const std::optional<std::string> text = text_of_file(file);
-  if (!text) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
+  const std::string shape =
+      "write {\"regions\": [{\"box\": [minx, miny, maxx, maxy], \"semi_axes\": [a, b], \"angle\": "
+      "degrees}]}";
+  const std::optional<nlohmann::json> found = json_of_file(file, kMostBytes, shape);
+  if (!found) {
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "cannot be read",
                          .remedy = "`metric` elliptical:FILE names a JSON file of regions"});
   }
-  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, /* allow_exceptions= */ false);
+  const nlohmann::json& json = *found;
   if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
       json["regions"].empty()) {
-    throw stream::Error(
-        {.file = file,
-         .where = {},
-         .cause = "is no JSON object with a list \"regions\"",
-         .remedy = "write {\"regions\": [{\"box\": [minx, miny, maxx, maxy], \"semi_axes\": "
-                   "[a, b], \"angle\": degrees}]}"});
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "is not a JSON object with a list \"regions\"",
+                         .remedy = shape});
   }
   std::vector<MetricChoice::Region> regions;
   for (const nlohmann::json& region : json["regions"]) {

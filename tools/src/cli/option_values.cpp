@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/text_of_file.hpp"
+#include "base/json_of_file.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -176,11 +176,11 @@ std::vector<Point2> parse_line(const std::string& text) {
     for (std::size_t i = 0; i < v.size(); i += 2) line.push_back({v[i], v[i + 1]});
     return line;
   }
-  const std::optional<std::string> file = text_of_file(text);
-  if (!file) throw bad("is neither a list of places nor a readable file");
+  const auto json = json_of_file(text, kMostGeoJsonBytes, convert_to_geojson(text));
+  if (!json) throw bad("is neither a list of places nor a readable file");
   std::vector<std::vector<Point2>> lines;
   try {
-    collect_line(nlohmann::json::parse(*file), 0, lines);
+    collect_line(*json, 0, lines);
   } catch (const nlohmann::json::exception& error) {
     throw bad(std::string("is not GeoJSON (") + error.what() + ")");
   }

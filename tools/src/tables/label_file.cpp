@@ -18,6 +18,7 @@ constexpr std::uint32_t kNoCluster = 0xFFFFFFFFu;
 }  // namespace
 
 std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t points) {
+  constexpr std::streamsize kLongestLine = 4096;  // also of a file that is not text
   std::ifstream file(path);
   if (!file) {
     throw stream::Error({.file = path,
@@ -26,9 +27,11 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
                          .remedy = "name a file with one cluster number per line"});
   }
   std::vector<std::uint32_t> labels;
-  std::string line;
-  while (std::getline(file, line)) {
+  std::vector<char> buffer(kLongestLine);
+  while (file.getline(buffer.data(), kLongestLine) || file.gcount() > 0) {
     if (labels.size() % 65536 == 0) check_interrupt();
+    const bool ended = !file.eof() && !file.fail();  // by '\n', which gcount() counts
+    std::string line(buffer.data(), static_cast<std::size_t>(file.gcount()) - (ended ? 1 : 0));
     if (!line.empty() && line.back() == '\r') line.pop_back();
     const std::string where = "line " + std::to_string(labels.size() + 1);
     const std::uint32_t label = number_from<std::uint32_t>(line).value_or(kNoCluster);

@@ -10,7 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/file_marks.hpp"
-#include "base/text_of_file.hpp"
+#include "base/json_of_file.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -142,21 +142,22 @@ std::string layer_json(const TileLayer& layer) {
 }
 
 TileLayer read_layer(const std::string& path) {
-  const std::optional<std::string> text = text_of_file(path);
-  if (!text) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;  // of a fragmented coverage
+  const auto json = json_of_file(path, kMostBytes, "make the tiles again");
+  if (!json) {
     throw stream::Error({.file = path,
                          .where = {},
                          .cause = "cannot be read",
                          .remedy = "name the folder of a finished tile set"});
   }
   try {
-    return layer_from(Json::parse(*text));
+    return layer_from(*json);
   } catch (const std::exception& error) {
     throw stream::Error(
         {.file = path,
          .where = {},
          .cause = std::string("describes no tile set that can be read here: ") + error.what(),
-         .remedy = "make the tiles anew"});
+         .remedy = "make the tiles again"});
   }
 }
 

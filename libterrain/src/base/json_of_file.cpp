@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/json_of_file.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "base/units.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+std::string place_of(std::string_view text, std::size_t byte) {
+  const std::string_view before = text.substr(0, byte);
+  const std::size_t line_begin = before.rfind('\n') + 1;  // 0 if there is none
+  return "line " + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) +
+         ", column " + std::to_string(before.size() - line_begin + 1);
+}
+
+}  // namespace
+
+std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
+                                           const std::string& remedy) {
+  // A stream of the standard library throws at the first byte of a folder.
+  std::error_code ignored;
+  if (std::filesystem::is_directory(name, ignored)) return std::nullopt;
+  std::ifstream file(name, std::ios::binary);
+  if (!file) return std::nullopt;
+  const auto fail = [&](const std::string& where, const std::string& cause) {
+    throw stream::Error({.file = name, .where = where, .cause = cause, .remedy = remedy});
+  };
+  std::string text;
+  std::vector<char> piece(std::size_t{1} << 16);
+  while (file) {
+    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
+    if (text.size() > most_bytes) {
+      fail({}, "is larger than the " + readable_bytes(most_bytes) + " that such a file may have");
+    }
+    // What is not text is recognised before all of it is read.
+    const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+    if (first != std::string::npos && text[first] != '{' && text[first] != '[') {
+      fail({}, "is not JSON");
+    }
+  }
+  if (file.bad()) return std::nullopt;
+  try {
+    return nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
+    const std::size_t byte = std::min(error.byte == 0 ? 0 : error.byte - 1, text.size());
+    fail(place_of(text, byte), byte == text.size() ? "the JSON is cut off" : "is not JSON");
+  }
+  return std::nullopt;
+}
+
+std::string convert_to_geojson(const std::string& name) {
+  return "give GeoJSON; 'ogr2ogr -f GeoJSON -lco RFC7946=YES out.geojson " + name +
+         "' converts what GDAL can read";
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+namespace terrace::terrain {
+
+/// The most that is read of a file of polygons or lines: some 6 million corners.
+inline constexpr std::uint64_t kMostGeoJsonBytes = std::uint64_t{128} << 20;
+
+/// The JSON in a file; nothing if the file cannot be opened or is a folder. Memory: some ten times
+/// the file. Throws: stream::Error, with this remedy, if it is larger than most_bytes or not JSON,
+/// which names the place.
+std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
+                                           const std::string& remedy);
+
+/// A remedy for files that should be GeoJSON.
+std::string convert_to_geojson(const std::string& name);
+
+}  // namespace terrace::terrain
