@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 #include <terrace/terrain/build.hpp>
 #include <terrace/terrain/crs.hpp>
+#include <terrace/terrain/output_kinds.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -22,6 +23,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   } else {
     request.open = opener_of(source);
   }
+  format_of_output(terrain::outputs::kStore, path);
   request.store = path;
   const auto set = [&](const char* name, auto& to) { take_option(options, name, to); };
   set("replace", request.replace);

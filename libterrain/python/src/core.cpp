@@ -21,10 +21,11 @@ namespace {
 py::handle error_type;  // terrace.Error, kept by the module
 
 /// Parameters that the libraries and the module call by different names.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kParameters{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParameters{{
     {"`channel`", "`channels`"},
     {"`format`", "`input_format`"},
     {"`memory_bytes`", "`memory`"},
+    {"`output_format`", "`format`"},
     {"`own_crs`", "`lonlat=False`"},
     {"`region_crs`", "`crs`"},
     {"`shift`", "`datum_shift`"},

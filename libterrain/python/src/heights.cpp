@@ -9,6 +9,7 @@
 #include <terrace/terrain/contours.hpp>
 #include <terrace/terrain/error.hpp>
 #include <terrace/terrain/heights.hpp>
+#include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/profile.hpp>
 #include <terrace/terrain/raster.hpp>
 
@@ -108,6 +109,7 @@ void write_raster(const OpenStore& open, const std::string& path, const std::str
                   std::optional<double> cell, const py::object& region, const std::string& crs,
                   const std::string& method, unsigned level, std::optional<double> max_edge,
                   bool replace, const py::tuple& how) {
+  format_of_output(terrain::outputs::kRasterFile, path);
   const stream::Store store = open.get();
   using terrain::RasterValue;
   terrain::RasterRequest request{

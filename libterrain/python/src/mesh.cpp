@@ -10,6 +10,7 @@
 #include <terrace/terrain/bounded_mesh.hpp>
 #include <terrace/terrain/detail_lines.hpp>
 #include <terrace/terrain/detail_mesh.hpp>
+#include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/scan_surface.hpp>
 
 #include "arrays.hpp"
@@ -57,6 +58,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   take_option(heights, "overlay", overlay_path);
   take_option(heights, "save", save_path);
   take_option(heights, "replace", replace);
+  if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
   return arrays_of(Job(how).run([&](const terrain::Context& context) {
     std::optional<stream::Overlay> overlay;
     if (!overlay_path.empty()) {
@@ -109,6 +111,7 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
                       const py::tuple& how) {
   const stream::Store store = open.get(given["where"].cast<std::string>());
+  format_of_output(terrain::outputs::kMeshFile, path);
   terrain::BoundedMeshOptions options;
   options.path = path;
   const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
@@ -144,6 +147,7 @@ void bind_mesh(py::module_& module) {
   });
   module.def("write_mesh", [](const std::string& path, const Array<double>& vertices,
                               const Array<std::uint32_t>& triangles, bool replace) {
+    format_of_output(terrain::outputs::kMeshFile, path);
     terrain::TriangleMesh mesh;
     const auto positions = rows_of<3>(vertices, "vertices");
     const auto corners = rows_of<3>(triangles, "triangles");

@@ -9,6 +9,7 @@
 #include <pybind11/stl.h>
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/terrain/crs.hpp>
+#include <terrace/terrain/output_kinds.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -68,6 +69,7 @@ class PointReader {
 /// (points written, points left out as a coordinate is NaN, how far a coordinate was moved at most)
 py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
                        const std::string& format, bool replace, const py::tuple& how) {
+  format_of_output(terrain::outputs::kPointFile, path, format);
   const OpenSource open = opener_of(source);
   std::uint64_t points = 0, nodata = 0;
   double rounding = 0;

@@ -3,6 +3,7 @@
 #include <string>
 
 #include <pybind11/stl.h>
+#include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/tile_check.hpp>
 #include <terrace/terrain/tiles.hpp>
 
@@ -24,6 +25,7 @@ terrain::HeightReference reference_named(const std::string& name) {
 }
 
 terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& given) {
+  format_of_output(terrain::outputs::kTileSet, folder);
   terrain::TilesRequest request{.folder = folder};
   const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
   set("name", request.name);

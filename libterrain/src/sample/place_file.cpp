@@ -65,6 +65,22 @@ constexpr std::array<std::array<const char*, 2>, 7> kPlaceNames{{{"x", "y"},
 
 PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file) {
   PlaceLayout layout;
+  const std::string_view text = bare(first_line);
+  const bool json = text.starts_with('{') || text.starts_with('[');
+  const bool binary = std::ranges::any_of(first_line, [](char c) {
+    return static_cast<unsigned char>(c) < ' ' && c != '\t' && c != '\r';
+  });
+  if (json || binary || text.starts_with('<')) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = std::string("is ") +
+                                  (json     ? "JSON"
+                                   : binary ? "not text"
+                                            : "XML") +
+                                  ", not a table of places",
+                         .remedy = "give CSV; 'ogr2ogr -f CSV -lco GEOMETRY=AS_XY out.csv " + file +
+                                   "' converts what GDAL can read"});
+  }
   if (const std::size_t at = first_line.find_first_of(",;\t"); at != std::string_view::npos) {
     layout.separator = first_line[at];
   } else {

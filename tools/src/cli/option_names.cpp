@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 39> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 40> kOptions{{
     {"band", "--band"},
     {"block_points", "--block"},
     {"cell", "--cell"},
@@ -36,6 +36,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 39> kOptions
     {"metric", "--metric"},
     {"near", "--near"},
     {"outlier_price", "--outlier-price"},
+    {"output_format", "--format"},
     {"own_crs", "--own-crs"},
     {"radius", "--within"},
     {"region", "--region"},

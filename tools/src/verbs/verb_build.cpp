@@ -24,6 +24,7 @@
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -107,6 +108,7 @@ class BuildCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kStore, output_);
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
@@ -127,7 +129,6 @@ class BuildCommand final : public Command {
     request_.order = order_ == "stream"    ? stream::Order::stream
                      : order_ == "spatial" ? stream::Order::spatial
                                            : stream::Order::automatic;
-    if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
     std::error_code ignored;
     if (!common.force && std::filesystem::exists(request_.store, ignored)) {
       throw stream::Error({.file = output_,

@@ -34,6 +34,7 @@
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -515,6 +516,9 @@ class ClusterCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    if (!output_.empty()) format_of_output(outputs::kPointFile, output_, format_);
+    if (!labels_.empty()) format_of_output(outputs::kLabelFile, labels_);
+    if (!dendrogram_.empty()) format_of_output(outputs::kDendrogramTable, dendrogram_);
     const Stopwatch watch;
     check_usage(common);
     const MetricChoice metric = MetricChoice::parse(metric_);

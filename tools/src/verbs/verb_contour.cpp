@@ -12,6 +12,7 @@
 #include "cli/output.hpp"
 #include "cli/store_options.hpp"
 #include "terrace/terrain/contours.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -38,6 +39,7 @@ class ContourCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kContourFile, output_);
     const Stopwatch watch;
     ContourRequest request = request_;
     request.interval = *interval_;  // required

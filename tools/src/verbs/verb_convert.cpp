@@ -23,6 +23,7 @@
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/source.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -46,6 +47,7 @@ class ConvertCommand : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kPointFile, output_, format_);
     const Stopwatch watch;
     stream::WriterOptions writing = point_writer_options(output_, format_, common);
     stream::SourceOptions reading{.format = input_format_,

@@ -32,6 +32,7 @@
 #include "tables/point_table.hpp"
 #include "terrace/stream/sink.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -228,6 +229,7 @@ class MatchCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kPairsTable, output_);
     const Stopwatch watch;
     MatchRequest request = request_of(common);
     const stream::Naming replace = may_replace(output_, common.force);

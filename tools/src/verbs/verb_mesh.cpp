@@ -24,6 +24,7 @@
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/store_view.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 #include "verbs/verbs.hpp"
@@ -48,7 +49,7 @@ class MeshCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     part_.define(app, "only triangles that reach inside");
-    add_output(app, output_, "the file to write: .ply, .obj, .glb");
+    add_output(app, output_, "the file to write: " + endings_of(outputs::kMeshFile));
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
     part_.define_cluster(app, "the mesh of the points of --level (default: L) that it stands for");
     app.add_option(
@@ -98,6 +99,8 @@ class MeshCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kMeshFile, output_, format_);
+    if (!save_overlay_.empty()) format_of_output(outputs::kOverlayFile, save_overlay_);
     return max_error_ || !max_points_.empty() ? bounded(common) : multiresolution(common);
   }
 

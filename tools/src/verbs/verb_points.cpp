@@ -27,6 +27,7 @@
 #include "terrace/terrain/detail_points.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -63,11 +64,12 @@ class PointsCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    const std::string_view format = format_of_output(outputs::kPointOrLineFile, output_, format_);
     const Stopwatch watch;
     const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
     if (!near_.empty()) return near(store, detail, watch, common);
-    if (format_ == "geojson" || (format_.empty() && output_.ends_with(".geojson"))) {
+    if (format == "geojson") {
       return lines(store, detail, watch, common);
     }
     std::optional<stream::Overlay> overlay;

@@ -12,6 +12,7 @@
 #include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "cli/store_options.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/profile.hpp"
 #include "verbs/verbs.hpp"
 
@@ -38,6 +39,7 @@ class ProfileCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kProfileTable, output_);
     const Stopwatch watch;
     ProfileRequest request;
     request.step = step_;

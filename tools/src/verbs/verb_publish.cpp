@@ -9,6 +9,7 @@
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "serve/site.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -27,6 +28,7 @@ class PublishCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kSite, output_);
     const Stopwatch watch;
     std::vector<stream::Store> stores;
     for (const std::string& path : stores_) stores.push_back(open_store(path));

@@ -11,6 +11,7 @@
 #include "cli/output.hpp"
 #include "cli/store_options.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/raster.hpp"
 #include "verbs/verbs.hpp"
 
@@ -21,7 +22,8 @@ class RasterCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     surface_.define(app);
-    add_output(app, output_, "the Cloud Optimized GeoTIFF to write");
+    add_output(app, output_,
+               "the Cloud Optimized GeoTIFF to write: " + endings_of(outputs::kRasterFile));
     app.add_option("--value", value_,
                    "height; slope in degrees; aspect in degrees clockwise from north, downhill; "
                    "hillshade, 1 to 255")
@@ -39,11 +41,11 @@ class RasterCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kRasterFile, output_);
     const Stopwatch watch;
     RasterRequest request;
     request.value = parse_raster_value(value_);
     request.cell = cell_;
-    if (output_ == "-") throw UsageError("a GeoTIFF cannot go to standard output; name a file");
     const stream::Store store = surface_.open(request.sampler);
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
     request.to = crs_.to(store, common);

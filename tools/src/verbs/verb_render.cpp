@@ -38,6 +38,7 @@
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/scan_surface.hpp"
 #include "verbs/verbs.hpp"
 
@@ -294,6 +295,7 @@ class RenderCommand : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kPictureFile, output_);
     const Stopwatch watch;
     const ImageSize size = parse_size(size_);
     if (size.width > 20000 || size.height > 20000) {

@@ -16,6 +16,7 @@
 #include "cli/store_options.hpp"
 #include "sample/sample_run.hpp"
 #include "terrace/terrain/crs.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -40,6 +41,8 @@ class SampleCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kSampleTable, output_);
+    check_input_name(outputs::kPlaceTable, points_);
     const Stopwatch watch;
     SamplerOptions options;
     const stream::Store store = surface_.open(options);

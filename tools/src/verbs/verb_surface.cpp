@@ -16,6 +16,7 @@
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 #include "verbs/verbs.hpp"
 
@@ -26,7 +27,9 @@ class SurfaceCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     part_.define(app, "only points inside");
-    add_output(app, output_, "the file to write: .ply, .obj, .glb; with --tetrahedra .vtk");
+    add_output(app, output_,
+               "the file to write: " + endings_of(outputs::kMeshFile) + "; with --tetrahedra " +
+                   endings_of(outputs::kTetrahedraFile));
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
     app.add_option(
            "--criterion", criterion_,
@@ -47,12 +50,11 @@ class SurfaceCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(tetrahedra_ ? outputs::kTetrahedraFile : outputs::kMeshFile, output_, format_);
     const Stopwatch watch;
     ScanSurfaceOptions options = parse_criterion(criterion_);
     set_metric(MetricChoice::parse(metric_), options);
     options.tetrahedra = tetrahedra_;
-    const bool vtk = output_.ends_with(".vtk");
-    if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     if (tetrahedra_ && options.method) {
       throw UsageError("--tetrahedra is for --criterion poles, gabriel and edge");
     }

@@ -19,6 +19,7 @@
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -62,6 +63,7 @@ class SynthCommand : public Command {
 
   Summary run(const CommonOptions& common) override {
     const bool dem = kind_ == "dem";
+    format_of_output(dem ? outputs::kRasterFile : outputs::kPointFile, output_);
     if (dem && (points_option_->count() > 0 || shuffle_option_->count() > 0)) {
       throw UsageError("synth dem takes --size, not --points or --shuffle");
     }
@@ -74,7 +76,6 @@ class SynthCommand : public Command {
  private:
   Summary make_dem(const CommonOptions& common) {
     const Stopwatch watch;
-    if (output_ == "-") throw UsageError("a GeoTIFF cannot be written to standard output");
     dem_.size = parse_size(size_);
     dem_.crs = crs_named(crs_);
     dem_.crs.name.clear();  // the code says it all

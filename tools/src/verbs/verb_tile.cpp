@@ -15,6 +15,7 @@
 #include "cli/option_values.hpp"
 #include "cli/selection_options.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/tiles.hpp"
 #include "verbs/verbs.hpp"
 
@@ -88,6 +89,7 @@ class TileCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kTileSet, output_);
     const Stopwatch watch;
     const TilesOutcome result =
         write_tiles(open_store(store_, where_), request(common), common.context());

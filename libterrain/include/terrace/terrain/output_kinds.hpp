@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+/// What terrace writes, and what the names of such files may end in. A name that promises another
+/// format is refused: a program that opens the file later goes by its ending.
+
+namespace terrace::terrain {
+
+struct OutputFormat {
+  std::string_view name;     ///< as users name it
+  std::string_view endings;  ///< ".a .b", in lower case
+};
+
+struct OutputKind {
+  std::string_view what;  ///< for messages, as in "a raster"
+  std::span<const OutputFormat> formats;
+  /// Listed: the ending is one of `formats`, and may be missing only if there is one format.
+  /// Free: any ending that does not belong to another format, or none.
+  enum class Names : std::uint8_t { listed, free } names = Names::listed;
+  bool streams = true;  ///< may go to standard output
+};
+
+namespace output_formats {
+inline constexpr OutputFormat kPoints[] = {
+    {"xyz", ".xyz .txt"}, {"csv", ".csv .txt"}, {"ply", ".ply"},       {"ply-ascii", ".ply"},
+    {"las", ".las"},      {"laz", ".laz"},      {"copc", ".copc.laz"}, {"geojson", ".geojson"}};
+inline constexpr OutputFormat kMesh[] = {
+    {"ply", ".ply"}, {"ply-ascii", ".ply"}, {"obj", ".obj"}, {"glb", ".glb"}};
+inline constexpr OutputFormat kTetrahedra[] = {{"vtk", ".vtk"}};
+inline constexpr OutputFormat kRaster[] = {{"tif", ".tif .tiff"}};
+inline constexpr OutputFormat kPicture[] = {{"png", ".png"}};
+inline constexpr OutputFormat kLines[] = {{"geojson", ".geojson .json"}};
+inline constexpr OutputFormat kTable[] = {{"csv", ".csv .txt"}};
+inline constexpr OutputFormat kPlaces[] = {{"csv", ".csv .txt .tsv .tab"}};
+inline constexpr OutputFormat kLabels[] = {{"txt", ".txt .csv .labels"}};
+inline constexpr OutputFormat kOverlay[] = {{"overlay", ".overlay"}};
+inline constexpr OutputFormat kFolder[] = {{"folder", ""}};
+}  // namespace output_formats
+
+/// One row for everything that a verb or a function of the Python module writes.
+namespace outputs {
+using namespace output_formats;
+using enum OutputKind::Names;
+inline constexpr OutputKind kPointFile{"a file of points", std::span(kPoints).first(7)};
+/// Of a store that may hold lines.
+inline constexpr OutputKind kPointOrLineFile{"a file of points", kPoints};
+inline constexpr OutputKind kMeshFile{"a mesh", kMesh};
+inline constexpr OutputKind kTetrahedraFile{"a file of tetrahedra", kTetrahedra, listed, false};
+inline constexpr OutputKind kRasterFile{"a raster", kRaster, listed, false};
+inline constexpr OutputKind kPictureFile{"a picture", kPicture};
+inline constexpr OutputKind kContourFile{"a file of contour lines", kLines};
+inline constexpr OutputKind kProfileTable{"a profile", kTable};
+inline constexpr OutputKind kSampleTable{"a table of heights", kPlaces};
+inline constexpr OutputKind kPairsTable{"a table of pairs", kTable};
+inline constexpr OutputKind kDendrogramTable{"a dendrogram", kTable};
+/// Also what `sample` reads.
+inline constexpr OutputKind kPlaceTable{"a table of places", kPlaces, free};
+inline constexpr OutputKind kLabelFile{"a list of labels", kLabels, free};
+inline constexpr OutputKind kOverlayFile{"an overlay", kOverlay, free, false};
+inline constexpr OutputKind kStore{"a store, which is a folder,", kFolder, free, false};
+inline constexpr OutputKind kTileSet{"a tile set, which is a folder,", kFolder, free, false};
+inline constexpr OutputKind kSite{"a site, which is a folder,", kFolder, free, false};
+}  // namespace outputs
+
+/// ".ply, .obj or .glb".
+std::string endings_of(const OutputKind& kind);
+
+/// The format of the output `path`: `format` if it is given, else by the ending, else the only one;
+/// "-" has the first unless `format` is given. Throws: UsageError if there is no such format, and
+/// for a name that promises another one; both list what is possible.
+std::string_view format_of_output(const OutputKind& kind, const std::string& path,
+                                  const std::string& format = {});
+
+/// For an input of such a kind. Throws: UsageError for a name that promises another format.
+void check_input_name(const OutputKind& kind, const std::string& path);
+
+}  // namespace terrace::terrain
