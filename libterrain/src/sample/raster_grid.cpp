@@ -164,7 +164,11 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     }
   }
   if (!(cell > 0) || !std::isfinite(cell)) {
-    throw UsageError("the points do not tell a cell size: give `cell`");
+    throw stream::Error(
+        {.file = store.path().string(),
+         .where = {},
+         .cause = "all points are at one place or on one line, so no cell size follows",
+         .remedy = "give `cell`"});
   }
   grid.step_x = cell;
   grid.step_y = -cell;

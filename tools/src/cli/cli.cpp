@@ -7,6 +7,7 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <numeric>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -49,7 +50,7 @@ std::string general_help() {
 std::string version_text() {
   const cluster::CudaStatus cuda = cluster::cuda_available();
   return std::string("terrace ") + kVersion + "\nbuild: " + kBuild +
-         "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : cuda.reason) + "\n";
+         "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : "no GPU") + "\n";
 }
 
 /// Verbs and options to come: promised by name, so that nobody takes them for misspelt.
@@ -72,12 +73,71 @@ void refuse_options_to_come(const Verb& verb, std::span<const std::string> argum
   }
 }
 
+/// How many letters are to be added, left out, changed or swapped with the next one.
+std::size_t letters_apart(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before, last(b.size() + 1), now(b.size() + 1);
+  std::iota(last.begin(), last.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    now[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      now[j] =
+          std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        now[j] = std::min(now[j], before[j - 2] + 1);
+      }
+    }
+    before = std::exchange(last, now);
+  }
+  return last[b.size()];
+}
+
+/// "did you mean NAME?" for the name that is most like a word, if one is; else empty.
+std::string meant(std::string_view word, std::span<const std::string> names) {
+  constexpr std::size_t kLongest = 40;  // no name of ours is longer
+  if (word.size() > kLongest) return {};
+  const std::string* nearest = nullptr;
+  std::size_t least = word.size() / 3 + 1;  // of short words almost any is one letter away
+  for (const std::string& name : names) {
+    // The beginning of a name counts as one letter away.
+    const std::size_t apart =
+        word.size() > 3 && name.starts_with(word) ? 1 : letters_apart(word, name);
+    if (apart >= least) continue;
+    least = apart;
+    nearest = &name;
+  }
+  return nearest == nullptr ? std::string() : "did you mean " + *nearest + "? ";
+}
+
+/// "did you mean --NAME?" for an option that there is not.
+std::string meant_option(const CLI::App& app, const std::string& argument) {
+  if (!argument.starts_with("--")) return {};
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options({})) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return meant(argument.substr(0, argument.find('=')), names);
+}
+
+/// An empty value is a slip, such as a variable of the shell that is not set; as if the option were
+/// not given, the result would be another than asked for.
+void refuse_empty_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options({})) {
+    const std::vector<std::string>& values = option->results();
+    if (std::find(values.begin(), values.end(), "") != values.end()) {
+      throw UsageError(option->get_name() + " is empty; give it a value or leave it out");
+    }
+  }
+}
+
 const Verb& find_verb(const std::string& name) {
   if (name == kVerbToCome) throw UsageError("the verb '" + name + "' is not available yet");
   for (const Verb& verb : verbs()) {
     if (verb.name == name) return verb;
   }
-  throw UsageError("there is no verb '" + name + "'; `terrace --help` lists them");
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs()) names.push_back(verb.name);
+  throw UsageError("there is no verb '" + name + "'; " + meant(name, names) +
+                   "`terrace --help` lists them");
 }
 
 /// parse(text), with the option's name in front of the message of an error.
@@ -164,10 +224,12 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
     throw UsageError(
         "'" + extras.front() + "'" +
         (extras.size() > 1 ? " and " + std::to_string(extras.size() - 1) + " more" : "") +
-        " cannot be taken; `terrace " + verb.name + " --help` tells what can");
+        " cannot be taken; " + meant_option(app, extras.front()) + "`terrace " + verb.name +
+        " --help` lists what can");
   } catch (const CLI::ParseError& error) {
     throw UsageError(std::string(error.what()) + "; `terrace " + verb.name + " --help` tells more");
   }
+  refuse_empty_values(app);
   if (common.json && writes_to_stdout(app)) {
     throw UsageError("--json and the output both want standard output; give -o FILE");
   }
@@ -213,13 +275,24 @@ int dispatch(const std::vector<std::string>& arguments) {
   return run_verb(find_verb(first), {arguments.begin() + 1, arguments.end()});
 }
 
+/// How to go on after Ctrl-C.
+std::string stopped_message(std::string_view verb_name) {
+  for (const Verb& verb : verbs()) {
+    if (verb.name == verb_name && !verb.resumed_by.empty()) {
+      return "interrupted; run the same command with " + verb.resumed_by + " to go on";
+    }
+  }
+  return kStopped;
+}
+
 /// The message for people; those of the standard library are of little use to them.
 std::string message_of(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
     return "out of memory; give a smaller --memory or a smaller input";
   }
   if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
-    return file->path1().string() + ": " + file->code().message();
+    const std::string& name = file->path1().string();
+    return (name.empty() ? "" : name + ": ") + file->code().message();
   }
   const std::string text = error.what();
   // "vector::reserve", "cannot create std::vector larger than max_size()": a size beyond all
@@ -332,7 +405,7 @@ int run_command_line(int argc, const char* const* argv) {
   } catch (const std::exception& error) {
     // A wait, read or write that Ctrl-C cut short is not a failure.
     if (interrupted()) {
-      print_message(kStopped);
+      print_message(stopped_message(argc > 1 ? argv[1] : ""));
       return kInterrupted;
     }
     print_message(with_option_names(message_of(error)));

@@ -96,6 +96,7 @@ struct Verb {
   std::string brief;    ///< one line for the list of verbs
   std::string example;  ///< ends the verb's help
   std::unique_ptr<Command> (*create)() = nullptr;
+  std::string resumed_by{};  ///< the option that goes on with an interrupted run
 };
 
 /// In the order of use.

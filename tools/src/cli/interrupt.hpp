@@ -11,7 +11,7 @@
 namespace terrace::tools {
 
 /// What the user is told who has asked to stop.
-inline constexpr const char* kStopped = "interrupted; run the same command again to start anew";
+inline constexpr const char* kStopped = "interrupted; run the same command again to start over";
 
 /// From then on SIGINT and SIGTERM only ask to stop (the second one ends the process at once), and
 /// a closed pipe is an error of the write instead of a signal.

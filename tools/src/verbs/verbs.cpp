@@ -18,7 +18,7 @@ std::span<const Verb> verbs() {
        make_mesh},
       {"surface", "write a 3D surface", "terrace surface scan.terrace -o scan.ply", make_surface},
       {"tile", "write terrain tiles for web globes",
-       "terrace tile dem.terrace --vertical ellipsoidal -o tiles", make_tile},
+       "terrace tile dem.terrace --vertical ellipsoidal -o tiles", make_tile, "--resume"},
       {"sample", "answer heights and slopes at points",
        "terrace sample dem.terrace --points places.csv", make_sample},
       {"raster", "interpolate a GeoTIFF", "terrace raster dem.terrace --cell 90 -o coarse.tif",

@@ -14,6 +14,7 @@
 #include "base/ordered_work.hpp"
 #include "base/portable_math.hpp"
 #include "earth/ground.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -235,8 +236,13 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
                            const Context& context)
     : BoundedMesher(store, options, context), whole_(lattice_of(store, options.region)) {
   if (whole_.columns < 2 || whole_.rows < 2) {
-    throw UsageError(options.region ? "`region`: nothing of it lies on the raster of the store"
-                                    : "the raster is one line of samples: it has no triangles");
+    if (options.region) {
+      throw UsageError("`region`: nothing of it is on the raster of the store");
+    }
+    throw stream::Error({.file = store.path().string(),
+                         .where = {},
+                         .cause = "the raster is one line of samples, so it has no triangles",
+                         .remedy = "take a profile or its points instead of a mesh"});
   }
   const bool interpolates = options.fill == Fill::interpolate;
   threads_ = threads_within_memory(
