@@ -89,9 +89,12 @@ const fs::path& AtomicFolder::target() const { return impl_->target; }
 
 void AtomicFolder::commit() {
   Impl& impl = *impl_;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(impl.folder)) {
-    if (entry.is_directory() && !entry.is_symlink()) sync_folder(entry.path());
+  std::error_code error;
+  fs::recursive_directory_iterator at(impl.folder, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    if (fs::is_directory(at->symlink_status())) sync_folder(at->path());
   }
+  if (error) throw system_error(impl.target.string(), "cannot be listed", error.value());
   sync_folder(impl.folder);
   Placement placement(impl.target, impl.target, impl.folder, impl.naming);
   const std::array<Placement*, 1> alone{&placement};

@@ -32,7 +32,7 @@ class Mesh:
             return Mesh(*_core.read_mesh(os.fsencode(path)))
 
     def save(self, path, replace=False):
-        """Writes a mesh file by its ending: .ply, .obj, .glb, .vtk, whole or not at all; or .svg, a picture from above."""
+        """Writes a mesh file by its ending: .ply, .obj, .glb, whole or not at all; or .svg, a picture from above."""
         path = os.fspath(path)
         if path.endswith('.svg'):
             with open(path, 'w' if replace else 'x', encoding='ascii') as file:

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
@@ -285,6 +286,23 @@ class Stores(StoreCase):
                            ('passes', lambda: terrace.rotate_tree([[0, 1]], [[0, 0], [1, 1]], passes=2 ** 32))):
             with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` is below 2\\^(32|64)'):
                 call()
+
+    def test_names_that_promise_another_format_are_refused(self):
+        corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+        with tempfile.TemporaryDirectory() as folder:
+            for ending, call in (
+                    ('png', lambda path: self.raster.raster(path=path)),
+                    ('stl', lambda path: self.raster.bounded_mesh(5, path=path)),
+                    ('vtk', terrace.Mesh(corners, [[0, 1, 2]]).save),
+                    ('tif', lambda path: self.raster.mesh(smoothing='taubin', save_overlay=path)),
+                    ('gpkg', lambda path: terrace.write_points(path, self.points)),
+                    ('las', lambda path: terrace.build(self.points, path)),
+                    ('mbtiles', lambda path: self.raster.tiles(path, vertical='ignore'))):
+                with self.subTest(ending), self.assertRaisesRegex(ValueError, f'cannot be written as .{ending}'):
+                    call(os.path.join(folder, 'x.' + ending))
+            self.assertEqual(os.listdir(folder), [])
+            with self.assertRaisesRegex(ValueError, "`format` 'foo': a file of points can be xyz, csv"):
+                terrace.write_points(os.path.join(folder, 'x'), self.points, format='foo')
 
     def test_a_region_that_is_nested_without_end_is_refused(self):
         endless = {'type': 'GeometryCollection'}

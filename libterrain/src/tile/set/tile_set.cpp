@@ -80,8 +80,11 @@ bool holds_others(const std::string& folder) {
   if (fs::exists(folder + "/" + TileJournal::kName) || fs::exists(folder + "/" + kLayerName)) {
     return false;
   }
-  std::error_code none;  // such as no folder
-  const fs::directory_iterator entries(folder, none);
+  std::error_code error;
+  const fs::directory_iterator entries(folder, error);
+  if (error && error != std::errc::no_such_file_or_directory) {
+    throw stream::system_error(folder, "cannot be listed", error.value());
+  }
   return std::any_of(fs::begin(entries), fs::end(entries),
                      [](const auto& entry) { return entry.path().filename() != kLockName; });
 }

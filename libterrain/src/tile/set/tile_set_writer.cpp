@@ -265,16 +265,21 @@ void TileSetWriter::conclude(const Zoom& zoom) {
 
 void TileSetWriter::remove_others() {
   std::vector<fs::path> gone, torn;
-  for (const auto& entry : fs::recursive_directory_iterator(options_.folder)) {
-    if (!entry.is_regular_file()) continue;
-    const std::string name = entry.path().lexically_relative(options_.folder).generic_string();
-    if (is_torn_tile(name)) torn.push_back(entry.path());
+  std::error_code error;
+  fs::recursive_directory_iterator at(options_.folder, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    std::error_code vanished;
+    if (!at->is_regular_file(vanished)) continue;
+    const fs::path& path = at->path();
+    const std::string name = path.lexically_relative(options_.folder).generic_string();
+    if (is_torn_tile(name)) torn.push_back(path);
     const auto tile = parse_tile_path(name);
     if (!tile) continue;
     if (tile->zoom >= present.size() || !number_of(*tile, present[tile->zoom])) {
-      gone.push_back(entry.path());
+      gone.push_back(path);
     }
   }
+  if (error) throw stream::system_error(options_.folder, "cannot be listed", error.value());
   if (!gone.empty()) begin_change();
   const auto remove = [](const fs::path& path) {
     fs::remove(path);
