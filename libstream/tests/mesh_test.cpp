@@ -230,6 +230,48 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
   }
 }
 
+TEST_F(MeshFile, GlbIsInTheMetresOfItsFrame) {
+  Mesh mesh = random_mesh(6, 1000, 300);
+  const Point3 far{500, -300, 1000};
+  for (Point3& p : mesh.positions) {
+    for (std::size_t k = 0; k < 3; ++k) p[k] = far[k] + p[k] / 1000;
+  }
+  Box3 bounds;
+  for (const Point3& p : mesh.positions) bounds.include(p);
+  for (const bool local : {true, false}) {
+    SCOPED_TRACE(local);
+    // Names are not always UTF-8.
+    const MeshFrame frame{.metres = {77000.25, 111000.5, 0.3048}, .local = local, .crs = "EPSG \xff"};
+    write(path("m.glb"), mesh, {.bounds = bounds, .frame = frame});
+    const MeshRounding rounding(path("m.glb"), bounds, {}, frame);
+    const Glb glb(read_text(path("m.glb")));
+    const auto& extras = glb.json["asset"]["extras"];
+    EXPECT_EQ(extras["metres_per_unit"].get<Point3>(), frame.metres);
+    EXPECT_TRUE(extras["crs"].get<std::string>().starts_with("EPSG "));
+    const auto translation = glb.json["nodes"][0]["translation"].get<Point3>();
+    const auto origin = extras["origin"].get<Point3>();
+    EXPECT_EQ(translation[0] == 0 && translation[2] == 0, local);
+    EXPECT_EQ(origin[0] != 0 && origin[1] != 0, local);
+    EXPECT_EQ(origin[2], 0);
+    const std::size_t position = glb.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"];
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      Point3 scene{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        scene[k] = translation[k] + static_cast<double>(glb.value<float>(position, i, k));
+      }
+      const Point3 turned{scene[0], -scene[2], scene[1]};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double back = origin[k] + turned[k] / frame.metres[k];
+        EXPECT_NEAR(back, rounding(mesh.positions[i])[k], 1e-12 * std::abs(far[k]));
+        EXPECT_LE(std::abs(rounding(mesh.positions[i])[k] - mesh.positions[i][k]),
+                  rounding.largest()[k]);
+      }
+    }
+  }
+  EXPECT_EQ(mesh_format(path("m.glb")), "glb");
+  EXPECT_EQ(mesh_format(path("m.glb"), {.format = "obj"}), "obj");
+}
+
 TEST_F(MeshFile, OtherFormatsRoundNothing) {
   const Box3 bounds{{691000, 5338000, 0}, {692000, 5340000, 500}};
   const Point3 p{691000.1, 5338000.2, 0.3};

@@ -93,18 +93,22 @@ std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const Mesh
   return kMeshOpeners[choose_format(kMeshFormats, path, options)](path, header, options);
 }
 
+std::string mesh_format(const std::string& path, const WriterOptions& options) {
+  return std::string(kMeshFormats[choose_format(kMeshFormats, path, options)].name);
+}
+
 MeshRounding::MeshRounding(const std::string& path, const Box3& bounds,
-                           const WriterOptions& options) {
-  if (kMeshFormats[choose_format(kMeshFormats, path, options)].name != "glb" || bounds.empty()) {
-    return;
-  }
+                           const WriterOptions& options, const std::optional<MeshFrame>& frame) {
+  if (mesh_format(path, options) != "glb" || bounds.empty()) return;
   origin_ = glb_origin(bounds);
+  if (frame) metres_ = frame->metres;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // Half a unit in the last of 24 bits, and what doubles lose when the origin is taken off and
-    // added again.
+    // added again, and between units.
     const double half =
         std::max(bounds.max[axis] - (*origin_)[axis], (*origin_)[axis] - bounds.min[axis]);
-    largest_[axis] = half * 0x1p-24 + (half + std::abs((*origin_)[axis])) * 0x1p-51;
+    const double doubles = metres_[axis] == 1.0 ? 0x1p-51 : 0x1p-50;
+    largest_[axis] = half * 0x1p-24 + (half + std::abs((*origin_)[axis])) * doubles;
   }
 }
 
@@ -112,8 +116,8 @@ Point3 MeshRounding::operator()(const Point3& p) const {
   if (!origin_) return p;
   Point3 read;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double origin = (*origin_)[axis];
-    read[axis] = origin + static_cast<double>(glb_coordinate(p[axis], origin));
+    const double origin = (*origin_)[axis], metres = metres_[axis];
+    read[axis] = origin + static_cast<double>(glb_coordinate(p[axis], origin, metres)) / metres;
   }
   return read;
 }

@@ -24,7 +24,10 @@ constexpr std::size_t kGlbPieceBytes = 64u << 10;
 constexpr std::size_t kMaxStride = 252;  // of a vertex buffer, by the specification
 
 /// z up to y up: a rotation, so that triangles keep their sense.
-std::array<double, 3> y_up(const Point3& p) { return {p[0], p[2], -p[1]}; }
+template <class Number>
+std::array<Number, 3> y_up(const std::array<Number, 3>& p) {
+  return {p[0], p[2], -p[1]};
+}
 
 /// Application-specific attributes begin with an underscore and are upper case by convention.
 std::string attribute_name(const std::string& name) {
@@ -40,7 +43,10 @@ std::string attribute_name(const std::string& name) {
 class GlbWriter final : public MeshWriter {
  public:
   GlbWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)
-      : header_(header), counts_(header), stride_(4 * (3 + header.attributes.size())) {
+      : header_(header),
+        frame_(header.frame.value_or(MeshFrame{})),
+        counts_(header),
+        stride_(4 * (3 + header.attributes.size())) {
     const auto refuse = [&](std::string cause) {
       throw Error({.file = path,
                    .where = {},
@@ -52,7 +58,7 @@ class GlbWriter final : public MeshWriter {
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
     if (header.vertices >= kMost / stride_ || header.triangles >= kMost / 12 ||
         glb::kHeaderBytes + 2 * glb::kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
-                binary_bytes() >
+                8 * frame_.crs.size() + binary_bytes() >
             kMost) {
       refuse("GLB holds at most 4 GiB");
     }
@@ -62,10 +68,8 @@ class GlbWriter final : public MeshWriter {
     }
     // The longest numbers show how much room the JSON may need; blanks fill what is left.
     constexpr double kLongest = -1.2345678901234567e-300;
-    json_bytes_ = json({kLongest, kLongest, kLongest}, {kLongest, kLongest, kLongest},
-                       {kLongest, kLongest, kLongest})
-                      .size() +
-                  36;
+    constexpr std::array<double, 3> kAny{kLongest, kLongest, kLongest};
+    json_bytes_ = json(kAny, kAny, kAny, kAny).size() + 36;
     json_bytes_ += (4 - json_bytes_ % 4) % 4;
     sink_.emplace(path, options.replace, options.stop);
     std::string text;
@@ -92,9 +96,13 @@ class GlbWriter final : public MeshWriter {
     }
     const float* values = attributes.data();
     for (const Point3& p : positions) {
-      const auto local = y_up({p[0] - origin_[0], p[1] - origin_[1], p[2] - origin_[2]});
+      std::array<float, 3> local{};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto stored = static_cast<float>(local[axis]);
+        local[axis] = glb_coordinate(p[axis], origin_[axis], frame_.metres[axis]);
+      }
+      local = y_up(local);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float stored = local[axis];
         if (stored < min_[axis]) min_[axis] = stored;
         if (stored > max_[axis]) max_[axis] = stored;
         append_little_endian(piece_, stored);
@@ -121,7 +129,16 @@ class GlbWriter final : public MeshWriter {
     const auto widened = [](const std::array<float, 3>& v) {
       return std::array<double, 3>{v[0], v[1], v[2]};
     };
-    const std::string text = json(y_up(origin_), widened(min_), widened(max_));
+    // Where the local origin is in the scene, and the scene's in the coordinates.
+    Point3 place{}, scene{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (frame_.local && axis < 2) {
+        scene[axis] = origin_[axis];
+      } else {
+        place[axis] = origin_[axis] * frame_.metres[axis];
+      }
+    }
+    const std::string text = json(y_up(place), scene, widened(min_), widened(max_));
     assert(text.size() <= json_bytes_);
     sink_->write_at(glb::kHeaderBytes + glb::kChunkHeaderBytes, text);
     sink_->commit();
@@ -137,15 +154,24 @@ class GlbWriter final : public MeshWriter {
     return header_.vertices == 0 ? 0 : glb::kChunkHeaderBytes + binary_bytes();
   }
 
-  [[nodiscard]] std::string json(const std::array<double, 3>& translation,
+  [[nodiscard]] std::string json(const std::array<double, 3>& translation, const Point3& origin,
                                  const std::array<double, 3>& min,
                                  const std::array<double, 3>& max) const {
     Json out;
     out["asset"] = {{"version", "2.0"}, {"generator", "terrace"}};
+    if (header_.frame) {
+      Json& extras = out["asset"]["extras"];
+      extras["crs"] = frame_.crs;
+      extras["origin"] = origin;
+      extras["metres_per_unit"] = frame_.metres;
+      extras["coordinates"] =
+          "x = origin[0] + X / metres_per_unit[0], y = origin[1] - Z / metres_per_unit[1], "
+          "z = Y / metres_per_unit[2] of a vertex at X, Y, Z in the scene";
+    }
     out["scene"] = 0;
     if (header_.vertices == 0) {
       out["scenes"] = Json::array({Json::object()});
-      return out.dump();
+      return text_of(out);
     }
     out["scenes"] = Json::array({{{"nodes", {0}}}});
     out["nodes"] = Json::array({{{"mesh", 0}, {"translation", translation}}});
@@ -193,7 +219,11 @@ class GlbWriter final : public MeshWriter {
     out["accessors"] = accessors;
     out["bufferViews"] = views;
     out["buffers"] = Json::array({{{"byteLength", binary_bytes()}}});
-    return out.dump();
+    return text_of(out);
+  }
+  /// Names of reference systems may have bytes that are not UTF-8.
+  static std::string text_of(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
   }
 
   void flush_if_full() {
@@ -205,6 +235,7 @@ class GlbWriter final : public MeshWriter {
   }
 
   MeshHeader header_;
+  MeshFrame frame_;
   MeshCounts counts_;
   std::size_t stride_;
   std::optional<Sink> sink_;
@@ -228,8 +259,8 @@ Point3 glb_origin(const Box3& bounds) {
   return origin;
 }
 
-float glb_coordinate(double coordinate, double origin) {
-  return static_cast<float>(coordinate - origin);
+float glb_coordinate(double coordinate, double origin, double metres) {
+  return static_cast<float>((coordinate - origin) * metres);
 }
 
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
