@@ -21,12 +21,40 @@
 namespace terrace::python {
 namespace {
 
-/// (vertices, triangles, levels)
-py::tuple arrays_of(terrain::TriangleMesh&& mesh) {
+/// As Python holds units, for units_from(): bytes, for names need not be UTF-8.
+py::tuple to_python(const terrain::MeshUnits& units) {
+  const stream::Crs& crs = units.crs;
+  return py::make_tuple(crs.epsg, crs.geographic, py::bytes(crs.name), py::bytes(crs.wkt),
+                        py::bytes(crs.horizontal_unit), py::bytes(crs.vertical_unit),
+                        py::bytes(units.height_unit));
+}
+
+terrain::MeshUnits units_from(const py::object& units) {
+  terrain::MeshUnits made;
+  if (units.is_none()) return made;
+  const auto fields = units.cast<py::tuple>();
+  made.crs.epsg = fields[0].cast<int>();
+  made.crs.geographic = fields[1].cast<bool>();
+  std::size_t next = 2;
+  for (std::string* text : {&made.crs.name, &made.crs.wkt, &made.crs.horizontal_unit,
+                            &made.crs.vertical_unit, &made.height_unit}) {
+    *text = fields[next++].cast<std::string>();
+  }
+  return made;
+}
+
+/// (vertices, triangles, levels, units)
+py::tuple arrays_of(terrain::TriangleMesh&& mesh, const py::object& units = py::none()) {
   py::object levels = py::none();
   if (!mesh.levels.empty()) levels = to_array(std::move(mesh.levels));
   return py::make_tuple(to_array(std::move(mesh.positions)), to_array(std::move(mesh.triangles)),
-                        levels);
+                        levels, units);
+}
+
+/// To the CRS of that name, if it is not empty.
+terrain::PlaceConversion places_to(const stream::Store& store, const std::string& crs) {
+  const auto to = change_to(store, crs);
+  return to ? terrain::PlaceConversion(*to, store) : terrain::PlaceConversion();
 }
 
 /// heights: "smoothing" (method, iterations, strength, pass band, edge height), the files "overlay"
@@ -59,7 +87,8 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   take_option(heights, "save", save_path);
   take_option(heights, "replace", replace);
   if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
-  return arrays_of(Job(how).run([&](const terrain::Context& context) {
+  terrain::MeshUnits units;
+  terrain::TriangleMesh made = Job(how).run([&](const terrain::Context& context) {
     std::optional<stream::Overlay> overlay;
     if (!overlay_path.empty()) {
       options.heights.overlay = &overlay.emplace(terrain::open_height_overlay(overlay_path, store));
@@ -69,14 +98,14 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
       options.heights.save =
           &writer.emplace(save_path, store, store.schema().coordinates[2].name, replace);
     }
-    terrain::TriangleMesh made = detail_mesh(store, detail, options, context);
+    terrain::TriangleMesh mesh = detail_mesh(store, detail, options, context);
     if (writer) writer->finish();
-    if (const auto to = change_to(store, crs)) {
-      const terrain::PlaceConversion places(*to, store);
-      places(made.positions);
-    }
-    return made;
-  }));
+    const terrain::PlaceConversion places = places_to(store, crs);
+    places(mesh.positions);
+    units = terrain::MeshUnits(store, places);
+    return mesh;
+  });
+  return arrays_of(std::move(made), to_python(units));
 }
 
 /// As arrays_of(), and the tetrahedra inside the surface in place of its triangles if asked for.
@@ -87,7 +116,9 @@ py::tuple surface(const OpenStore& open, unsigned level, const py::object& regio
   terrain::ScanSurface made = Job(how).run([&](const terrain::Context& context) {
     return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
   });
-  if (!tetrahedra) return arrays_of(std::move(made.mesh));
+  if (!tetrahedra) {
+    return arrays_of(std::move(made.mesh), to_python(terrain::MeshUnits(store)));
+  }
   return py::make_tuple(to_array(std::move(made.mesh.positions)),
                         to_array(std::move(made.tetrahedra)));
 }
@@ -122,9 +153,14 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   options.quality = quality_named(given["quality"].cast<std::string>());
   options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
   options.fill = fill_named(given["fill"].cast<std::string>());
-  const terrain::BoundedMeshResult outcome = Job(how).run(
-      [&](const terrain::Context& context) { return write_bounded_mesh(store, options, context); });
+  const auto crs = given["crs"].cast<std::string>();
+  const terrain::BoundedMeshResult outcome = Job(how).run([&](const terrain::Context& context) {
+    options.places = places_to(store, crs);
+    return write_bounded_mesh(store, options, context);
+  });
   py::dict result;
+  result["units"] = to_python(terrain::MeshUnits(store, options.places));
+  result["note"] = outcome.coordinates.note;
   result["triangles"] = outcome.triangles;
   result["max_error"] = outcome.max_error;
   result["rms_error"] = outcome.rms_error;
@@ -146,8 +182,10 @@ void bind_mesh(py::module_& module) {
     return arrays_of(terrain::triangle_mesh_of(std::move(*file)));
   });
   module.def("write_mesh", [](const std::string& path, const Array<double>& vertices,
-                              const Array<std::uint32_t>& triangles, bool replace) {
+                              const Array<std::uint32_t>& triangles, bool replace,
+                              const py::object& given_units) {
     format_of_output(terrain::outputs::kMeshFile, path);
+    const terrain::MeshUnits units = units_from(given_units);
     terrain::TriangleMesh mesh;
     const auto positions = rows_of<3>(vertices, "vertices");
     const auto corners = rows_of<3>(triangles, "triangles");
@@ -162,8 +200,11 @@ void bind_mesh(py::module_& module) {
         }
       }
     }
-    released([&] { terrain::write_mesh(path, mesh, {.replace = replace}); });
+    return released(
+        [&] { return terrain::write_mesh(path, mesh, {.replace = replace}, units).note; });
   });
+  module.def("units",
+             [](const OpenStore& open) { return to_python(terrain::MeshUnits(open.get())); });
   module.def("level_within", [](const OpenStore& open, std::uint64_t most) {
     return terrain::level_within(open.get(), most);
   });

@@ -68,11 +68,14 @@ _Smoothing = Literal['laplacian', 'taubin', 'bilateral']
 _Cluster = Union[tuple[int, int], npt.NDArray[Any]]
 
 class Mesh:
-    vertices: _Floats
     triangles: npt.NDArray[np.uint32]
     levels: npt.NDArray[np.uint8] | None
     def __init__(self, vertices: _Floats, triangles: npt.NDArray[Any],
                  levels: npt.NDArray[np.uint8] | None = ...) -> None: ...
+    @property
+    def vertices(self) -> _Floats: ...
+    @vertices.setter
+    def vertices(self, vertices: _Floats) -> None: ...
     def __iter__(self) -> Iterator[npt.NDArray[Any]]: ...
     @classmethod
     def read(cls, path: _Path) -> Mesh: ...
@@ -158,7 +161,7 @@ class Store:
     def bounded_mesh(self, max_error: float | None = ..., *, max_points: int | None = ..., quality: _Quality = ...,
                      duplicates: Literal['all', 'min', 'max', 'mean', 'first', 'error'] = ...,
                      fill: Literal['none', 'flat', 'interpolate'] = ..., region: _Region | None = ...,
-                     where: str | None = ..., path: _Path | None = ..., replace: bool = ...,
+                     where: str | None = ..., crs: _Crs | None = ..., path: _Path | None = ..., replace: bool = ...,
                      progress: _Progress | None = ..., threads: int | None = ...,
                      memory: int | None = ...) -> BoundedMesh: ...
     def tiles(self, folder: _Path, zooms: tuple[int, int] | None = ..., *, progress: _Progress | None = ...,

@@ -7,6 +7,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import as_numbered, as_rows
+from ._job import notes
 from ._pictures import light, triangles_svg
 
 
@@ -20,6 +21,22 @@ class Mesh:
     def __init__(self, vertices, triangles, levels=None):
         self.vertices, self.triangles, self.levels = vertices, triangles, levels
 
+    @classmethod
+    def _of(cls, made):
+        """As the core gives it: arrays, and the units of the coordinates."""
+        mesh = Mesh(*made[:3])
+        mesh._units = made[3]
+        return mesh
+
+    @property
+    def vertices(self):
+        """Float64, shape (n, 3)."""
+        return self._vertices
+
+    @vertices.setter
+    def vertices(self, vertices):
+        self._vertices, self._units = vertices, None
+
     def __iter__(self):
         return iter((self.vertices, self.triangles))
 
@@ -29,16 +46,23 @@ class Mesh:
         triangles; OSError; Error."""
         path = os.fspath(path)
         with open(path, 'rb'):  # what is not there is an error of the system
-            return Mesh(*_core.read_mesh(os.fsencode(path)))
+            return Mesh._of(_core.read_mesh(os.fsencode(path)))
 
     def save(self, path, replace=False):
-        """Writes a mesh file by its ending: .ply, .obj, .glb, whole or not at all; or .svg, a picture from above."""
+        """Writes a mesh file by its ending: .ply, .obj, .glb, whole or not at all; or .svg, a picture from above.
+
+        glTF has no unit but the metre: in .glb the coordinates that a store gives in degrees or feet become metres (see
+        "Meshes in metres" in tools/README.md), and ``asset.extras`` of the file says how to get them back. After ``vertices``
+        has been set, and in a mesh made of arrays, they are taken as they are. A note of what was done goes to
+        ``logging.getLogger('terrace')``."""
         path = os.fspath(path)
         if path.endswith('.svg'):
             with open(path, 'w' if replace else 'x', encoding='ascii') as file:
                 file.write(self._svg(len(self.triangles)))
             return
-        _core.write_mesh(os.fsencode(path), *self._parts(), bool(replace))
+        note = _core.write_mesh(os.fsencode(path), *self._parts(), bool(replace), self._units)
+        if note:
+            notes.info(note)
 
     def _parts(self):
         vertices = as_rows(self.vertices, 'vertices', (3,))
@@ -52,7 +76,7 @@ class Mesh:
 
     def turned_outward(self):
         """The same mesh with components of negative volume turned inside out. Raises: ValueError."""
-        return Mesh(self.vertices, _core.turned_outward(*self._parts()), self.levels)
+        return Mesh._of((self.vertices, _core.turned_outward(*self._parts()), self.levels, self._units))
 
     def errors(self, samples):
         """Vertical distances of samples from the mesh, whose triangles must not overlap seen from above.
@@ -97,5 +121,6 @@ class BoundedMesh(Mesh):
 
     def __init__(self, vertices, triangles, measured):
         super().__init__(vertices, triangles)
+        self._units = measured.get('units')
         self.max_error, self.rms_error = measured['max_error'], measured['rms_error']
         self.samples, self.uncovered = measured['samples'], measured['uncovered']

@@ -405,8 +405,8 @@ class Store:
         for name, path in (('overlay', overlay), ('save', save_overlay)):
             if path is not None:
                 heights[name] = os.fsencode(path)
-        return Mesh(*_core.mesh(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '', cluster,
-                                metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
+        return Mesh._of(_core.mesh(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '',
+                                   cluster, metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
 
     def lines(self, level=0, region=None, where=None, *, focus=(), progress=None, threads=None, memory=None):
         """The lines of a store that was built with ``entities`` 'segments' or 'polylines', of mixed levels of detail.
@@ -428,17 +428,18 @@ class Store:
         """
         made = _core.surface(self._core, whole(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
                              job(progress, threads, memory))
-        return made if tetrahedra else Mesh(*made)
+        return made if tetrahedra else Mesh._of(made)
 
     def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
-                     region=None, where=None, path=None, replace=False, progress=None, threads=None, memory=None):
+                     region=None, where=None, crs=None, path=None, replace=False, progress=None, threads=None, memory=None):
         """The mesh with the fewest triangles that is within ``max_error`` metres of every sample, verified on each,
         or the best of at most ``max_points`` vertices.
 
         quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time. duplicates: which of samples
         at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. fill: of a raster's cells without data:
         'none' leaves holes, 'flat', 'interpolate'. path: where to write it (.ply, .obj, .glb); other formats than PLY round
-        numbers in their own way and get a mesh that is verified as they have it.
+        numbers in their own way and get a mesh that is verified as they have it. crs: of the vertices, in place of the
+        store's; the bound holds over its x and y. In .glb the coordinates are metres, see Mesh.save().
 
         Returns: a BoundedMesh: ``vertices``, ``triangles``, ``max_error``, ``rms_error``. It is made window by window
         in constant memory, but for the arrays.
@@ -446,7 +447,7 @@ class Store:
         if (max_error is None) == (max_points is None):
             raise ValueError('bounded_mesh() needs either `max_error` or `max_points`')
         options = {'quality': quality, 'duplicates': duplicates, 'fill': fill, 'region': as_region(region),
-                   'where': where or '', 'replace': replace}
+                   'where': where or '', 'replace': replace, 'crs': crs_text(crs) or ''}
         if max_error is not None:
             max_error = float(max_error)
             if not 0 <= max_error < math.inf:
@@ -456,8 +457,10 @@ class Store:
             options['max_points'] = whole(max_points, 'max_points', 3)
         how = job(progress, threads, memory)
 
-        def make(name):
+        def make(name, say=None):
             measured = _core.bounded_mesh(self._core, os.fsencode(name), options, how)
+            if say and measured['note']:
+                say(measured['note'])
             if measured['triangles'] == 0:  # such a file is not read as a mesh
                 return BoundedMesh(np.empty((0, 3)), np.empty((0, 3), np.uint32), measured)
             return BoundedMesh(*_core.read_mesh(os.fsencode(name))[:2], measured)
@@ -465,8 +468,10 @@ class Store:
         if path is not None:
             path = os.fspath(path)
             if path.endswith('.ply'):
-                return make(path)
-            _core.bounded_mesh(self._core, os.fsencode(path), options, how)
+                return make(path, say=notes.info)
+            note = _core.bounded_mesh(self._core, os.fsencode(path), options, how)['note']
+            if note:
+                notes.info(note)
         with tempfile.TemporaryDirectory() as folder:
             return make(os.path.join(folder, 'mesh.ply'))
 

@@ -174,7 +174,7 @@ class Multiresolution:
     def __init__(self, store, level=None, *, focus=()):
         if not isinstance(store, Store):
             raise TypeError(f'a model is of a terrace.Store, not of {type(store).__name__}')
-        self._top = store.top
+        self._top, self._units = store.top, _core.units(store._core)
         kind = _core.GridModel if store.info['grid'] else _core.PointModel
         self._core = kind(store._core, store.top if level is None else whole(level, 'level', bits=32), self._focuses(focus))
 
@@ -222,7 +222,7 @@ class Multiresolution:
         """What there is now, as a Mesh."""
         whole_mesh = self._core.whole()
         corners = np.searchsorted(whole_mesh['added_vertices'], whole_mesh['added_corners'])
-        return Mesh(whole_mesh['added_positions'], corners.astype(np.uint32), self._core.levels())
+        return Mesh._of((whole_mesh['added_positions'], corners.astype(np.uint32), self._core.levels(), self._units))
 
     @property
     def expanded(self):

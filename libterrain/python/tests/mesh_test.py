@@ -7,7 +7,7 @@ import unittest
 import numpy as np
 
 import terrace
-from python_case import StoreCase, sorted_rows
+from python_case import StoreCase, hills, sorted_rows
 
 try:
     from scipy.spatial import ConvexHull, Delaunay
@@ -175,7 +175,7 @@ class Meshes(StoreCase):
     def test_files(self):
         mesh = self.raster.bounded_mesh(4, path=self.path('hills.ply'))
         from terrace import _core
-        vertices, triangles, _ = _core.read_mesh(self.path('hills.ply'))
+        vertices, triangles, *_ = _core.read_mesh(self.path('hills.ply'))
         np.testing.assert_array_equal(vertices, mesh.vertices)
         np.testing.assert_array_equal(triangles, mesh.triangles)
         for name in ('hills.ply', 'hills.svg'):
@@ -188,6 +188,41 @@ class Meshes(StoreCase):
         self.assertGreater(os.path.getsize(self.path('hills.glb')), 1000)
         with self.assertRaises(ValueError):
             terrace.Mesh(np.zeros((3, 3)), np.array([[0, 1, 3]])).save(self.path('wrong.ply'))
+
+    def test_glb_of_degrees_is_in_metres(self):
+        store = terrace.build(hills(), self.path('degrees'), transform=(0.001, 0, 8, 0, -0.001, 46.1), crs='EPSG:4326')
+        metres = np.array([77400, 111150])  # in a degree, at 46 degrees north
+        path = self.path('degrees.glb')
+        model = terrace.Multiresolution(store)
+        model.set_detail(0)
+        for made in (store.mesh(level=0), store.mesh(level=0).turned_outward(), store.bounded_mesh(2), store.bounded_mesh(2, crs=4326),
+                     model.mesh):
+            with self.assertLogs('terrace', 'INFO') as notes:
+                made.save(path, replace=True)
+            self.assertIn('in metres, as glTF asks', notes.output[0])
+            self.check_metres(path, np.ptp(made.vertices[:, :2], axis=0) * metres, np.ptp(made.vertices[:, 2]))
+        with self.assertLogs('terrace', 'INFO') as notes:
+            store.bounded_mesh(2, path=path, replace=True)
+            store.bounded_mesh(2, path=self.path('degrees.ply'))
+        self.assertIn('in metres', notes.output[0])
+        self.assertIn('x and y are degrees', notes.output[1])
+        self.check_metres(path, np.array([149, 119]) * 0.001 * metres, np.ptp(hills()))
+        # In another CRS, with the bound there; and of a caller's own numbers, which stay.
+        there = store.bounded_mesh(2, crs='EPSG:32632')
+        self.assertLessEqual(there.max_error, 2)
+        samples = terrace.xyz(store.points(crs='EPSG:32632'))
+        measured = there.errors(samples)
+        self.assertLessEqual(measured['max_error'], there.max_error + 1e-6)
+        self.assertLess(measured['uncovered'], 2 * (120 + 150))
+        mesh = store.mesh(level=0)
+        mesh.vertices = mesh.vertices * [1000, 1000, 1]
+        mesh.save(path, replace=True)
+        self.check_metres(path, np.ptp(mesh.vertices[:, :2], axis=0), np.ptp(mesh.vertices[:, 2]))
+
+    def check_metres(self, path, wide, high):
+        vertices = terrace.Mesh.read(path).vertices
+        np.testing.assert_allclose(np.ptp(vertices[:, :2], axis=0), wide, rtol=2e-3)
+        self.assertAlmostEqual(np.ptp(vertices[:, 2]), high, delta=1e-2)
 
 
 if __name__ == '__main__':

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
@@ -113,6 +114,14 @@ PlaceConversion::PlaceConversion(Transformation change, const stream::Store& sto
   middle_ = middle_in(*change_, world_box(store.schema(), store.whole().bounds()))[0];
 }
 
+void PlaceConversion::operator()(std::span<Point2> places) const {
+  if (!change_) return;
+  change_->forward(places);
+  if (!(turn_ > 0)) return;
+  const WholeTurns turns(middle_, turn_);
+  for (Point2& place : places) place = turns(place);
+}
+
 void PlaceConversion::operator()(std::span<stream::Point3> points) const {
   if (!change_) return;
   std::array<Point2, 1024> places{};
@@ -120,11 +129,7 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
     const std::size_t count = std::min(places.size(), points.size() - first);
     for (std::size_t i = 0; i < count; ++i)
       places[i] = {points[first + i][0], points[first + i][1]};
-    change_->forward(std::span(places).first(count));
-    if (turn_ > 0) {
-      const WholeTurns turns(middle_, turn_);
-      for (std::size_t i = 0; i < count; ++i) places[i] = turns(places[i]);
-    }
+    (*this)(std::span(places).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       stream::Point3& p = points[first + i];
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {
@@ -137,6 +142,42 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
       p[1] = places[i][1];
     }
   }
+}
+
+stream::Box3 PlaceConversion::box_around(const stream::Box3& box) const {
+  if (!change_ || box.empty()) return box;
+  constexpr int kSteps = 32;
+  std::vector<Point2> places;
+  for (int i = 0; i <= kSteps * (kSteps + 2); ++i) {
+    const std::array<int, 2> step{i % (kSteps + 1), i / (kSteps + 1)};
+    Point2 place{};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double part = static_cast<double>(step[axis]) / kSteps;
+      place[axis] = box.min[axis] * (1 - part) + box.max[axis] * part;
+    }
+    places.push_back(place);
+  }
+  (*this)(std::span<Point2>(places));
+  stream::Box3 around;
+  for (const Point2& place : places) {
+    if (!std::isfinite(place[0]) || !std::isfinite(place[1])) continue;
+    around.include(stream::Point3{place[0], place[1], box.min[2]});
+    around.include(stream::Point3{place[0], place[1], box.max[2]});
+  }
+  if (around.empty()) return around;
+  // The places between bend by less than that.
+  constexpr double kBend = 0.02;
+  const double margin =
+      kBend * std::max(around.max[0] - around.min[0], around.max[1] - around.min[1]);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    around.min[axis] -= margin;
+    around.max[axis] += margin;
+  }
+  return around;
+}
+
+std::optional<stream::Crs> PlaceConversion::crs() const {
+  return change_ ? std::optional(change_->to().crs()) : std::nullopt;
 }
 
 }  // namespace terrace::terrain

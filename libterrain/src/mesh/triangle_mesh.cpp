@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "base/file_marks.hpp"
+#include "base/units.hpp"
+#include "earth/ground.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 
 namespace terrace::terrain {
@@ -35,7 +37,141 @@ T clamped(double value) {
   return static_cast<T>(std::isnan(value) ? 0 : std::clamp(value, low, high));
 }
 
+/// The projection that suits a place of longitude and latitude in degrees.
+std::string projection_at(double longitude, double latitude) {
+  if (latitude > 84) return "EPSG:5041";
+  if (latitude < -80) return "EPSG:5042";
+  const double turned = longitude - 360 * std::floor((longitude + 180) / 360);
+  const double zone = std::clamp(std::floor((turned + 180) / 6) + 1, 1.0, 60.0);
+  return "EPSG:" + std::to_string((latitude < 0 ? 32700 : 32600) + static_cast<int>(zone));
+}
+
+std::string plural(const std::string& unit) {
+  if (unit.ends_with("foot")) return unit.substr(0, unit.size() - 4) + "feet";
+  return unit.ends_with('s') || unit.ends_with("feet") ? unit : unit + "s";
+}
+
+/// As mesh_coordinates() has them, and as the note describes them.
+struct Coordinates {
+  Coordinates(const MeshUnits& units, const stream::Box3& bounds) : crs(units.crs) {
+    stream::Placement placement;
+    placement.crs = crs;
+    placement.coordinates[2].unit = units.height_unit;
+    const Ground ground(placement);
+    const bool known =
+        crs.epsg != 0 || !crs.wkt.empty() || crs.geographic || !crs.horizontal_unit.empty();
+    if (!known || bounds.empty()) return;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      middle[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
+    }
+    // Without a place it is that of the unit alone.
+    const GroundMap unit = ground.map({}), there = ground.map(bounds);
+    metres = {unit[0], unit[4], unit[8]};
+    // Maps stretch lengths by a few percent where they are used.
+    constexpr double kStretched = 0.1;
+    const double east = there[0] / unit[0], north = there[4] / unit[4];
+    const bool stretched = std::abs(east - 1) > kStretched || std::abs(north - 1) > kStretched;
+    // Nor does a map that is far from its centre keep right angles.
+    const bool straight = std::abs(there[1]) <= kStretched * std::min(there[0], there[4]);
+    degrees = !ground.same_everywhere() && !ground.projected() && north > 10000;  // metres
+    // Beyond the poles they are no latitudes.
+    const bool apart = degrees && std::max(-bounds.min[1], bounds.max[1]) * north > 1.02e7;
+    if (!stretched || !straight || apart) return;
+    local = true;
+    // At a pole there is no east.
+    metres = {std::max(there[0], 0x1p-20 * there[4]), there[4], there[8]};
+    if (!degrees) return;
+    for (const double latitude : {bounds.min[1], bounds.max[1]}) {
+      const double length = ground.map({{0, latitude, 0}, {0, latitude, 0}})[0];
+      widest_error = std::max(widest_error, std::abs(length / metres[0] - 1));
+    }
+  }
+
+  [[nodiscard]] bool as_they_are() const { return !local && metres == stream::Point3{1, 1, 1}; }
+  [[nodiscard]] std::string name() const {
+    return crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : crs.name;
+  }
+  [[nodiscard]] std::string horizontal_unit() const {
+    if (!crs.horizontal_unit.empty()) return plural(crs.horizontal_unit);
+    return degrees ? "degrees" : metres[0] == 1 ? "metres" : "feet";
+  }
+  [[nodiscard]] std::string projection() const {
+    const bool common = metres[1] > 1.05e5 && metres[1] < 1.2e5;  // not grads
+    return degrees && common ? " " + projection_at(middle[0], middle[1]) : " EPSG:n";
+  }
+
+  stream::Crs crs;
+  stream::Point3 metres{1, 1, 1};
+  Point2 middle{};
+  bool local = false, degrees = false;
+  double widest_error = 0;  ///< of lengths from west to east, as a share
+};
+
+std::string note_in_metres(const Coordinates& here) {
+  const std::string name = here.name().empty() ? "" : " of " + here.name();
+  const std::string back = "; asset.extras says how to get the coordinates" + name + " back";
+  if (!here.local) {
+    return "in metres, as glTF asks, in place of " + here.horizontal_unit() + back;
+  }
+  std::string note = "in metres, as glTF asks, east and north of " +
+                     readable_number(here.middle[0], 10) + ", " +
+                     readable_number(here.middle[1], 10) + name;
+  if (here.widest_error >= 0.001) {
+    note += "; lengths from west to east are true there and off by up to " +
+            readable_number(100 * here.widest_error, 2) + " % at the border";
+    if (here.widest_error >= 0.01) {
+      note += " (a projection, as `to_crs`" + here.projection() + ", is truer)";
+    }
+  }
+  return note + "; asset.extras says how to get the coordinates back";
+}
+
+std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
+  const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-3;
+  if (!here.local && same) return {};
+  std::string heights = units.height_unit.empty() ? here.crs.vertical_unit : units.height_unit;
+  if (!metres_in_unit(heights)) heights = "metre";
+  const std::string what = here.degrees || !here.local
+                               ? here.horizontal_unit()
+                               : "metres of a map that stretches lengths to " +
+                                     readable_number(1 / here.metres[0]) + " times";
+  return "x and y are " + what + " and heights " + plural(heights) +
+         ", which most programs take for one unit; pass `to_crs`" + here.projection() +
+         " for metres, or write GLB, which is in metres";
+}
+
 }  // namespace
+
+MeshUnits::MeshUnits(const stream::Store& store, const PlaceConversion& places)
+    : crs(store.schema().crs), height_unit(store.schema().coordinates[2].unit) {
+  const std::optional<stream::Crs> other = places.crs();
+  if (!other) return;
+  // Heights stay as they are, in feet too if only x and y are said to be.
+  if (!metres_in_unit(height_unit)) height_unit = crs.vertical_unit;
+  if (!metres_in_unit(height_unit) && Ground(store.schema()).metres_vertical() != 1) {
+    height_unit = crs.horizontal_unit;
+  }
+  const stream::Crs own = std::exchange(crs, *other);
+  crs.vertical_epsg = own.vertical_epsg;
+  crs.vertical_unit = own.vertical_unit;
+}
+
+MeshCoordinates mesh_coordinates(const std::string& path, const stream::WriterOptions& options,
+                                 const MeshUnits& units, const stream::Box3& bounds) {
+  const Coordinates here(units, bounds);
+  MeshCoordinates out;
+  if (stream::mesh_format(path, options) != "glb") {
+    out.note = note_as_they_are(here, units);
+  } else if (!here.as_they_are()) {
+    const std::string text =
+        here.crs.epsg == 0 && !here.crs.wkt.empty() ? here.crs.wkt : here.name();
+    out.frame = {.metres = here.metres, .local = here.local, .crs = text};
+    if (here.local) out.origin = {here.middle[0], here.middle[1], 0};
+    out.note = note_in_metres(here);
+  }
+  if (!out.note.empty()) out.note = path + ": " + out.note;
+  return out;
+}
 
 void append_points(TriangleMesh& mesh, const stream::Schema& schema,
                    const stream::PointBlock& points) {
@@ -82,8 +218,8 @@ TriangleMesh triangle_mesh_of(stream::MeshFile file) {
   return mesh;
 }
 
-void write_mesh(const std::string& path, const TriangleMesh& mesh,
-                const stream::WriterOptions& options) {
+MeshCoordinates write_mesh(const std::string& path, const TriangleMesh& mesh,
+                           const stream::WriterOptions& options, const MeshUnits& units) {
   constexpr std::size_t kPiece = 65536;
   stream::Box3 bounds;
   for (const stream::Point3& p : mesh.positions) bounds.include(p);
@@ -93,6 +229,8 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh,
   if (!mesh.levels.empty()) header.attributes = {"level"};
   header.comments = {kWriterMark};
   if (!bounds.empty()) header.bounds = bounds;
+  MeshCoordinates coordinates = mesh_coordinates(path, options, units, bounds);
+  header.frame = coordinates.frame;
   const auto writer = stream::open_mesh_writer(path, header, options);
   std::vector<float> levels;
   const std::span vertices(mesh.positions);
@@ -106,6 +244,7 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh,
   }
   writer->add_triangles(mesh.triangles);
   writer->finish();
+  return coordinates;
 }
 
 }  // namespace terrace::terrain

@@ -135,6 +135,15 @@ void tell_rounding(const stream::PointWriter& writer, Summary& summary) {
                   " to fit the format\n";
 }
 
+void tell_coordinates(const terrain::MeshCoordinates& coordinates, const CommonOptions& common,
+                      Summary& summary) {
+  if (!coordinates.note.empty()) common.say(coordinates.note);
+  if (!coordinates.frame) return;
+  const stream::MeshFrame& frame = *coordinates.frame;
+  summary.json["frame"] = {
+      {"crs", frame.crs}, {"origin", coordinates.origin}, {"metres_per_unit", frame.metres}};
+}
+
 stream::Naming may_replace(const std::string& path, bool force) {
   namespace fs = std::filesystem;
   stream::Naming naming;

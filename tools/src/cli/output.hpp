@@ -9,6 +9,7 @@
 #include "cli/cli.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/point_writer.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 
 namespace terrace::tools {
 
@@ -33,6 +34,10 @@ std::function<stream::Crs()> crs_to_write(stream::Crs recorded);
 
 /// Reports in the summary if coordinates were rounded to fit the file's format.
 void tell_rounding(const stream::PointWriter& writer, Summary& summary);
+
+/// Reports what a mesh file has for the coordinates: a note, and in the summary "frame".
+void tell_coordinates(const terrain::MeshCoordinates& coordinates, const CommonOptions& common,
+                      Summary& summary);
 
 /// Checks, before the work begins, that the output `path` may be written. Returns the writers'
 /// `replace`: with `force`, a file of ours, which is looked at again when it is replaced.

@@ -49,7 +49,8 @@ class MeshCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     part_.define(app, "only triangles that reach inside");
-    add_output(app, output_, "the file to write: " + endings_of(outputs::kMeshFile));
+    add_output(app, output_,
+               "the file to write: " + endings_of(outputs::kMeshFile) + " (GLB in metres)");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
     part_.define_cluster(app, "the mesh of the points of --level (default: L) that it stands for");
     app.add_option(
@@ -135,11 +136,7 @@ class MeshCommand final : public Command {
     options.path = output_;
     const stream::Store store = open_store(part_.path, part_.where);
     options.region = part_.detail(store, common).region;
-    if (part_.crs.places(store, common).has_effect()) {
-      throw UsageError(
-          "--to-crs: between other coordinates the triangles would be other surfaces, and the "
-          "bound would not hold; write the mesh in the store's CRS");
-    }
+    options.places = part_.crs.places(store, common);
     options.writer = {
         .format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()};
     keep_freed_memory();
@@ -157,6 +154,7 @@ class MeshCommand final : public Command {
                     {"reading_seconds", result.reading_seconds},
                     {"meshing_seconds", result.meshing_seconds},
                     {"peak_rss_bytes", peak_rss_bytes()}};
+    tell_coordinates(result.coordinates, common, summary);
     const bool all = result.uncovered == 0;
     summary.text =
         output_ + ": " + with_commas(result.vertices) + " vertices, " +
@@ -235,7 +233,9 @@ class MeshCommand final : public Command {
     if (mesh.positions.empty()) throw_none_inside(store, "triangle");
     if (mesh.triangles.empty()) common.say(part_.path + ": " + why_flat(mesh.positions));
     places(mesh.positions);
-    write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()});
+    const MeshCoordinates coordinates =
+        write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()},
+                   MeshUnits(store, places));
     if (writer) writer->finish();
     outputs.commit();
     if (looks_like_scan(store)) {
@@ -247,6 +247,7 @@ class MeshCommand final : public Command {
     Summary summary;
     summary.json = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
     summary.add_cost(watch);
+    tell_coordinates(coordinates, common, summary);
     summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
                    with_commas(mesh.triangles.size()) + " triangles in " +
                    readable_seconds(watch.seconds()) + "\n";

@@ -28,8 +28,8 @@ class SurfaceCommand final : public Command {
   void define(CLI::App& app) override {
     part_.define(app, "only points inside");
     add_output(app, output_,
-               "the file to write: " + endings_of(outputs::kMeshFile) + "; with --tetrahedra " +
-                   endings_of(outputs::kTetrahedraFile));
+               "the file to write: " + endings_of(outputs::kMeshFile) +
+                   " (GLB in metres); with --tetrahedra " + endings_of(outputs::kTetrahedraFile));
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
     app.add_option(
            "--criterion", criterion_,
@@ -76,13 +76,21 @@ class SurfaceCommand final : public Command {
                  "triangulates heights over x and y"));
     }
     places(surface.mesh.positions);
+    const MeshUnits units(store, places);
     const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};
+    MeshCoordinates coordinates;
     if (tetrahedra_) {
       write_vtk(output_, surface.mesh.positions, surface.mesh.levels, surface.tetrahedra, writer);
+      stream::Box3 bounds;
+      for (const stream::Point3& p : surface.mesh.positions) bounds.include(p);
+      // Like PLY, VTK has the coordinates as they are.
+      coordinates = mesh_coordinates(output_, {.format = "ply"}, units, bounds);
     } else {
-      write_mesh(output_, surface.mesh, writer);
+      coordinates = write_mesh(output_, surface.mesh, writer, units);
     }
-    return summary_of(surface, watch);
+    Summary summary = summary_of(surface, watch);
+    tell_coordinates(coordinates, common, summary);
+    return summary;
   }
 
  private:

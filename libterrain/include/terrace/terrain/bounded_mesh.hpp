@@ -12,8 +12,10 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/fill.hpp"
 #include "terrace/terrain/region.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 
 /// Meshes whose vertical error is bounded, and measured at every sample.
 
@@ -27,6 +29,9 @@ struct BoundedMeshOptions {
   tri::PointDuplicates duplicates = tri::PointDuplicates::kAll;
   Fill fill = Fill::none;          ///< of a raster's cells
   std::optional<Region> region{};  ///< in the store's CRS
+  /// To the CRS in which the mesh is written. The bound holds there: every sample is moved, and
+  /// measured against the surface over that x and y.
+  PlaceConversion places{};
   std::string path{};              ///< of the mesh; "-" is standard output
   stream::WriterOptions writer{};  ///< its format; the context's stop counts, not this one's
   /// Irregular samples meshed at once, at most; the mesh depends on it.
@@ -43,6 +48,7 @@ struct BoundedMeshResult {
   std::uint64_t duplicates = 0;             ///< samples at the place of another
   double reading_seconds = 0.0;             ///< of all threads together, decoding included
   double meshing_seconds = 0.0;             ///< likewise, the check included
+  MeshCoordinates coordinates{};            ///< of the file
 };
 
 /// Writes the mesh of a store's samples at full resolution, with the fewest triangles within the
@@ -51,7 +57,10 @@ struct BoundedMeshResult {
 /// Works window by window: windows depend on the data and the bound alone, what lies on their sides
 /// on the samples there alone. A finished window is spooled beside `path` and forgotten. Of
 /// irregular points the mesh covers the convex hull; up to options.window_points they are meshed as
-/// a whole, above that after one pass that finds the hull and the windows. Reports "samples".
+/// a whole, above that after one pass that finds the hull and the windows. With `places` irregular
+/// points are meshed where they are moved; a raster's triangles are made on its lattice, in windows
+/// so small that an edge, which is straight in the file, is within an eighth of a cell of the
+/// samples along it. Reports "samples".
 /// Throws: stream::Error on a damaged store, if the memory does not suffice (says what it needs),
 /// or if the format's numbers are too coarse for the bound; UsageError; stream::Stopped. The file
 /// is whole or not there.

@@ -205,7 +205,13 @@ class PlaceConversion {
   PlaceConversion(Transformation change, const stream::Store& store);
   /// x and y in place. Throws: stream::Error for a point that has no place there.
   void operator()(std::span<stream::Point3> points) const;
+  /// In place; NaN where there is no place.
+  void operator()(std::span<Point2> places) const;
+  /// A box around what becomes of the places in another; empty if they have none there.
+  [[nodiscard]] stream::Box3 box_around(const stream::Box3& box) const;
   [[nodiscard]] bool has_effect() const { return change_.has_value(); }
+  /// The CRS that it leads to; nullopt if it leaves places as they are.
+  [[nodiscard]] std::optional<stream::Crs> crs() const;
 
  private:
   std::optional<Transformation> change_;

@@ -3,13 +3,19 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <terrace/stream/mesh_reader.hpp>
+#include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/point.hpp>
 #include <terrace/stream/point_writer.hpp>
+#include <terrace/stream/schema.hpp>
 #include <terrace/stream/source.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 
@@ -37,9 +43,39 @@ void append_points(TriangleMesh& mesh, const stream::Schema& schema,
 /// The mesh of a file (see stream::read_mesh()).
 [[nodiscard]] TriangleMesh triangle_mesh_of(stream::MeshFile file);
 
+/// The units of positions: made by default they are not known.
+struct MeshUnits {
+  MeshUnits() = default;
+  /// Of what a store gives, after its places were converted.
+  explicit MeshUnits(const stream::Store& store, const PlaceConversion& places = {});
+
+  stream::Crs crs{};          ///< of x and y
+  std::string height_unit{};  ///< "metre", "foot", ...; empty: as `crs` says
+};
+
+/// What a mesh file has for the coordinates of a CRS.
+///
+/// glTF has no unit but the metre. So in GLB coordinates that are not metres on the ground become
+/// metres: longitudes and latitudes, and those of a map that stretches lengths by more than a tenth
+/// (Web Mercator), by one scale east and one north, those of the middle of the mesh, about that
+/// middle; feet by their length. Heights become metres above the same zero. A linear map leaves
+/// triangles the surfaces that they are, so a bound on heights holds as before. Without known units
+/// nothing changes. Other formats have the coordinates as they are.
+struct MeshCoordinates {
+  std::optional<stream::MeshFrame> frame{};  ///< nullopt: the coordinates themselves
+  stream::Point3 origin{};  ///< of the file's scene, in the coordinates, if it has a frame
+  /// What the user should know of the coordinates in the file; empty: nothing. Names the file.
+  std::string note{};
+};
+
+/// For a mesh within `bounds`, and the file that stream::open_mesh_writer() writes.
+[[nodiscard]] MeshCoordinates mesh_coordinates(const std::string& path,
+                                               const stream::WriterOptions& options,
+                                               const MeshUnits& units, const stream::Box3& bounds);
+
 /// Writes a mesh, with its levels where it has any; "-" is standard output. The file is whole or
 /// not there. Throws: stream::Error, stream::Stopped.
-void write_mesh(const std::string& path, const TriangleMesh& mesh,
-                const stream::WriterOptions& options = {});
+MeshCoordinates write_mesh(const std::string& path, const TriangleMesh& mesh,
+                           const stream::WriterOptions& options = {}, const MeshUnits& units = {});
 
 }  // namespace terrace::terrain

@@ -54,7 +54,8 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
   if (result.samples == 0 && options.region) throw_none_inside(store, "sample");
   stream::WriterOptions writer = options.writer;
   writer.stop = stop;
-  spool->write(options.path, writer, mesher.bounds());
+  spool->write(options.path, writer, mesher.bounds(), mesher.coordinates().frame);
+  result.coordinates = mesher.coordinates();
   result.max_error *= metres;
   result.rms_error *= metres;
   return result;

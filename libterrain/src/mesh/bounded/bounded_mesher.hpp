@@ -19,12 +19,13 @@ namespace terrace::terrain {
 
 /// Targets for the error of a mesh such that, after the file's rounding, a reader sees no more than
 /// the bound. Heights are rounded by a known amount; rounded places add a little more, depending on
-/// the slope. Both targets are the bound if the format is exact.
+/// the slope, and so do lines that are curves in the file. Both targets are the bound if the format
+/// is exact and the samples are not moved.
 struct Aim {
   double first = 0.0;  ///< ignores rounded places: to be tried, and checked
   double sure = 0.0;   ///< where the first misses the bound, or cannot be checked
   double bound = 0.0;  ///< what readers may see: infinite if a number of points was asked for, not
-                       ///< a bound, and the format rounds; what they do see is measured then
+                       ///< a bound, and the two differ; what they do see is measured then
 };
 
 /// What was measured on the mesh of one window, as a reader of the file gets it back.
@@ -56,7 +57,9 @@ class BoundedMesher {
   [[nodiscard]] virtual bool can_estimate() const = 0;
 
   [[nodiscard]] double metres_vertical() const;
+  /// Of the file's vertices, in its CRS.
   [[nodiscard]] const stream::Box3& bounds() const { return bounds_; }
+  [[nodiscard]] const MeshCoordinates& coordinates() const { return coordinates_; }
 
  protected:
   /// All must outlive it.
@@ -123,7 +126,12 @@ class BoundedMesher {
   const Context& context_;
   stream::Placement placement_;
   stream::Box3 bounds_;
+  MeshCoordinates coordinates_;
   stream::MeshRounding rounding_;
+
+ private:
+  /// Whether lines of a raster's samples are curves in the file.
+  [[nodiscard]] bool bends() const { return store_.schema().grid && options_.places.has_effect(); }
 };
 
 }  // namespace terrace::terrain

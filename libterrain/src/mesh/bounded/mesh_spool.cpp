@@ -70,12 +70,13 @@ void MeshSpool::add_triangles(std::span<const stream::TriangleIndices> triangles
 }
 
 void MeshSpool::write(const std::string& path, const stream::WriterOptions& options,
-                      const stream::Box3& bounds) {
+                      const stream::Box3& bounds, const std::optional<stream::MeshFrame>& frame) {
   stream::MeshHeader header;
   header.vertices = vertices_;
   header.triangles = triangles_;
   header.comments = {kWriterMark};
   if (!bounds.empty()) header.bounds = bounds;
+  header.frame = frame;
   const auto writer = stream::open_mesh_writer(path, header, options);
   read_back<stream::Point3>(vertex_file_, vertices_, options.stop,
                             [&](std::span<const stream::Point3> p) { writer->add_vertices(p); });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -27,9 +28,9 @@ class MeshSpool {
   void add_triangle(const stream::TriangleIndices& triangle);
   void add_triangles(std::span<const stream::TriangleIndices> triangles);
 
-  /// Writes the file. bounds: what the writer is told, see stream::MeshHeader.
+  /// Writes the file. bounds, frame: what the writer is told, see stream::MeshHeader.
   void write(const std::string& path, const stream::WriterOptions& options,
-             const stream::Box3& bounds);
+             const stream::Box3& bounds, const std::optional<stream::MeshFrame>& frame);
 
  private:
   stream::AtomicFile vertex_file_, triangle_file_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -180,6 +181,19 @@ constexpr std::size_t kMostPlaces = std::size_t{1} << 20;
 /// The limit of tri::point_tin(); products of two are finite.
 constexpr double kLargest = 1e100;
 
+/// As for_each_wanted_place(), moved.
+void for_each_sample(const stream::Store& store, const Detail& detail, unsigned threads,
+                     const PlaceConversion& places,
+                     const std::function<void(std::span<const stream::Point3>)>& show) {
+  if (!places.has_effect()) return for_each_wanted_place(store, detail, threads, show);
+  std::vector<stream::Point3> moved;
+  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> own) {
+    moved.assign(own.begin(), own.end());
+    places(std::span<stream::Point3>(moved));
+    show(moved);
+  });
+}
+
 /// Drops every other place.
 void thin_out(std::vector<Point2>& places) {
   for (std::size_t i = 0; 2 * i < places.size(); ++i) places[i] = places[2 * i];
@@ -246,7 +260,7 @@ void SharedPlaces::add(const MeshSamples& samples) {
 
 PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& detail,
                                    const PointMeshCuts& cuts, const std::string& path,
-                                   unsigned threads)
+                                   unsigned threads, const PlaceConversion& places)
     : cuts_(cuts),
       file_(place_for(path), true),
       chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(),
@@ -254,8 +268,8 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& det
       counts_(cuts.cells.size(), 0),
       waiting_(cuts.cells.size()),
       chunks_(cuts.cells.size()) {
-  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> places) {
-    for (const stream::Point3& p : places) deal(cuts.cell_of({p[0], p[1]}), p);
+  for_each_sample(store, detail, threads, places, [&](std::span<const stream::Point3> samples) {
+    for (const stream::Point3& p : samples) deal(cuts.cell_of({p[0], p[1]}), p);
   });
   // The rest is kept without spare capacity; the file's buffer is flushed.
   for (std::vector<stream::Point3>& rest : waiting_) rest.shrink_to_fit();
@@ -311,7 +325,7 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
 }
 
 PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few,
-                              unsigned threads) {
+                              unsigned threads, const PlaceConversion& places) {
   PointMeshScan scan;
   scan.whole.emplace();
   StreamingHull hull;
@@ -338,8 +352,8 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
       scan.whole->add(p);
     }
   };
-  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> places) {
-    for (const stream::Point3& p : places) add(p);
+  for_each_sample(store, detail, threads, places, [&](std::span<const stream::Point3> samples) {
+    for (const stream::Point3& p : samples) add(p);
   });
   if (scan.whole) {
     scan.some = {};

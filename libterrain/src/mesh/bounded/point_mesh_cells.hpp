@@ -15,6 +15,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -116,10 +117,11 @@ struct SharedPlaces {
 /// threads may read at once.
 class PointMeshSamples {
  public:
-  /// One pass over the store. path: of the mesh. Throws: stream::Error on a damaged store, or if
-  /// the file cannot be written. Memory: 16 MiB, and 4 bytes per 40 samples or more.
+  /// One pass over the store. path: of the mesh. places: to where samples are moved, as for
+  /// scan_point_mesh(). Throws: stream::Error on a damaged store, or if the file cannot be written.
+  /// Memory: 16 MiB, and 4 bytes per 40 samples or more.
   PointMeshSamples(const stream::Store& store, const Detail& detail, const PointMeshCuts& cuts,
-                   const std::string& path, unsigned threads);
+                   const std::string& path, unsigned threads, const PlaceConversion& places = {});
 
   [[nodiscard]] std::size_t count(std::uint32_t first_cell, std::uint32_t cells) const;
   /// Appends the samples of some cells that lie in the box, by cells, of each in the order of the
@@ -150,10 +152,11 @@ struct PointMeshScan {
   std::vector<Point2> hull;  ///< as convex_hull() of all
 };
 
-/// Reads all samples once, in the order of the store. few: how many at most are kept. Memory: of
-/// `few` samples, of up to a million places, and of the hull.
-/// Throws: stream::Error on a damaged store.
+/// Reads all samples once, in the order of the store. few: how many at most are kept. places: to
+/// where samples are moved before anything else. Memory: of `few` samples, of up to a million
+/// places, and of the hull. Throws: stream::Error on a damaged store, and for a sample that has no
+/// place there.
 PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few,
-                              unsigned threads);
+                              unsigned threads, const PlaceConversion& places = {});
 
 }  // namespace terrace::terrain

@@ -163,11 +163,11 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
   const Stopwatch reading;
   Detail detail;
   detail.region = options.region;
-  scan_ = scan_point_mesh(store, detail, options.window_points, context.threads);
+  scan_ = scan_point_mesh(store, detail, options.window_points, context.threads, options.places);
   if (!scan_.whole && scan_.hull.size() >= 3) {
     cuts_ = cut_for_point_mesh(std::move(scan_.some), scan_.period, options.window_points);
     scan_.some = {};
-    samples_.emplace(store, detail, cuts_, options.path, context.threads);
+    samples_.emplace(store, detail, cuts_, options.path, context.threads, options.places);
     std::uint64_t most = 0;
     for (std::uint32_t i = 0; i < cuts_.cells.size(); ++i) {
       most = std::max<std::uint64_t>(most, samples_->count(i, 1));

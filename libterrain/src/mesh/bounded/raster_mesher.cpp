@@ -32,6 +32,9 @@ constexpr std::int64_t kSampleCells = 256;
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{112} << 20;
 constexpr std::uint64_t kRasterBytesBeside = std::uint64_t{48} << 20;
 constexpr std::uint64_t kFillBytes = std::uint64_t{32} << 20;
+/// Cells by which an edge that is straight in the file may leave the samples along it: less than
+/// half, so that no sample beside a window's side comes to its other side.
+constexpr double kMostBend = 0.125;
 
 /// How large windows should be, from the vertices per sample of greedy insertion.
 std::int64_t window_cells(double per_sample) {
@@ -249,6 +252,45 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
       kBytesPerThread, kRasterBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
                            (interpolates ? kFillBytes : 0));
   if (interpolates) fill_ = std::make_shared<StoreFill>(store);
+  if (options.places.has_effect()) most_cells_ = straight_cells();
+}
+
+std::int64_t RasterMesher::straight_cells() const {
+  constexpr int kPlaces = 8;  // each way
+  constexpr std::array<Point2, 4> kWays{{{1, 0}, {0, 1}, {1, 1}, {1, -1}}};
+  const double half = 0.5 * static_cast<double>(std::min<std::int64_t>(
+                                kWindowCells, std::max(whole_.columns, whole_.rows) - 1));
+  double bend = 0.0;  // of an edge of twice `half` cells along a row or column
+  for (int i = 0; i <= kPlaces; ++i) {
+    for (int j = 0; j <= kPlaces; ++j) {
+      const auto at = [](std::int64_t first, std::int64_t count, int step) {
+        return static_cast<double>(first) + static_cast<double>((count - 1) * step) / kPlaces;
+      };
+      const Point2 middle{at(whole_.column, whole_.columns, i), at(whole_.row, whole_.rows, j)};
+      for (const Point2& way : kWays) {
+        std::array<Point2, 3> places{};
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double step = half * (static_cast<double>(k) - 1.0);
+          const stream::Point3 p =
+              world_point(placement_, {middle[0] + step * way[0], middle[1] + step * way[1], 0.0});
+          places[k] = {p[0], p[1]};
+        }
+        options_.places(std::span<Point2>(places));
+        const auto& [a, m, b] = places;
+        const double cells = 2.0 * half * portable_hypot(way[0], way[1]);
+        const double off = portable_hypot(0.5 * (a[0] + b[0]) - m[0], 0.5 * (a[1] + b[1]) - m[1]);
+        const double length = portable_hypot(b[0] - a[0], b[1] - a[1]);
+        // What has no place there is refused when it becomes a vertex.
+        if (!std::isfinite(off) || !(length > 0.0)) continue;
+        // In cells along this way, and as if it were no longer than along a row.
+        bend = std::max(bend, off / (length / cells) / (way[0] * way[0] + way[1] * way[1]));
+      }
+    }
+  }
+  // Bends grow as the square of the length; the longest is the diagonal of the largest window.
+  constexpr double kLongest = 1.5 * 1.4143;
+  const double cells = 2.0 * half * std::sqrt(kMostBend / std::max(bend, 1e-9)) / kLongest;
+  return static_cast<std::int64_t>(std::clamp(cells, 1.0, static_cast<double>(kWidestCells)));
 }
 
 double RasterMesher::estimate(double max_error) const {
@@ -277,6 +319,7 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
   out.aim = aim.sure;
   out.whole = whole_;
   out.region = options_.region;
+  out.places = options_.places;
   out.tin.quality = options_.quality;
   const GroundMap ground = Ground(placement_).map(store_.bounds());
   const bool mirrored = ground[0] * ground[4] - ground[1] * ground[3] < 0.0;
@@ -331,7 +374,7 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
     sample = this->sample(max_error, tri::TinQuality::kGreedy, 2, 2);
     cells = window_cells(sample.vertices_per_sample);
   }
-  const LatticePlan plan(whole_, cells);
+  const LatticePlan plan(whole_, std::min(cells, most_cells_));
   const auto meshers = this->meshers(max_error);
   WindowJoiner joiner(plan, spool);
   BoundedMeshResult result = run_windows(

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -39,7 +40,12 @@ class RasterMesher final : public BoundedMesher {
   [[nodiscard]] Sample sample(double max_error, tri::TinQuality quality, std::size_t across,
                               std::size_t down) const;
 
+  /// How many cells a window may have each way, so that a straight edge in the file is within
+  /// kMostBend of the samples along it. Requires places that have an effect.
+  [[nodiscard]] std::int64_t straight_cells() const;
+
   LatticeWindow whole_;
+  std::int64_t most_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, each way
   unsigned threads_ = 1;
   std::shared_ptr<const StoreFill> fill_;
 };

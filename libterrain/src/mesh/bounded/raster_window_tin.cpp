@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/tri/point_tin.hpp>
 
 #include "base/portable_math.hpp"
 #include "base/stopwatch.hpp"
@@ -61,6 +63,50 @@ double rounding_of_errors(const WindowTin& tin) {
     most = std::max(most, 0x1p-48 * rise * box / std::fabs(bx * cy - by * cx));
   }
   return most;
+}
+
+/// Twice the area of a triangle, positive if it is counter-clockwise.
+double twice_area(std::span<const tri::Point3> points, const std::array<std::uint32_t, 3>& t) {
+  const tri::Point3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/// Swaps an edge of each triangle that is not counter-clockwise, so that it is. Returns whether all
+/// are.
+bool turn_back(std::span<const tri::Point3> points,
+               std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  constexpr int kMostRounds = 16;
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<std::uint32_t> turned;
+    for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+      if (!(twice_area(points, triangles[i]) > 0.0)) turned.push_back(i);
+    }
+    if (turned.empty()) return true;
+    // The triangle to the left of each edge.
+    std::map<std::array<std::uint32_t, 2>, std::uint32_t> left;
+    for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) left[{triangles[i][k], triangles[i][(k + 1) % 3]}] = i;
+    }
+    std::vector<bool> changed(triangles.size(), false);
+    bool any = false;
+    for (const std::uint32_t i : turned) {
+      for (std::size_t k = 0; k < 3 && !changed[i]; ++k) {
+        const std::uint32_t a = triangles[i][k], b = triangles[i][(k + 1) % 3];
+        const auto mate = left.find({b, a});
+        if (mate == left.end() || changed[mate->second]) continue;
+        const std::uint32_t c = triangles[i][(k + 2) % 3];
+        std::array<std::uint32_t, 3>& other = triangles[mate->second];
+        const std::uint32_t d = other[0] + other[1] + other[2] - a - b;
+        const std::array<std::uint32_t, 3> one{a, d, c}, two{d, b, c};
+        if (!(twice_area(points, one) > 0.0 && twice_area(points, two) > 0.0)) continue;
+        changed[i] = changed[mate->second] = any = true;
+        triangles[i] = one;
+        other = two;
+      }
+    }
+    if (!any) return false;
+  }
+  return false;
 }
 
 }  // namespace
@@ -175,13 +221,14 @@ void WindowMesher::measure_as_read(
     const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double)>& measure) const {
   const stream::Point3& moved = rounding_.largest();
   const bool exact = moved == stream::Point3{};
+  const bool moves = options_.places.has_effect();  // what becomes of them there is measured later
   std::vector<tri::Point3> read;
   read.reserve(tin.vertices.size());
   for (std::size_t i = 0; i < tin.vertices.size(); ++i) {
     const tri::GridVertex& vertex = tin.vertices[i];
     tri::Point3 p{static_cast<double>(vertex.column), static_cast<double>(vertex.row),
                   vertex.height};
-    if (!exact) {
+    if (!exact && !moves) {
       const stream::Point3 back = rounding_(tin.positions[i]);
       const std::array<double, 2> stored = stored_place(placement_, {back[0], back[1]});
       p = {stored[0] - static_cast<double>(tin.window.column),
@@ -191,31 +238,82 @@ void WindowMesher::measure_as_read(
   }
   const std::array<double, 6>& m = placement_.world.xy;
   const double cell = std::min(portable_hypot(m[0], m[3]), portable_hypot(m[1], m[4]));
-  const double tolerance = std::min(1.0, 2.0 * portable_hypot(moved[0], moved[1]) / cell);
+  const double tolerance =
+      moves ? 0.0 : std::min(1.0, 2.0 * portable_hypot(moved[0], moved[1]) / cell);
   tin.check = measure(read, tolerance);
+}
+
+template <class T>
+void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) const {
+  std::vector<tri::Point3> read = tin.positions;
+  options_.places(std::span<stream::Point3>(read));
+  for (tri::Point3& p : read) p = rounding_(p);
+  if (!turn_back(read, tin.triangles)) {
+    fail(tin, "triangles would be turned over by the way to the other CRS",
+         "write the mesh in the store's CRS, or take another `to_crs`");
+  }
+  std::vector<stream::Point3> moved;
+  moved.reserve(samples.heights.size());
+  for (std::int64_t row = 0; row < samples.rows; ++row) {
+    for (std::int64_t column = 0; column < samples.columns; ++column) {
+      const T height = samples.heights[static_cast<std::size_t>(row * samples.columns + column)];
+      if (!std::isfinite(height)) continue;
+      moved.push_back(world_point(placement_, {static_cast<double>(tin.window.column + column),
+                                               static_cast<double>(tin.window.row + row), 0.0}));
+      moved.back()[2] = static_cast<double>(height);
+    }
+  }
+  options_.places(std::span<stream::Point3>(moved));
+  std::vector<double> x, y, z;
+  for (const auto& [axis, values] : {std::pair{0, &x}, std::pair{1, &y}, std::pair{2, &z}}) {
+    values->reserve(moved.size());
+    for (const stream::Point3& p : moved) values->push_back(p[static_cast<std::size_t>(axis)]);
+  }
+  const tri::TinErrors errors = tri::measure_surface(x, y, z, read, tin.triangles);
+  // A sample that is beside the mesh now was on one of its sides. The next window measures it, or
+  // it is at the border: there it counts on the side, as on the lattice.
+  if (errors.uncovered == 0) tin.check.max_error = 0.0;
+  tin.check.max_error = std::max(tin.check.max_error, errors.largest);
+  if (errors.covered > 0) tin.check.rms_error = errors.rms;
+}
+
+void WindowMesher::fail(const WindowTin& tin, const std::string& cause,
+                        const std::string& remedy) const {
+  throw stream::Error({.file = store_.path().string(),
+                       .where = "window at column " + std::to_string(tin.window.column) + ", row " +
+                                std::to_string(tin.window.row),
+                       .cause = cause,
+                       .remedy = remedy});
 }
 
 void WindowMesher::require_sound(const WindowTin& tin) const {
   const bool exact = rounding_.largest() == stream::Point3{};
-  const auto fail = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = store_.path().string(),
-                         .where = "window at column " + std::to_string(tin.window.column) +
-                                  ", row " + std::to_string(tin.window.row),
-                         .cause = cause,
-                         .remedy = remedy});
-  };
+  if (options_.places.has_effect() && tin.check.max_error > options_.bound &&
+      !(exact && tin.check.max_error <= rounding_of_errors(tin))) {
+    fail(tin,
+         "the mesh misses its bound in the other CRS: " + number_text(tin.check.max_error) +
+             " of " + number_text(options_.bound),
+         "allow a larger `max_error`, or write the mesh in the store's CRS");
+  }
   if (tin.check.max_error > options_.bound &&
       !(exact && tin.check.max_error <= rounding_of_errors(tin))) {
     if (exact) {
-      fail("the mesh misses its bound: " + number_text(tin.check.max_error) + " of " +
+      fail(tin,
+           "the mesh misses its bound: " + number_text(tin.check.max_error) + " of " +
                number_text(options_.bound),
            "this is a fault of terrace, please report it");
     }
-    fail("the numbers of the file's format are too coarse for this bound so far from its origin",
+    fail(tin,
+         "the numbers of the file's format are too coarse for this bound so far from its origin",
          "write PLY, which is exact, or a smaller `region`");
   }
+  require_no_holes(tin);
+}
+
+void WindowMesher::require_no_holes(const WindowTin& tin) const {
+  const bool exact = rounding_.largest() == stream::Point3{} || options_.places.has_effect();
   if (tin.check.nodata_covered > 0 || tin.check.uncovered_inner > 0 || tin.check.turned > 0) {
-    fail("the mesh covers cells without data, leaves out cells with data, or folds",
+    fail(tin, "the mesh covers cells without data, leaves out cells with data, or folds",
          exact ? "this is a fault of terrace, please report it"
                : "write PLY, which is exact, or a smaller `region`");
   }
@@ -262,11 +360,20 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
     measure_as_read(out, [&](std::span<const tri::Point3> points, double tolerance) {
       return tri::check_grid_tin<T>(grid, points, out.triangles, tolerance);
     });
+    if (options_.places.has_effect()) {
+      require_no_holes(out);
+      measure_moved(samples, out);
+    }
   };
   mesh_to(options_.first_aim);
   if (checked) {
     if (out.check.max_error > options_.bound && options_.aim < options_.first_aim) {
       mesh_to(options_.aim);
+    }
+    // Curved lines have no known share of the bound.
+    for (const double share : {0.5, 0.25}) {
+      if (!options_.places.has_effect() || !(out.check.max_error > options_.bound)) break;
+      mesh_to(share * options_.aim);
     }
     require_sound(out);
     // Samples in the region lie on triangles that reach into it, which are kept.
@@ -278,6 +385,7 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
     }
     if (options_.region) keep_what_touches(out, *options_.region);
     order_by_use(out);
+    options_.places(std::span<stream::Point3>(out.positions));
   }
   out.meshing_seconds = meshing.seconds();
   return out;

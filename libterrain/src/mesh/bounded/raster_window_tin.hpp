@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <terrace/stream/mesh_writer.hpp>
@@ -12,6 +13,7 @@
 #include <terrace/tri/grid_tin.hpp>
 
 #include "surface/store_window.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -26,6 +28,8 @@ struct WindowTinOptions {
   LatticeWindow whole;  ///< of which the windows are parts
   /// With a region the meshes have only the triangles that reach into it.
   std::optional<Region> region;
+  /// To the CRS of the file.
+  PlaceConversion places;
   /// The height that a sample without data gets; empty: it stays without data.
   std::function<double(std::int64_t column, std::int64_t row)> fill;
 };
@@ -34,9 +38,10 @@ struct WindowTinOptions {
 struct WindowTin {
   LatticeWindow window;
   std::vector<tri::GridVertex> vertices;  ///< columns and rows count from the window's first
-  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS
+  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS of the file
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  tri::GridTinCheck check;  ///< of the mesh that a reader gets back
+  /// Of the mesh that a reader gets back; which samples it covers is told on the lattice.
+  tri::GridTinCheck check;
   /// Samples with data, before filling and inside the region; those on the first row and column
   /// count in the previous window.
   std::uint64_t samples = 0;
@@ -74,12 +79,21 @@ class WindowMesher {
   /// Whether a sample of the window lies in the region, if there is one.
   [[nodiscard]] bool in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
                                double height) const;
+  /// In the CRS of the store.
   [[nodiscard]] std::vector<stream::Point3> positions(const WindowTin& tin) const;
   void measure_as_read(WindowTin& tin,
                        const std::function<tri::GridTinCheck(std::span<const tri::Point3>,
                                                              double tolerance)>& measure) const;
+  /// Measures a sound mesh of the lattice where the file has it, and swaps edges where thin
+  /// triangles would be turned over there.
+  template <class T>
+  void measure_moved(const Samples<T>& samples, WindowTin& tin) const;
+  /// Throws: stream::Error.
+  [[noreturn]] void fail(const WindowTin& tin, const std::string& cause,
+                         const std::string& remedy) const;
   /// Throws: stream::Error if a reader of the file would see more than the bound, or a hole.
   void require_sound(const WindowTin& tin) const;
+  void require_no_holes(const WindowTin& tin) const;
 
   const stream::Store& store_;
   WindowTinOptions options_;
