@@ -21,6 +21,7 @@
 #include "las_files.hpp"
 #include "octree_testing.hpp"
 #include "point_files.hpp"
+#include "terrace/stream/point_writer.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -182,7 +183,8 @@ TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
   EXPECT_EQ(kept(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0.5), 5u);
   // A cube's points may be rounded across its sides.
   EXPECT_EQ(kept(Box3{{-1, -1, -1}, {-0.005, -0.005, -0.005}}, 0), 7u);
-  EXPECT_EQ(kept(Box3{{9, 9, 9}, {10, 10, 10}}, 0), 0u);
+  // The root is read for any region, as its points check its cube.
+  EXPECT_EQ(kept(Box3{{9, 9, 9}, {10, 10, 10}}, 0), 1u);
 }
 
 TEST(CopcOctree, RefusesWhatCannotBe) {
@@ -215,6 +217,32 @@ TEST(CopcOctree, RefusesWhatCannotBe) {
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 0)), "not a positive number");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 1, -1)), "not a positive number");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "cut off");
+}
+
+/// A cube in another place would leave all points of a region out.
+TEST(CopcOctree, RegionsOfAWrongCubeAreRefused) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "cube.copc.laz").string();
+  PointBlock points;
+  for (int i = 0; i < 1000; ++i) points.positions.push_back({i * 0.5, i % 7, i % 11});
+  const auto writer = open_point_writer(path, {});
+  writer->append(points);
+  writer->finish();
+  SourceOptions options;
+  options.selection.region = Box3{{100, 0, -kInfinity}, {200, 7, kInfinity}};
+  EXPECT_EQ(read_file(path, options).points.size(), 201u);
+
+  std::string bytes = read_text(path);
+  constexpr std::size_t kCentreX = 375 + 54;
+  put(bytes, kCentreX, load_little_endian<double>(bytes.data() + kCentreX) - 1e6);
+  write_text(path, bytes);
+  EXPECT_EQ(read_file(path).points.size(), 1000u);
+  for (const unsigned threads : {1u, 3u}) {
+    options.threads = threads;
+    const std::string error = error_of([&] { read_file(path, options); });
+    EXPECT_NE(error.find("node 0-0-0-0: has a point outside of its cube"), std::string::npos)
+        << error;
+  }
 }
 
 class CopcFiles : public ::testing::TestWithParam<const char*> {};

@@ -192,6 +192,20 @@ std::string write_by_schema(const fs::path& from, const fs::path& folder, bool z
   return write_text(folder / "ept.json", metadata.dump());
 }
 
+/// Bounds in another place would leave all points of a region out.
+TEST(Ept, RegionsOfWrongBoundsAreRefused) {
+  EptParts parts = small_parts();
+  SourceOptions options;
+  options.selection.region = Box3{{0, 0, 0}, {1, 1, 8}};
+  const TempFolder folder;
+  EXPECT_EQ(read_file(parts.write(folder.path()), options).points.size(), 3u);
+  parts.metadata["bounds"] = {100, 0, 0, 108, 8, 8};
+  const std::string file = parts.write(folder.path());
+  EXPECT_EQ(read_file(file).points.size(), 6u);
+  EXPECT_NE(error_of([&] { read_file(file, options); }).find("outside of its cube"),
+            std::string::npos);
+}
+
 TEST(Ept, LoneStarInAllThreeForms) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";

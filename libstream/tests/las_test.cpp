@@ -411,3 +411,14 @@ TEST_F(Las, WhatDoesNotFitIsRefused) {
 
 }  // namespace
 }  // namespace terrace::stream
+// The header's box may be wrong: it selects nothing.
+TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
+  LasParts parts{.points = 1, .records = std::string(28, '\0')};
+  parts.bounds = {{1e6, 1e6, 1e6}, {1e6 + 1, 1e6 + 1, 1e6 + 1}};
+  const std::string path = folder_.path() / "wrong_box.las";
+  write_text(path, parts.bytes());
+  SourceOptions options;
+  options.selection.region = Box3{{-1, -1, -1}, {1, 1, 1}};
+  EXPECT_EQ(read_file(path, options).points.size(), 1u);
+}
+

@@ -2,9 +2,76 @@
 #include "format/octree.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <memory>
+#include <span>
+#include <utility>
+
+#include "format/packed_column.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
+namespace {
+
+/// What the readers of all threads check.
+struct CubeCheck {
+  RecordParts parts;
+  std::vector<OctreeNode> nodes;
+  std::vector<Box3> boxes;  ///< in which the nodes' points must be, in the CRS
+  Placement placement;
+  std::array<ScalarType, 3> types{};
+  std::array<std::size_t, 3> offsets{};
+  std::string file;
+};
+
+class CubeCheckingReader final : public PartReader {
+ public:
+  explicit CubeCheckingReader(std::shared_ptr<const CubeCheck> check)
+      : check_(std::move(check)), reader_(check_->parts.make_reader()) {}
+
+  void start(std::size_t part) override {
+    part_ = part;
+    reader_->start(part);
+  }
+
+  std::size_t read(std::span<std::byte> room) override {
+    const std::size_t bytes = reader_->read(room);
+    const std::size_t stride = check_->parts.record_bytes;
+    points_.resize(bytes / stride);
+    PackedColumn column{.rows = nullptr,
+                        .stride = stride,
+                        .count = points_.size(),
+                        .type = ScalarType::i32,
+                        .swap = std::endian::native == std::endian::big};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      column.rows = reinterpret_cast<const char*>(room.data()) + check_->offsets[axis];
+      column.type = check_->types[axis];
+      decode_coordinate(column, points_.data(), axis);
+    }
+    const Box3& box = check_->boxes[part_];
+    for (const Point3& point : points_) {
+      if (!box.contains(world_point(check_->placement, point))) refuse();
+    }
+    return bytes;
+  }
+
+ private:
+  [[noreturn]] void refuse() const {
+    throw Error({.file = check_->file,
+                 .where = "node " + name_of(check_->nodes[part_]),
+                 .cause = "has a point outside of its cube: the header or the hierarchy is wrong, "
+                          "and a region would miss points",
+                 .remedy = "convert the whole file to LAS or LAZ and select the region from that"});
+  }
+
+  std::shared_ptr<const CubeCheck> check_;
+  std::unique_ptr<PartReader> reader_;
+  std::size_t part_ = 0;
+  std::vector<Point3> points_;
+};
+
+}  // namespace
 
 std::string name_of(const OctreeNode& node) {
   std::string name = std::to_string(node.depth);
@@ -58,7 +125,7 @@ const OctreeNode* Octree::arrange() {
   return nullptr;
 }
 
-void Octree::keep(const std::optional<Box3>& region, double resolution, const Point3& margin) {
+void Octree::keep(const std::optional<Box3>& region, double resolution, const Point3& steps) {
   unsigned deepest = kDeepestNode;
   if (resolution > 0) {
     deepest = 0;
@@ -68,16 +135,46 @@ void Octree::keep(const std::optional<Box3>& region, double resolution, const Po
   }
   std::erase_if(nodes, [&](const OctreeNode& node) {
     if (node.depth > deepest) return true;
-    if (!region) return false;
+    if (!region || &node == nodes.data()) return false;
     const Box3 cube = box(node);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (cube.min[axis] - margin[axis] > region->max[axis] ||
-          cube.max[axis] + margin[axis] < region->min[axis]) {
+      if (cube.min[axis] - 2 * steps[axis] > region->max[axis] ||
+          cube.max[axis] + 2 * steps[axis] < region->min[axis]) {
         return true;
       }
     }
     return false;
   });
+}
+
+Point3 steps_of(const Placement& placement) {
+  return {std::abs(placement.world.xy[0]), std::abs(placement.world.xy[4]),
+          std::abs(placement.coordinates[2].scale)};
+}
+
+RecordParts parts_in_cubes(RecordParts parts, const Octree& octree, const RecordStream& stream,
+                           const std::string& file) {
+  auto check = std::make_shared<CubeCheck>();
+  check->nodes = octree.nodes;
+  check->placement = stream.info;
+  check->offsets = stream.coordinate_offsets;
+  check->file = file;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    check->types[axis] = stream.info.coordinates[axis].type;
+  }
+  // Less than keep() allows, so that no point within it is missed.
+  const Point3 steps = steps_of(stream.info);
+  for (const OctreeNode& node : octree.nodes) {
+    Box3& box = check->boxes.emplace_back(octree.box(node));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.min[axis] -= 1.5 * steps[axis];
+      box.max[axis] += 1.5 * steps[axis];
+    }
+  }
+  check->parts = std::move(parts);
+  RecordParts checked{.record_bytes = check->parts.record_bytes, .parts = check->parts.parts};
+  checked.make_reader = [check] { return std::make_unique<CubeCheckingReader>(check); };
+  return checked;
 }
 
 }  // namespace terrace::stream

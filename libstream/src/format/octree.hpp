@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "format/record_parts.hpp"
+#include "format/record_source.hpp"
 #include "terrace/stream/point.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -47,8 +49,20 @@ struct Octree {
   /// Sorts the nodes. Returns a duplicate node, nullptr if there is none.
   const OctreeNode* arrange();
   /// Keeps the nodes down to the first depth whose spacing is at most `resolution` (all, if that is
-  /// 0) whose cubes, enlarged by `margin`, meet the region.
-  void keep(const std::optional<Box3>& region, double resolution, const Point3& margin);
+  /// 0) whose cubes, enlarged by two `steps`, meet the region. The first node is kept for any
+  /// region: parts_in_cubes() checks the root's cube by its points.
+  void keep(const std::optional<Box3>& region, double resolution, const Point3& steps);
 };
+
+/// Size of a step of the coordinates, in the CRS: points may be rounded across the sides of their
+/// node.
+Point3 steps_of(const Placement& placement);
+
+/// The same parts, one for each of the octree's nodes, with a check that their points are in the
+/// nodes' cubes, by which a region selects nodes: a wrong cube would leave points out in silence.
+/// stream: the records and their placement. The reader throws: Error that names `file` and the
+/// node.
+RecordParts parts_in_cubes(RecordParts parts, const Octree& octree, const RecordStream& stream,
+                           const std::string& file);
 
 }  // namespace terrace::stream

@@ -246,4 +246,9 @@ std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts) {
   return std::make_unique<PartsInTurn>(std::move(parts));
 }
 
+std::unique_ptr<RecordReader> records_of_parts(RecordParts parts, const SourceOptions& options) {
+  if (auto reader = parts_ahead(parts, options)) return reader;
+  return parts_in_turn(std::move(parts));
+}
+
 }  // namespace terrace::stream

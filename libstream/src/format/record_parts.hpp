@@ -46,5 +46,7 @@ std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const Source
 /// The same on the caller's thread, in small pieces: however many points a part has, its records
 /// are not held at once.
 std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts);
+/// Ahead where that is of use, otherwise in turn.
+std::unique_ptr<RecordReader> records_of_parts(RecordParts parts, const SourceOptions& options);
 
 }  // namespace terrace::stream

@@ -73,21 +73,24 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   }
   const bool degrees = source.crs.geographic && source.crs.horizontal_unit == "degree";
   turn_ = system ? system->turn() : degrees ? 360 : 0;
+  stream::Box3 area;
   std::optional<stream::Box3> stored = source.stated_bounds;
   if (source.grid) {
     const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
     stored = {{0, 0, 0}, {end(source.columns), end(source.rows), 0}};
   }
-  if (stored) {
-    bounds_ = world_box(source, *stored);
+  if (stored) area = world_box(source, *stored);
+  bounds_ = area;
+  if (source.grid) {
     // What is wider is no place on the earth.
-    if (!(bounds_.max[0] - bounds_.min[0] <= turn_)) turn_ = 0;
+    if (!(area.max[0] - area.min[0] <= turn_)) turn_ = 0;
   } else {
-    // Longitudes from -180 to 180, or from 0 to 360.
-    bounds_ = {{-0.5 * turn_, -0.5 * turn_, 0}, {turn_, 0.5 * turn_, 0}};
+    // Longitudes from -180 to 180, or from 0 to 360, whatever bounds a header states: if they are
+    // wrong, the points are elsewhere.
+    bounds_.include(stream::Box3{{-0.5 * turn_, -0.5 * turn_, 0}, {turn_, 0.5 * turn_, 0}});
   }
   if (named.empty()) return;
-  Transformation change(stored ? system->over(bounds_) : *system, CoordinateSystem::parse(named));
+  Transformation change(stored ? system->over(area) : *system, CoordinateSystem::parse(named));
   if (!change.identity()) to_regions_ = std::move(change);
 }
 

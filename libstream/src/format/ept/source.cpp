@@ -21,6 +21,7 @@
 #include "format/formats.hpp"
 #include "format/las/header.hpp"
 #include "format/las/stream.hpp"
+#include "format/octree.hpp"
 #include "format/record_parts.hpp"
 #include "format/record_source.hpp"
 #include "terrace/stream/input.hpp"
@@ -60,15 +61,12 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   info.format = "ept";
   info.files = {file};
   info.crs = options.crs ? *options.crs : metadata.crs;
-  // Points may be rounded across the sides of their node.
-  const Point3 step{std::abs(info.world.xy[0]), std::abs(info.world.xy[4]),
-                    std::abs(info.coordinates[2].scale)};
-  octree.keep(options.selection.region, options.selection.resolution, step);
+  octree.keep(options.selection.region, options.selection.resolution, steps_of(info));
   info.points = octree.points();
   info.octree = octree.info();
   RecordParts parts = ept_parts(folder, metadata, header);
-  stream.records = parts_ahead(parts, options);
-  if (!stream.records) stream.records = parts_in_turn(std::move(parts));
+  if (options.selection.region) parts = parts_in_cubes(std::move(parts), octree, stream, file);
+  stream.records = records_of_parts(std::move(parts), options);
   return source_of_records(std::move(stream), options.block_points, onto);
 }
 

@@ -236,9 +236,8 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
   return std::make_unique<LazInTurn>(input, std::move(layout), header.points, options.on_damage);
 }
 
-std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
-                                             const LasHeader& header, const Octree& octree,
-                                             const SourceOptions& options) {
+RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
+                           const Octree& octree) {
   LazLayout layout{.vlr = laz_vlr(header, file->name())};
   if (layout.vlr.compressor != laz::Compressor::layered) {
     fail_laz(file->name(), "header", "its points are not coded in layers, as those of COPC are");
@@ -246,9 +245,7 @@ std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
   for (const OctreeNode& node : octree.nodes) {
     layout.chunks.push_back({.offset = node.offset, .bytes = node.bytes, .points = node.points});
   }
-  RecordParts parts = laz_parts(std::move(file), std::move(layout));
-  if (auto reader = parts_ahead(parts, options)) return reader;
-  return parts_in_turn(std::move(parts));
+  return laz_parts(std::move(file), std::move(layout));
 }
 
 }  // namespace terrace::stream

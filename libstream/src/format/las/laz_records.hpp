@@ -8,6 +8,7 @@
 #include "format/copc/hierarchy.hpp"
 #include "format/las/header.hpp"
 #include "format/las/record_reader.hpp"
+#include "format/record_parts.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
@@ -22,9 +23,8 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
                                                const LasHeader& header,
                                                const SourceOptions& options);
 
-/// The records of the octree's nodes, in its order. Throws: Error as open_laz_records().
-std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
-                                             const LasHeader& header, const Octree& octree,
-                                             const SourceOptions& options);
+/// The parts that are the octree's nodes, in its order. Throws: Error as open_laz_records().
+RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
+                           const Octree& octree);
 
 }  // namespace terrace::stream

@@ -18,6 +18,8 @@
 #include "format/las/laz_records.hpp"
 #include "format/las/record_reader.hpp"
 #include "format/las/stream.hpp"
+#include "format/octree.hpp"
+#include "format/record_parts.hpp"
 #include "format/record_source.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/byte_source.hpp"
@@ -73,7 +75,6 @@ class LasOpener {
                    .cause = "its points lie in no octree that could be read down to a resolution",
                    .remedy = "name a COPC file, not piped, or EPT, or leave `resolution` out"});
     }
-    if (wanted.region && lies_outside(*wanted.region)) stream_.info.points = 0;
     if (header_.compressed) {
       stream_.records = open_laz_records(*stream_.input, file_, header_, options_);
     } else {
@@ -93,8 +94,10 @@ class LasOpener {
       std::unique_ptr<ByteSource> bytes = open_file(file_);
       Octree octree = read_copc_hierarchy(*bytes, header_.vlrs.front().data, header_.points_offset,
                                           header_.points);
-      octree.keep(wanted.region, wanted.resolution, header_.scale);
-      stream_.records = open_laz_nodes(std::move(bytes), header_, octree, options_);
+      octree.keep(wanted.region, wanted.resolution, steps_of(stream_.info));
+      RecordParts parts = laz_node_parts(std::move(bytes), header_, octree);
+      if (wanted.region) parts = parts_in_cubes(std::move(parts), octree, stream_, file_);
+      stream_.records = records_of_parts(std::move(parts), options_);
       stream_.info.points = octree.points();
       stream_.info.octree = octree.info();
       stream_.info.format = "copc";
@@ -102,20 +105,6 @@ class LasOpener {
       if (wanted.resolution > 0) throw;
       stream_.info.comments.push_back("read in the order of the file: " + error.parts().cause);
     }
-  }
-
-  /// Whether the header says that no point is in the region. Steps of the lattice make up for the
-  /// rounding of its box.
-  [[nodiscard]] bool lies_outside(const Box3& region) const {
-    const Box3& box = header_.bounds;
-    if (box.empty()) return false;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (box.min[axis] - header_.scale[axis] > region.max[axis] ||
-          box.max[axis] + header_.scale[axis] < region.min[axis]) {
-        return true;
-      }
-    }
-    return false;
   }
 
   const std::string& file_;
