@@ -291,6 +291,22 @@ TEST_F(Las, DamageIsOneLine) {
             std::string::npos);
 }
 
+TEST_F(Las, RefusesCoordinatesThatAreNotFinite) {
+  const std::string records(28, '\1');
+  LasParts parts{.points = 1, .records = records};
+  EXPECT_EQ(refusal(parts.bytes()), "");
+  parts.scale = {0.01, 1e301, 0.01};
+  EXPECT_NE(refusal(parts.bytes())
+                .find("the scale and the offset of y lead to coordinates that are "
+                      "not finite"),
+            std::string::npos);
+  parts.scale = {0.01, 0.01, 1e301};
+  EXPECT_NE(refusal(parts.bytes()).find("of z lead to"), std::string::npos);
+  parts.scale = {0.01, 0.01, 1e290};
+  parts.offset = {0, 0, 1.79e308};
+  EXPECT_EQ(refusal(parts.bytes()), "");
+}
+
 TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
   std::mt19937_64 random(2);
   for (const unsigned format : {3U, 7U}) {
@@ -409,8 +425,6 @@ TEST_F(Las, WhatDoesNotFitIsRefused) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-}  // namespace
-}  // namespace terrace::stream
 // The header's box may be wrong: it selects nothing.
 TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
   LasParts parts{.points = 1, .records = std::string(28, '\0')};
@@ -422,3 +436,5 @@ TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
   EXPECT_EQ(read_file(path, options).points.size(), 1u);
 }
 
+}  // namespace
+}  // namespace terrace::stream

@@ -197,6 +197,7 @@ TEST(StoreInvariants, ManifestsWhosePlacesCannotBeAreRefused) {
       {"the bounds do not suit", [](auto& m) { m["bounds"]["min"][2] = "nan"; }},
       {"the bounds do not suit", [](auto& m) { m["bounds"]["min"][2] = 1e9; }},
       {"the bounds are not finite", [](auto& m) { m["bounds"]["max"][2] = "inf"; }},
+      {"not finite in the CRS", [](auto& m) { m["coordinates"][2]["scale"] = 1e308; }},
       {"on the raster's columns", [](auto& m) { m["columns"] = 20; }},
       {"on the raster's columns", [](auto& m) { m["rows"] = 49; }},
       {"on the raster's columns", [](auto& m) { m["bounds"]["min"][0] = -1; }},

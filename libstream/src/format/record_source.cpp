@@ -139,6 +139,7 @@ class RecordSource final : public PointSource {
       ScalarType& type = stream_.info.coordinates[axis].type;
       types_[axis] = type;
       checked_ = checked_ || size_of(type) == 8 || type == ScalarType::f32;
+      check_reach(axis);
       // Coordinates are doubles in memory; what these cannot hold is refused.
       if (is_wide_integer(type)) type = ScalarType::f64;
     }
@@ -184,8 +185,11 @@ class RecordSource final : public PointSource {
   std::uint64_t reading_bytes() const override { return stream_.records->held_bytes(); }
 
  private:
+  [[nodiscard]] std::string file() const {
+    return stream_.input ? stream_.input->name() : stream_.info.files.front();
+  }
   [[noreturn]] void fail(std::size_t point, std::string cause, std::string remedy) const {
-    throw Error({.file = stream_.input ? stream_.input->name() : stream_.info.files.front(),
+    throw Error({.file = file(),
                  .where = "point " + std::to_string(delivered_ + point),
                  .cause = std::move(cause),
                  .remedy = std::move(remedy)});
@@ -215,13 +219,39 @@ class RecordSource final : public PointSource {
     for (std::size_t i = 0; i < marks.size(); ++i) withheld_ += marks[i] != 0 ? 1 : 0;
   }
 
+  /// The scale and the offset that lead to coordinates in the CRS.
+  [[nodiscard]] std::array<double, 2> scale_and_offset(std::size_t axis) const {
+    const std::array<double, 6>& xy = stream_.info.world.xy;
+    const Channel& z = stream_.info.coordinates[2];
+    return axis == 0   ? std::array{xy[0], xy[2]}
+           : axis == 1 ? std::array{xy[4], xy[5]}
+                       : std::array{z.scale, z.offset};
+  }
+
+  /// Throws: Error if integers of the type lead to coordinates that are not finite.
+  void check_reach(std::size_t axis) const {
+    const ScalarType type = types_[axis];
+    if (type == ScalarType::f32 || type == ScalarType::f64) return;
+    const auto [scale, offset] = scale_and_offset(axis);
+    if (std::isfinite(std::ldexp(std::abs(scale), 8 * static_cast<int>(size_of(type))) +
+                      std::abs(offset))) {
+      return;
+    }
+    throw Error({.file = file(),
+                 .where = "header",
+                 .cause = std::string("the scale and the offset of ") + "xyz"[axis] +
+                          " lead to coordinates that are not finite",
+                 .remedy = "the header is wrong: write the file again"});
+  }
+
   void check(const PointBlock& block) const {
     for (std::size_t i = 0; i < block.size(); ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const double value = block.positions[i][axis];
         const double most =
             is_wide_integer(types_[axis]) ? 0x1p53 : std::numeric_limits<double>::max();
-        if (!(std::abs(value) <= most)) {
+        const auto [scale, offset] = scale_and_offset(axis);
+        if (!(std::abs(value) <= most) || !std::isfinite(value * scale + offset)) {
           fail(i, std::string("its ") + "xyz"[axis] + " is not a number that can be kept exactly",
                "the file is damaged: get it anew");
         }
@@ -235,7 +265,7 @@ class RecordSource final : public PointSource {
     try {
       move_ = move_between(info, placement);
     } catch (const std::domain_error& axis) {
-      throw Error({.file = stream_.input ? stream_.input->name() : info.files.front(),
+      throw Error({.file = file(),
                    .where = {},
                    .cause = std::string(axis.what()) + " is on another lattice than that of the " +
                             "other files: its scale or the fraction of its offset differs",

@@ -180,6 +180,9 @@ void check_places(const Manifest& m) {
       throw Damage("the bounds are not finite");
     }
   }
+  if (m.points > 0 && !is_finite_in_crs(m.schema, m.bounds)) {
+    throw Damage("the bounds are not finite in the CRS");
+  }
   if (!m.schema.grid) {
     if (m.schema.columns != 0 || m.schema.rows != 0) throw Damage("a cloud has columns or rows");
     return;
@@ -205,6 +208,14 @@ void check_places(const Manifest& m) {
 }
 
 }  // namespace
+
+bool is_finite_in_crs(const Placement& placement, const Box3& stored) {
+  const Box3 box = world_box(placement, stored);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!std::isfinite(box.min[axis]) || !std::isfinite(box.max[axis])) return false;
+  }
+  return true;
+}
 
 std::string hexadecimal(std::uint32_t value) {
   std::string text(8, '0');

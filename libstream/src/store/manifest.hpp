@@ -51,6 +51,9 @@ struct Manifest {
   std::uint32_t checksum = 0;      ///< of the text; set by parse_manifest()
 };
 
+/// True if the corners of the box, in the CRS, are.
+bool is_finite_in_crs(const Placement& placement, const Box3& stored);
+
 /// Eight lower-case digits.
 std::string hexadecimal(std::uint32_t value);
 

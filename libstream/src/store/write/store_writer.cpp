@@ -181,6 +181,13 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   Impl& w = *impl_;
   assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
+  if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
+    throw Error({.file = w.staging.folder().string(),
+                 .where = {},
+                 .cause = "its coordinates are not finite in the CRS: scale or offset of the input "
+                          "are too large",
+                 .remedy = "correct the scale and the offset of the input"});
+  }
 
   const std::uint64_t top_points = root.positions.size();
   RawBlock block(root);
