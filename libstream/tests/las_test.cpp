@@ -255,26 +255,46 @@ TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Point3 world = world_point(all.info, all.points.positions[i]);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        largest = std::max(largest, std::abs(world[axis] - points[i][axis]));
-        EXPECT_LE(largest, lattice.scale[axis] * 0.5000001);
+        const double moved = std::abs(world[axis] - points[i][axis]);
+        EXPECT_LE(moved, lattice.scale[axis] * 0.5000001);
+        largest = std::max(largest, moved);
       }
     }
     EXPECT_EQ(writer->rounding() > 0, largest > 1e-9);
     return lattice.scale;
   };
-  EXPECT_EQ(written({{691000.25, 5338000.125, 7}}), (Point3{0.001, 0.001, 1}));
-  EXPECT_EQ(written({{-0.0946899, 0.0329874, 1.5}, {0.06, 0.18, 0}}), (Point3{1e-7, 1e-7, 0.1}));
+  EXPECT_EQ(written({{691000.25, 5338000.125, 7}}), (Point3{0.001, 0.001, 0.001}));
+  EXPECT_EQ(written({{-0.0946899, 0.0329874, 1.5}, {0.06, 0.18, 0}}), (Point3{1e-7, 1e-7, 0.001}));
   // 1/3 gets as many decimals as 32 bits allow within the bounds.
   Box3 bounds{.min = {0, 0, 0}, .max = {1e6, 1e6, 1}};
-  EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{0.001, 0.001, 1}));
+  EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{0.001, 0.001, 0.001}));
   bounds.max[1] = 1e12;
-  EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{1000, 1000, 1}));
+  EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{1000, 1000, 0.001}));
   // Without bounds more points may follow: millimetres are kept over 200 km, finer steps over less.
-  EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5, 5.1e6 + 0.125, 7}}), (Point3{0.001, 0.001, 1}));
-  EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5 + 1 / 3.0, 5.1e6, 7}}), (Point3{0.001, 0.001, 1}));
-  EXPECT_EQ(written({{4e5, 5e6, 7}, {4e5 + 1 / 3.0, 5e6 + 400, 7}}), (Point3{1e-4, 1e-4, 1}));
-  EXPECT_EQ(written({{4e5, 5e6, 7}, {8e5, 5.1e6 + 0.125, 7}}), (Point3{0.01, 0.01, 1}));
-  EXPECT_EQ(written({{8, 46, 7}, {9, 47 - 1 / 3.0, 7}}, {}, true), (Point3{1e-7, 1e-7, 1}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5, 5.1e6 + 0.125, 7}}), (Point3{0.001, 0.001, 0.001}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5 + 1 / 3.0, 5.1e6, 7}}), (Point3{0.001, 0.001, 0.001}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {4e5 + 1 / 3.0, 5e6 + 400, 7}}), (Point3{1e-4, 1e-4, 0.001}));
+  EXPECT_EQ(written({{4e5, 5e6, 7}, {8e5, 5.1e6 + 0.125, 7}}), (Point3{0.01, 0.01, 0.001}));
+  EXPECT_EQ(written({{8, 46, 7}, {9, 47 - 1 / 3.0, 7}}, {}, true), (Point3{1e-7, 1e-7, 0.001}));
+}
+
+TEST_F(Las, LaterPointsKeepTheirDecimalsWhateverTheFirstAre) {
+  for (const char* const name : {"sea.las", "sea.laz", "sea.copc.laz"}) {
+    const std::string path = folder_.path() / name;
+    PointBlock sea, land;
+    for (int i = 0; i < 100; ++i) sea.positions.push_back({5e5 + i, 5.2e6 - i, 0});
+    for (int i = 0; i < 100; ++i) land.positions.push_back({5e5 + i, 5.1e6 + 0.125, 0.37 + i});
+    const auto writer = open_point_writer(path, {}, {.replace = true});
+    writer->append(sea);
+    writer->append(land);
+    writer->finish();
+    EXPECT_EQ(writer->rounding(), 0) << name;
+    const AllPoints all = read_file(path);
+    Box3 box;
+    for (const Point3& p : all.points.positions) box.include(world_point(all.info, p));
+    EXPECT_NEAR(box.max[2], 99.37, 1e-9) << name;
+    EXPECT_NEAR(box.min[1], 5.1e6 + 0.125, 1e-9) << name;
+  }
 }
 
 TEST_F(Las, DamageIsOneLine) {

@@ -282,7 +282,7 @@ class LasSurveyTest(LasCase):
         self.run_ok('convert', self.path('p.csv'), '-o', self.path('p.las'))
         copy = Las(self.path('p.las'))
         self.assertEqual((copy.point_format, copy.record_bytes), (7, 36 + 8))
-        self.assertEqual(copy.scale, (0.001, 0.001, 0.1))
+        self.assertEqual(copy.scale, (0.001, 0.001, 0.001))
         for i, record in enumerate(copy.records):
             values = unpack_record(7, record)
             self.assertAlmostEqual(values['X'] * 0.001 + copy.offset[0], 691000 + i / 1000, places=9)

@@ -48,7 +48,7 @@ Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3
   const std::array<int, 3> wanted{planar, planar, decimals_of(points, 2, 0)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int usual = degrees && axis < 2 ? 7 : 3;
-    int decimals = wanted[axis];
+    int decimals = std::max(wanted[axis], usual);
     const auto reach = [&] {  // from the offset, which is a whole number
       return half[axis] * (bounds ? 1 : decimals > usual ? 1000 : 20) + 1;
     };

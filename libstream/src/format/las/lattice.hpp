@@ -10,9 +10,10 @@
 namespace terrace::stream {
 
 /// A lattice for coordinates that have none: steps of a power of ten from 1e-9 on, the same for x
-/// and y. They are as small as the decimals of `points` require, and large enough that 32 bits
-/// reach all of `bounds`. Without bounds they reach a thousand times as far as the points, of which
-/// others may follow; steps of 0.001 (in degrees 1e-7), 2,000 km either way, only twenty times.
+/// and y. They are 0.001 (1e-7 for degrees), whatever decimals `points` have, as the points that
+/// follow may have more; smaller where `points` require it; and larger where 32 bits would not
+/// reach all of `bounds`. Without bounds they reach twenty times as far as the points, smaller
+/// steps than those a thousand times.
 Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds,
                         bool degrees);
 
