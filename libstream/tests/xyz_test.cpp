@@ -90,7 +90,7 @@ TEST_F(Xyz, ReadsEverySeparatorLineEndAndComment) {
            "\"x\",\"y\",\"z\"\n1,2,3\n4.5,-5,6e3\n",
            "z,x,y\n3,1,2\n6e3,4.5,-5\n",
            "Easting;Northing;Elevation\n1;2;3\n4.5;-5;6e3\n",
-           "first second third\n1 2 3\n4.5 -5 6e3\n",
+           "# East North Height\n1 2 3\n4.5 -5 6e3\n",
            "//X Y Z\n1 2 3\n4.5 -5 6e3\n",
            "\"x\",\"y\",\"z\"\n\"1\",\"2\",\"3\"\n\"4.5\", \"-5\" ,'6e3'\n",
            "\xEF\xBB\xBFx,y,z\n1,2,3\n4.5,-5,6e3\n",
@@ -125,6 +125,37 @@ TEST_F(Xyz, LettersGoBeforeWords) {
   EXPECT_FALSE(all.info.crs.geographic);
   ASSERT_EQ(all.info.attributes.size(), 3u);
   EXPECT_EQ(all.info.attributes[2].name, "height");
+}
+
+TEST_F(Xyz, FindsCoordinatesBehindOtherColumnsByDecoratedNames) {
+  for (const std::string_view header :
+       {"FID,POINT_X,POINT_Y,POINT_Z", "id,x_coord,y_coord,z_coord", "id,X [m],Y [m],Z [m]",
+        "PointID,Easting(m),Northing(m),Elev(m)", "id,E,N,H", "n_id,XCoord,YCoord,Height_ft",
+        "id,UTM_X,UTM_Y,z", "id,Rechtswert,Hochwert,H\xC3\xB6he", "//id,pos.x,pos.y,pos.z",
+        "# id,east,north,alt"}) {
+    SCOPED_TRACE(header);
+    const AllPoints all = read(std::string(header) + "\n7,1,2,3\n8,4,5,6\n");
+    EXPECT_TRUE(same_bits(all.points.positions, std::vector<Point3>{{1, 2, 3}, {4, 5, 6}}));
+    ASSERT_EQ(all.info.attributes.size(), 1u);
+    EXPECT_EQ(all.values<double>(0)[1], 8.0);
+  }
+  EXPECT_TRUE(read("id,lon_deg,lat_deg,h\n7,1,2,3\n").info.crs.geographic);
+}
+
+TEST_F(Xyz, RefusesAHeaderThatNamesNoCoordinates) {
+  for (const std::string_view header :
+       {"id,first,second,third", "id,nx,ny,nz", "id,x_std,y_std,z_std", "point,x2,y2,z2"}) {
+    EXPECT_NE(refusal(std::string(header) + "\n7,1,2,3\n").find("the header names no x column"),
+              std::string::npos)
+        << header;
+  }
+}
+
+TEST_F(Xyz, ColumnsOfOneNameStayDistinct) {
+  const AllPoints all = read("x,y,z,a,a_2,a,a\n1,2,3,4,5,6,7\n");
+  ASSERT_EQ(all.info.attributes.size(), 4u);
+  EXPECT_EQ(all.info.attributes[2].name, "a_3");
+  EXPECT_EQ(all.info.attributes[3].name, "a_4");
 }
 
 TEST_F(Xyz, UnnamedColumnsAreNumbered) {

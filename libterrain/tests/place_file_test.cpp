@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "terrace/stream/error.hpp"
+
 namespace terrace::terrain {
 namespace {
 
@@ -14,6 +16,23 @@ TEST(PlaceFile, QuotesAroundQuotesTakeNoStack) {
   EXPECT_TRUE(place[0] != place[0]);  // nothing is in the quotes
   EXPECT_EQ(place[1], 1.0);
   EXPECT_TRUE(PlaceLayout::of(quotes + "x" + quotes + ",y", "places.csv").header);
+}
+
+TEST(PlaceFile, FindsPlacesBehindOtherColumnsByName) {
+  for (const std::string_view header :
+       {"id,POINT_X,POINT_Y", "id,x_coord,y_coord", "PointID;Easting(m);Northing(m)", "n_id,E,N",
+        "id,x,y,lon,lat", "name,lon,lat,easting,northing"}) {
+    const PlaceLayout layout = PlaceLayout::of(header, "places.csv");
+    EXPECT_TRUE(layout.header) << header;
+    EXPECT_EQ(layout.x, 1u) << header;
+    EXPECT_EQ(layout.y, 2u) << header;
+  }
+  const PlaceLayout commented = PlaceLayout::of("7,1,2", "places.csv", "# id,x,y");
+  EXPECT_FALSE(commented.header);
+  EXPECT_EQ(commented.x, 1u);
+  EXPECT_EQ(PlaceLayout::of("1,2", "places.csv", "# id,x,y").x, 0u);
+  EXPECT_EQ(PlaceLayout::of("5,", "places.csv").x, 0u);
+  EXPECT_THROW(PlaceLayout::of("id,first,second", "places.csv"), stream::Error);
 }
 
 }  // namespace

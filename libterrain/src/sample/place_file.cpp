@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/units.hpp"
+#include "terrace/stream/axis_names.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
@@ -47,23 +48,31 @@ std::optional<double> number_in(std::string_view cell) {
   return number_from<double>(cell);
 }
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
-  return result;
+/// The columns of x and y by the names of a header; of several pairs the one whose names say it
+/// most directly, longitude and latitude before other words.
+std::optional<std::array<std::size_t, 2>> place_columns(
+    const std::vector<std::string_view>& names) {
+  for (std::size_t kind = 0; kind < stream::kAxisNameKinds; ++kind) {
+    for (const bool angle : {true, false}) {
+      std::array<std::optional<std::size_t>, 2> found;
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        const auto name = stream::axis_named(names[i]);
+        if (!name || name->axis > 1 || name->angle != angle ||
+            name->kind != static_cast<stream::AxisNameKind>(kind)) {
+          continue;
+        }
+        if (!found[name->axis]) found[name->axis] = i;
+      }
+      if (found[0] && found[1]) return std::array{*found[0], *found[1]};
+    }
+  }
+  return std::nullopt;
 }
-
-constexpr std::array<std::array<const char*, 2>, 7> kPlaceNames{{{"x", "y"},
-                                                                 {"lon", "lat"},
-                                                                 {"longitude", "latitude"},
-                                                                 {"long", "lat"},
-                                                                 {"lng", "lat"},
-                                                                 {"easting", "northing"},
-                                                                 {"east", "north"}}};
 
 }  // namespace
 
-PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file) {
+PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file,
+                            std::string_view comment) {
   PlaceLayout layout;
   const std::string_view text = bare(first_line);
   const bool json = text.starts_with('{') || text.starts_with('[');
@@ -89,22 +98,36 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
                          .cause = "the first line has one column only",
                          .remedy = "give x and y with a comma, a semicolon or a tab between them"});
   }
-  std::vector<std::string>& names = layout.names;
-  bool numbers = true;
-  for (std::string_view rest = first_line; !rest.empty();) {
-    const std::string_view cell = take_text(rest, layout.separator);
-    if (names.size() < 2) numbers = numbers && number_in(cell).has_value();
-    names.push_back(lower(bare(cell)));
+  const auto cells_of = [&layout](std::string_view line) {
+    std::vector<std::string_view> cells;
+    while (!line.empty()) cells.push_back(bare(take_text(line, layout.separator)));
+    return cells;
+  };
+  const std::vector<std::string_view> cells = cells_of(first_line);
+  const auto is_number = [](std::string_view cell) { return number_in(cell).has_value(); };
+  std::optional<std::array<std::size_t, 2>> columns = place_columns(cells);
+  const std::size_t first_two = std::min<std::size_t>(cells.size(), 2);
+  layout.header = columns || !std::all_of(cells.data(), cells.data() + first_two, is_number);
+  if (layout.header) {
+    layout.names.assign(cells.begin(), cells.end());
+    for (std::string& name : layout.names) {
+      for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+    }
+    if (!columns) {
+      throw stream::Error({.file = file,
+                           .where = "the first line",
+                           .cause = "the header names no x and y column",
+                           .remedy = "name the columns x and y, or lon and lat; without a header, "
+                                     "the first two are x and y"});
+    }
+  } else {
+    comment.remove_prefix(std::min(comment.find_first_not_of("# "), comment.size()));
+    const std::vector<std::string_view> names = cells_of(comment);
+    if (names.size() == cells.size()) columns = place_columns(names);
   }
-  layout.header = !numbers;
-  for (const auto& [x, y] : kPlaceNames) {
-    const auto at_x = std::find(names.begin(), names.end(), x);
-    const auto at_y = std::find(names.begin(), names.end(), y);
-    if (at_x == names.end() || at_y == names.end()) continue;
-    layout.header = true;
-    layout.x = static_cast<std::size_t>(at_x - names.begin());
-    layout.y = static_cast<std::size_t>(at_y - names.begin());
-    break;
+  if (columns) {
+    layout.x = (*columns)[0];
+    layout.y = (*columns)[1];
   }
   return layout;
 }
@@ -117,7 +140,12 @@ std::string_view PlaceBatch::line(std::size_t i) const {
 }
 
 PlaceFile::PlaceFile(const std::string& path, std::stop_token stop)
-    : input_(path, std::move(stop), kReadAtOnce) {}
+    : input_(path, std::move(stop), kReadAtOnce) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (input_.fill(kByteOrderMark.size()).starts_with(kByteOrderMark)) {
+    input_.consume(kByteOrderMark.size());
+  }
+}
 
 bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
   const std::size_t wanted = std::max(most_bytes, kLongestPlaceLine);

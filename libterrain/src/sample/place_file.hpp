@@ -18,17 +18,18 @@
 
 namespace terrace::terrain {
 
-/// Where x and y stand in a line. Told by the first line: names in it say where (x and y, lon and
-/// lat, longitude and latitude, easting and northing, in any case and order); without names that
-/// are known the first two columns.
+/// The columns of x and y. If the first line is a header, or the comment before it has as many
+/// names, those that stream::axis_named() knows; otherwise the first two.
 struct PlaceLayout {
   char separator = ',';  ///< or ';' or a tab: the first of these in the first line
   std::size_t x = 0, y = 1;
   bool header = false;             ///< the first line has names
-  std::vector<std::string> names;  ///< the cells of the first line, in lower case
+  std::vector<std::string> names;  ///< of the header, in lower case
 
-  /// Throws: stream::Error for a line with fewer than two columns. file: named in the error.
-  static PlaceLayout of(std::string_view first_line, const std::string& file);
+  /// comment: the line before, without which `first_line` has no names. Throws: stream::Error,
+  /// naming `file`, for a line with fewer than two columns and for a header that names no x and y.
+  static PlaceLayout of(std::string_view first_line, const std::string& file,
+                        std::string_view comment = {});
 };
 
 /// Lines without their ends, "\n" or "\r\n".

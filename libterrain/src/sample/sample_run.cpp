@@ -146,9 +146,13 @@ class Answers {
   }
   /// The first line that is no comment says how all are to be read.
   void find_layout(const PlaceBatch& batch) {
+    std::string_view comment;
     for (std::size_t i = 0; !layout_ && i < batch.size(); ++i) {
-      if (is_no_place(batch.line(i))) continue;
-      layout_ = PlaceLayout::of(batch.line(i), file_.name());
+      if (is_no_place(batch.line(i))) {
+        comment = batch.line(i);
+        continue;
+      }
+      layout_ = PlaceLayout::of(batch.line(i), file_.name(), comment);
       if (layout_->header) header_line_ = batch.first_line + i;
     }
   }

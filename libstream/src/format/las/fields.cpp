@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/las/fields.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "io/bytes.hpp"
+#include "io/distinct_names.hpp"
 #include "io/number.hpp"
 
 namespace terrace::stream {
@@ -112,15 +112,10 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
                                        std::size_t record_bytes, std::span<const LasField> taken,
                                        std::vector<std::string>& comments) {
   FieldList list{.fields = {}, .offset = first};
+  DistinctNames distinct;
+  for (const LasField& field : taken) distinct.add(field.channel.name);
   const auto add = [&](Channel channel) {
-    const auto is_taken = [&](std::string_view name) {
-      const auto has = [&](const LasField& field) { return field.channel.name == name; };
-      return name.empty() || std::any_of(taken.begin(), taken.end(), has) ||
-             std::any_of(list.fields.begin(), list.fields.end(), has);
-    };
-    const std::string wanted = channel.name.empty() ? "extra" : channel.name;
-    channel.name = wanted;
-    for (int n = 2; is_taken(channel.name); ++n) channel.name = wanted + "_" + std::to_string(n);
+    channel.name = distinct.add(channel.name.empty() ? "extra" : channel.name);
     list.add(std::move(channel));
   };
   for (std::size_t at = 0; at + kLasExtraBytesDescription <= descriptions.size();

@@ -2,12 +2,13 @@
 #include "format/text/xyz_layout.hpp"
 
 #include <algorithm>
-#include <initializer_list>
 #include <optional>
 #include <utility>
 
+#include "io/distinct_names.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
+#include "terrace/stream/axis_names.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -25,88 +26,75 @@ bool is_number(std::string_view field) {
   return !field.empty() && parse_real(field.data(), end, value) == end;
 }
 
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return out;
-}
-
-/// What a column's name says: an axis by its letter or by a word for it, an angle of the earth.
-struct Axis {
-  std::size_t index;
-  bool letter;
-  bool angle;
-};
-std::optional<Axis> axis_of(std::string_view name) {
-  const std::string key = lower(name);
-  const auto any = [&](std::initializer_list<std::string_view> names) {
-    return std::find(names.begin(), names.end(), key) != names.end();
-  };
-  if (any({"x", "y", "z"})) return Axis{static_cast<std::size_t>(key[0] - 'x'), true, false};
-  if (any({"easting", "east"})) return Axis{0, false, false};
-  if (any({"northing", "north"})) return Axis{1, false, false};
-  if (any({"lon", "long", "lng", "longitude"})) return Axis{0, false, true};
-  if (any({"lat", "latitude"})) return Axis{1, false, true};
-  if (any({"h", "height", "elevation", "elev", "ele", "alt", "altitude"})) {
-    return Axis{2, false, false};
-  }
-  return std::nullopt;
-}
-
-/// Finds the coordinates among the names. Letters go before words, so that in "x,y,z,lat,lon" the
-/// last two are attributes; of several words for the height the first one counts. Without any name
-/// that says an axis the first three columns stay what they are.
-/// Throws: Error if only some axes are named, or one of x and y twice.
-void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
-               const std::string& file, const std::string& where) {
-  std::array<std::optional<std::size_t>, 3> found;
+/// The columns that the names say are coordinates.
+struct NamedAxes {
+  std::array<std::optional<std::size_t>, 3> columns;
   std::array<bool, 3> angle{};
-  for (const bool letters : {true, false}) {
-    const auto before = found;
+  /// A second column for one of x and y, with names of one kind.
+  std::optional<std::size_t> twice;
+
+  [[nodiscard]] bool none() const { return !columns[0] && !columns[1] && !columns[2]; }
+  [[nodiscard]] bool complete() const { return columns[0] && columns[1] && columns[2] && !twice; }
+};
+
+/// Letters go before words, so that in "x,y,z,lat,lon" the last two are attributes; of several
+/// words for the height the first one counts.
+NamedAxes named_axes(const std::vector<std::string_view>& names) {
+  NamedAxes found;
+  for (std::size_t kind = 0; kind < kAxisNameKinds; ++kind) {
+    const auto before = found.columns;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      const auto axis = axis_of(names[i]);
-      if (!axis || axis->letter != letters || before[axis->index]) continue;
-      auto& column = found[axis->index];
-      if (column && axis->index == 2 && !letters) continue;
+      const auto name = axis_named(names[i]);
+      if (!name || name->kind != static_cast<AxisNameKind>(kind) || before[name->axis]) continue;
+      auto& column = found.columns[name->axis];
       if (column) {
-        throw Error({.file = file,
-                     .where = where,
-                     .cause = "columns " + in_quotes(names[*column]) + " and " +
-                              in_quotes(names[i]) + " name the same coordinate",
-                     .remedy = "rename one of them"});
+        const bool height = name->axis == 2 && name->kind != AxisNameKind::letter;
+        if (!height && !found.twice) found.twice = i;
+        continue;
       }
       column = i;
-      angle[axis->index] = axis->angle;
+      found.angle[name->axis] = name->angle;
     }
   }
-  if (!found[0] && !found[1] && !found[2]) return;
+  return found;
+}
+
+/// Finds the coordinates among the names of a header. Throws: Error if one is not named, or one of
+/// x and y twice.
+void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
+               const std::string& file, const std::string& where) {
+  const NamedAxes found = named_axes(names);
+  if (found.twice) {
+    const std::size_t axis = axis_named(names[*found.twice])->axis;
+    throw Error({.file = file,
+                 .where = where,
+                 .cause = "columns " + in_quotes(names[*found.columns[axis]]) + " and " +
+                          in_quotes(names[*found.twice]) + " name the same coordinate",
+                 .remedy = "rename one of them"});
+  }
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!found[axis]) {
+    if (!found.columns[axis]) {
       throw Error({.file = file,
                    .where = where,
                    .cause = std::string("the header names no ") + "xyz"[axis] + " column",
-                   .remedy = "name the columns x, y and z, or lon, lat and height"});
+                   .remedy = found.none() ? "name the columns x, y and z, or lon, lat and height; "
+                                            "without the header, the first three are x, y and z"
+                                          : "name the columns x, y and z, or lon, lat and height"});
     }
-    layout.xyz[axis] = *found[axis];
+    layout.xyz[axis] = *found.columns[axis];
   }
-  layout.geographic = angle[0] && angle[1];
+  layout.geographic = found.angle[0] && found.angle[1];
 }
 
 /// Names and numbers the columns that are no coordinates; names become distinct and not empty.
 void name_attributes(const std::vector<std::string_view>& names, TextLayout& layout) {
+  DistinctNames distinct;
   for (std::size_t i = 0; i < layout.columns; ++i) {
     if (std::find(layout.xyz.begin(), layout.xyz.end(), i) != layout.xyz.end()) continue;
     std::string name = i < names.size() ? std::string(names[i]) : std::string();
     if (name.empty()) name.append("a").append(std::to_string(i));
-    const std::string base = name;
-    const auto taken = [&] {
-      return std::find(layout.names.begin(), layout.names.end(), name) != layout.names.end();
-    };
-    for (int n = 2; taken(); ++n) name.assign(base).append("_").append(std::to_string(n));
     layout.attributes.push_back(i);
-    layout.names.push_back(std::move(name));
+    layout.names.push_back(distinct.add(name));
   }
 }
 
@@ -139,15 +127,10 @@ std::vector<std::string_view> header_names(std::string_view line, char separator
   return names;
 }
 
-/// A comment can be the header too ("//X Y Z Intensity"): if it has the letters and fits the data.
+/// A comment can be the header too ("//X Y Z Intensity"): if it names all coordinates and has as
+/// many names as there are columns.
 bool is_header_comment(const std::vector<std::string_view>& names, std::size_t columns) {
-  if (names.size() != columns) return false;
-  std::array<int, 3> seen{};
-  for (const std::string_view name : names) {
-    const auto axis = axis_of(name);
-    if (axis && axis->letter) ++seen[axis->index];
-  }
-  return seen == std::array{1, 1, 1};
+  return names.size() == columns && named_axes(names).complete();
 }
 
 std::string_view comment_text(std::string_view comment) {
@@ -251,7 +234,7 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
                           std::to_string(names.size()),
                  .remedy = "one of them is wrong"});
   }
-  find_axes(names, layout, file, "line " + std::to_string(header_line));
+  if (!header.empty()) find_axes(names, layout, file, "line " + std::to_string(header_line));
   name_attributes(names, layout);
   lines.hold();
   return layout;

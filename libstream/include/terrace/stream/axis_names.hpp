@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace terrace::stream {
+
+/// How directly a column's name says what it is. A table that has names of several kinds means the
+/// first of them.
+enum class AxisNameKind : std::uint8_t {
+  letter,        ///< "x"
+  word,          ///< "easting", "lon", "height"
+  with_letter,   ///< "POINT_X", "x_coord", "X [m]"
+  abbreviation,  ///< "E", "N"
+};
+inline constexpr std::size_t kAxisNameKinds = 4;
+
+/// The coordinate that a column's name says.
+struct AxisName {
+  std::size_t axis = 0;  ///< 0 to 2
+  AxisNameKind kind = AxisNameKind::letter;
+  bool angle = false;  ///< a longitude or latitude
+};
+
+/// Case and units ("Easting(m)", "z_ft") do not matter. nullopt if the name is not that of a
+/// coordinate.
+std::optional<AxisName> axis_named(std::string_view name);
+
+}  // namespace terrace::stream
