@@ -279,6 +279,62 @@ TEST_F(MeshFormats, DamageIsNamed) {
   }
 }
 
+/// Four vertices and two triangles, in all the ways that OBJ allows.
+TEST_F(MeshFormats, ObjLinesMayBeContinuedIndentedAndSeparatedByTabs) {
+  const std::vector<Point3> square{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
+  for (const std::string& text : std::vector<std::string>{
+           vertices + "f 1 2 \\\n4 3\n", vertices + "f 1 2\\\r\n 4\\\r\n3",
+           "v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nv \\\n 1 \\\n1 0\nf 1 2 4 3\n",
+           "v\t0\t0\t0\nv\t1\t0\t0\nv\t0\t1\t0\nv\t1\t1\t0\nf\t1\t2\t4\t3\n",
+           "# by hand\no part\n  v 0 0 0\n\tv 1 0 0\n  v 0 1 0\n  v 1 1 0\n   f 1 2 4 3  \n",
+           "\xEF\xBB\xBF" + vertices + "f 1 2 4 3\n",
+           "# C:\\models\\\n" + vertices + "f 1 2 4 3 # all\n",
+           "g\n" + vertices + "f 1 2 4 3 \\"}) {
+    for (const char* const name : {"square.obj", "named_otherwise"}) {
+      SCOPED_TRACE(name + (": " + text));
+      const auto mesh = read_mesh(put(name, text));
+      ASSERT_TRUE(mesh);
+      EXPECT_EQ(mesh->info.format, "obj");
+      EXPECT_EQ(mesh->vertices.positions, square);
+      EXPECT_EQ(mesh->triangles, (std::vector<TriangleIndices>{{0, 1, 3}, {0, 3, 2}}));
+    }
+  }
+  std::string endless = "v 0 0 \\\n";
+  for (int i = 0; i < 100000; ++i) endless += "\\\n";
+  EXPECT_NE(error_of([&] { read_all({put("endless.obj", endless)}); }).find("continue each other"),
+            std::string::npos);
+}
+
+/// Text in UTF-16 is not read as text without points.
+TEST_F(MeshFormats, TextInUtf16IsRefusedWithTheRemedy) {
+  const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const std::pair<const char*, std::string> files[] = {
+      {"a.obj", obj},
+      {"a.off", "OFF\n1 0 0\n0 0 0\n"},
+      {"a.xyz", "1 2 3\n4 5 6\n"},
+      {"a.csv", "x,y,z\n1,2,3\n"},
+      {"a.ply", "ply\nformat ascii 1.0\n"},
+      {"a.asc", "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n"},
+      {"a.geojson", R"({"type":"Point","coordinates":[1,2]})"}};
+  for (const auto& [name, text] : files) {
+    for (const bool big : {false, true}) {
+      for (const bool mark : {false, true}) {
+        SCOPED_TRACE(std::string(name) + (big ? ", big" : ", little") + (mark ? ", mark" : ""));
+        std::string wide = !mark ? "" : big ? "\xFE\xFF" : "\xFF\xFE";
+        for (const char c : text) {
+          if (big) wide += '\0';
+          wide += c;
+          if (!big) wide += '\0';
+        }
+        const std::string file = put(name, wide);
+        EXPECT_NE(error_of([&] { read_all({file}); }).find("is text in UTF-16"), std::string::npos)
+            << error_of([&] { read_all({file}); });
+      }
+    }
+  }
+}
+
 // Facts of real files, if they are available.
 TEST(MeshFormatsReal, HaveTheFactsOfTheirReadme) {
   const char* data = std::getenv("TERRACE_DATA");

@@ -6,9 +6,31 @@
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
+namespace {
+
+/// True for the beginning of a text in UTF-16, with its mark or without.
+bool is_utf16(std::string_view head) {
+  if (head.starts_with("\xFF\xFE") || head.starts_with("\xFE\xFF")) return true;
+  // Every other byte of ASCII characters is 0.
+  if (head.size() < 4) return false;
+  const bool little = head[0] != 0 && head[1] == 0 && head[2] != 0 && head[3] == 0;
+  const bool big = head[0] == 0 && head[1] != 0 && head[2] == 0 && head[3] != 0;
+  return little || big;
+}
+
+}  // namespace
+
+void refuse_utf16(Input& input) {
+  if (!is_utf16(input.fill(4))) return;
+  throw Error({.file = input.name(),
+               .where = {},
+               .cause = "is text in UTF-16, which is not read",
+               .remedy = "save it as UTF-8, e.g. 'iconv -f UTF-16 -t UTF-8 FILE'"});
+}
 
 bool LineReader::next(std::string_view& line) {
   release();
+  if (number_ == 0) refuse_utf16(*input_);
   std::string_view window = input_->window();
   std::size_t length = window.find(line_end_);
   std::size_t line_end = 1;

@@ -9,6 +9,10 @@
 
 namespace terrace::stream {
 
+/// Throws: Error, with the remedy, if the text that begins at the input's position is UTF-16, which
+/// would be read as text without numbers.
+void refuse_utf16(Input& input);
+
 /// The lines of a text, in a window of bounded size. Lines end in LF or CR LF, or, if the beginning
 /// of the text has no LF, in CR; the last needs no end.
 class LineReader {
@@ -20,7 +24,7 @@ class LineReader {
   explicit LineReader(Input& input) : input_(&input) {}
 
   /// The next line without its end; false if there is none. `line` is valid until the next call.
-  /// Throws: Error if the line is longer than kMaxLine or cannot be read.
+  /// Throws: Error if the line is longer than kMaxLine or cannot be read, and for UTF-16.
   bool next(std::string_view& line);
   /// Makes the next call of next() return the last line again.
   void hold() {

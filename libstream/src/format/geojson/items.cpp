@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -45,6 +46,7 @@ std::optional<Crs> crs_named(std::string_view name) {
 GeoJsonItems::GeoJsonItems(Input& input, std::size_t most_bytes, bool wants_crs)
     : input_(&input), most_bytes_(most_bytes), wants_crs_(wants_crs) {
   if (wants_crs_) crs_ = longitude_and_latitude();
+  refuse_utf16(*input_);
   if (at(0) == '\xEF' && at(1) == '\xBB' && at(2) == '\xBF') input_->consume(3);
   advance();
 }

@@ -18,6 +18,7 @@
 #include "format/grid/plain_grid.hpp"
 #include "format/raster_points.hpp"
 #include "format/world_file.hpp"
+#include "io/line_reader.hpp"
 #include "io/number.hpp"
 #include "io/spool.hpp"
 #include "io/text.hpp"
@@ -63,7 +64,7 @@ bool is_void_word(std::string_view word) {
 /// The words of a text between white space, whatever the lengths of its lines.
 class Words {
  public:
-  explicit Words(Input& input) : input_(input) {}
+  explicit Words(Input& input) : input_(input) { refuse_utf16(input); }
 
   /// The next word, valid until the next call; empty at the end. Throws: Error if it is longer than
   /// any number.

@@ -17,26 +17,43 @@
 namespace terrace::stream {
 namespace {
 
-/// Wavefront OBJ: lines "v x y z" and "f a b c ...", the rest left out.
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
+/// Takes the word at the beginning of a line without leading blanks, and the blanks after it.
+std::string_view take_word(std::string_view& line) {
+  const std::string_view word = line.substr(0, line.find_first_of(" \t"));
+  line = trim_left(line.substr(word.size()));
+  return word;
+}
+
+/// Wavefront OBJ: statements "v x y z" and "f a b c ...", the rest left out. A backslash at its end
+/// continues a line.
 class ObjParser final : public MeshParser {
  public:
-  ObjParser(Input& input, bool faces) : input_(&input), lines_(input), faces_(faces) {}
+  ObjParser(Input& input, bool faces) : input_(&input), lines_(input), faces_(faces) {
+    if (input.fill(kByteOrderMark.size()).starts_with(kByteOrderMark)) {
+      input.consume(kByteOrderMark.size());
+    }
+  }
 
   const char* format() const override { return "obj"; }
   const Input& input() const override { return *input_; }
 
   Item next() override {
     std::string_view line;
-    while (lines_.next(line)) {
+    while (next_statement(line)) {
       if (line.starts_with("# ")) {
         if (comments_.size() < kMostComments) comments_.emplace_back(line.substr(2));
-      } else if (line.starts_with("v ")) {
-        line.remove_prefix(2);
+        continue;
+      }
+      const std::string_view word = take_word(line);
+      if (word == "v") {
         if (!read_vertex(line, vertex_)) fail("a vertex without three coordinates");
         ++vertices_;
         return Item::vertex;
-      } else if (faces_ && line.starts_with("f ")) {
-        read_face(line.substr(2));
+      }
+      if (faces_ && word == "f") {
+        read_face(line.substr(0, line.find('#')));
         if (face_.size() > 2) return Item::face;
       }
     }
@@ -54,12 +71,33 @@ class ObjParser final : public MeshParser {
                  .remedy = "the file is damaged; write it anew"});
   }
 
+  /// The next line without the blanks around it, and with those that continue it. Comments are not
+  /// continued: paths in them may end in a backslash.
+  bool next_statement(std::string_view& line) {
+    if (!lines_.next(line)) return false;
+    line = trim(line);
+    if (!line.ends_with('\\') || line.starts_with('#')) return true;
+    joined_.clear();
+    for (bool more = true; more;) {
+      const bool continued = line.ends_with('\\');
+      joined_.append(line.substr(0, line.size() - (continued ? 1 : 0))).append(" ");
+      if (joined_.size() > LineReader::kMaxLine) {
+        fail("lines that continue each other are longer than " +
+             std::to_string(LineReader::kMaxLine) + " bytes");
+      }
+      more = continued && lines_.next(line);
+      if (more) line = trim(line);
+    }
+    line = trim(joined_);
+    return true;
+  }
+
   /// Corners are "7", "7/2", "7/2/3" or "7//3": the first number is the vertex. Negative ones count
   /// back from the last vertex so far, positive ones from 1.
   void read_face(std::string_view text) {
     face_.clear();
-    for (text = trim_left(text); !text.empty();) {
-      const std::string_view word = text.substr(0, text.find_first_of(" \t"));
+    while (!text.empty()) {
+      const std::string_view word = take_word(text);
       std::int64_t number = 0;
       const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), number);
       const bool ends = rest == word.data() + word.size() || *rest == '/';
@@ -69,7 +107,6 @@ class ObjParser final : public MeshParser {
         fail("a face names the vertex " + in_quotes(word) + ", which is not there");
       }
       face_.push_back(static_cast<std::uint32_t>(vertex));
-      text = trim_left(text.substr(word.size()));
     }
   }
 
@@ -77,6 +114,7 @@ class ObjParser final : public MeshParser {
   LineReader lines_;
   bool faces_;
   std::int64_t vertices_ = 0;
+  std::string joined_;  ///< a statement of several lines
 };
 
 }  // namespace
@@ -95,19 +133,19 @@ bool read_vertex(std::string_view& text, Point3& vertex) {
 /// True if the first line that says something is one of an OBJ.
 bool recognise_obj(std::span<const std::byte> bytes) {
   std::string_view head(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (head.starts_with(kByteOrderMark)) head.remove_prefix(kByteOrderMark.size());
   while (!head.empty()) {
-    const std::string_view line = head.substr(0, head.find('\n'));
+    std::string_view line = head.substr(0, head.find_first_of("\r\n"));
     head.remove_prefix(std::min(line.size() + 1, head.size()));
-    if (line.empty() || line == "\r" || line.starts_with('#')) continue;
-    for (const std::string_view word : {"mtllib ", "usemtl ", "vn ", "vt "}) {
-      if (line.starts_with(word)) return true;
-    }
-    if (line.starts_with("o ") || line.starts_with("g ") || line.starts_with("s ")) continue;
+    line = trim(line);
+    if (line.empty() || line.starts_with('#')) continue;
+    const bool continued = line.ends_with('\\');
+    const std::string_view word = take_word(line);
+    if (word == "o" || word == "g" || word == "s") continue;
+    if (line.empty()) return false;
+    if (word == "mtllib" || word == "usemtl" || word == "vn" || word == "vt") return true;
     Point3 place{};
-    std::string_view rest = line;
-    if (!line.starts_with("v ")) return false;
-    rest.remove_prefix(2);
-    return read_vertex(rest, place);
+    return word == "v" && (continued || read_vertex(line, place));
   }
   return false;
 }
