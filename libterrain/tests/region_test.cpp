@@ -76,6 +76,18 @@ TEST(Region, TakesAllKindsOfGeoJson) {
   }
 }
 
+TEST(Region, FeaturesWithoutAGeometryAreLeftOut) {
+  const std::string nowhere = R"({"type":"Feature","properties":{},"geometry":null})";
+  const std::string square =
+      R"({"type":"Feature","properties":null,"geometry":)"
+      R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[4,4],[0,4],[0,0]]]}})";
+  const Region region = region_of(R"({"type":"FeatureCollection","features":[)" + nowhere + "," +
+                                  square + "," + nowhere + "]}");
+  EXPECT_EQ(region.polygons().size(), 1u);
+  EXPECT_TRUE(region.contains({2, 2, 0}));
+  EXPECT_THROW(region_of(nowhere), stream::Error);
+}
+
 TEST(Region, RestrictsWhatASourceDelivers) {
   stream::Selection selection;
   region_of(R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[0,4]],[[1,1],[2,1],[1,2]]]})")

@@ -71,7 +71,9 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   } else if (type == "GeometryCollection") {
     each(member("geometries"));
   } else if (type == "Feature") {
-    collect_polygons(member("geometry"), file, depth + 1, polygons);
+    // A feature may have no place (RFC 7946, 3.2).
+    const nlohmann::json& geometry = member("geometry");
+    if (!geometry.is_null()) collect_polygons(geometry, file, depth + 1, polygons);
   } else if (type == "MultiPolygon") {
     const nlohmann::json& parts = member("coordinates");
     if (!parts.is_array()) fail(file, "MultiPolygon without a list");

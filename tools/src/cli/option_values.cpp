@@ -27,7 +27,11 @@ void collect_line(const nlohmann::json& object, int depth,
                   std::vector<std::vector<Point2>>& lines) {
   if (depth > 8) return;
   const std::string type = object.value("type", "");
-  if (type == "Feature") return collect_line(object.at("geometry"), depth + 1, lines);
+  if (type == "Feature") {
+    // A feature may have no place (RFC 7946, 3.2).
+    const nlohmann::json& geometry = object.at("geometry");
+    return geometry.is_null() ? void() : collect_line(geometry, depth + 1, lines);
+  }
   if (type == "FeatureCollection") {
     for (const nlohmann::json& feature : object.at("features"))
       collect_line(feature, depth + 1, lines);
