@@ -62,6 +62,14 @@ TEST(Ept, RefusesWhatCannotBe) {
   Json deep = 1;
   for (int i = 0; i < 100; ++i) deep = Json::array({deep});
   EXPECT_PRED2(has, with("more", deep), "nested too deeply");
+  // In time linear in their number.
+  EXPECT_EQ(with("more", Json(400'000, Json::object())), "");
+  EXPECT_PRED2(has, with("more", Json(600'000, Json::object())), "has too many values");
+  Json many = Json::array();
+  for (int i = 0; i < 5000; ++i) {
+    many.push_back({{"name", std::to_string(i)}, {"type", "unsigned"}, {"size", 1}});
+  }
+  EXPECT_PRED2(has, with("schema", many), "has too many dimensions");
   {
     const TempFolder folder;
     const std::string file = small_parts().write(folder.path());

@@ -363,6 +363,10 @@ TEST_F(GeoJson, IsRefusedWhereItIsNone) {
   }
   expect_error(R"({"type":"Feature","geometry":{)" + deep + "}}", "nested too deeply");
 
+  const std::string list(100'000, '['), end(100'000, ']');
+  expect_error(R"({"type":"FeatureCollection","crs":)" + list + end + R"(,"features":[]})",
+               "nested too deeply");
+
   // A feature longer than memory allows is refused before it is read completely.
   std::string large = R"({"type":"LineString","coordinates":[[0,0])";
   for (int i = 0; i < 400'000; ++i) large += ",[1,1]";

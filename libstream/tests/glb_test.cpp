@@ -290,6 +290,23 @@ TEST_F(GlbFiles, TrianglesComeFromListsStripsAndFans) {
   EXPECT_EQ(mesh.info.coordinates[0].type, ScalarType::f32);
 }
 
+/// Time grows with the bytes of the JSON, not with their square, and memory neither.
+TEST_F(GlbFiles, LargeJsonIsReadInLinearTime) {
+  GlbMaker glb;
+  const std::uint64_t positions = glb.add_positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  const GlbJson triangle{{"attributes", {{"POSITION", positions}}}};
+  glb.add_mesh(triangle);
+  glb.json["extras"] = GlbJson(400'000, GlbJson::object());
+  EXPECT_EQ(read(glb).triangles.size(), 1u);
+  glb.json["extras"] = GlbJson(600'000, GlbJson::object());
+  EXPECT_NE(error_of([&] { read(glb); }).find("too many values"), std::string::npos);
+  glb.json.erase("extras");
+  // Many primitives in many places.
+  glb.json["meshes"][0]["primitives"] = GlbJson(1100, triangle);
+  glb.json["nodes"] = GlbJson(1000, GlbJson{{"mesh", 0}});
+  EXPECT_NE(error_of([&] { read(glb); }).find("more than 1048576 primitives"), std::string::npos);
+}
+
 /// Vertices that lie far behind one another in the file, more than are read at once.
 TEST_F(GlbFiles, LargeMeshesAreReadAsPointsAndAsTriangles) {
   GlbMaker glb;

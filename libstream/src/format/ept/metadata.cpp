@@ -7,7 +7,9 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <set>
 #include <span>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -15,6 +17,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/bounded_json.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
@@ -88,8 +91,8 @@ class EptMetadataReader {
 
   /// A schema takes a hundred bytes a dimension, WKT a few kilobytes.
   static constexpr std::uint64_t kMostBytes = 8u << 20;
-  static constexpr int kDeepestJson = 16;
   static constexpr std::size_t kMostRecordBytes = 65535;
+  static constexpr std::size_t kMostDimensions = 4096;
 
   [[noreturn]] void fail(std::string where, std::string cause) const {
     fail_ept(file_, std::move(where), std::move(cause));
@@ -101,10 +104,7 @@ class EptMetadataReader {
     std::string all(bytes->size(), '\0');
     bytes->read(0, std::as_writable_bytes(std::span(all)));
     try {
-      return Json::parse(all, [this](int depth, Json::parse_event_t, const Json&) {
-        if (depth > kDeepestJson) fail({}, "its JSON is nested too deeply");
-        return true;
-      });
+      return parse_bounded_json(all, {}, [this](const char* cause) { fail({}, cause); });
     } catch (const Json::parse_error& error) {
       fail("byte " + std::to_string(error.byte), "it is not JSON");
     } catch (const Json::out_of_range&) {
@@ -204,6 +204,8 @@ class EptMetadataReader {
     if (!schema.is_array()) fail("schema", "is not a list of dimensions");
     SourceInfo& info = stream.info;
     std::array<bool, 3> found{};
+    std::set<std::string> names;
+    if (schema.size() > kMostDimensions) fail("schema", "has too many dimensions");
     for (std::size_t i = 0; i < schema.size(); ++i) {
       const std::string where = "dimension " + std::to_string(i) + " of the schema";
       const auto [name, channel] = dimension(schema[i], where);
@@ -218,9 +220,7 @@ class EptMetadataReader {
         place(channel, axis, info);
         continue;
       }
-      for (const LasField& field : stream.fields) {
-        if (field.channel.name == channel.name) fail(where, "is " + name + " once more");
-      }
+      if (!names.insert(channel.name).second) fail(where, "is " + name + " once more");
       if (channel.name.empty()) fail(where, "has no name");
       stream.fields.push_back({.channel = channel, .offset = offset});
       info.attributes.push_back(channel);

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/bounded_json.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -123,8 +124,12 @@ GeoJsonItems::Stop GeoJsonItems::scan_object(std::size_t depth, bool stop_at_lis
 
 void GeoJsonItems::take_members(std::string_view text, bool before) {
   using nlohmann::json;
-  const json members = json::parse(text, nullptr, false);
-  if (!members.is_object()) fail("is not JSON");
+  json members;
+  try {
+    members = parse_bounded_json(text, {.depth = 64}, [this](const char* cause) { fail(cause); });
+  } catch (const json::exception&) {
+    fail("is not JSON");
+  }
   const auto type = members.find("type");
   if (before && type != members.end() && *type != "FeatureCollection" &&
       *type != "GeometryCollection") {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,6 +17,7 @@
 
 #include "format/mesh/glb.hpp"
 #include "format/mesh/parser.hpp"
+#include "io/bounded_json.hpp"
 #include "io/bytes.hpp"
 #include "io/spool.hpp"
 #include "terrace/stream/error.hpp"
@@ -116,9 +118,8 @@ class GlbParser final : public MeshParser {
 
   static constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t kMostJsonBytes = std::size_t{64} << 20;
-  /// Far more than a scene of many thousand nodes has, few enough to fit into memory.
-  static constexpr std::size_t kMostJsonValues = std::size_t{1} << 20;
-  static constexpr int kDeepestJson = 16;
+  /// Primitives that nodes place, each in each place.
+  static constexpr std::size_t kMostParts = std::size_t{1} << 20;
 
   /// A primitive (3.7.2.1).
   struct Part {
@@ -191,13 +192,11 @@ class GlbParser final : public MeshParser {
 
   void parse(std::string_view text, std::uint64_t promised) {
     if (text.size() < promised) fail_here("ends within its JSON", "get it anew");
-    std::size_t values = 0;
     try {
-      json_ = Json::parse(text, [&](int depth, Json::parse_event_t, const Json&) {
-        if (depth > kDeepestJson) fail_here("its JSON is nested too deeply");
-        if (++values > kMostJsonValues) fail_here("its JSON has too many values", kPlainRemedy);
-        return true;
-      });
+      // A million values are far more than a scene of many thousand nodes has, and few enough to
+      // fit into memory.
+      json_ = parse_bounded_json(text, {.depth = 16, .values = std::size_t{1} << 20},
+                                 [this](const char* cause) { fail_here(cause, kPlainRemedy); });
     } catch (const Json::parse_error& error) {
       fail("byte " + std::to_string(input_->offset() + error.byte), "is not JSON");
     } catch (const Json::out_of_range&) {
@@ -382,10 +381,8 @@ class GlbParser final : public MeshParser {
   }
 
   void add_mesh(std::uint64_t index, const Transform& transform) {
-    struct Placed {
-      std::uint64_t positions, first;
-    };
-    std::vector<Placed> placed;  // in this mesh: primitives may share their vertices
+    // By accessor, the first vertex in this mesh: primitives may share their vertices.
+    std::map<std::uint64_t, std::uint64_t> placed;
     const std::string where = "meshes " + std::to_string(index);
     for (const Json& primitive : list(entry("meshes", index), "primitives")) {
       const auto attributes = primitive.find("attributes");
@@ -401,18 +398,20 @@ class GlbParser final : public MeshParser {
       if (component != glb::kFloat) fail(where, "has positions that are not floats", kPlainRemedy);
       part.vertices = part.positions.count;
       part.first = vertices_;
-      const auto same = std::find_if(placed.begin(), placed.end(),
-                                     [&](const Placed& p) { return p.positions == *positions; });
-      if (same != placed.end()) {
-        part.first = same->first;
+      const auto [same, is_new] = placed.emplace(*positions, vertices_);
+      if (!is_new) {
+        part.first = same->second;
         part.positions.count = 0;
       } else {
-        placed.push_back({*positions, vertices_});
         vertices_ += part.vertices;
         if (vertices_ >= kMost) fail(where, "has more vertices than can be numbered");
       }
       if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
       moved_ = moved_ || transform != kIdentity;
+      if (parts_.size() == kMostParts) {
+        fail(where, "is one of more than " + std::to_string(kMostParts) + " primitives in places",
+             kPlainRemedy);
+      }
       parts_.push_back(part);
     }
   }
