@@ -41,11 +41,14 @@ class MadePoints final : public PointSource {
     info_.points = points;
     info_.stated_bounds = bounds;
   }
+  /// As many points a block, with room for kBlock.
+  void block_points(std::size_t points) { block_points_ = points; }
   const SourceInfo& info() const override { return info_; }
   Progress progress() const override { return {.points = next_}; }
   bool next(PointBlock& block) override {
     block.clear();
-    for (std::size_t i = 0; i < 777 && next_ < count_; ++i, ++next_) {
+    block.positions.reserve(kBlock);
+    for (std::size_t i = 0; i < block_points_ && next_ < count_; ++i, ++next_) {
       block.positions.push_back(place_(next_));
       std::array<std::byte, 9> record{std::byte{7}};
       std::memcpy(record.data() + 1, &next_, sizeof next_);
@@ -57,6 +60,7 @@ class MadePoints final : public PointSource {
  private:
   SourceInfo info_;
   std::uint64_t count_, next_ = 0;
+  std::size_t block_points_ = 777;
   Place place_;
 };
 
@@ -254,6 +258,33 @@ TEST(SpatialOrderTest, HeightsInMetresDoNotHideDegrees) {
   for (PointBlock block; source->next(block);) ordered.blocks.push_back(block);
   expect_all(ordered, kCount, place);
   EXPECT_LT(ordered.width(), 0.01 * 20);
+}
+
+/// Thousands of files of one point each take the room of their points, not that of a block each.
+TEST(SpatialOrderTest, SmallBlocksAreHeldTogether) {
+  constexpr std::uint64_t kCount = 300'000;
+  for (const auto& [place, order] :
+       {std::pair{squares(100), Order::automatic}, std::pair{shuffled(1024), Order::automatic},
+        std::pair{squares(100), Order::spatial}}) {
+    for (const std::size_t block_points : {std::size_t{1}, std::size_t{600}}) {
+      auto made = std::make_unique<MadePoints>(kCount, place);
+      made->block_points(block_points);
+      const auto source =
+          in_spatial_order(std::move(made), {.order = order, .block_points = kBlock});
+      Read found;
+      std::uint64_t points = 0, room = 0;
+      for (PointBlock block; source->next(block); block = {}) {
+        points += block.size();
+        // Of the first window, which is held until it is judged.
+        if (points <= 1u << 18) room += block.positions.capacity();
+        EXPECT_LE(block.size(), kBlock);
+        found.blocks.push_back(block);
+      }
+      expect_all(found, kCount, place);
+      EXPECT_LT(room, 1.3 * (1u << 18));
+      EXPECT_LT(found.blocks.size(), block_points == 1 ? 40'000u : 600u);
+    }
+  }
 }
 
 TEST(SpatialOrderTest, ThreadsDoNotChangeTheOrder) {

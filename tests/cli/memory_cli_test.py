@@ -239,6 +239,18 @@ class LongFeatureTest(MemoryCase):
                 self.within(256, *args)
 
 
+class ManyFilesTest(MemoryCase):
+    def test_thousands_of_files_of_one_point(self):
+        """What is held while the order is judged counts by its points, not by its blocks."""
+        folder = self.path('many')
+        os.mkdir(folder)
+        for i in range(2000):
+            with open(os.path.join(folder, f'{i}.csv'), 'w') as file:
+                file.write(f'x,y,z\n{i},{i % 7},1\n')
+        for order in ('auto', 'spatial'):
+            self.within(256, 'build', folder, '-o', self.path(f'{order}.store'), '--order', order)
+
+
 class VirtualRasterTest(MemoryCase):
     def test_a_mosaic_of_many_files(self):
         """60,000 places of one file: 13 MB of description."""

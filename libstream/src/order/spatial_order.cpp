@@ -105,7 +105,7 @@ class SpatialSource final : public OrderedSource {
     } else if (!window_.empty()) {
       block = std::move(window_.front());
       window_.pop_front();
-    } else if (source_->next(block) && state_ == State::judging) {
+    } else if (next_block(block) && state_ == State::judging) {
       judge(block);
     }
     delivered_ += block.size();
@@ -115,14 +115,48 @@ class SpatialSource final : public OrderedSource {
  private:
   enum class State : std::uint8_t { opening, passing, judging, gathering, delivering };
 
+  /// The next block of the source.
+  bool next_block(PointBlock& block) {
+    if (following_.empty()) return source_->next(block);
+    std::swap(block, following_);
+    following_.clear();
+    return true;
+  }
+
+  /// The next blocks of the source as one, as many as fit: thousands of files may have one point
+  /// each, and what is held must not grow with the number of blocks.
+  bool next_full_block(PointBlock& block) {
+    block.clear();
+    for (; !ended_; following_.clear()) {
+      if (following_.empty() && !source_->next(following_)) {
+        ended_ = true;
+      } else if (block.empty()) {
+        std::swap(block, following_);
+      } else if (block.size() + following_.size() <= options_.block_points) {
+        block.positions.insert(block.positions.end(), following_.positions.begin(),
+                               following_.positions.end());
+        block.payload.insert(block.payload.end(), following_.payload.begin(),
+                             following_.payload.end());
+      } else {
+        break;
+      }
+    }
+    return !block.empty();
+  }
+
   /// Reads the first window, which is held back until it has been judged.
   void open() {
     state_ = State::judging;
     bool more = true;
     while (seen_ < kWindowPoints && more) {
       PointBlock block;
-      more = source_->next(block);
+      more = next_full_block(block);
       look_at(block);
+      // A source may leave room for more points than there are.
+      if (block.positions.capacity() > block.size() + block.size() / 4) {
+        block.positions.shrink_to_fit();
+        block.payload.shrink_to_fit();
+      }
       if (!block.empty()) window_.push_back(std::move(block));
     }
     if (seen_ > 0 && (options_.order == Order::spatial || spread() > kWidest)) {
@@ -213,8 +247,8 @@ class SpatialSource final : public OrderedSource {
     file_.emplace(info().files.empty() ? std::string("points") : info().files.front(),
                   options_.folder, packed_->record_bytes());
     std::vector<Bucket> buckets(planes_.size() + 1);
-    const auto next_block = [&](PointBlock& block) {
-      if (window_.empty()) return source_->next(block);
+    const auto next_of_all = [&](PointBlock& block) {
+      if (window_.empty()) return next_full_block(block);
       block = std::move(window_.front());
       window_.pop_front();
       return true;
@@ -233,7 +267,7 @@ class SpatialSource final : public OrderedSource {
           if (count == shares.size()) shares.emplace_back();
           Share& share = shares[count];
           more = false;  // should this fail, no other is to read
-          if (!next_block(share.block)) return;
+          if (!next_of_all(share.block)) return;
           more = true;
           ++count;
           points += share.block.size();
@@ -476,6 +510,8 @@ class SpatialSource final : public OrderedSource {
   SpatialOrderOptions options_;
   State state_;
   std::uint64_t ordering_bytes_;
+  PointBlock following_;               ///< read, but did not fit the last full block
+  bool ended_ = false;                 ///< the source has no more blocks
   std::deque<PointBlock> window_;      ///< what was held back to be judged
   std::vector<NumberedPoint> places_;  ///< of a window
   std::uint64_t unjudged_ = 0;         ///< points that pass before the next window
