@@ -48,6 +48,7 @@ class Folder {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   static const Folder folder;
+  WorkLimit limit(size);
   std::string_view rest(reinterpret_cast<const char*>(data), size);
   const auto next = [&rest] {
     const std::string_view part = rest.substr(0, rest.find('\0'));
@@ -62,6 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     folder.write((std::string("ept-data/1-0-0-0.") + ending).c_str(), rest);
   }
   const Reading large = read_through(file, {.format = "ept", .block_points = 500});
+  limit.add(large.points);
   const Reading small = read_through(file, {.format = "ept", .block_points = 3});
   require(large == small, "the same points in blocks of any size");
   const Reading threads = read_through(file, {.format = "ept", .block_points = 500, .threads = 2});

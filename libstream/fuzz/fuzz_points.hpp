@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <span>
 #include <string>
 
@@ -22,6 +23,27 @@ inline void require(bool good, const char* what) {
   std::fprintf(stderr, "broken promise: %s\n", what);
   std::abort();
 }
+
+/// Stops the fuzzer where work grows faster than with the bytes of the input and what they hold:
+/// more than two seconds of processor time and ten microseconds for each, a hundred times what
+/// parsers take.
+class WorkLimit {
+ public:
+  explicit WorkLimit(std::uint64_t bytes) : items_(bytes) {}
+  ~WorkLimit() {
+    const double seconds = static_cast<double>(std::clock() - begin_) / CLOCKS_PER_SEC;
+    require(seconds <= 2 + 1e-5 * static_cast<double>(items_), "time in proportion to the input");
+  }
+  WorkLimit(const WorkLimit&) = delete;
+  WorkLimit& operator=(const WorkLimit&) = delete;
+
+  /// Points or triangles that the input holds.
+  void add(std::uint64_t items) { items_ += items; }
+
+ private:
+  std::uint64_t items_;
+  std::clock_t begin_ = std::clock();
+};
 
 /// The input as a file in memory, so that the reader uses its ordinary path.
 class MemoryFile {

@@ -7,6 +7,7 @@
 /// in its segments.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
+  const WorkLimit limit(size);
   const MemoryFile file(data, size);
   std::vector<std::uint64_t> vertices;
   for (const Entities entities : {Entities::points, Entities::segments, Entities::polylines}) {

@@ -10,6 +10,7 @@
 /// are as many.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
+  WorkLimit limit(size);
   const MemoryFile file(data, size);
   for (const char* format : {"ply", "glb", "obj", "off", "stl"}) {
     try {
@@ -29,6 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const auto mesh = read_mesh(file.name(), {.format = format});
       if (!mesh) continue;
       const std::size_t vertices = mesh->vertices.size();
+      limit.add(vertices + mesh->triangles.size());
       require(mesh->vertices.payload.size() == vertices * mesh->info.payload_size(), "records");
       for (const TriangleIndices& triangle : mesh->triangles) {
         for (const std::uint32_t v : triangle) require(v < vertices, "corners are vertices");

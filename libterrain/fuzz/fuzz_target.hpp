@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -27,6 +28,24 @@ inline void require(bool good, const char* what) {
   std::fprintf(stderr, "broken promise: %s\n", what);
   std::abort();
 }
+
+/// Stops the fuzzer where work grows faster than with the bytes of the input: more
+/// than two seconds of processor time and ten microseconds for each byte, a hundred times what
+/// parsers take.
+class WorkLimit {
+ public:
+  explicit WorkLimit(std::uint64_t bytes) : items_(bytes) {}
+  ~WorkLimit() {
+    const double seconds = static_cast<double>(std::clock() - begin_) / CLOCKS_PER_SEC;
+    require(seconds <= 2 + 1e-5 * static_cast<double>(items_), "time in proportion to the input");
+  }
+  WorkLimit(const WorkLimit&) = delete;
+  WorkLimit& operator=(const WorkLimit&) = delete;
+
+ private:
+  std::uint64_t items_;
+  std::clock_t begin_ = std::clock();
+};
 
 /// Bytes as a file in memory, so that a reader takes its ordinary way.
 class MemoryFile {

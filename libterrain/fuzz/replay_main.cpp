@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
       if (!entry.is_regular_file()) continue;
       std::ifstream file(entry.path(), std::ios::binary);
       const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+      const terrace::terrain::fuzz::WorkLimit limit(bytes.size());
       const bool due = entry.path().filename().string().starts_with("good");
       const bool accepted = terrace::terrain::fuzz::accepts(
           reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
