@@ -258,6 +258,31 @@ class GeodesyTest(unittest.TestCase):
         self.assertIn('proj.db', result.stderr)
         self.assertIn('PROJ_DATA', result.stderr)
 
+    def test_a_database_that_cannot_be_read_is_an_error(self):
+        """A failed read must not be taken for a CRS that is not known."""
+        database = '/usr/share/proj/proj.db'
+        if not os.path.exists(database):
+            self.skipTest('proj.db is elsewhere')
+        raster = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001})
+        folder = self.path('proj')
+        os.mkdir(folder)
+        environment = {**os.environ, 'PROJ_DATA': folder, 'PROJ_LIB': folder}
+        size = os.path.getsize(database)
+        for kept in (size // 20, size // 3, size // 2, 3 * size // 4):
+            with self.subTest(kept=kept), open(database, 'rb') as whole, \
+                    open(os.path.join(folder, 'proj.db'), 'wb') as part:
+                part.write(whole.read(kept) + bytes(size - kept))
+                part.flush()
+                result = subprocess.run([TERRACE, 'build', raster, '-o', self.path('none'), '--force', '-q'],
+                                        capture_output=True, text=True, env=environment, timeout=120)
+                if result.returncode == 0:  # what it needs is in the part that is kept
+                    self.assertEqual(self.info(self.path('none'))['crs']['epsg'], 32632)
+                    self.assertIn('Transverse Mercator', self.info(self.path('none'))['crs']['wkt'])
+                    continue
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn('proj.db', result.stderr)
+                self.assertIn('cannot be read', result.stderr)
+
     def test_info_says_what_counts_as_wgs84(self):
         etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
         self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))

@@ -61,6 +61,8 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   std::optional<CoordinateSystem> system;
   try {
     system = crs_of_source(source, shift).system;
+  } catch (const CrsDatabaseError&) {
+    throw;
   } catch (const stream::Error&) {
     if (!named.empty()) throw;
   }

@@ -10,6 +10,7 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -122,6 +123,8 @@ std::function<stream::Crs()> crs_to_write(stream::Crs recorded) {
     try {
       const auto system = CoordinateSystem::of(recorded, {});
       return system ? system->crs_with_wkt1() : recorded;
+    } catch (const terrain::CrsDatabaseError&) {
+      throw;
     } catch (const stream::Error&) {
       return recorded;
     }

@@ -18,6 +18,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/source_crs.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
@@ -126,6 +127,8 @@ class ConvertCommand : public Command {
     return [&info] {
       try {
         return crs_to_write(crs_of_source(info).crs)();
+      } catch (const terrain::CrsDatabaseError&) {
+        throw;
       } catch (const stream::Error&) {
         return info.crs;
       }

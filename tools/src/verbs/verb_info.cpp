@@ -271,6 +271,8 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   SourceCrs crs;
   try {
     crs = crs_of_source(info);
+  } catch (const CrsDatabaseError&) {
+    throw;
   } catch (const stream::Error& error) {
     // Where a build would fail, the error is reported with the rest of the file.
     crs.crs = info.crs;

@@ -147,8 +147,12 @@ std::string proj_pipeline_of(const CrsDefinition& definition) {
     const char* const text = normal != nullptr
                                  ? proj_as_proj_string(context, normal.get(), PJ_PROJ_5, nullptr)
                                  : nullptr;
-    if (text != nullptr) return text;
+    if (text != nullptr) {
+      check_proj_database();
+      return text;
+    }
   }
+  check_proj_database();
   const std::string why = proj_complaint();
   throw CrsError("PROJ cannot compute the projection of the CRS " + definition.title() +
                      (why.empty() ? "" : ": " + why),

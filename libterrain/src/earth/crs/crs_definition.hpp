@@ -8,6 +8,7 @@
 #include <string>
 
 #include "earth/crs/projection.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
@@ -22,6 +23,13 @@ class CrsError : public std::runtime_error {
 
  private:
   std::string remedy_;
+};
+
+/// PROJ's database is not found, or a read of it failed: nothing is known of any system, which must
+/// not be taken for an unknown system.
+class CrsDatabaseError : public stream::Error {
+ public:
+  using stream::Error::Error;
 };
 
 /// One that says two things at once: nothing may be done with it until it is known which is meant.

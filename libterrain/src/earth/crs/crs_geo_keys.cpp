@@ -76,6 +76,7 @@ class GeoKeyValues {
     const bool known =
         proj_uom_get_info_from_database(proj_context(), "EPSG", std::to_string(unit).c_str(),
                                         nullptr, &factor, &category) != 0;
+    check_proj_database();
     if (!known || text_of(category) != kind || !(factor > 0)) {
       fail_geo_keys(std::string("its ") + kind + " unit EPSG:" + std::to_string(unit) +
                     " is not known");
@@ -179,8 +180,10 @@ std::string part_of(const std::string& citation, std::string_view part) {
 }
 
 ProjObject object_of_code(int code, PJ_CATEGORY category) {
-  return ProjObject(proj_create_from_database(proj_context(), "EPSG", std::to_string(code).c_str(),
+  ProjObject object(proj_create_from_database(proj_context(), "EPSG", std::to_string(code).c_str(),
                                               category, 0, nullptr));
+  check_proj_database();
+  return object;
 }
 
 /// None for a CRS of another kind: PROJ identifies no projected CRS on, say, a geocentric one, but

@@ -59,6 +59,7 @@ ProjObject identified(const PJ* geographic) {
   int* confidence = nullptr;
   const ProjOwned<PJ_OBJ_LIST> found(
       proj_identify(context, geographic, "EPSG", nullptr, &confidence));
+  check_proj_database();
   constexpr int kSure = 70;
   ProjObject result;
   if (found != nullptr && confidence != nullptr && proj_list_get_count(found.get()) > 0 &&
@@ -351,6 +352,7 @@ void settle_code(CrsDefinition& definition) {
   const ProjOwned<PJ_OBJ_LIST> list(
       crs != nullptr ? proj_identify(proj_context(), crs.get(), "EPSG", nullptr, &confidence)
                      : nullptr);
+  check_proj_database();
   std::optional<CrsDefinition> only;
   bool several = false;
   constexpr int kSure = 70;

@@ -86,7 +86,11 @@ std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
 /// "ESRI:54030", "OGC:CRS84", "urn:ogc:def:crs:EPSG::4326",
 /// "http://www.opengis.net/def/crs/EPSG/0/4326"; nullptr if the text is none of them.
 ProjObject crs_of_authority(const std::string& text) {
-  if (text.starts_with("urn:")) return ProjObject(proj_create(proj_context(), text.c_str()));
+  if (text.starts_with("urn:")) {
+    ProjObject object(proj_create(proj_context(), text.c_str()));
+    check_proj_database();
+    return object;
+  }
   constexpr std::string_view kPath = "opengis.net/def/crs/";
   if (const std::size_t at = text.find(kPath); text.starts_with("http") && at != text.npos) {
     const std::string rest = text.substr(at + kPath.size());
@@ -113,6 +117,7 @@ ProjObject crs_of_name(const std::string& text) {
   constexpr std::size_t kMost = 50;
   const ProjOwned<PJ_OBJ_LIST> list(proj_create_from_name(
       context, nullptr, text.c_str(), types.data(), types.size(), 0, kMost, nullptr));
+  check_proj_database();
   ProjObject only;
   std::string codes;
   const int count = list != nullptr ? proj_list_get_count(list.get()) : 0;

@@ -22,7 +22,9 @@ List candidates(const PJ* from, const PJ* to, const std::optional<GeographicArea
     proj_operation_factory_context_set_area_of_interest(context, f, area->west, area->south,
                                                         area->east, area->north);
   }
-  return List(proj_create_operations(context, from, to, f));
+  List list(proj_create_operations(context, from, to, f));
+  check_proj_database();
+  return list;
 }
 
 ProjObject candidate(const List& list, int i) {
@@ -111,6 +113,7 @@ OperationChoice choose_operation(const PJ* from, const PJ* to,
     choice.better = quoted_with_accuracy(text_of(proj_get_name(one.get())), accuracy) +
                     " lacks the grid " + grid;
   }
+  check_proj_database();
   return choice;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <new>
+#include <string_view>
 #include <utility>
 
 #include "earth/crs/crs_definition.hpp"
@@ -11,10 +12,18 @@ namespace terrace::terrain {
 namespace {
 
 thread_local std::string complaint;
+thread_local std::string database_failure;
+
+/// True for what PROJ says of its database: of a failed read, or that it is not found.
+bool is_of_database(std::string_view message) {
+  return message.find("SQLite error") != message.npos || message.find("proj.db") != message.npos;
+}
 
 /// PROJ would write to standard error.
 void keep_message(void*, int level, const char* message) {
-  if (level == PJ_LOG_ERROR && message != nullptr) complaint = message;
+  if (level != PJ_LOG_ERROR || message == nullptr) return;
+  complaint = message;
+  if (database_failure.empty() && is_of_database(message)) database_failure = message;
 }
 
 struct ThreadContext {
@@ -38,26 +47,49 @@ PJ_CONTEXT* make_proj_context() {
 
 PJ_CONTEXT* proj_context() {
   thread_local const ThreadContext own;
+  check_proj_database();
   if (proj_context_get_database_path(own.context) == nullptr) {
-    throw CrsError("PROJ's database of reference systems, proj.db, is not found",
-                   "install it (Debian's package proj-data), or name its folder in PROJ_DATA");
+    if (database_failure.empty()) database_failure = "Cannot find proj.db";
+    check_proj_database();
   }
   return own.context;
+}
+
+void check_proj_database() {
+  const std::string why = std::exchange(database_failure, {});
+  if (why.empty()) return;
+  if (why.find("Cannot find") != why.npos) {
+    throw CrsDatabaseError(
+        {.file = "proj.db",
+         .where = {},
+         .cause = "PROJ's database of reference systems is not found",
+         .remedy = "install it (Debian's package proj-data), or name its folder in PROJ_DATA"});
+  }
+  throw CrsDatabaseError(
+      {.file = "proj.db",
+       .where = {},
+       .cause = "PROJ's database of reference systems cannot be read (" + why + ")",
+       .remedy = "check the disk it is on, and how many files a process may open"});
 }
 
 std::string proj_complaint() { return std::exchange(complaint, {}); }
 
 ProjObject proj_crs_of_code(const std::string& authority, const std::string& code) {
-  return ProjObject(proj_create_from_database(proj_context(), authority.c_str(), code.c_str(),
+  ProjObject object(proj_create_from_database(proj_context(), authority.c_str(), code.c_str(),
                                               PJ_CATEGORY_CRS, 0, nullptr));
+  check_proj_database();
+  return object;
 }
 
 ProjObject proj_crs_of_text(const std::string& text) {
   PJ_CONTEXT* const context = proj_context();
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) return nullptr;
-  if (text[first] == '{' || text[first] == '+')
-    return ProjObject(proj_create(context, text.c_str()));
+  if (text[first] == '{' || text[first] == '+') {
+    ProjObject object(proj_create(context, text.c_str()));
+    check_proj_database();
+    return object;
+  }
   const std::array<const char*, 2> options{"STRICT=NO", nullptr};
   PROJ_STRING_LIST warnings = nullptr, errors = nullptr;
   ProjObject object(
@@ -65,12 +97,15 @@ ProjObject proj_crs_of_text(const std::string& text) {
   if (errors != nullptr && errors[0] != nullptr && object == nullptr) complaint = errors[0];
   proj_string_list_destroy(warnings);
   proj_string_list_destroy(errors);
+  check_proj_database();
   return object;
 }
 
 std::string wkt_of(const PJ* object) {
   const std::array<const char*, 2> options{"MULTILINE=NO", nullptr};
-  return text_of(proj_as_wkt(proj_context(), object, PJ_WKT2_2019, options.data()));
+  std::string text = text_of(proj_as_wkt(proj_context(), object, PJ_WKT2_2019, options.data()));
+  check_proj_database();
+  return text;
 }
 
 }  // namespace terrace::terrain

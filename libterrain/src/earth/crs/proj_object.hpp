@@ -25,8 +25,13 @@ using ProjOwned = std::unique_ptr<Thing, ProjDestroy>;
 using ProjObject = ProjOwned<PJ>;
 
 /// PROJ's context of this thread, with its database open and the network off. Nothing made with it
-/// may leave the thread. Throws: CrsError if there is no database.
+/// may leave the thread. Throws: CrsDatabaseError if there is no database, and as
+/// check_proj_database().
 PJ_CONTEXT* proj_context();
+
+/// To be called after what reads the database: PROJ returns the same for a failed read as for an
+/// unknown name. Throws: CrsDatabaseError if a read failed in this thread since the last call.
+void check_proj_database();
 
 /// A context that never uses the network and keeps messages for proj_complaint().
 PJ_CONTEXT* make_proj_context();

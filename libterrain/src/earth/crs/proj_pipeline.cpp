@@ -59,6 +59,7 @@ class ProjPipeline::Pool {
   [[nodiscard]] std::unique_ptr<Worker> made() const {
     proj_complaint();
     auto worker = std::make_unique<Worker>(definition_);
+    check_proj_database();
     if (worker->operation() == nullptr) {
       const std::string why = proj_complaint();
       throw CrsError("PROJ cannot compute '" + definition_ + "'" + (why.empty() ? "" : ": " + why),
