@@ -102,6 +102,27 @@ TEST(CoordinateSystem, ReadsWhatPeopleWrite) {
   EXPECT_TRUE(CoordinateSystem::of(esri.crs(), "store")->same_places(esri));
 }
 
+/// What LAS, LAZ, COPC and GeoTIFF are given is read as the same system, whichever way the axes
+/// point.
+TEST(CoordinateSystem, WhatFilesAreGivenReadsBack) {
+  for (const char* const code :
+       {"EPSG:5513", "EPSG:2065", "EPSG:8352", "EPSG:8044", "EPSG:8045", "EPSG:5514", "EPSG:2053",
+        "EPSG:32632", "EPSG:25832+7837", "EPSG:4326", "EPSG:4979", "EPSG:31468", "ESRI:102067"}) {
+    SCOPED_TRACE(code);
+    const CoordinateSystem known = CoordinateSystem::parse(code);
+    const auto read = CoordinateSystem::of({.wkt = known.crs_with_wkt1().wkt}, "file");
+    ASSERT_TRUE(read);
+    EXPECT_TRUE(read->same_places(known));
+    EXPECT_EQ(read->crs().epsg, known.crs().epsg);
+    EXPECT_EQ(read->heights(), known.heights());
+    const auto keyed = CoordinateSystem::of(known.crs_with_keys(), "file");
+    ASSERT_TRUE(keyed);
+    EXPECT_TRUE(keyed->same_places(known));
+  }
+  // WKT 1 wherever it says all.
+  EXPECT_TRUE(CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt.starts_with("PROJCS["));
+}
+
 TEST(CoordinateSystem, HeightsOfTheCodes) {
   const auto heights = [](const char* text) { return CoordinateSystem::parse(text).heights(); };
   EXPECT_EQ(heights("EPSG:32632"), Heights::unknown);

@@ -110,6 +110,10 @@ void check(const Code& row, Findings& found) {
     if (!same_places(read, definition) || read.epsg() != row.code) {
       found.fault(row.code, "its WKT reads back as another system");
     }
+    const CoordinateSystem system(definition);
+    if (!mean_the_same(system.crs_with_wkt1().wkt, wkt_of(definition))) {
+      found.fault(row.code, "what is written to LAS reads back as another system");
+    }
   } catch (const CrsError& error) {
     ++found.refused;
     if (!is_one_of(kBeyondProj, row.code)) found.fault(row.code, error.what());

@@ -124,11 +124,28 @@ std::string wkt_of(const CrsDefinition& definition) {
          text + "," + definition.height_wkt + "]";
 }
 
+bool mean_the_same(const std::string& wkt, const std::string& other) {
+  try {
+    const CrsDefinition a = definition_of_contents(wkt), b = definition_of_contents(other);
+    return a.epsg() == b.epsg() && a.heights == b.heights && same_places(a, b);
+  } catch (const CrsError&) {
+    return false;
+  }
+}
+
 std::string wkt1_of(const CrsDefinition& definition) {
-  const ProjObject crs = proj_crs_of_text(wkt_of(definition));
+  const std::string wkt = wkt_of(definition);
+  const ProjObject crs = proj_crs_of_text(wkt);
   if (crs == nullptr) return {};
-  const std::array<const char*, 2> options{"MULTILINE=NO", nullptr};
-  return text_of(proj_as_wkt(proj_context(), crs.get(), PJ_WKT1_GDAL, options.data()));
+  // GDAL leaves axes out, which count where they do not point east and north (Krovak's).
+  for (const char* const axes : {"OUTPUT_AXIS=AUTO", "OUTPUT_AXIS=YES"}) {
+    const std::array<const char*, 3> options{"MULTILINE=NO", axes, nullptr};
+    const std::string text =
+        text_of(proj_as_wkt(proj_context(), crs.get(), PJ_WKT1_GDAL, options.data()));
+    check_proj_database();
+    if (!text.empty() && mean_the_same(text, wkt)) return text;
+  }
+  return {};
 }
 
 std::string proj_pipeline_of(const CrsDefinition& definition) {

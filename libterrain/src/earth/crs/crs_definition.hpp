@@ -121,8 +121,10 @@ void set_vertical_epsg(CrsDefinition& definition, int code);
 void forget_heights(CrsDefinition& definition);
 /// The system as WKT 2 (ISO 19162:2019), with a shift as a bound CRS.
 std::string wkt_of(const CrsDefinition& definition);
-/// The same as WKT 1, as GDAL writes it; empty where that cannot say it.
+/// The same as WKT 1, as GDAL writes it; empty where that cannot say it, as is known by reading it.
 std::string wkt1_of(const CrsDefinition& definition);
+/// Whether both texts, when they are read, give the same code, places and kind of heights.
+bool mean_the_same(const std::string& wkt, const std::string& other);
 
 /// What a source or a store says, whichever way; nothing if it says nothing of a CRS, or names a
 /// local one. Throws: CrsError.

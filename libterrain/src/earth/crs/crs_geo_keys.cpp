@@ -481,7 +481,8 @@ std::vector<stream::GeoKey> geo_keys_of(const CrsDefinition& definition) {
                           : std::string();
   };
   std::string wkt = written(PJ_WKT1_ESRI);
-  if (wkt.empty()) wkt = definition.wkt;
+  // ESRI's form has no axes, and its parameters are not those of every method.
+  if (wkt.empty() || !mean_the_same(wkt, definition.wkt)) wkt = definition.wkt;
   // GDAL looks for that citation where the model is nobody's.
   return {number(1024, kUserDefined), number(3072, kUserDefined),
           stream::GeoKey{.key = 3073, .text = "ESRI PE String = " + wkt}};
