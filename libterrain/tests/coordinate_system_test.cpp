@@ -123,6 +123,17 @@ TEST(CoordinateSystem, WhatFilesAreGivenReadsBack) {
   EXPECT_TRUE(CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt.starts_with("PROJCS["));
 }
 
+TEST(CoordinateSystem, AGeocentricSystemIsNamedButHasNoTerrain) {
+  const stream::Crs crs = crs_named("EPSG:4978");
+  EXPECT_EQ(crs.epsg, 0);
+  EXPECT_EQ(crs.horizontal_unit, "metre");
+  EXPECT_EQ(crs.vertical_unit, "metre");
+  EXPECT_TRUE(crs.wkt.starts_with("GEODCRS[")) << crs.wkt;
+  EXPECT_FALSE(CoordinateSystem::of(crs, "store"));
+  EXPECT_FALSE(CoordinateSystem::of({.epsg = 4978}, "file"));
+  EXPECT_THROW(CoordinateSystem::parse("EPSG:4978"), UsageError);
+}
+
 TEST(CoordinateSystem, HeightsOfTheCodes) {
   const auto heights = [](const char* text) { return CoordinateSystem::parse(text).heights(); };
   EXPECT_EQ(heights("EPSG:32632"), Heights::unknown);
@@ -276,7 +287,7 @@ TEST(CoordinateSystem, AFileMaySpellACrsAsItLikes) {
   std::ofstream(file) << "EPSG:32632";
   EXPECT_EQ(definition_of_text(file).epsg(), 32632);
   EXPECT_EQ(title(file).find("refused"), 0U);
-  EXPECT_EQ(local_crs_in(file), std::nullopt);
+  EXPECT_EQ(local_crs_of({.wkt = file}), std::nullopt);
 }
 
 TEST(CoordinateSystem, WktMayHaveParentheses) {

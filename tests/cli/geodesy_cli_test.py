@@ -283,6 +283,33 @@ class GeodesyTest(unittest.TestCase):
                 self.assertIn('proj.db', result.stderr)
                 self.assertIn('cannot be read', result.stderr)
 
+    def test_a_geocentric_cloud_is_points_in_space(self):
+        cloud = self.cloud([(4027893.75 + 3 * i, 307041.99 + 2 * i) for i in range(50)])
+        store = self.path('space')
+        result = terrace('build', cloud, '--crs', 'EPSG:4978', '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('geocentric', result.stderr + result.stdout)
+        self.assertIn('GEODCRS', self.info(store)['crs']['wkt'])
+        self.assertEqual(len(self.points(store)), 50)
+        self.ok('verify', store)
+        las = self.path('space.las')
+        self.ok('points', store, '-o', las)
+        self.assertEqual(len(self.points(self.build(las))), 50)
+        for args in (['raster', store, '--cell', 1, '-o', self.path('a.tif')],
+                     ['contour', store, '--interval', 1, '-o', self.path('a.geojson')],
+                     ['tile', store, '-o', self.path('tiles')],
+                     ['profile', store, '--line', '4027893,307041,4027900,307050', '-o', self.path('a.csv')],
+                     ['mesh', store, '-o', self.path('a.ply')],
+                     ['mesh', store, '--max-error', 1, '-o', self.path('a.ply')],
+                     ['sample', store, '--points', self.places()]):
+            with self.subTest(args=args):
+                self.assertIn('geocentric', self.refused(1, *args))
+
+    def places(self):
+        with open(self.path('places.csv'), 'w', encoding='utf-8') as file:
+            file.write('x,y\n4027893,307041\n')
+        return self.path('places.csv')
+
     def test_info_says_what_counts_as_wgs84(self):
         etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
         self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))

@@ -19,6 +19,23 @@ void need_points(const stream::Store& store, const std::string& what) {
                        .remedy = "build a store of the vertices: leave `entities` out"});
 }
 
+bool is_geocentric(const stream::Crs& recorded) {
+  // WKT 2 as PROJ writes it: that of a geographic system begins with GEOGCRS.
+  return recorded.wkt.starts_with("GEODCRS[");
+}
+
+void need_terrain(const stream::Store& store, const std::string& what) {
+  need_points(store, what);
+  const stream::Crs& crs = store.schema().crs;
+  if (!is_geocentric(crs)) return;
+  throw stream::Error({.file = store.path().string(),
+                       .where = {},
+                       .cause = "has the geocentric CRS \"" + crs.name +
+                                "\", in which z is not a height, and " + what + " needs heights",
+                       .remedy = "convert the points to a projected CRS and build a store of "
+                                 "those, or make a surface of the scan"});
+}
+
 void need_level(const stream::Store& store, unsigned level) {
   if (level <= store.top()) return;
   throw UsageError("the store has no level " + std::to_string(level) + ": its top is level " +

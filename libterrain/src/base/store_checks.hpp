@@ -12,6 +12,10 @@ namespace terrace::terrain {
 
 /// Throws: stream::Error if the store holds anything but points; `what` needs them.
 void need_points(const stream::Store& store, const std::string& what);
+/// True for a CRS, as a store records it, whose x, y and z count from the middle of the earth.
+bool is_geocentric(const stream::Crs& recorded);
+/// need_points(), and that z is a height. Throws: stream::Error for a store in a geocentric CRS.
+void need_terrain(const stream::Store& store, const std::string& what);
 /// Throws: UsageError if the store has no such level.
 void need_level(const stream::Store& store, unsigned level);
 /// Throws: stream::Error if the clusters of a level and of those above do not have as many points

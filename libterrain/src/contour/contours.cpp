@@ -59,7 +59,7 @@ bool reaches_into(const StoredBox& box, const Region& region, const GroundSlope&
 ContourOutcome write_contours(const stream::Store& given, const ContourRequest& request,
                               const std::function<void(std::string_view)>& write,
                               const Context& context) {
-  need_points(given, "a contour");
+  need_terrain(given, "a contour");
   const stream::Store store = given.with_stop(context.stop);
   const std::uint64_t memory = context.memory_or(0);
   need_level(store, request.level);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "earth/source_crs.hpp"
 
+#include "base/store_checks.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
@@ -81,7 +82,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   std::string sidecar;
   std::optional<stream::Crs> local;
   if (!found.system) {
-    local = local_crs_in(info.crs.wkt);
+    local = local_crs_of(info.crs);
     if (!local) found.system = system_of_sidecars(info, sidecar, local, found.note);
   } else if (!info.crs.geo_keys.empty()) {
     // A file that tells its own CRS needs no other; one beside it must not say anything else.
@@ -95,9 +96,17 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   }
   if (!found.system) {
     if (local) {
+      found.crs.epsg = 0;
       found.crs.name = local->name;
       found.crs.wkt = local->wkt;
       if (found.crs.horizontal_unit.empty()) found.crs.horizontal_unit = local->horizontal_unit;
+      if (found.crs.vertical_unit.empty()) found.crs.vertical_unit = local->vertical_unit;
+      if (is_geocentric(found.crs)) {
+        found.note = "the CRS \"" + local->name +
+                     "\" is geocentric, with x, y and z from the middle of the earth: z is not a "
+                     "height, and what needs a terrain will not work";
+        return found;
+      }
     }
     if (info.crs.vertical_epsg != 0) {
       CrsDefinition heights;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
@@ -27,7 +28,9 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
         {.file = file,
          .where = {},
          .cause = name.empty() ? "has no CRS"
-                               : "has the CRS \"" + name + "\", which has no place on the earth",
+                  : is_geocentric(store.schema().crs)
+                      ? "has the geocentric CRS \"" + name + "\", which is not converted"
+                      : "has the CRS \"" + name + "\", which has no place on the earth",
          .remedy = "build it anew with `crs` EPSG:n" + otherwise});
   }
   return system->over(world_box(store.schema(), store.bounds()));

@@ -365,6 +365,7 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   const stream::Store store = given.with_stop(context.stop);
   const MetricChoice::Kind kind = options.metric.kind;
   if (holds_lines(store.schema())) need_points(store, "a mesh");
+  if (is_geocentric(store.schema().crs)) need_terrain(store, "a mesh over x and y");
   if (entities_of(store.schema()) == stream::Entities::triangles) {
     if (kind != MetricChoice::Kind::euclidean || options.heights.any()) {
       throw UsageError(

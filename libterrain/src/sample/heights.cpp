@@ -13,7 +13,7 @@ namespace terrace::terrain {
 
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& given,
                                             const SamplerOptions& options, const Context& context) {
-  need_points(given, "the height of a place");
+  need_terrain(given, "the height of a place");
   const stream::Store store = given.with_stop(context.stop);
   need_level(store, options.level);
   if (!store.schema().grid || options.level > 0) return make_point_sampler(store, options, context);

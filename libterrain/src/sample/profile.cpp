@@ -203,7 +203,7 @@ double largest_height(const stream::Store& store) {
 ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context) {
-  need_points(store, "a profile");
+  need_terrain(store, "a profile");
   if (request.line.size() < 2) throw UsageError("a profile needs a line of two places or more");
   for (const Point2& place : request.line) {
     constexpr double kFarthest = 0x1p40;  // columns and rows must differ by 1 there

@@ -319,7 +319,7 @@ class RasterRun {
 
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
                            const Context& context) {
-  need_points(store, "a raster");
+  need_terrain(store, "a raster");
   const stream::Store source = store.with_stop(context.stop);
   const ProgressReport report(context, "cells");
   return RasterRun(source, request, context).run(store.schema().coordinates[2], report);

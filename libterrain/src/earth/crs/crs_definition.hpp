@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "earth/crs/projection.hpp"
 #include "terrace/stream/error.hpp"
@@ -48,14 +49,29 @@ class UnreadableCrs : public CrsError {
 class LocalCrs : public CrsError {
  public:
   explicit LocalCrs(const stream::Crs& crs)
-      : CrsError("the CRS \"" + crs.name + "\" is a local one, without a place on the earth",
-                 "name one that has: EPSG:n"),
-        crs_(crs) {}
+      : LocalCrs(crs, "the CRS \"" + crs.name + "\" is a local one, without a place on the earth",
+                 "name one that has: EPSG:n") {}
   /// As stores record it.
   [[nodiscard]] const stream::Crs& crs() const { return crs_; }
 
+ protected:
+  LocalCrs(stream::Crs crs, const std::string& cause, std::string remedy)
+      : CrsError(cause, std::move(remedy)), crs_(std::move(crs)) {}
+
  private:
   stream::Crs crs_;
+};
+
+/// A geocentric system: x, y and z count from the middle of the earth, so z is not a height. Its
+/// points are stored like those of a local system.
+class GeocentricCrs : public LocalCrs {
+ public:
+  explicit GeocentricCrs(const stream::Crs& crs)
+      : LocalCrs(crs,
+                 "the CRS \"" + crs.name +
+                     "\" is geocentric, with x, y and z from the middle of the earth",
+                 "take a geographic or projected one, by `crs` where a file is mistaken; cs2cs "
+                 "converts points") {}
 };
 
 /// "metre", "foot", "US survey foot", "kilometre"; else empty.
@@ -110,9 +126,10 @@ CrsDefinition definition_of_contents(const std::string& text);
 /// The contents of such a file, without a byte order mark and white space around them; of a larger
 /// file only as much as shows that it is too large.
 std::string contents_of_file(const std::string& name);
-/// The local system that such a text describes; nothing if it is another or none.
+/// The local or geocentric system that such a text describes; nothing if it is another or none.
 std::optional<stream::Crs> local_crs_named(const std::string& text);
-std::optional<stream::Crs> local_crs_in(const std::string& contents);
+/// The same for what a source or a store says.
+std::optional<stream::Crs> local_crs_of(const stream::Crs& crs);
 /// The system of an EPSG code: geographic, projected or compound. Throws: CrsError.
 CrsDefinition definition_of_epsg(int code);
 /// Sets the vertical part from the code of a vertical system. Throws: CrsError.
@@ -127,7 +144,7 @@ std::string wkt1_of(const CrsDefinition& definition);
 bool mean_the_same(const std::string& wkt, const std::string& other);
 
 /// What a source or a store says, whichever way; nothing if it says nothing of a CRS, or names a
-/// local one. Throws: CrsError.
+/// local or geocentric one. Throws: CrsError.
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
 
 /// The projection of a system that is not geographic: from longitudes (from its prime meridian) and

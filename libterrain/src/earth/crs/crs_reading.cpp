@@ -193,13 +193,14 @@ void read_horizontal(const PJ* crs, CrsDefinition& definition) {
     if (!axes.empty()) local.horizontal_unit = unit_name(axes[0].unit);
     throw LocalCrs(local);
   }
-  const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
   if (type == PJ_TYPE_GEOCENTRIC_CRS) {
-    throw CrsError("the CRS \"" + definition.name +
-                       "\" is geocentric, with x, y and z from the middle of the earth",
-                   "take a geographic or projected one, by `crs` where a file is mistaken; cs2cs "
-                   "converts points");
+    stream::Crs local;
+    local.name = definition.name;
+    local.wkt = wkt_of(crs);
+    local.horizontal_unit = local.vertical_unit = unit_name(axes_of(crs).at(0).unit);
+    throw GeocentricCrs(local);
   }
+  const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
   if (!geographic && type != PJ_TYPE_PROJECTED_CRS) {
     throw CrsError("the CRS \"" + definition.name + "\" is neither geographic nor projected",
                    kByCode);

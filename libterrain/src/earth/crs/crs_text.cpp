@@ -351,18 +351,10 @@ std::optional<stream::Crs> local_crs_named(const std::string& text) {
   return std::nullopt;
 }
 
-std::optional<stream::Crs> local_crs_in(const std::string& contents) {
-  try {
-    definition_of_contents(contents);
-  } catch (const LocalCrs& local) {
-    return local.crs();
-  } catch (const CrsError&) {
-    // The caller reports it when it uses the text.
-  }
-  return std::nullopt;
-}
+namespace {
 
-std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
+/// As definition_of(). Throws: LocalCrs for a local or geocentric one.
+std::optional<CrsDefinition> definition_or_local(const stream::Crs& crs) {
   CrsDefinition definition;
   constexpr std::string_view kEsri = "ESRI PE String = ";
   const std::string wkt = !crs.wkt.empty()              ? crs.wkt
@@ -376,11 +368,7 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
                std::find(kUnits.begin(), kUnits.end(), key.key) == kUnits.end();
       });
   if (!wkt.empty()) {
-    try {
-      definition = definition_of_contents(wkt);
-    } catch (const LocalCrs&) {
-      return std::nullopt;
-    }
+    definition = definition_of_contents(wkt);
     if (crs.epsg != 0 && definition.epsg() != 0 && alias_of(crs.epsg) != definition.epsg()) {
       throw ContradictoryCrs("its CRS is EPSG:" + std::to_string(crs.epsg) + " by code and EPSG:" +
                                  std::to_string(definition.epsg()) + " by WKT",
@@ -407,6 +395,27 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
     definition.metres_per_height = *height;
   }
   return definition;
+}
+
+}  // namespace
+
+std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
+  try {
+    return definition_or_local(crs);
+  } catch (const LocalCrs&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<stream::Crs> local_crs_of(const stream::Crs& crs) {
+  try {
+    static_cast<void>(definition_or_local(crs));
+  } catch (const LocalCrs& local) {
+    return local.crs();
+  } catch (const CrsError&) {
+    // The caller that needs the definition reports it.
+  }
+  return std::nullopt;
 }
 
 }  // namespace terrace::terrain

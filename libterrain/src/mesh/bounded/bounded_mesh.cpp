@@ -65,7 +65,7 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
 
 BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                      const Context& context) {
-  need_points(store, "a bounded mesh");
+  need_terrain(store, "a bounded mesh");
   const stream::Store source = store.with_stop(context.stop);
   if (store.schema().grid) {
     const char* const remedy = options.fill == Fill::none

@@ -218,7 +218,7 @@ double TileSetOptions::max_error(unsigned zoom) const {
 
 TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request,
                          const Context& context) {
-  need_points(store, "a tile");
+  need_terrain(store, "a tile");
   check_request(request);
   const TileResources resources = tile_resources(context, store.path().string());
   const TileFolder folder(request.folder, request.replace, request.resume);
