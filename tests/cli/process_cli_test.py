@@ -22,6 +22,8 @@ import threading
 import time
 import unittest
 
+from small_tiff import utm, write_tiff
+
 TERRACE = os.environ.get('TERRACE', 'terrace')
 # A library that makes each start of a thread fail; preloaded.
 NO_THREADS = os.environ.get('NO_THREADS')
@@ -329,6 +331,104 @@ class WaitTest(ProcessTest):
             process.send_signal(signal.SIGINT)
             code, error = self.end_of(process)
         self.assertEqual(code, 130, error)
+
+
+class StopTest(ProcessTest):
+    """Long work ends soon after a signal, whatever loop it is in, and leaves no files."""
+
+    def cloud(self):
+        if not os.path.exists(self.path('cloud')):
+            self.run_ok('synth', 'clusters', '--points', '200000', '-o', self.path('cloud.las'))
+            self.run_ok('build', self.path('cloud.las'), '-o', self.path('cloud'))
+        return self.path('cloud')
+
+    def extent(self):
+        box = json.loads(self.run_ok('info', self.cloud(), '--json').stdout)['bounds']
+        return box['min'], box['max']
+
+    def dem(self):
+        if not os.path.exists(self.path('dem')):
+            self.run_ok('synth', 'dem', '--size', '200x200', '-o', self.path('dem.tif'))
+            self.run_ok('build', self.path('dem.tif'), '-o', self.path('dem'))
+        return self.path('dem')
+
+    def sparse(self):
+        """Two small rasters far apart: 400 million cells, nearly all without data."""
+        if not os.path.exists(self.path('sparse')):
+            for name, away in (('a.tif', 0), ('b.tif', 19900)):
+                write_tiff(self.path(name), 100, 100, [float(i % 97) for i in range(10000)],
+                           corner=(500000 + away, 5200000 - away), cell=1, keys=utm(32))
+            self.run_ok('build', self.path('a.tif'), self.path('b.tif'), '-o', self.path('sparse'))
+        return self.path('sparse')
+
+    def assert_stopped(self, output, *args):
+        with self.subTest(args=args):
+            process = self.start(*args, '-o', self.path(output), '-q')
+            wait_until(lambda: any(name.startswith('.' + output) for name in os.listdir(self.folder)))
+            time.sleep(0.5)  # into its work
+            self.assertIsNone(process.poll(), 'it has ended by itself')
+            process.send_signal(signal.SIGTERM)
+            code, error = self.end_of(process)
+            self.assertEqual(code, 130, error)
+            self.assertEqual(error.count('\n'), 1, error)
+            self.assertFalse([name for name in os.listdir(self.folder) if output in name])
+
+    def test_a_raster_of_a_cloud_in_memory(self):
+        low, high = self.extent()
+        for method in ('linear', 'natural', 'nearest'):
+            self.assert_stopped('out.tif', 'raster', self.cloud(), '--method', method, '--cell',
+                                str((high[0] - low[0]) / 50000))
+
+    def test_heights_at_places_of_a_cloud_in_memory(self):
+        low, high = self.extent()
+        with open(self.path('places.csv'), 'w') as file:
+            file.write('x,y\n')
+            for i in range(2000000):
+                at = (i * 0.7548776662466927 % 1, i * 0.5698402909980532 % 1)
+                file.write('%f,%f\n' % tuple(low[k] + at[k] * (high[k] - low[k]) for k in (0, 1)))
+        self.assert_stopped('out.csv', 'sample', self.cloud(), '--method', 'natural', '--points',
+                            self.path('places.csv'))
+
+    def test_a_raster_of_voids(self):
+        self.assert_stopped('out.tif', 'raster', self.sparse())
+        self.assert_stopped('out.tif', 'raster', self.sparse(), '--method', 'natural')
+
+    def test_contours_of_many_levels(self):
+        self.assert_stopped('out.geojson', 'contour', self.dem(), '--interval', '0.001', '--own-crs')
+        low, high = self.extent()
+        self.assert_stopped('out.geojson', 'contour', self.cloud(), '--own-crs', '--interval',
+                            str((high[2] - low[2]) / 1e6))
+
+    def test_a_profile_of_many_steps(self):
+        self.assert_stopped('out.csv', 'profile', self.dem(), '--line', '400000,5200000,405000,5195000',
+                            '--step', '0.00001')
+
+    def test_what_would_never_end_is_refused(self):
+        line = ['--line', '400000,5200000,405000,5195000']
+        for args, what in ((['profile', self.dem(), *line, '--step', '1e-17'], '--step is too small'),
+                           (['profile', self.dem(), *line, '--step', '1e-300'], '--step is too small'),
+                           (['profile', self.dem(), '--line', '0,0,1e12,1e12'], 'the line is too long'),
+                           (['contour', self.dem(), '--interval', '1e-6'], 'levels of 1e-06'),
+                           (['raster', self.dem(), '--cell', '0.0003'], 'of memory')):
+            with self.subTest(args=args):
+                result = terrace(*args, '-o', self.path('out'))
+                self.assertIn(result.returncode, (1, 2))
+                self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
+                self.assertIn(what, result.stderr)
+                self.assertFalse([name for name in os.listdir(self.folder) if 'out' in name])
+
+    def test_work_that_looks_for_no_signal_is_cut_short(self):
+        """A linkage in one piece."""
+        cloud = self.path('large.las')
+        self.run_ok('synth', 'uniform', '--points', '3M', '-o', cloud)
+        process = self.start('cluster', cloud, '--method', 'single', '-o', self.path('out.csv'), '-k', '2')
+        wait_until(lambda: catches_signals(process))
+        time.sleep(3)
+        self.assertIsNone(process.poll(), 'it has ended by itself')
+        process.send_signal(signal.SIGTERM)
+        code, error = self.end_of(process)
+        self.assertEqual(code, 130, error)
+        self.assertEqual(error.count('\n'), 1, error)
 
 
 class OptionTest(ProcessTest):

@@ -28,7 +28,8 @@ bool may_wait(int descriptor) {
 
 }  // namespace
 
-Sink::Sink(const std::string& path, const Naming& replace, const std::stop_token& stop) {
+Sink::Sink(const std::string& path, const Naming& replace, const std::stop_token& stop)
+    : stop_(stop) {
   if (path != kStandardStream) {
     file_.emplace(path, replace);
   } else if (may_wait(STDOUT_FILENO)) {
@@ -38,7 +39,12 @@ Sink::Sink(const std::string& path, const Naming& replace, const std::stop_token
 
 Sink::~Sink() = default;
 
+void Sink::check_stop() const {
+  if (stop_.stop_requested()) throw Stopped();
+}
+
 void Sink::write(std::string_view text) {
+  check_stop();
   size_ += text.size();
   if (file_) {
     file_->write(text);
@@ -74,6 +80,7 @@ void Sink::flush() {
 }
 
 void Sink::commit() {
+  check_stop();
   if (file_) {
     file_->commit();
   } else {

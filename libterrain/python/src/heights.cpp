@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <pybind11/stl.h>
+#include <terrace/stream/error.hpp>
 #include <terrace/stream/raster.hpp>
 #include <terrace/terrain/contours.hpp>
 #include <terrace/terrain/error.hpp>
@@ -98,8 +101,19 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
                                         .own_crs = !(lonlat ? *lonlat : reaches_wgs84(store))};
   const std::string text = Job(how).run([&](const terrain::Context& context) {
     std::string lines;
+    // Twice while the text grows, and once more as Python's.
+    const std::uint64_t most = context.memory_or(0) / 4;
     write_contours(
-        store, request, [&](std::string_view more) { lines += more; }, context);
+        store, request,
+        [&](std::string_view more) {
+          if (lines.size() + more.size() > most) {
+            throw terrain::UsageError("the contours would take more than " + std::to_string(most) +
+                                      " bytes of text, which memory does not hold; give a larger "
+                                      "`interval`");
+          }
+          lines += more;
+        },
+        context);
     return lines;
   });
   return py::make_tuple(text, request.own_crs);
@@ -148,11 +162,21 @@ py::tuple read_geotiff(const std::string& path) {
   py::array_t<std::uint8_t> valid(shape);
   std::fill_n(valid.mutable_data(), valid.size(), std::uint8_t{0});
   std::fill_n(static_cast<std::byte*>(samples.mutable_data()), samples.nbytes(), std::byte{0});
-  const stream::CellBuffer out{.samples = static_cast<std::byte*>(samples.mutable_data()),
-                               .valid = valid.mutable_data(),
-                               .stride = info.columns};
-  released([&] {
-    raster->read_over({.column = 0, .row = 0, .columns = info.columns, .rows = info.rows}, out);
+  auto* const cells = static_cast<std::byte*>(samples.mutable_data());
+  std::uint8_t* const are_valid = valid.mutable_data();
+  const auto size = static_cast<std::size_t>(samples.itemsize());
+  released([&](const std::stop_token& stop) {
+    constexpr std::uint64_t kRows = 256;
+    for (std::uint64_t row = 0; row < info.rows; row += kRows) {
+      if (stop.stop_requested()) throw stream::Stopped();
+      const std::size_t at = row * info.columns;
+      raster->read_over(
+          {.column = 0,
+           .row = row,
+           .columns = info.columns,
+           .rows = std::min(kRows, info.rows - row)},
+          {.samples = cells + at * size, .valid = are_valid + at, .stride = info.columns});
+    }
   });
   return py::make_tuple(samples, valid, py::cast(info.world.xy), name_of_crs(info.crs, path));
 }

@@ -177,7 +177,8 @@ void bind_mesh(py::module_& module) {
   module.def("lines", &lines);
   module.def("bounded_mesh", &bounded_mesh);
   module.def("read_mesh", [](const std::string& path) {
-    auto file = released([&] { return stream::read_mesh(path); });
+    auto file = released(
+        [&](const std::stop_token& stop) { return stream::read_mesh(path, {.stop = stop}); });
     if (!file) throw py::value_error(path + " is not a mesh");
     return arrays_of(terrain::triangle_mesh_of(std::move(*file)));
   });
@@ -200,8 +201,9 @@ void bind_mesh(py::module_& module) {
         }
       }
     }
-    return released(
-        [&] { return terrain::write_mesh(path, mesh, {.replace = replace}, units).note; });
+    return released([&](const std::stop_token& stop) {
+      return terrain::write_mesh(path, mesh, {.replace = replace, .stop = stop}, units).note;
+    });
   });
   module.def("units",
              [](const OpenStore& open) { return to_python(terrain::MeshUnits(open.get())); });

@@ -25,8 +25,11 @@ class PointReader {
  public:
   PointReader(const py::object& source, const py::dict& given, unsigned threads) : held_(source) {
     const OpenSource open = opener_of(source);
-    const stream::SourceOptions options = reading_of(source, given, all_or(threads));
-    source_ = released([&] { return open(options); });
+    stream::SourceOptions options = reading_of(source, given, all_or(threads));
+    source_ = released([&](const std::stop_token& stop) {
+      options.stop = stop;
+      return open(options);
+    });
     type_ = record_type(source_->info());
   }
 

@@ -198,8 +198,9 @@ py::array near(const OpenStore& open, const std::vector<double>& place,
     throw py::value_error("`near` has two or three numbers");
   terrain::NearPlace wanted{.xy = {place[0], place[1]}};
   if (place.size() == 3) wanted.z = place[2];
-  std::vector<std::byte> records = released([&] {
-    stream::StoreQuery query(store);
+  std::vector<std::byte> records = released([&](std::stop_token stop) {
+    const stream::Store heard = store.with_stop(std::move(stop));
+    stream::StoreQuery query(heard);
     return records_of(query, count ? nearest_points(query, wanted, *count, level)
                                    : points_within(query, wanted, radius.value(), level));
   });

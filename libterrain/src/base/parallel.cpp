@@ -9,10 +9,13 @@
 #include <thread>
 #include <vector>
 
+#include <terrace/stream/error.hpp>
+
 namespace terrace::terrain {
 
 void parallel_for(std::size_t items, unsigned threads,
-                  const std::function<void(unsigned, std::size_t)>& work) {
+                  const std::function<void(unsigned, std::size_t)>& work,
+                  const std::stop_token& stop) {
   std::atomic<std::size_t> next{0};
   std::mutex mutex;
   std::exception_ptr failure;
@@ -20,6 +23,7 @@ void parallel_for(std::size_t items, unsigned threads,
   const auto run = [&](unsigned thread) {
     for (std::size_t item = next++; item < items; item = next++) {
       try {
+        if (stop.stop_requested()) throw stream::Stopped();
         work(thread, item);
       } catch (...) {
         const std::lock_guard lock(mutex);
@@ -46,12 +50,16 @@ void parallel_for(std::size_t items, unsigned threads,
 }
 
 void for_bands(std::uint32_t rows, unsigned threads,
-               const std::function<void(std::uint32_t, std::uint32_t)>& work) {
+               const std::function<void(std::uint32_t, std::uint32_t)>& work,
+               const std::stop_token& stop) {
   const std::uint32_t bands = std::clamp<std::uint32_t>(threads * 4, 1, std::max(rows / 16, 1u));
-  parallel_for(bands, threads, [&](unsigned, std::size_t band) {
-    work(static_cast<std::uint32_t>(std::uint64_t{rows} * band / bands),
-         static_cast<std::uint32_t>(std::uint64_t{rows} * (band + 1) / bands));
-  });
+  parallel_for(
+      bands, threads,
+      [&](unsigned, std::size_t band) {
+        work(static_cast<std::uint32_t>(std::uint64_t{rows} * band / bands),
+             static_cast<std::uint32_t>(std::uint64_t{rows} * (band + 1) / bands));
+      },
+      stop);
 }
 
 }  // namespace terrace::terrain

@@ -23,6 +23,8 @@ namespace {
 constexpr std::uint64_t kContourBytesPerPoint = 48;
 constexpr double kMostLevels = 1e15;
 
+/// Lines of more levels than this would be drawn without end.
+constexpr double kMostLevelsDrawn = 1e7;
 stream::Error failure(const stream::Store& store, const std::string& cause,
                       const std::string& remedy) {
   return stream::Error(
@@ -30,6 +32,34 @@ stream::Error failure(const stream::Store& store, const std::string& cause,
 }
 
 }  // namespace
+/// Refuses an interval that is too small for the heights.
+void check_levels(const stream::Store& store, const ContourRequest& request) {
+  const stream::Channel& z = store.schema().coordinates[2];
+  const auto level = [&](double raw) { return (raw * z.scale + z.offset) / request.interval; };
+  const stream::Box3& bounds = store.bounds();
+  if (std::max(std::abs(level(bounds.min[2])), std::abs(level(bounds.max[2]))) > kMostLevels) {
+    throw failure(store, "heights have too many levels of " + number_text(request.interval),
+                  "give a larger `interval`");
+  }
+  double low = bounds.min[2], high = bounds.max[2];
+  if (request.region) {
+    stream::StoreQuery query(store);
+    const GroundSlope ground(store);
+    const auto heights = cluster_heights(query, box_around(*request.region, ground));
+    if (!heights) return;
+    low = heights->low;
+    high = heights->high;
+  }
+  const double levels = std::abs(level(high) - level(low));
+  if (levels <= kMostLevelsDrawn) return;
+  throw failure(store,
+                "between the lowest and the highest point there are " +
+                    with_commas(static_cast<std::uint64_t>(levels)) + " levels of " +
+                    number_text(request.interval) + ", more than " +
+                    with_commas(static_cast<std::uint64_t>(kMostLevelsDrawn)),
+                "give a larger `interval`");
+}
+
 
 StoredBox box_around(const Region& region, const GroundSlope& ground) {
   const stream::Box3& world = region.box();
@@ -63,14 +93,7 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
   const stream::Store store = given.with_stop(context.stop);
   const std::uint64_t memory = context.memory_or(0);
   need_level(store, request.level);
-  const stream::Channel& z = store.schema().coordinates[2];
-  for (const double raw : {store.bounds().min[2], store.bounds().max[2]}) {
-    if (store.points() > 0 &&
-        std::abs((raw * z.scale + z.offset) / request.interval) > kMostLevels) {
-      throw failure(store, "heights have too many levels of " + number_text(request.interval),
-                    "give a larger `interval`");
-    }
-  }
+  if (store.points() > 0) check_levels(store, request);
   ContourText text(store, request, context.threads, write);
   const ProgressReport report(context, "lines");
   ContourParts parts{
@@ -88,7 +111,8 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
                               with_commas(memory / 3 / kContourBytesPerPoint) +
                               " points, too many for `memory_bytes`",
                           "raise `memory_bytes` or `interval`, or take a smaller `region`");
-                    }},
+                    },
+                .stop = context.stop},
       .progress = [&](double share) { report.update(text.outcome().lines, share); },
   };
   if (store.schema().grid && request.level == 0) {

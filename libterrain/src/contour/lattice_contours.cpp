@@ -79,27 +79,30 @@ void draw_lattice_contours(const ContourParts& parts) {
   for (std::int64_t row = 0; row + 1 < lattice.rows; row += band) {
     const std::int64_t rows = std::min(band + 1, lattice.rows - row);
     heights.resize(static_cast<std::size_t>(lattice.columns * rows));
-    parallel_for(windows, parts.threads, [&](unsigned thread, std::size_t i) {
-      if (readers[thread] == nullptr) {
-        readers[thread] = std::make_unique<StoreWindow>(store);
-      }
-      const std::int64_t column = static_cast<std::int64_t>(i) * kWindow;
-      const LatticeWindow window{lattice.column + column, lattice.row + row,
-                                 std::min(kWindow, lattice.columns - column), rows};
-      std::vector<double> part(window.size(), NAN);
-      // The squares of the samples at the window's sides reach half a cell out of it.
-      const StoredBox around{
-          {static_cast<double>(window.column - 1), static_cast<double>(window.row - 1)},
-          {static_cast<double>(window.column + window.columns),
-           static_cast<double>(window.row + window.rows)}};
-      if (!request.region || reaches_into(around, *request.region, ground)) {
-        readers[thread]->heights(window, std::span(part));
-      }
-      for (std::int64_t r = 0; r < rows; ++r) {
-        std::copy_n(part.begin() + r * window.columns, window.columns,
-                    heights.begin() + r * lattice.columns + column);
-      }
-    });
+    parallel_for(
+        windows, parts.threads,
+        [&](unsigned thread, std::size_t i) {
+          if (readers[thread] == nullptr) {
+            readers[thread] = std::make_unique<StoreWindow>(store);
+          }
+          const std::int64_t column = static_cast<std::int64_t>(i) * kWindow;
+          const LatticeWindow window{lattice.column + column, lattice.row + row,
+                                     std::min(kWindow, lattice.columns - column), rows};
+          std::vector<double> part(window.size(), NAN);
+          // The squares of the samples at the window's sides reach half a cell out of it.
+          const StoredBox around{
+              {static_cast<double>(window.column - 1), static_cast<double>(window.row - 1)},
+              {static_cast<double>(window.column + window.columns),
+               static_cast<double>(window.row + window.rows)}};
+          if (!request.region || reaches_into(around, *request.region, ground)) {
+            readers[thread]->heights(window, std::span(part));
+          }
+          for (std::int64_t r = 0; r < rows; ++r) {
+            std::copy_n(part.begin() + r * window.columns, window.columns,
+                        heights.begin() + r * lattice.columns + column);
+          }
+        },
+        parts.limit.stop);
     lines.add(heights, rows, wanted);
     parts.progress(static_cast<double>(row) / static_cast<double>(lattice.rows));
   }

@@ -9,8 +9,11 @@
 #include <iterator>
 #include <limits>
 #include <span>
+#include <stop_token>
 #include <utility>
 #include <vector>
+
+#include <terrace/stream/error.hpp>
 
 #include "terrace/terrain/region.hpp"
 
@@ -23,10 +26,12 @@ struct ContourLine {
   std::vector<Point2> points;
 };
 
-/// How many points lines that are not whole may have.
+/// Limits that end the joining of lines early.
 struct OpenLineLimit {
+  /// Most points of lines that are not whole.
   std::uint64_t points = std::numeric_limits<std::uint64_t>::max();
   std::function<void()> exceeded{};  ///< called beyond; must throw
+  std::stop_token stop{};            ///< ends with stream::Stopped
 };
 
 /// Segments of a line one after another. Segments have an order; a line that closes begins behind
@@ -66,6 +71,7 @@ class LineJoiner {
   void add(const LineStretch<Crossing>& stretch) {
     const std::span<const Point2> points = stretch.points;
     segments_ += points.size() - 1;
+    if (limit_.stop.stop_requested()) throw stream::Stopped();
     if (open_points_ > limit_.points) limit_.exceeded();
     const std::uint64_t number = next_number_ + stretch.number;
     const std::uint32_t from_hash = hash_of(stretch.from), to_hash = hash_of(stretch.to);

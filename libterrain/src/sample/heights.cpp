@@ -39,7 +39,8 @@ std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<con
                    const std::size_t begin = piece * kPlacesAtOnce;
                    const std::size_t end = std::min(begin + kPlacesAtOnce, places.size());
                    for (std::size_t i = begin; i < end; ++i) work(i);
-                 });
+                 },
+                 context.stop);
   };
   in_pieces([&](std::size_t i) { stored[i] = ground.stored(places[i]); });
   sampler->sample(stored, surface);

@@ -51,6 +51,7 @@ class NaturalBlock {
       const std::array<tri::Point2, 1> place{
           tri::Point2{places[i][0] - static_cast<double>(window.column),
                       places[i][1] - static_cast<double>(window.row)}};
+      reader.query().store().check_stop();
       const double height = tri::heights_at(triangulation_, heights_, place,
                                             tri::Interpolation::kNaturalNeighbour, 1)[0];
       const tri::Gradient gradient = tri::gradients_at(triangulation_, heights_, place,
@@ -87,17 +88,20 @@ class LatticeSampler final : public HeightSampler {
         raster_{0, 0, static_cast<std::int64_t>(store.schema().columns),
                 static_cast<std::int64_t>(store.schema().rows)},
         tile_(options.method == tri::Interpolation::kNaturalNeighbour ? kNaturalTile : kTile),
+        stop_(context.stop),
         workers_(std::max(1U, context.threads)) {}
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {
     std::fill(out.begin(), out.end(), SurfacePoint{});
     sort_by_tile(places);
-    parallel_for(tiles_.size(), static_cast<unsigned>(workers_.size()),
-                 [&](unsigned thread, std::size_t i) {
-                   std::unique_ptr<Worker<T>>& worker = workers_[thread];
-                   if (worker == nullptr) worker = std::make_unique<Worker<T>>(store_);
-                   answer_tile(*worker, tiles_[i], places, out);
-                 });
+    parallel_for(
+        tiles_.size(), static_cast<unsigned>(workers_.size()),
+        [&](unsigned thread, std::size_t i) {
+          std::unique_ptr<Worker<T>>& worker = workers_[thread];
+          if (worker == nullptr) worker = std::make_unique<Worker<T>>(store_);
+          answer_tile(*worker, tiles_[i], places, out);
+        },
+        stop_);
   }
 
  private:
@@ -218,6 +222,7 @@ class LatticeSampler final : public HeightSampler {
   std::int64_t tile_;
   std::vector<std::unique_ptr<Worker<T>>> workers_;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed_;
+  std::stop_token stop_;
   std::vector<std::uint32_t> order_;
   std::vector<Tile> tiles_;
 };

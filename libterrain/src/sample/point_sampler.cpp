@@ -91,6 +91,7 @@ void sample_line(const stream::Store& store, const SamplerOptions& options, cons
   const auto& points = window.triangulation();
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Point2& place = places[i];
+    store.check_stop();
     if (!std::isfinite(place[0]) || !std::isfinite(place[1])) continue;
     const SurfacePoint linear = window.at(place);
     if (options.method == tri::Interpolation::kLinear) {
@@ -171,7 +172,8 @@ class PointSampler final : public HeightSampler {
       if (!numbers_in(part).empty()) parts.push_back(&part);
     });
     parallel_for(
-        parts.size(), static_cast<unsigned>(workers_.size()), [&](unsigned thread, std::size_t i) {
+        parts.size(), static_cast<unsigned>(workers_.size()),
+        [&](unsigned thread, std::size_t i) {
           std::unique_ptr<CloudWorker>& worker = workers_[thread];
           if (worker == nullptr) {
             worker = std::make_unique<CloudWorker>(store_, options_.level, hull_, too_long_, voids_,
@@ -182,7 +184,8 @@ class PointSampler final : public HeightSampler {
             return answer_along(*worker, parts[i]->box, numbers_in(*parts[i]), places, out);
           }
           work_on(*worker, *parts[i], places, out);
-        });
+        },
+        stop_);
   }
 
  private:
@@ -209,7 +212,8 @@ class PointSampler final : public HeightSampler {
                      if (!counts(places[i])) continue;
                      keys_[i] = static_cast<std::uint32_t>(tree_.window_of(places[i]));
                    }
-                 });
+                 },
+                 stop_);
     begin_.assign(tree_.size() + 1, 0);
     for (const std::uint32_t key : keys_) {
       if (key != kNone) ++begin_[key + 1];
@@ -286,6 +290,7 @@ class PointSampler final : public HeightSampler {
     for (const std::uint64_t one : worker.along) {
       const auto i = static_cast<std::uint32_t>(one);
       out[i] = answer(worker.surface, places[i]);
+      store_.check_stop();
     }
   }
 
@@ -335,6 +340,7 @@ class PointSampler final : public HeightSampler {
   SamplerOptions options_;
   std::uint64_t memory_;
   PointHull hull_;
+  std::stop_token stop_;
   std::shared_ptr<PointVoids> voids_;
   WindowTree tree_;
   TooLong too_long_;

@@ -25,6 +25,8 @@ namespace {
 
 constexpr std::size_t kRowsAtOnce = 65536;
 
+/// More are refused: they would be written without end.
+constexpr double kMostRows = 1e9;
 Point2 between(const Point2& a, const Point2& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
 }
@@ -35,6 +37,7 @@ class ProfileRun {
              const std::function<void(std::span<const ProfilePoint>)>& take, const Context& context)
       : request_(request),
         take_(take),
+        context_(context),
         ground_(store),
         distance_(LineDistance::of(store)),
         sampler_(make_sampler(store, request.sampler, context)) {
@@ -46,6 +49,7 @@ class ProfileRun {
 
   ProfileOutcome run() {
     add(line_.front(), 0);
+    check_rows();
     for (std::size_t leg = 0; leg + 1 < line_.size(); ++leg) {
       const Point2 &a = line_[leg], &b = line_[leg + 1];
       if (request_.step) {
@@ -64,6 +68,24 @@ class ProfileRun {
 
  private:
   /// Every so many metres of the leg.
+  /// Refuses a profile of too many rows.
+  void check_rows() const {
+    double rows = 0;
+    for (std::size_t leg = 0; leg + 1 < line_.size(); ++leg) {
+      const Point2 &a = line_[leg], &b = line_[leg + 1];
+      if (request_.step) {
+        rows += distance_.between(a, b) / *request_.step;
+      } else if (!crossings_) {
+        const Point2 from = ground_.stored(a), to = ground_.stored(b);
+        rows += 2 * (std::abs(to[0] - from[0]) + std::abs(to[1] - from[1]));
+      }
+    }
+    if (!(rows > kMostRows)) return;
+    throw UsageError(std::string(request_.step ? "`step` is too small" : "the line is too long") +
+                     ": the profile would have more than " +
+                     with_commas(static_cast<std::uint64_t>(kMostRows)) + " rows");
+  }
+
   void walk(const Point2& a, const Point2& b) {
     const double step = *request_.step;
     // So short that neither the line's bend nor the map's changing scale shows.
@@ -71,6 +93,7 @@ class ProfileRun {
     Point2 from = a;
     for (double i = 1; i <= pieces; ++i) {
       const Point2 to = i == pieces ? b : between(a, b, i / pieces);
+      context_.check_stop();
       const double length = distance_.between(from, to);
       for (double next = next_step_ * step; next <= outcome_.metres + length;
            next = ++next_step_ * step) {
@@ -115,6 +138,7 @@ class ProfileRun {
         at[k] = t_of(k);
       }
       // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
+      context_.check_stop();
       if (t - last_t <= 1e-12 && last_t > 0) continue;
       const Point2 here = between(a, b, t);
       outcome_.metres += distance_.along(last, here);
@@ -152,6 +176,7 @@ class ProfileRun {
 
   void flush() {
     surface_.assign(stored_.size(), {});
+    context_.check_stop();
     const tri::Interpolation method = request_.sampler.method;
     if (method == tri::Interpolation::kLinear) {
       for (std::size_t i = 0; i < stored_.size(); ++i) {
@@ -179,6 +204,7 @@ class ProfileRun {
 
   const ProfileRequest& request_;
   const std::function<void(std::span<const ProfilePoint>)>& take_;
+  const Context& context_;
   GroundSlope ground_;
   LineDistance distance_;
   std::vector<Point2> line_;

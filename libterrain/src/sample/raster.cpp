@@ -221,23 +221,26 @@ class RasterRun {
     places_.resize(width_ * height);
     surface_.resize(places_.size());
     heights_.resize(places_.size());
-    parallel_for(height, context_.threads, [&](unsigned, std::size_t j) {
-      const std::span<Point2> line(places_.data() + j * width_, width_);
-      const auto cell = [](std::int64_t first, std::size_t i) {
-        return static_cast<double>(first + static_cast<std::int64_t>(i));
-      };
-      const double y = grid_.y + grid_.step_y * cell(first_row_, j);
-      for (std::size_t i = 0; i < width_; ++i) {
-        line[i] = {grid_.x + grid_.step_x * cell(first_column_, i), y};
-      }
-      if (request_.to) request_.to->reverse(line);
-      for (Point2& p : line) {
-        p = ground_.turned(p);
-        const bool wanted =
-            !request_.region || request_.region->polygons().empty() || request_.region->covers(p);
-        p = wanted ? ground_.stored(p) : Point2{NAN, NAN};
-      }
-    });
+    parallel_for(
+        height, context_.threads,
+        [&](unsigned, std::size_t j) {
+          const std::span<Point2> line(places_.data() + j * width_, width_);
+          const auto cell = [](std::int64_t first, std::size_t i) {
+            return static_cast<double>(first + static_cast<std::int64_t>(i));
+          };
+          const double y = grid_.y + grid_.step_y * cell(first_row_, j);
+          for (std::size_t i = 0; i < width_; ++i) {
+            line[i] = {grid_.x + grid_.step_x * cell(first_column_, i), y};
+          }
+          if (request_.to) request_.to->reverse(line);
+          for (Point2& p : line) {
+            p = ground_.turned(p);
+            const bool wanted = !request_.region || request_.region->polygons().empty() ||
+                                request_.region->covers(p);
+            p = wanted ? ground_.stored(p) : Point2{NAN, NAN};
+          }
+        },
+        context_.stop);
     sampler_->sample(places_, surface_);
     for (std::size_t i = 0; i < surface_.size(); ++i) heights_[i] = surface_[i].height;
   }
@@ -245,9 +248,12 @@ class RasterRun {
   void make_tiles(std::span<const TilePlace> block, stream::GeoTiffWriter& writer) {
     tiles_.resize(block.size());
     counts_.assign(block.size(), 0);
-    parallel_for(block.size(), context_.threads, [&](unsigned, std::size_t i) {
-      make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
-    });
+    parallel_for(
+        block.size(), context_.threads,
+        [&](unsigned, std::size_t i) {
+          make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
+        },
+        context_.stop);
     for (std::size_t i = 0; i < block.size(); ++i) {
       outcome_.cells_with_data += counts_[i];
       const std::span<const std::byte> samples = tiles_[i];

@@ -56,6 +56,7 @@ class Answers {
       : store_(store),
         threads_(context.threads),
         file_(file),
+        stop_(context.stop),
         sampler_(make_sampler(store, options, context)),
         ground_(store) {}
 
@@ -68,43 +69,49 @@ class Answers {
     surface_.assign(lines, SurfacePoint{});
     if (conversions.to_written) written_.resize(lines);
     if (layout_) {
-      parallel_for(pieces, threads_, [&](unsigned, std::size_t piece) {
-        for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
-          if (!is_place(batch, i)) continue;
-          places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
-        }
-        const std::span<Point2> here(places_.data() + piece * kLines,
-                                     end_of(piece) - piece * kLines);
-        if (conversions.to_written) {
-          const std::span<Point2> there(written_.data() + piece * kLines, here.size());
-          std::copy(here.begin(), here.end(), there.begin());
-          conversions.to_written(there);
-        }
-        if (conversions.to_store) conversions.to_store(here);
-        for (Point2& p : here) p = ground_.stored(p);
-      });
+      parallel_for(
+          pieces, threads_,
+          [&](unsigned, std::size_t piece) {
+            for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
+              if (!is_place(batch, i)) continue;
+              places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
+            }
+            const std::span<Point2> here(places_.data() + piece * kLines,
+                                         end_of(piece) - piece * kLines);
+            if (conversions.to_written) {
+              const std::span<Point2> there(written_.data() + piece * kLines, here.size());
+              std::copy(here.begin(), here.end(), there.begin());
+              conversions.to_written(there);
+            }
+            if (conversions.to_store) conversions.to_store(here);
+            for (Point2& p : here) p = ground_.stored(p);
+          },
+          stop_);
       sampler_->sample(places_, surface_);
     }
     texts_.resize(pieces);
     counts_.assign(pieces, {});
     const AnswerText numbers(store_, layout_ ? layout_->separator : ',');
-    parallel_for(pieces, threads_, [&](unsigned, std::size_t piece) {
-      std::string& text = texts_[piece];
-      text.clear();
-      for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
-        append_line(text, batch, i, conversions);
-        if (is_header(batch, i)) {
-          for (const char* name : {"height", "gradient", "slope", "aspect"}) {
-            (text += layout_->separator) += unused_name(name);
+    parallel_for(
+        pieces, threads_,
+        [&](unsigned, std::size_t piece) {
+          std::string& text = texts_[piece];
+          text.clear();
+          for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
+            append_line(text, batch, i, conversions);
+            if (is_header(batch, i)) {
+              for (const char* name : {"height", "gradient", "slope", "aspect"}) {
+                (text += layout_->separator) += unused_name(name);
+              }
+            } else if (is_place(batch, i)) {
+              ++counts_[piece].points;
+              if (!std::isnan(surface_[i].height)) ++counts_[piece].answered;
+              numbers.append(text, surface_[i].height, ground_.on_ground(places_[i], surface_[i]));
+            }
+            text += '\n';
           }
-        } else if (is_place(batch, i)) {
-          ++counts_[piece].points;
-          if (!std::isnan(surface_[i].height)) ++counts_[piece].answered;
-          numbers.append(text, surface_[i].height, ground_.on_ground(places_[i], surface_[i]));
-        }
-        text += '\n';
-      }
-    });
+        },
+        stop_);
     SampleCounts sum;
     for (std::size_t piece = 0; piece < pieces; ++piece) {
       write(texts_[piece]);
@@ -166,6 +173,7 @@ class Answers {
   const stream::Store& store_;
   unsigned threads_;
   const PlaceFile& file_;
+  std::stop_token stop_;
   std::unique_ptr<HeightSampler> sampler_;
   GroundSlope ground_;
   std::optional<PlaceLayout> layout_;

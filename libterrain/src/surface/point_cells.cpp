@@ -21,6 +21,8 @@ constexpr double kCrowd = 48;
 constexpr std::size_t kFewInCells = 16;
 /// That a thread decodes at a time.
 constexpr std::uint64_t kClustersAtOnce = 256;
+/// Points sorted between two checks for a stop.
+constexpr std::size_t kBetweenChecks = std::size_t{1} << 20;
 
 }  // namespace
 
@@ -149,6 +151,7 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
       const auto from = static_cast<std::uint32_t>(std::uint64_t{rows_} * band / bands);
       const auto to = static_cast<std::uint32_t>(std::uint64_t{rows_} * (band + 1) / bands);
       for (std::size_t i = 0; i < places.size(); ++i) {
+        if (i % kBetweenChecks == 0) store.check_stop();
         const std::uint32_t row = index(1, places[i][1], rows_);
         if (row >= from && row < to) take(cell(places[i]), i);
       }

@@ -7,11 +7,9 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <future>
 #include <new>
 #include <system_error>
 #include <thread>
-#include <utility>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -40,7 +38,12 @@ extern "C" void on_stop_signal(int signal) {
   errno = error;
 }
 
-/// Passes the signal on to `stop`. If no thread can be started, only loops that poll the flag end.
+/// How long work may go on after a request to stop.
+constexpr std::chrono::seconds kGrace{2};
+
+/// Passes the signal on to `stop`, and ends the process if it does not end by itself, as in the
+/// middle of a large triangulation. That is as safe as to kill it: nothing partial has its final
+/// name. If no thread can be started, only loops that poll the flag end.
 void watch_for_signals(const std::stop_source& stop) {
   if (wake_pipe[0] < 0) return;
   // Signals are to interrupt system calls of the other threads, not of this one.
@@ -53,30 +56,14 @@ void watch_for_signals(const std::stop_source& stop) {
       while (::read(wake_pipe[0], &byte, 1) < 0 && errno == EINTR) {
       }
       stop.request_stop();
+      std::this_thread::sleep_for(kGrace);
+      print_message(kStopped);
+      // Not exit(): other threads would still run during the destructors.
+      std::_Exit(130);
     }).detach();
   } catch (const std::system_error&) {
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
-}
-
-void run_interruptible(const std::function<void()>& work) {
-  std::packaged_task<void()> task(work);
-  std::future<void> done = task.get_future();
-  std::thread worker;
-  try {
-    worker = std::thread(std::move(task));
-  } catch (const std::system_error&) {
-    return work();  // the system grants no thread: Ctrl-C ends what looks for it
-  }
-  using namespace std::chrono_literals;
-  while (done.wait_for(50ms) != std::future_status::ready) {
-    if (!interrupted() || done.wait_for(1s) == std::future_status::ready) continue;
-    print_message(kStopped);
-    // Not exit(): the worker would still run during the destructors.
-    std::_Exit(130);
-  }
-  worker.join();
-  done.get();
 }
 
 }  // namespace
@@ -94,6 +81,7 @@ void install_signal_handlers() {
   std::signal(SIGPIPE, SIG_IGN);
   // Beyond a file size limit, writes fail with an error that can be reported.
   std::signal(SIGXFSZ, SIG_IGN);
+  static_cast<void>(stop_token());  // from here on signals are watched for
 }
 
 bool interrupted() noexcept { return stop_requested; }
@@ -119,7 +107,7 @@ stream::Store open_store(const std::filesystem::path& path, const std::string& w
 void call_library(const std::string& file, const std::string& method,
                   const std::function<void()>& work) {
   try {
-    run_interruptible(work);
+    work();
   } catch (const std::invalid_argument& error) {
     throw stream::Error({.file = file, .where = {}, .cause = error.what(), .remedy = {}});
   } catch (const std::bad_alloc&) {

@@ -13,8 +13,9 @@ namespace terrace::tools {
 /// What the user is told who has asked to stop.
 inline constexpr const char* kStopped = "interrupted; run the same command again to start over";
 
-/// From then on SIGINT and SIGTERM only ask to stop (the second one ends the process at once), and
-/// a closed pipe is an error of the write instead of a signal.
+/// From then on SIGINT and SIGTERM ask to stop, and a closed pipe is an error of the write instead
+/// of a signal. Work that does not end within two seconds is cut short with exit code 130; a second
+/// signal ends the process at once.
 void install_signal_handlers();
 
 /// True once the user has asked to stop. Cheap; may be called from any thread.
@@ -31,10 +32,8 @@ void check_interrupt();
 /// The same request as a token: reading and writing pipes ends with stream::Stopped.
 [[nodiscard]] std::stop_token stop_token();
 
-/// Does long work of a library on points in memory. `work` runs on a thread of its own; if the user
-/// asks to stop and it does not end by itself within a second, the process ends here with a message
-/// and exit code 130, so it must not be writing anything. Exceptions are rethrown,
-/// std::invalid_argument and std::bad_alloc as a stream::Error that names the file.
+/// Does work of a library on points in memory. Exceptions are rethrown, std::invalid_argument and
+/// std::bad_alloc as a stream::Error that names the file.
 void call_library(const std::string& file, const std::string& method,
                   const std::function<void()>& work);
 

@@ -45,6 +45,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 40> kOptions
     {"resolution", "--resolution"},
     {"resume", "--resume"},
     {"shift", "--towgs84"},
+    {"step", "--step"},
     {"threads", "--threads"},
     {"to_crs", "--to-crs"},
     {"vertical", "--vertical"},

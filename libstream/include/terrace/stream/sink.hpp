@@ -20,14 +20,14 @@ class StopWaiter;
 /// standard output.
 class Sink {
  public:
-  /// replace: an existing file. stop: ends a wait for the reader of standard output. Throws: as
-  /// AtomicFile.
+  /// replace: an existing file. stop: ends writing, and a wait for the reader of standard output.
+  /// Throws: as AtomicFile.
   Sink(const std::string& path, const Naming& replace, const std::stop_token& stop = {});
   ~Sink();
   Sink(const Sink&) = delete;
   Sink& operator=(const Sink&) = delete;
 
-  /// Throws: Error if writing fails; for standard output also ClosedPipe and Stopped, here or in
+  /// Throws: Error if writing fails, Stopped, and for standard output ClosedPipe; each here or in
   /// commit().
   void write(std::string_view text);
   void write(std::span<const std::byte> bytes) {
@@ -42,10 +42,12 @@ class Sink {
 
  private:
   void flush();
+  void check_stop() const;
 
   std::optional<AtomicFile> file_;      ///< nullopt: standard output
   std::string pending_;                 ///< for standard output
   std::unique_ptr<StopWaiter> waiter_;  ///< if standard output may block
+  std::stop_token stop_;
   std::uint64_t size_ = 0;
 };
 

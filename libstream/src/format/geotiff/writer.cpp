@@ -106,8 +106,12 @@ struct GeoTiffWriter::Impl {
 
   [[nodiscard]] std::size_t sample_bytes() const { return size_of(options.sample.type); }
 
+  void check_stop() const {
+    if (options.stop.stop_requested()) throw Stopped();
+  }
   void put(std::size_t level, std::uint32_t across, std::uint32_t down,
            std::span<const std::byte> samples) {
+    check_stop();
     Waiting& tile_there = waiting[waiting_count++];
     tile_there.level = level;
     tile_there.number = std::size_t{down} * levels[level].across + across;
@@ -218,7 +222,7 @@ void GeoTiffWriter::Impl::finish_with_overviews() {
   for (std::size_t level = levels.size(); level-- > 0;) {
     for (std::size_t i = 0; i < levels[level].tiles(); ++i) {
       if (spooled[level].bytes[i] == 0) continue;
-      if (options.stop.stop_requested()) throw Stopped();
+      check_stop();
       coded.resize(spooled[level].bytes[i]);
       spool->read(spooled[level].offsets[i], coded);
       std::string leader;
@@ -275,6 +279,7 @@ void GeoTiffWriter::write_tile(std::uint32_t across, std::uint32_t down,
 
 void GeoTiffWriter::commit() {
   Impl& impl = *impl_;
+  impl.check_stop();
   assert(!impl.by_rows || impl.next_row == impl.options.rows);
   if (impl.spool) {
     impl.finish_with_overviews();
