@@ -10,6 +10,7 @@ import json
 import os
 import re
 import resource
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -389,6 +390,83 @@ class StoreMemoryTest(MemoryCase):
         clustering = ('cluster', points, '--method', 'k-means', '-k', '5', '--threads', 2)
         needs = self.needed(64, octree, *clustering)
         self.within(needs, *clustering, '-o', octree)
+
+
+class PromiseTest(MemoryCase):
+    """Every verb keeps within --memory, or says what it needs before it starts."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.dem, cls.raster = cls.path('dem.tif'), cls.path('dem.store')
+        cls.las, cls.cloud = cls.path('cloud.las'), cls.path('cloud.store')
+        cls.places, cls.mesh = cls.path('places.csv'), cls.path('mesh.ply')
+        for args in (('synth', 'dem', '--size', '2048x2048', '-o', cls.dem),
+                     ('build', cls.dem, '-o', cls.raster),
+                     ('synth', 'clusters', '--points', 1000000, '-o', cls.las),
+                     ('build', cls.las, '-o', cls.cloud),
+                     ('mesh', cls.raster, '--level', 1, '-o', cls.mesh)):
+            code, _, err, _ = run(*args)
+            assert code == 0, err
+        with open(cls.places, 'w') as file:
+            file.write('x,y\n')
+            file.writelines(f'{400000 + i * 7919 % 61440},{5138560 + i * 4729 % 61440}\n'
+                            for i in range(200000))
+
+    def commands(self):
+        out = lambda name: ['-o', self.path(name)]
+        line = '401000,5150000,460000,5190000'
+        small = ['--size', '640x480']
+        return [['info', self.raster], ['info', self.dem], ['info', self.las],
+                ['verify', self.raster], ['verify', self.cloud],
+                ['points', self.raster, '--level', 1, *out('out.xyz')],
+                ['points', self.cloud, *out('out.las')],
+                ['points', self.cloud, '--near', '0,0', '-k', 9, *out('out.csv')],
+                ['mesh', self.raster, '--level', 2, *out('out.ply')],
+                ['mesh', self.raster, '--max-error', 20, *out('out.ply')],
+                ['surface', self.cloud, '--level', 'top', *out('out.ply')],
+                ['tile', self.raster, '--zoom', '0-8', '--vertical', 'ellipsoidal', *out('out')],
+                ['sample', self.raster, '--points', self.places, *out('out.csv')],
+                ['sample', self.raster, '--points', self.places, '--method', 'natural', *out('out.csv')],
+                ['sample', self.cloud, '--points', self.places, *out('out.csv')],
+                ['raster', self.raster, '--cell', 60, *out('out.tif')],
+                ['raster', self.raster, '--cell', 0.0003, *out('out.tif')],
+                ['raster', self.cloud, *out('out.tif')],
+                ['profile', self.raster, '--line', line, *out('out.csv')],
+                ['profile', self.cloud, '--line', '0,0,1,1', *out('out.csv')],
+                ['contour', self.raster, '--interval', 500, *out('out.geojson')],
+                ['contour', self.cloud, '--interval', 0.5, '--own-crs', *out('out.geojson')],
+                ['cluster', self.las, '--method', 'k-means', '-k', 5, *out('out.csv')],
+                ['match', self.las, *out('out.csv')],
+                ['render', self.raster, *out('out.png')],
+                ['render', self.raster, '--level', 0, *out('out.png')],
+                ['render', self.raster, *small, '--level', 1, *out('out.png')],
+                ['render', self.cloud, *small, '--level', 'top', *out('out.png')],
+                ['render', self.dem, *out('out.png')], ['render', self.las, *small, *out('out.png')],
+                ['render', self.mesh, *small, *out('out.png')],
+                ['publish', self.raster, *out('out')],
+                ['synth', 'dem', '--size', '2048x2048', *out('out.tif')],
+                ['synth', 'dem', '--size', '4000000x4000000', *out('out.tif')],
+                ['synth', 'uniform', '--points', 1000000, *out('out.las')],
+                ['convert', self.las, *out('out.xyz')], ['convert', self.dem, *out('out.laz')],
+                ['build', self.las, *out('out')], ['build', self.dem, *out('out')]]
+
+    def test_every_verb_keeps_it_or_refuses(self):
+        for command in self.commands():
+            for memory in (1, 8, 32, 64, 128):
+                with self.subTest(command=command, memory=memory):
+                    code, _, err, peak = run(*command, '--memory', f'{memory}M', '--threads', 2, '-q')
+                    made = [name for name in os.listdir(self.folder.name) if name.startswith(('out', '.out'))]
+                    if code == 0:
+                        self.assertLessEqual(peak, memory * MIB * 1.05, f'{peak >> 20} MiB')
+                    else:
+                        self.assertEqual((code, made), (1, []), err)
+                        self.assertEqual(len(err.splitlines()), 1, err)
+                        self.assertRegex(err, r'--memory|memory limit|\d ?Mi?B? ')
+                        self.assertLessEqual(peak, max(memory, 24) * MIB * 1.05, err)
+                    for name in made:
+                        path = self.path(name)
+                        (shutil.rmtree if os.path.isdir(path) else os.remove)(path)
 
 
 class MachineMemoryTest(MemoryCase):

@@ -123,6 +123,11 @@ std::optional<std::uint64_t> cgroup_memory_limit(const fs::path& proc) {
   return least;
 }
 
+std::uint64_t working_memory(const Context& context) {
+  const std::uint64_t memory = context.memory_or(0);
+  return memory - std::min(memory, kProcessBytes);
+}
+
 std::uint64_t available_memory_bytes() {
   std::uint64_t bytes = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
                         static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));

@@ -9,6 +9,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/available_memory.hpp"
 #include "base/progress_report.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
@@ -22,16 +23,15 @@ namespace {
 /// Bytes per point of an unfinished line (the vector doubles while it grows).
 constexpr std::uint64_t kContourBytesPerPoint = 48;
 constexpr double kMostLevels = 1e15;
-
 /// Lines of more levels than this would be drawn without end.
 constexpr double kMostLevelsDrawn = 1e7;
+
 stream::Error failure(const stream::Store& store, const std::string& cause,
                       const std::string& remedy) {
   return stream::Error(
       {.file = store.path().string(), .where = {}, .cause = cause, .remedy = remedy});
 }
 
-}  // namespace
 /// Refuses an interval that is too small for the heights.
 void check_levels(const stream::Store& store, const ContourRequest& request) {
   const stream::Channel& z = store.schema().coordinates[2];
@@ -60,6 +60,7 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
                 "give a larger `interval`");
 }
 
+}  // namespace
 
 StoredBox box_around(const Region& region, const GroundSlope& ground) {
   const stream::Box3& world = region.box();
@@ -91,7 +92,7 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
                               const Context& context) {
   need_terrain(given, "a contour");
   const stream::Store store = given.with_stop(context.stop);
-  const std::uint64_t memory = context.memory_or(0);
+  const std::uint64_t memory = working_memory(context);
   need_level(store, request.level);
   if (store.points() > 0) check_levels(store, request);
   ContourText text(store, request, context.threads, write);

@@ -10,8 +10,10 @@
 #include <variant>
 #include <vector>
 
+#include "base/available_memory.hpp"
 #include "base/ordered_work.hpp"
 #include "base/store_checks.hpp"
+#include "base/units.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_triangles.hpp"
 #include "contour/part_lines.hpp"
@@ -26,6 +28,8 @@ constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
 /// Several parts are triangulated at once, which costs less per point; a point counts for its share
 /// of the triangulation and of the triangles that wait until lines are drawn.
 constexpr double kMostPointsAtOnce = 1U << 16;
+/// Peak bytes per point where all points are one part.
+constexpr std::uint64_t kBytesPerPointAlone = 1200;
 constexpr double kPartsPerThread = 4;
 constexpr double kBytesPerExpected = 3.0 * PointWindow::kBytesPerPoint + 3 * 240;
 /// Lines that wait to be drawn may have this share of a thread's memory; where levels are closer,
@@ -85,6 +89,18 @@ class PointContours {
 
   void draw() {
     const std::uint64_t memory = parts_.memory_bytes / 2;
+    // The order of the lines depends on the parts, so a whole part must fit.
+    const std::uint64_t least = std::min(
+        kBytesPerWindow, parts_.store.levels()[request_.level].points * kBytesPerPointAlone);
+    if (memory < least) {
+      throw stream::Error({.file = parts_.store.path().string(),
+                           .where = {},
+                           .cause = "contours of its points need " +
+                                    readable_bytes(kProcessBytes + 2 * least) +
+                                    " of memory, `memory_bytes` allows " +
+                                    readable_bytes(kProcessBytes + parts_.memory_bytes),
+                           .remedy = "raise `memory_bytes`, or take a coarser `level`"});
+    }
     const auto threads = static_cast<unsigned>(
         std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, parts_.threads));
     most_segments_ = memory / threads / kShareOfLines / kBytesPerSegment;

@@ -7,14 +7,34 @@
 
 namespace terrace::terrain {
 
-HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells)
-    : full_columns_(columns), full_rows_(rows) {
-  const auto reduced = [this](std::uint64_t n) { return (n + reduction_ - 1) / reduction_; };
-  while (reduced(columns) * reduced(rows) > most_cells && reduction_ < std::max(columns, rows)) {
-    ++reduction_;
+namespace {
+
+std::uint64_t reduced(std::uint64_t size, std::uint64_t reduction) {
+  return (size + reduction - 1) / reduction;
+}
+
+std::uint64_t reduction_for(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells) {
+  std::uint64_t by = 1;
+  while (reduced(columns, by) * reduced(rows, by) > most_cells && by < std::max(columns, rows)) {
+    ++by;
   }
-  columns_ = reduced(columns);
-  rows_ = reduced(rows);
+  return by;
+}
+
+}  // namespace
+
+std::uint64_t HeightGrid::cells(std::uint64_t columns, std::uint64_t rows,
+                                std::uint64_t most_cells) {
+  const std::uint64_t by = reduction_for(columns, rows, most_cells);
+  return reduced(columns, by) * reduced(rows, by);
+}
+
+HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells)
+    : reduction_(reduction_for(columns, rows, most_cells)),
+      columns_(reduced(columns, reduction_)),
+      rows_(reduced(rows, reduction_)),
+      full_columns_(columns),
+      full_rows_(rows) {
   sums_.assign(columns_ * rows_, 0.0);
   counts_.assign(columns_ * rows_, 0);
 }
@@ -33,6 +53,9 @@ TriangleMesh HeightGrid::mesh() const {
   constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   TriangleMesh mesh;
   std::vector<std::uint32_t> vertex(sums_.size(), kNone);
+  const auto filled = sums_.size() - static_cast<std::size_t>(std::ranges::count(counts_, 0U));
+  mesh.positions.reserve(filled);
+  mesh.triangles.reserve(2 * filled);
   // The place of an averaged square is its middle.
   const double shift = 0.5 * static_cast<double>(reduction_ - 1);
   for (std::uint64_t row = 0; row < rows_; ++row) {

@@ -23,6 +23,9 @@ class HeightGrid {
   /// outside are ignored.
   void add(const stream::Point3& cell);
 
+  /// How many cells of that are left.
+  static std::uint64_t cells(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells);
+
   [[nodiscard]] std::uint64_t reduction() const { return reduction_; }
 
   /// Two triangles per square of four cells with data, three cells one. Positions are stored

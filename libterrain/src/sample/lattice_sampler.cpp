@@ -8,6 +8,7 @@
 
 #include <terrace/tri/delaunay2.hpp>
 
+#include "base/available_memory.hpp"
 #include "base/parallel.hpp"
 #include "sample/samplers.hpp"
 #include "surface/lattice_surface.hpp"
@@ -20,6 +21,8 @@ namespace {
 constexpr std::int64_t kTile = 256, kLatticePiece = 32;
 constexpr std::size_t kFew = 100;
 constexpr std::uint64_t kLatticeCacheBytes = std::uint64_t{4} << 20;
+/// Memory of a thread: two readers with their clusters, and the heights of a tile.
+constexpr std::uint64_t kWorkerBytes = std::uint64_t{20} << 20;
 
 /// Natural neighbours of a place in the unit lattice lie within two samples of its square, so a
 /// block of the lattice that is a little larger than the tile has them all.
@@ -48,10 +51,10 @@ class NaturalBlock {
     // One by one: together, the way to a place and with it the last bit of its height would depend
     // on the other places.
     for (const std::uint32_t i : numbers) {
+      reader.query().store().check_stop();
       const std::array<tri::Point2, 1> place{
           tri::Point2{places[i][0] - static_cast<double>(window.column),
                       places[i][1] - static_cast<double>(window.row)}};
-      reader.query().store().check_stop();
       const double height = tri::heights_at(triangulation_, heights_, place,
                                             tri::Interpolation::kNaturalNeighbour, 1)[0];
       const tri::Gradient gradient = tri::gradients_at(triangulation_, heights_, place,
@@ -85,11 +88,12 @@ class LatticeSampler final : public HeightSampler {
   LatticeSampler(const stream::Store& store, const SamplerOptions& options, const Context& context)
       : store_(store),
         options_(options),
+        stop_(context.stop),
         raster_{0, 0, static_cast<std::int64_t>(store.schema().columns),
                 static_cast<std::int64_t>(store.schema().rows)},
         tile_(options.method == tri::Interpolation::kNaturalNeighbour ? kNaturalTile : kTile),
-        stop_(context.stop),
-        workers_(std::max(1U, context.threads)) {}
+        workers_(std::clamp<std::uint64_t>(working_memory(context) / 2 / kWorkerBytes, 1,
+                                           std::max(1U, context.threads))) {}
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {
     std::fill(out.begin(), out.end(), SurfacePoint{});
@@ -218,11 +222,11 @@ class LatticeSampler final : public HeightSampler {
 
   stream::Store store_;
   SamplerOptions options_;
+  std::stop_token stop_;
   LatticeWindow raster_;
   std::int64_t tile_;
   std::vector<std::unique_ptr<Worker<T>>> workers_;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed_;
-  std::stop_token stop_;
   std::vector<std::uint32_t> order_;
   std::vector<Tile> tiles_;
 };

@@ -11,6 +11,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/interpolation.hpp>
 
+#include "base/available_memory.hpp"
 #include "base/parallel.hpp"
 #include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
@@ -90,8 +91,8 @@ void sample_line(const stream::Store& store, const SamplerOptions& options, cons
   window.load(flat(store.bounds()));
   const auto& points = window.triangulation();
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const Point2& place = places[i];
     store.check_stop();
+    const Point2& place = places[i];
     if (!std::isfinite(place[0]) || !std::isfinite(place[1])) continue;
     const SurfacePoint linear = window.at(place);
     if (options.method == tri::Interpolation::kLinear) {
@@ -137,7 +138,8 @@ class PointSampler final : public HeightSampler {
   PointSampler(const stream::Store& store, const SamplerOptions& options, const Context& context)
       : store_(store),
         options_(options),
-        memory_(context.memory_or(0) / 2),
+        stop_(context.stop),
+        memory_(working_memory(context) / 2),
         hull_(store, options.level),
         voids_(std::make_shared<PointVoids>(store_, options.level)),
         tree_(store, options.level, kWindowPoints) {
@@ -288,9 +290,9 @@ class PointSampler final : public HeightSampler {
     }
     std::sort(worker.along.begin(), worker.along.end());
     for (const std::uint64_t one : worker.along) {
+      store_.check_stop();
       const auto i = static_cast<std::uint32_t>(one);
       out[i] = answer(worker.surface, places[i]);
-      store_.check_stop();
     }
   }
 
@@ -338,9 +340,9 @@ class PointSampler final : public HeightSampler {
 
   stream::Store store_;
   SamplerOptions options_;
+  std::stop_token stop_;
   std::uint64_t memory_;
   PointHull hull_;
-  std::stop_token stop_;
   std::shared_ptr<PointVoids> voids_;
   WindowTree tree_;
   TooLong too_long_;

@@ -10,6 +10,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/available_memory.hpp"
 #include "base/file_marks.hpp"
 #include "base/fixed_text.hpp"
 #include "base/store_checks.hpp"
@@ -24,9 +25,9 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kRowsAtOnce = 65536;
-
 /// More are refused: they would be written without end.
 constexpr double kMostRows = 1e9;
+
 Point2 between(const Point2& a, const Point2& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
 }
@@ -36,20 +37,20 @@ class ProfileRun {
   ProfileRun(const stream::Store& store, const ProfileRequest& request,
              const std::function<void(std::span<const ProfilePoint>)>& take, const Context& context)
       : request_(request),
-        take_(take),
         context_(context),
+        take_(take),
         ground_(store),
         distance_(LineDistance::of(store)),
         sampler_(make_sampler(store, request.sampler, context)) {
     for (const Point2& place : request.line) line_.push_back(ground_.turned(place));
     if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
-      crossings_.emplace(store, request.sampler, context.memory_or(0));
+      crossings_.emplace(store, request.sampler, working_memory(context));
     }
   }
 
   ProfileOutcome run() {
-    add(line_.front(), 0);
     check_rows();
+    add(line_.front(), 0);
     for (std::size_t leg = 0; leg + 1 < line_.size(); ++leg) {
       const Point2 &a = line_[leg], &b = line_[leg + 1];
       if (request_.step) {
@@ -67,7 +68,6 @@ class ProfileRun {
   }
 
  private:
-  /// Every so many metres of the leg.
   /// Refuses a profile of too many rows.
   void check_rows() const {
     double rows = 0;
@@ -86,14 +86,15 @@ class ProfileRun {
                      with_commas(static_cast<std::uint64_t>(kMostRows)) + " rows");
   }
 
+  /// Every so many metres of the leg.
   void walk(const Point2& a, const Point2& b) {
     const double step = *request_.step;
     // So short that neither the line's bend nor the map's changing scale shows.
     const double pieces = std::clamp(distance_.pieces(a, b, std::min(1000.0, step / 4)), 16.0, 1e9);
     Point2 from = a;
     for (double i = 1; i <= pieces; ++i) {
-      const Point2 to = i == pieces ? b : between(a, b, i / pieces);
       context_.check_stop();
+      const Point2 to = i == pieces ? b : between(a, b, i / pieces);
       const double length = distance_.between(from, to);
       for (double next = next_step_ * step; next <= outcome_.metres + length;
            next = ++next_step_ * step) {
@@ -137,8 +138,8 @@ class ProfileRun {
         next[k] += begin[k] < end[k] ? 1 : -1;
         at[k] = t_of(k);
       }
-      // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
       context_.check_stop();
+      // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
       if (t - last_t <= 1e-12 && last_t > 0) continue;
       const Point2 here = between(a, b, t);
       outcome_.metres += distance_.along(last, here);
@@ -175,8 +176,8 @@ class ProfileRun {
   }
 
   void flush() {
-    surface_.assign(stored_.size(), {});
     context_.check_stop();
+    surface_.assign(stored_.size(), {});
     const tri::Interpolation method = request_.sampler.method;
     if (method == tri::Interpolation::kLinear) {
       for (std::size_t i = 0; i < stored_.size(); ++i) {
@@ -203,8 +204,8 @@ class ProfileRun {
   }
 
   const ProfileRequest& request_;
-  const std::function<void(std::span<const ProfilePoint>)>& take_;
   const Context& context_;
+  const std::function<void(std::span<const ProfilePoint>)>& take_;
   GroundSlope ground_;
   LineDistance distance_;
   std::vector<Point2> line_;

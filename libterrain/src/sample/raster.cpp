@@ -16,9 +16,11 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/tri/interpolation.hpp>
 
+#include "base/available_memory.hpp"
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "base/store_checks.hpp"
+#include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "sample/raster_grid.hpp"
@@ -167,11 +169,12 @@ class RasterRun {
     options.threads = context_.threads;
     options.replace = request_.replace;
     options.stop = context_.stop;
+    const std::uint64_t memory = room_beside_table(options);
     stream::GeoTiffWriter writer(request_.output, options);
     const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
     const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
     std::int64_t side = 1;
-    while (side < kMostSide && bytes_of(2 * side) <= context_.memory_or(0) / 2) side *= 2;
+    while (side < kMostSide && bytes_of(2 * side) <= memory / 2) side *= 2;
     std::vector<TilePlace> block;
     double done = 0;
     for_each_square({0, 0}, power_of_two(std::max(across, down)), side, {across, down},
@@ -195,6 +198,21 @@ class RasterRun {
   }
 
  private:
+  /// Memory left after the table of the file's tiles. Throws: stream::Error if that is less than
+  /// the table.
+  [[nodiscard]] std::uint64_t room_beside_table(const stream::GeoTiffOptions& options) const {
+    const std::uint64_t table = stream::geotiff_table_bytes(options);
+    const std::uint64_t memory = working_memory(context_);
+    if (table <= memory / 2) return memory - table;
+    throw stream::Error(
+        {.file = request_.output,
+         .where = {},
+         .cause = "a raster of " + with_commas(grid_.columns) + " x " + with_commas(grid_.rows) +
+                  " cells needs " + readable_bytes(kProcessBytes + 2 * table) +
+                  " of memory, `memory_bytes` allows " + readable_bytes(context_.memory_or(0)),
+         .remedy = "give a larger `cell` or a smaller `region`"});
+  }
+
   [[nodiscard]] bool shaded() const { return request_.value == RasterValue::hillshade; }
 
   static double nodata(const stream::Store& store, RasterValue value) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/available_memory.hpp"
 #include "base/fixed_text.hpp"
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
@@ -55,8 +56,8 @@ class Answers {
           const Context& context)
       : store_(store),
         threads_(context.threads),
-        file_(file),
         stop_(context.stop),
+        file_(file),
         sampler_(make_sampler(store, options, context)),
         ground_(store) {}
 
@@ -172,8 +173,8 @@ class Answers {
 
   const stream::Store& store_;
   unsigned threads_;
-  const PlaceFile& file_;
   std::stop_token stop_;
+  const PlaceFile& file_;
   std::unique_ptr<HeightSampler> sampler_;
   GroundSlope ground_;
   std::optional<PlaceLayout> layout_;
@@ -191,9 +192,9 @@ SampleCounts answer_places(const stream::Store& store, const SamplerOptions& opt
                            const std::function<void(std::string_view)>& write,
                            const Context& context) {
   Answers answers(store, options, places, context);
-  const std::uint64_t memory = context.memory_or(0);
+  const std::uint64_t memory = working_memory(context);
   const auto lines = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(memory / 3 / kBytesPerLine, 1000, kMostLines));
+      std::clamp<std::uint64_t>(memory / 4 / kBytesPerLine, 1000, kMostLines));
   const auto bytes = static_cast<std::size_t>(
       std::clamp<std::uint64_t>(memory / 16, std::uint64_t{1} << 20, kMostBytes));
   const ProgressReport report(context, "points");

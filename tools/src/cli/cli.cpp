@@ -129,6 +129,24 @@ void refuse_empty_values(const CLI::App& app) {
   }
 }
 
+/// Least memory of a verb in MiB: the process itself and the smallest buffers. A verb that needs
+/// more for its input refuses the input itself.
+constexpr std::uint64_t kLeastMemory = 24;
+constexpr std::array<std::pair<std::string_view, std::uint64_t>, 4> kLeastMemoryOf{
+    {{"contour", 64}, {"raster", 64}, {"sample", 64}, {"profile", 48}}};
+
+/// Refuses a --memory that is too small for any input.
+void check_memory(const Verb& verb, const CommonOptions& common) {
+  std::uint64_t least = kLeastMemory;
+  for (const auto& [name, mebibytes] : kLeastMemoryOf) {
+    if (name == verb.name) least = mebibytes;
+  }
+  if (!common.memory_bytes || *common.memory_bytes >= least << 20) return;
+  throw std::runtime_error("--memory is " + readable_bytes(*common.memory_bytes) +
+                           ", but `terrace " + verb.name + "` needs " + std::to_string(least) +
+                           " MiB at least; raise --memory");
+}
+
 const Verb& find_verb(const std::string& name) {
   if (name == kVerbToCome) throw UsageError("the verb '" + name + "' is not available yet");
   for (const Verb& verb : verbs()) {
@@ -237,6 +255,7 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
     common.progress = ProgressMode::none;
   }
 
+  check_memory(verb, common);
   const Summary summary = command->run(common);
   try {
     if (common.json) {

@@ -8,9 +8,11 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "base/ordered_work.hpp"
+#include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
 #include "terrace/terrain/error.hpp"
@@ -92,7 +94,7 @@ class Maker {
         progress_(progress),
         columns_(static_cast<std::uint32_t>(options.size.width)),
         rows_(static_cast<std::uint32_t>(options.size.height)),
-        writer_(path, writer_options(options)) {
+        writer_(path, checked(writer_options(options), options.memory_bytes)) {
     // Each thread holds a piece as samples and some rows of lattices, about 48 bytes a column; two
     // pieces more wait until they are written.
     const std::uint64_t per_column = 3 * kSynthTile * sizeof(Sample) + 48;
@@ -127,6 +129,16 @@ class Maker {
     std::vector<Sample> tiles;
     Statistics statistics;
   };
+
+  /// Throws: stream::Error if the table of the file's tiles does not fit.
+  static stream::GeoTiffOptions checked(stream::GeoTiffOptions tiff, std::uint64_t memory_bytes) {
+    const std::uint64_t table = stream::geotiff_table_bytes(tiff);
+    if (table <= memory_bytes / 4) return tiff;
+    throw std::runtime_error("a raster of " + with_commas(tiff.columns) + " x " +
+                             with_commas(tiff.rows) + " cells needs " + readable_bytes(4 * table) +
+                             " of memory, `memory_bytes` allows " + readable_bytes(memory_bytes) +
+                             "; give a smaller --size or more --memory");
+  }
 
   static stream::GeoTiffOptions writer_options(const SynthDemOptions& options) {
     stream::GeoTiffOptions tiff;

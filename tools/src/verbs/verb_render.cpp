@@ -107,18 +107,50 @@ PictureInput from_mesh(stream::MeshFile file) {
   return input;
 }
 
-/// Memory of a point of a cloud until it is drawn.
-constexpr std::uint64_t kPictureBytesPerPoint = 100;
+/// Peak bytes of a pixel: the colours, depths and radii of its samples, two passes of smoothing,
+/// and itself.
+constexpr std::uint64_t kBytesPerPixel = 4 * (16 + 12) + 3;
+/// Peak bytes of a point of a cloud, or of a vertex with its two triangles, while it is drawn.
+constexpr std::uint64_t kDrawnBytesPerPoint = 112;
+/// Memory for reading a file.
+constexpr std::uint64_t kReadingBytes = std::uint64_t{64} << 20;
+
+/// Memory left for the points of a picture after the program and the pixels. Throws: stream::Error
+/// that names the file if that is less than `bytes`.
+std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, std::uint64_t bytes,
+                                const CommonOptions& common) {
+  const std::uint64_t fixed = kProgramMemory + size.width * size.height * kBytesPerPixel;
+  const std::uint64_t memory = common.memory_or(0);
+  if (fixed + bytes <= memory) return memory - fixed;
+  throw stream::Error({.file = path,
+                       .where = {},
+                       .cause = "a picture of " + std::to_string(size.width) + " x " +
+                                std::to_string(size.height) + " pixels of it needs " +
+                                std::to_string(((fixed + bytes) >> 20) + 1) + " MiB, --memory is " +
+                                readable_bytes(memory),
+                       .remedy = "give a smaller --size, a coarser --level, or more --memory"});
+}
+
+/// Cells of a raster that a picture shows at most.
+std::uint64_t cells_of(const ImageSize& size) { return 2 * size.width * size.height; }
 
 PictureInput from_source(const std::string& path, stream::HeightsOfColour colours,
-                         std::uint64_t most_cells, const CommonOptions& common) {
+                         const ImageSize& size, const CommonOptions& common) {
+  const std::uint64_t most_cells = cells_of(size);
+  memory_for_points(path, size, kReadingBytes, common);
   const std::array<std::string, 1> files{path};
-  const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.memory_bytes = common.reading_memory(),
-                                  .heights_of_colour = colours,
-                                  .stop = stop_token()});
+  const std::unique_ptr<stream::PointSource> source = stream::open_source(
+      files, {.memory_bytes = kReadingBytes, .heights_of_colour = colours, .stop = stop_token()});
   const stream::SourceInfo& info = source->info();
-  const std::uint64_t memory = common.memory_or(0);
+  std::uint64_t known = 0;
+  if (info.grid) {
+    known = HeightGrid::cells(info.columns, info.rows, most_cells);
+  } else if (info.points) {
+    known = *info.points;
+  }
+  const std::uint64_t memory =
+      memory_for_points(path, size, kReadingBytes + known * kDrawnBytesPerPoint, common) -
+      kReadingBytes;
 
   PictureInput input;
   std::optional<HeightGrid> grid;
@@ -128,7 +160,7 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
       for (const stream::Point3& p : block.positions) grid->add(p);
     } else {
       append_points(input.mesh, info, block);
-      if (input.mesh.positions.size() > memory / kPictureBytesPerPoint) {
+      if (input.mesh.positions.size() > memory / kDrawnBytesPerPoint) {
         throw stream::Error(
             {.file = path,
              .where = {},
@@ -160,7 +192,8 @@ std::string finest_level(const stream::Store& store, const std::string& region) 
 }
 
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
-                        std::uint64_t most_cells, const CommonOptions& common) {
+                        const ImageSize& size, const CommonOptions& common) {
+  const std::uint64_t most_cells = cells_of(size);
   const stream::Store store = open_store(path, selection.where);
   const bool whole = selection.focuses.empty() && selection.region.empty();
   const stream::Placement& stored = store.schema();
@@ -172,6 +205,9 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   const bool all_cells =
       selection.level == "0" || (selection.level.empty() && store.points() <= kMostCells);
   if (store.schema().grid && whole && all_cells && !selection.triangles) {
+    const std::uint64_t cells =
+        HeightGrid::cells(store.schema().columns, store.schema().rows, most_cells);
+    memory_for_points(path, size, cells * kDrawnBytesPerPoint, common);
     input.mesh = reduced_raster(store, most_cells, common.context());
     put_on_ground(input, stored, Ground(stored));
     return input;
@@ -180,6 +216,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   const std::string level = chosen ? selection.level : finest_level(store, selection.region);
   const Detail detail =
       parse_detail(store, level, selection.region, selection.focuses, RegionConversion(store));
+  memory_for_points(path, size, wanted_points(store, detail) * kDrawnBytesPerPoint, common);
   // These positions are in the CRS already.
   stream::Placement world;
   world.crs = stored.crs;
@@ -232,14 +269,13 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
 /// Throws: stream::Error, UsageError, stream::Stopped.
 PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
                                 const ImageSize& size, const CommonOptions& common) {
-  const std::uint64_t most_cells = 2 * size.width * size.height;
   const auto no_colours = [&] {
     if (selection.colours == stream::HeightsOfColour::none) return;
     throw UsageError("'" + path + "' is not a PNG: --rgb does not apply");
   };
   if (std::filesystem::is_directory(path) || stream::Store::exists(path)) {
     no_colours();
-    return from_store(path, selection, most_cells, common);
+    return from_store(path, selection, size, common);
   }
   if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty() ||
       !selection.where.empty()) {
@@ -248,13 +284,16 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   }
   if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
     no_colours();
+    const std::size_t points =
+        std::max(file->vertices.positions.size(), file->triangles.size() / 2);
+    memory_for_points(path, size, points * kDrawnBytesPerPoint, common);
     if (file->nodata > 0) {
       common.context().say(with_commas(file->nodata) +
                            " triangles are left out: a coordinate of a corner is NaN");
     }
     return from_mesh(std::move(*file));
   }
-  return from_source(path, selection.colours, most_cells, common);
+  return from_source(path, selection.colours, size, common);
 }
 
 /// Degrees of slope at a vertex with that normal.
@@ -304,6 +343,7 @@ class RenderCommand : public Command {
     const ViewDirection view = parse_view(view_);
     const stream::Naming replace = may_replace(output_, common.force);
 
+    memory_for_points(input_, size, 0, common);
     if (is_matching_result(input_)) return render_matching(size, view, replace, common, watch);
     if (!points_file_.empty()) {
       throw UsageError("--points is for what 'terrace match' wrote; '" + input_ +

@@ -41,6 +41,9 @@ struct GeoTiffOptions {
   std::stop_token stop{};  ///< ends commit() of a file with overviews, with Stopped
 };
 
+/// Bytes that a writer takes at most for the table of the file's tiles.
+std::uint64_t geotiff_table_bytes(const GeoTiffOptions& options);
+
 /// Writes a tiled GeoTIFF of one band, in rows from the top or in tiles in any order; BigTIFF where
 /// 4 GiB might not do. The file appears whole and synced with `commit()`, or not at all (see
 /// AtomicFile). Holds one row of tiles when it is given rows, where each tile is, and for each of

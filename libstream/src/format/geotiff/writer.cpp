@@ -235,6 +235,16 @@ void GeoTiffWriter::Impl::finish_with_overviews() {
   }
 }
 
+std::uint64_t geotiff_table_bytes(const GeoTiffOptions& options) {
+  // With overviews the table is held twice while the file is put together, and directories are made
+  // of it one after another.
+  constexpr std::uint64_t kTable = sizeof(std::uint64_t) + sizeof(std::uint32_t);
+  const std::vector<GeoTiffLevel> levels = levels_of(options);
+  std::uint64_t bytes = 3 * kTable * levels.front().tiles();
+  for (const GeoTiffLevel& level : levels) bytes += 2 * kTable * level.tiles();
+  return bytes;
+}
+
 GeoTiffWriter::GeoTiffWriter(const std::filesystem::path& path, const GeoTiffOptions& options) {
   assert(options.columns > 0 && options.rows > 0);
   assert(options.tile > 0 && options.tile % 16 == 0);
@@ -269,6 +279,7 @@ void GeoTiffWriter::write_tile(std::uint32_t across, std::uint32_t down,
   Impl& impl = *impl_;
   assert(!impl.by_rows);
   assert(across < impl.levels.front().across && down < impl.levels.front().down);
+  impl.check_stop();
   if (samples.empty()) {
     impl.overviews.add(across, down, {});
     return;
@@ -279,7 +290,6 @@ void GeoTiffWriter::write_tile(std::uint32_t across, std::uint32_t down,
 
 void GeoTiffWriter::commit() {
   Impl& impl = *impl_;
-  impl.check_stop();
   assert(!impl.by_rows || impl.next_row == impl.options.rows);
   if (impl.spool) {
     impl.finish_with_overviews();
