@@ -2,6 +2,8 @@
 #include "earth/ground.hpp"
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <GeographicLib/Geodesic.hpp>
 #include <gtest/gtest.h>
@@ -85,6 +87,43 @@ TEST(Ground, SaysThatUnknownUnitsAreMetres) {
   const Ground ground{stream::Placement{}};
   EXPECT_NE(ground.assumption().find("metres"), std::string::npos);
   EXPECT_EQ(ground.map(around(0, 0)), (GroundMap{1, 0, 0, 0, 1, 0, 0, 0, 1}));
+}
+
+TEST(Ground, KnowsTheUsualWordsForUnits) {
+  constexpr double kSurveyFoot = 1200.0 / 3937.0;
+  const std::pair<double, std::vector<const char*>> words[] = {
+      {1.0, {"m", "metre", "Meters", " METRES ", "[m]", "mtr"}},
+      {0.3048, {"ft", "Feet", "foot", "Foot_International", "foot (intl)", "ift", "foot_intl"}},
+      {kSurveyFoot,
+       {"ftUS", "us-ft", "US survey feet", "us_survey_foot", "U.S. Survey Foot", "sfoot", "Foot_US",
+        "Foot (US survey)", "usft", "ft-us", "US feet"}},
+      {0.01, {"cm", "centimetre", "Centimeters"}},
+      {0.001, {"mm", "millimeter"}},
+      {0.1, {"dm"}},
+      {1000.0, {"km", "kilometers"}},
+      {0.0254, {"in", "inches"}},
+      {0.9144, {"yd", "Yards"}},
+      {1.8288, {"fathom", "fath"}},
+      {1852.0, {"nmi", "nautical mile"}},
+  };
+  for (const auto& [metres, names] : words) {
+    for (const char* name : names) EXPECT_EQ(metres_in_unit(name), metres) << name;
+  }
+  for (const char* name : {"", "counts", "degree", "f t", "metre squared", "survey"}) {
+    EXPECT_FALSE(metres_in_unit(name)) << name;
+  }
+}
+
+TEST(Ground, SaysWhichUnitOfHeightsIsNotKnown) {
+  stream::Placement placement = geographic(0.01);
+  placement.coordinates[2].unit = "cubits";
+  const Ground ground(placement);
+  EXPECT_EQ(ground.unknown_height_unit(),
+            "the unit of heights, \"cubits\", is not known and taken as metres");
+  EXPECT_EQ(ground.assumption(), ground.unknown_height_unit());
+  placement.coordinates[2].unit = "cm";
+  EXPECT_EQ(Ground(placement).unknown_height_unit(), "");
+  EXPECT_EQ(Ground(placement).metres_vertical(), 0.01);
 }
 
 TEST(Ground, UndoesTheGrowthOfWebMercator) {

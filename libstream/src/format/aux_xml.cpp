@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "format/geotiff/georeference.hpp"
 #include "format/vrt/document.hpp"
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
@@ -23,6 +22,7 @@
 #include "raster/overlay.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -200,7 +200,7 @@ class WithAuxXml final : public Raster {
       sample.offset = offset;
     }
     if (const XmlElement* const element = band.child("UnitType")) {
-      const std::string unit = canonical_unit(std::string(trim(element->text)));
+      const std::string unit = canonical_unit(element->text);
       if (!unit.empty() &&
           takes(!sample.unit.empty(), unit != sample.unit, overrides_, "unit of heights")) {
         sample.unit = info_.crs.vertical_unit = unit;

@@ -10,6 +10,7 @@
 
 #include "base/portable_math.hpp"
 #include "earth/crs/crs_definition.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -19,23 +20,27 @@ struct UnitName {
   double metres;
 };
 
-// The spellings of GeoTIFF citations, WKT and EPSG.
+// The names that stream::canonical_unit() gives.
 constexpr double kSurveyFoot = 1200.0 / 3937.0;
-constexpr std::array<UnitName, 14> kUnits{{
+constexpr std::array<UnitName, 18> kUnits{{
     {"metre", 1.0},
-    {"meter", 1.0},
-    {"metres", 1.0},
-    {"meters", 1.0},
-    {"m", 1.0},
-    {"kilometre", 1000.0},
-    {"km", 1000.0},
     {"foot", 0.3048},
-    {"feet", 0.3048},
-    {"ft", 0.3048},
-    {"international foot", 0.3048},
     {"US survey foot", kSurveyFoot},
-    {"Foot_US", kSurveyFoot},
-    {"US foot", kSurveyFoot},
+    {"kilometre", 1000.0},
+    {"hectometre", 100.0},
+    {"decametre", 10.0},
+    {"decimetre", 0.1},
+    {"centimetre", 0.01},
+    {"millimetre", 0.001},
+    {"inch", 0.0254},
+    {"US survey inch", kSurveyFoot / 12.0},
+    {"yard", 0.9144},
+    {"US survey yard", kSurveyFoot * 3.0},
+    {"fathom", 1.8288},
+    {"mile", 1609.344},
+    {"US survey mile", kSurveyFoot * 5280.0},
+    {"nautical mile", 1852.0},
+    {"Clarke's foot", 0.3047972654},
 }};
 
 bool same_text(std::string_view a, std::string_view b) {
@@ -61,8 +66,9 @@ MetresPerDegree metres_per_degree(double latitude) {
 }
 
 std::optional<double> metres_in_unit(std::string_view unit) {
+  const std::string name = stream::canonical_unit(unit);
   for (const UnitName& known : kUnits) {
-    if (same_text(unit, known.name)) return known.metres;
+    if (name == known.name) return known.metres;
   }
   return std::nullopt;
 }
@@ -100,13 +106,24 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
   }
 
   // The heights' own unit if it is named, else that of a CRS in feet, else metres.
-  if (const auto channel = metres_in_unit(placement_.coordinates[2].unit)) {
+  const std::string& own = placement_.coordinates[2].unit;
+  const std::string& word = own.empty() ? crs.vertical_unit : own;
+  const bool unknown = !word.empty() && !metres_in_unit(word);
+  std::string taken = "metres";
+  if (const auto channel = metres_in_unit(own)) {
     metres_vertical_ = *channel;
   } else if (const auto vertical = metres_in_unit(crs.vertical_unit)) {
     metres_vertical_ = *vertical;
+    taken = "the vertical unit of the CRS";
   } else if (kind_ != Kind::geographic && metres_horizontal_ < 1.0) {
     metres_vertical_ = metres_horizontal_;
-    assume("the unit of heights is unknown and taken as that of x and y");
+    taken = "that of x and y";
+    if (!unknown) assume("the unit of heights is unknown and taken as " + taken);
+  }
+  if (unknown) {
+    unknown_height_unit_ =
+        "the unit of heights, \"" + word + "\", is not known and taken as " + taken;
+    assume(unknown_height_unit_);
   }
   metres_vertical_ *= z_weight;
 }
@@ -189,6 +206,10 @@ GroundMap Ground::map(const stream::Box3& stored) const {
           0,
           0,
           height};
+}
+
+void say_unknown_height_unit(const Ground& ground, const Context& context) {
+  if (!ground.unknown_height_unit().empty()) context.say(ground.unknown_height_unit());
 }
 
 stream::Point3 apply(const GroundMap& map, const stream::Point3& v) {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "terrace/stream/point.hpp"
+#include "terrace/terrain/context.hpp"
 #include "terrace/terrain/crs.hpp"
 
 /// Ground distances. Points are stored as they came, in degrees, feet, or columns and rows; what is
@@ -25,8 +26,8 @@ struct MetresPerDegree {
 /// machine, unlike what calls the C library's sin and cos.
 MetresPerDegree metres_per_degree(double latitude);
 
-/// Metres in one "metre", "foot", "US survey foot" (and their usual spellings, EPSG names, and
-/// "kilometre"); nothing for a unit that is not known.
+/// Metres in a unit of length, by any word that stream::canonical_unit() knows; nothing for a unit
+/// that is not known.
 std::optional<double> metres_in_unit(std::string_view unit);
 
 /// Local ground maps for a source or a store.
@@ -46,6 +47,9 @@ class Ground {
 
   /// What had to be assumed because the source does not say; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
+  /// The part of assumption() that says which unit of heights, named by the source, is not known.
+  /// Empty if it is known or not named. Whatever turns heights into metres reports it.
+  [[nodiscard]] const std::string& unknown_height_unit() const { return unknown_height_unit_; }
   /// Metres in a unit of heights, times the weight of heights.
   [[nodiscard]] double metres_vertical() const { return metres_vertical_; }
 
@@ -60,8 +64,11 @@ class Ground {
   double degrees_ = 1.0;                    ///< of a unit of x, y
   double metres_horizontal_ = 1.0;          ///< of a unit of x, y
   double metres_vertical_ = 1.0;            ///< of a unit of z, weighed
-  std::string assumption_;
+  std::string assumption_, unknown_height_unit_;
 };
+
+/// Tells the user if the unit of the heights, which the job turns into metres, is not known.
+void say_unknown_height_unit(const Ground& ground, const Context& context);
 
 /// map * v.
 stream::Point3 apply(const GroundMap& map, const stream::Point3& v);

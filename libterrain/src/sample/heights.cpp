@@ -30,6 +30,7 @@ std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<con
   constexpr std::size_t kPlacesAtOnce = 16384;
   const std::unique_ptr<HeightSampler> sampler = make_sampler(store, options, context);
   const GroundSlope ground(store);
+  if (options.gradients) say_unknown_height_unit(ground.ground(), context);
   std::vector<Point2> stored(places.size());
   std::vector<SurfacePoint> surface(places.size());
   std::vector<GroundPoint> found(places.size());

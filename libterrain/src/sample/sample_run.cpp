@@ -59,7 +59,9 @@ class Answers {
         stop_(context.stop),
         file_(file),
         sampler_(make_sampler(store, options, context)),
-        ground_(store) {}
+        ground_(store) {
+    say_unknown_height_unit(ground_.ground(), context);
+  }
 
   SampleCounts answer(const PlaceBatch& batch, const PlaceConversions& conversions,
                       const std::function<void(std::string_view)>& write) {

@@ -38,8 +38,7 @@ class GroundSlope {
   /// Metres on the ground between two stored places, straight, as the place between them has it.
   [[nodiscard]] double metres(const Point2& a, const Point2& b) const;
 
-  /// What had to be assumed of units; empty if nothing.
-  [[nodiscard]] const std::string& assumption() const { return ground_.assumption(); }
+  [[nodiscard]] const Ground& ground() const { return ground_; }
 
  private:
   stream::Placement placement_;

@@ -10,6 +10,7 @@
 #include "format/world_file.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -145,21 +146,8 @@ BandMetadata band_metadata(const std::string& xml, unsigned band) {
     const std::string_view role = attribute(tag, "role");
     if (role == "scale") found.scale = number_in(text);
     if (role == "offset") found.offset = number_in(text);
-    if (role == "unittype") found.unit = canonical_unit(std::string(trimmed(text)));
+    if (role == "unittype") found.unit = canonical_unit(text);
   }
-}
-
-std::string canonical_unit(const std::string& text) {
-  for (const char* name : {"m", "metre", "metres", "meter", "meters", "Metre", "Meter", "METERS"}) {
-    if (text == name) return "metre";
-  }
-  for (const char* name : {"ft", "foot", "feet", "international foot", "Foot"}) {
-    if (text == name) return "foot";
-  }
-  for (const char* name : {"us-ft", "sfoot", "US survey foot", "us_survey_foot", "foot_us"}) {
-    if (text == name) return "US survey foot";
-  }
-  return text;
 }
 
 }  // namespace terrace::stream

@@ -24,7 +24,4 @@ struct BandMetadata {
 };
 BandMetadata band_metadata(const std::string& xml, unsigned band);
 
-/// The unit's name as in Channel::unit, if the text is a known spelling; otherwise the text.
-std::string canonical_unit(const std::string& text);
-
 }  // namespace terrace::stream

@@ -14,12 +14,12 @@
 #include <system_error>
 #include <utility>
 
-#include "format/geotiff/georeference.hpp"
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -190,7 +190,7 @@ class VrtReader {
     } else if (part.name == "Offset") {
       info_.sample.offset = number(part.text, "Offset");
     } else if (part.name == "UnitType") {
-      info_.sample.unit = info_.crs.vertical_unit = canonical_unit(std::string(trim(part.text)));
+      info_.sample.unit = info_.crs.vertical_unit = canonical_unit(part.text);
     }
   }
 

@@ -9,6 +9,7 @@
 #include <terrace/tri/least_error.hpp>
 
 #include "base/store_checks.hpp"
+#include "earth/ground.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesher.hpp"
 #include "mesh/bounded/raster_mesher.hpp"
@@ -66,6 +67,7 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
 BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                      const Context& context) {
   need_terrain(store, "a bounded mesh");
+  say_unknown_height_unit(Ground(store.schema()), context);
   const stream::Store source = store.with_stop(context.stop);
   if (store.schema().grid) {
     const char* const remedy = options.fill == Fill::none

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace terrace::stream {
+
+/// The one name that Channel::unit and Crs have for a unit of length, by any usual word for it:
+/// "ft", "Feet", "foot_intl" are "foot", "us-ft", "ftUS", "US survey feet" are "US survey foot".
+/// Words as GDAL, VRT and .aux.xml files, GeoTIFF citations, WKT, EPSG and PROJ have them, in any
+/// case. The text itself, without blanks around it, if it is not such a word.
+std::string canonical_unit(std::string_view text);
+
+}  // namespace terrace::stream
