@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/decimal_multiples.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -88,6 +89,25 @@ TEST(NumberText, ReadsBackAsTheSameDouble) {
   for (const double value : {0.1, 1.0 / 3.0, 1e300, -2.5e-308, 123456789.125}) {
     EXPECT_EQ(std::stod(number_text(value)), value);
   }
+}
+
+// Oracle: the decimal text of the product, read as a double.
+TEST(DecimalMultiples, AreTheDoublesNearestToTheDecimalProducts) {
+  EXPECT_EQ(number_text(DecimalMultiples(0.1)(std::int64_t{3})), "0.3");
+  EXPECT_EQ(number_text(DecimalMultiples(0.1)(std::int64_t{-6})), "-0.6");
+  EXPECT_EQ(number_text(DecimalMultiples(0.7)(std::int64_t{3})), "2.1");
+  EXPECT_EQ(number_text(DecimalMultiples(1e-22)(std::int64_t{7})), "7e-22");
+  for (std::int64_t i = -2000; i <= 2000; ++i) {
+    EXPECT_EQ(DecimalMultiples(0.01)(i), std::stod(std::to_string(i) + "e-2"));
+    EXPECT_EQ(DecimalMultiples(0.00025)(i), std::stod(std::to_string(25 * i) + "e-5"));
+    EXPECT_EQ(DecimalMultiples(12.35)(i), std::stod(std::to_string(1235 * i) + "e-2"));
+  }
+  // Steps without a short decimal, whole ones and huge counts: the product of the doubles.
+  for (const double step : {1.0 / 3.0, 20.0, 1e300, 5e-324, 2.5e18}) {
+    EXPECT_EQ(DecimalMultiples(step)(std::int64_t{1}), step);
+    EXPECT_EQ(DecimalMultiples(step)(std::int64_t{5}), 5 * step);
+  }
+  EXPECT_EQ(DecimalMultiples(0.1)(0x1p53), 0x1p53 * 0.1);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/decimal_multiples.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -17,16 +18,14 @@ namespace terrace::terrain {
 class ContourLevels {
  public:
   /// interval: above 0. Heights must be within 2^50 intervals.
-  explicit ContourLevels(double interval) : interval_(interval) {}
+  explicit ContourLevels(double interval) : heights_(interval) {}
 
-  [[nodiscard]] double height(std::int64_t level) const {
-    return static_cast<double>(level) * interval_;
-  }
+  [[nodiscard]] double height(std::int64_t level) const { return heights_(level); }
 
   /// The lowest level that is not below a height: those below this one lie under the height.
   [[nodiscard]] std::int64_t at_or_above(double height) const {
-    auto level = static_cast<std::int64_t>(std::ceil(height / interval_));
-    // The quotient is rounded; level * interval, as it is written, decides.
+    auto level = static_cast<std::int64_t>(std::ceil(height / heights_.step()));
+    // The quotient is rounded; the level, as it is written, decides.
     while (this->height(level) < height) ++level;
     while (this->height(level - 1) >= height) --level;
     return level;
@@ -69,7 +68,7 @@ class ContourLevels {
   }
 
  private:
-  double interval_;
+  DecimalMultiples heights_;
 };
 
 }  // namespace terrace::terrain

@@ -71,7 +71,7 @@ ContourText::ContourText(const stream::Store& store, const ContourRequest& reque
                          unsigned threads, std::function<void(std::string_view)> write)
     : file_(store.path().string()),
       ground_(store),
-      interval_(request.interval),
+      levels_(request.interval),
       threads_(std::max(1U, threads)),
       write_(std::move(write)),
       number_(request.own_crs ? kOwnDecimals : kDecimals) {
@@ -120,8 +120,9 @@ void ContourText::append(std::string& text, const ContourLine& line,
                          .remedy = "build the store with the right `crs`, or leave the "
                                    "place out with `region`"});
   }
-  text += "{\"type\":\"Feature\",\"properties\":{\"elev\":" +
-          number_text(static_cast<double>(line.level) * interval_) + "},\"geometry\":{\"type\":";
+  text +=
+      "{\"type\":\"Feature\",\"properties\":{\"elev\":" + number_text(levels_.height(line.level)) +
+      "},\"geometry\":{\"type\":";
   const bool beyond = geography_ && std::any_of(places.begin(), places.end(), [](const Point2& p) {
                         return std::abs(p[0]) > 180;
                       });

@@ -11,6 +11,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/fixed_text.hpp"
+#include "contour/contour_levels.hpp"
 #include "contour/line_joiner.hpp"
 #include "earth/geography_patch.hpp"
 #include "surface/ground_slope.hpp"
@@ -42,7 +43,7 @@ class ContourText {
   std::optional<BoxGeography> geography_;  ///< nothing: places stay in the store's CRS
   double middle_ = 0;                      ///< longitude of the store's, NaN if it has none
   bool reverse_;                           ///< higher ground is on the left in the CRS
-  double interval_;
+  ContourLevels levels_;
   unsigned threads_;
   std::function<void(std::string_view)> write_;
   FixedText number_;

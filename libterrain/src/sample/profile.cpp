@@ -11,6 +11,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/available_memory.hpp"
+#include "base/decimal_multiples.hpp"
 #include "base/file_marks.hpp"
 #include "base/fixed_text.hpp"
 #include "base/store_checks.hpp"
@@ -88,16 +89,17 @@ class ProfileRun {
 
   /// Every so many metres of the leg.
   void walk(const Point2& a, const Point2& b) {
-    const double step = *request_.step;
+    const DecimalMultiples multiples(*request_.step);
     // So short that neither the line's bend nor the map's changing scale shows.
-    const double pieces = std::clamp(distance_.pieces(a, b, std::min(1000.0, step / 4)), 16.0, 1e9);
+    const double pieces =
+        std::clamp(distance_.pieces(a, b, std::min(1000.0, multiples.step() / 4)), 16.0, 1e9);
     Point2 from = a;
     for (double i = 1; i <= pieces; ++i) {
       context_.check_stop();
       const Point2 to = i == pieces ? b : between(a, b, i / pieces);
       const double length = distance_.between(from, to);
-      for (double next = next_step_ * step; next <= outcome_.metres + length;
-           next = ++next_step_ * step) {
+      for (double next = multiples(next_step_); next <= outcome_.metres + length;
+           next = multiples(++next_step_)) {
         if (!(length > 0)) break;
         add(between(from, to, (next - outcome_.metres) / length), next);
       }
