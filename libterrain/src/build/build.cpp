@@ -26,6 +26,7 @@
 #include "build/clustering.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
+#include "earth/latitudes.hpp"
 #include "earth/source_crs.hpp"
 #include "terrace/terrain/store_sink.hpp"
 
@@ -331,6 +332,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);
 
+  const LatitudeCheck check_latitude(schema,
+                                     info.files.empty() ? std::string() : info.files.front());
   stream::PointBlock block;
   UndeclaredVoids voids(info);
   std::vector<std::byte> marked;
@@ -345,6 +348,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     }
   };
   while (next()) {
+    check_latitude(block.positions);
     voids.add(block);
     if (payload_bytes > info.payload_size()) {  // room for the mark
       append_zero_byte(block.payload, info.payload_size(), block.positions.size(), marked);

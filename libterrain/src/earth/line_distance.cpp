@@ -7,6 +7,7 @@
 #include "base/portable_math.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
+#include "earth/latitudes.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -23,6 +24,7 @@ LineDistance::LineDistance(std::optional<CoordinateSystem> system, double metres
     : system_(std::move(system)), earth_(earth_of(system_)), metres_per_unit_(metres_per_unit) {}
 
 LineDistance LineDistance::of(const stream::Store& store) {
+  check_latitudes(store);
   const stream::Crs& crs = store.schema().crs;
   return {CoordinateSystem::of(crs, store.path().string()),
           metres_in_unit(crs.horizontal_unit).value_or(1.0)};

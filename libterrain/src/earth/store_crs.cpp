@@ -10,6 +10,7 @@
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
+#include "earth/latitudes.hpp"
 #include "earth/region_crs.hpp"
 #include "earth/source_crs.hpp"
 #include "earth/whole_turns.hpp"
@@ -20,6 +21,7 @@ namespace terrace::terrain {
 
 CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise) {
   const std::string file = store.path().string();
+  check_latitudes(store);
   std::optional<CoordinateSystem> system = CoordinateSystem::of(store.schema().crs, file);
   if (!system) {
     // What is recorded by name alone is a local (engineering) system.

@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
+
+#include <terrace/stream/error.hpp>
 
 #include "base/available_memory.hpp"
 #include "base/fixed_text.hpp"
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
+#include "base/units.hpp"
 #include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {
@@ -78,6 +82,13 @@ class Answers {
             for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
               if (!is_place(batch, i)) continue;
               places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
+              if (!(std::abs(places_[i][1]) > conversions.most_latitude)) continue;
+              throw stream::Error(
+                  {.file = file_.name(),
+                   .where = "line " + std::to_string(batch.first_line + i),
+                   .cause = "the latitude " + number_text(places_[i][1]) + " is beyond a pole",
+                   .remedy = "places are longitude, latitude: name the columns lon and lat, or "
+                             "exchange them"});
             }
             const std::span<Point2> here(places_.data() + piece * kLines,
                                          end_of(piece) - piece * kLines);

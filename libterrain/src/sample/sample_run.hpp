@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,6 +26,8 @@ struct PlaceConversions {
   std::function<void(std::span<Point2>)> to_store;    ///< none: they are in the store's CRS
   std::function<void(std::span<Point2>)> to_written;  ///< none: lines keep their places
   bool writes_degrees = false;                        ///< of to_written
+  /// Of a given y that is a latitude. Beyond it the lines are wrong, not merely off the data.
+  double most_latitude = std::numeric_limits<double>::infinity();
 };
 
 /// Answers every line of `places` by one: its own columns, then height, gradient (rise per run),
@@ -34,7 +37,8 @@ struct PlaceConversions {
 /// are called x and y, or longitude and latitude.
 ///
 /// write: what takes the lines, in order, many at a time. Reports "points".
-/// Throws: stream::Error on bad lines and a damaged store, stream::Stopped, what `write` throws.
+/// Throws: stream::Error on bad lines, latitudes beyond a pole and a damaged store,
+/// stream::Stopped, what `write` throws.
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
                            PlaceFile& places, const PlaceConversions& conversions,
                            const std::function<void(std::string_view)>& write,

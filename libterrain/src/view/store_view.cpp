@@ -2,18 +2,25 @@
 #include "terrace/terrain/store_view.hpp"
 
 #include "earth/ground.hpp"
+#include "earth/latitudes.hpp"
 #include "view/view_impl.hpp"
 
 namespace terrace::terrain {
+namespace {
+
+stream::LinearMap ground_of(const stream::Store& store) {
+  check_latitudes(store);
+  return Ground(store.schema()).map(store.bounds());
+}
+
+}  // namespace
 
 template <class Shown>
 StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& options,
                             Reader reader)
-    : impl_(std::make_unique<Impl>(store, Ground(store.schema()).map(store.bounds()), options,
-                                   [&](FramedSource& source) {
-                                     return reader == Reader::thread ? make_reading_thread(source)
-                                                                     : make_frame_reader(source);
-                                   })) {}
+    : impl_(std::make_unique<Impl>(store, ground_of(store), options, [&](FramedSource& source) {
+        return reader == Reader::thread ? make_reading_thread(source) : make_frame_reader(source);
+      })) {}
 
 template StoreView<std::int32_t>::StoreView(const stream::Store&, const tri::ViewOptions&, Reader);
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,

@@ -78,6 +78,7 @@ class SampleCommand final : public Command {
     PlaceConversions conversions;
     const std::optional<Transformation> given = crs_.given(store, common);
     if (given) {
+      conversions.most_latitude = given->to().most_latitude();
       conversions.to_store = [given](std::span<Point2> here) { given->reverse(here); };
     }
     if (const auto written = crs_.written(store, common, given)) {

@@ -70,6 +70,8 @@ class CoordinateSystem {
   [[nodiscard]] std::string title() const;
   /// Metres in a unit of x and y; 0 if geographic.
   [[nodiscard]] double metres_per_unit() const;
+  /// The y of the north pole where y is a latitude, else infinite.
+  [[nodiscard]] double most_latitude() const;
   /// What leads once around the earth along x, in its unit: 360 degrees, or the width of a
   /// Mercator map; 0 if x does not lead around.
   [[nodiscard]] double turn() const;
@@ -93,15 +95,15 @@ class CoordinateSystem {
   [[nodiscard]] bool counts_as_wgs84() const;
 
   /// x, y to longitude and latitude of WGS 84 in degrees, in place, and back. What has no place
-  /// there becomes NaN. Longitudes lie in [-180, 180], but those of a geographic system that counts
-  /// as WGS 84 are left as they are (0 to 360 stays so). 0.6 to 5 million places per second.
-  /// Throws: stream::Error if no operation leads there.
+  /// there, as a latitude beyond a pole, becomes NaN. Longitudes lie in [-180, 180], but those of a
+  /// geographic system that counts as WGS 84 are left as they are (0 to 360 stays so). 0.6 to 5
+  /// million places per second. Throws: stream::Error if no operation leads there.
   void to_geographic(std::span<Point2> places) const;
   void from_geographic(std::span<Point2> places) const;
   [[nodiscard]] Point2 to_geographic(Point2 place) const;
   [[nodiscard]] Point2 from_geographic(Point2 place) const;
 
-  /// The same on the system's own datum and ellipsoid (from Greenwich): no shift, no condition.
+  /// The same on the system's own datum and ellipsoid (from Greenwich), without a shift.
   void to_own_geographic(std::span<Point2> places) const;
   void from_own_geographic(std::span<Point2> places) const;
 
@@ -152,8 +154,9 @@ class Transformation {
   std::shared_ptr<const DatumChange> change_;
 };
 
-/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known. otherwise:
-/// what helps those without, beside naming it when the store is built.
+/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known, or if a
+/// latitude is beyond a pole. otherwise: what helps those without,
+/// besides naming it when the store is built.
 CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise = {});
 
 /// From a store's CRS to another, named as for CoordinateSystem::parse, by the operation that is

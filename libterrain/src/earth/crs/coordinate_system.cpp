@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "earth/crs/crs_geo_keys.hpp"
 #include "earth/crs/datum_change.hpp"
 #include "earth/crs/projection.hpp"
+#include "earth/latitudes.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -166,6 +168,11 @@ double CoordinateSystem::metres_per_unit() const {
   return is_geographic() ? 0.0 : definition().metres_per_unit;
 }
 
+double CoordinateSystem::most_latitude() const {
+  return is_geographic() ? 90 / definition().degrees_per_unit
+                         : std::numeric_limits<double>::infinity();
+}
+
 double CoordinateSystem::turn() const {
   const CrsDefinition& own = definition();
   if (is_geographic()) return 360 / own.degrees_per_unit;
@@ -226,8 +233,9 @@ void CoordinateSystem::to_own_geographic(std::span<Point2> places) const {
   const CrsDefinition& own = definition();
   if (is_geographic()) {
     const double unit = own.degrees_per_unit, meridian = own.prime_meridian;
-    if (unit == 1 && meridian == 0) return;
-    for (Point2& place : places) place = {place[0] * unit + meridian, place[1] * unit};
+    for (Point2& place : places) {
+      place = {place[0] * unit + meridian, latitude_on_earth(place[1] * unit)};
+    }
     return;
   }
   const double unit = own.metres_per_unit;
