@@ -13,6 +13,7 @@ import json
 import math
 import os
 import random
+import re
 import shutil
 import subprocess
 import tempfile
@@ -248,9 +249,11 @@ class RasterTest(QueryTest):
     def test_cells_are_what_sample_answers(self):
         out = self.path('coarse.tif')
         self.run_ok('raster', self.store, '--cell', 97, '-o', out)
-        text, cells = '', [(0, 0), (3, 5), (40, 17), (91, 91)]
+        text, cells = '', [(1, 1), (3, 5), (40, 17), (91, 91)]
+        west = 97 * math.floor((self.low[0] - CELL / 2) / 97)
+        north = 97 * math.ceil((self.high[1] + CELL / 2) / 97)
         for c, r in cells:
-            text += f'{self.low[0] - CELL / 2 + 97 * (c + 0.5)},{self.high[1] + CELL / 2 - 97 * (r + 0.5)}\n'
+            text += f'{west + 97 * (c + 0.5)},{north - 97 * (r + 0.5)}\n'
         for (c, r), row in zip(cells, self.answers(text)):
             value = subprocess.run(['gdallocationinfo', '-valonly', out, str(c), str(r)],
                                    capture_output=True, text=True).stdout
@@ -287,6 +290,67 @@ class RasterTest(QueryTest):
         self.expect_error(2, 'raster', self.store, '--cell', 0, '-o', out)
         self.expect_error(2, 'raster', self.store, '--value', 'mood', '-o', out)
         self.expect_error(2, 'raster', self.store, '--cell', 1e-9, '-o', out)
+
+    @staticmethod
+    def grid(path):
+        """Origin, cell and size, as GDAL tells them."""
+        info = json.loads(subprocess.run(['gdalinfo', '-json', path], capture_output=True, text=True, check=True).stdout)
+        return info['geoTransform'], info['size']
+
+    @needs('gdalwarp')
+    def test_cells_begin_at_multiples_of_their_size(self):
+        out, theirs = self.path('ours.tif'), self.path('theirs.tif')
+        for cell in 7, 0.5, 12.1:
+            box = [self.low[0] + 301.3, self.low[1] + 602.6, self.low[0] + 420.7, self.low[1] + 703.1]
+            self.run_ok('raster', self.store, '--cell', cell, '--region', ','.join(map(str, box)), '-o', out, '--force')
+            subprocess.run(['gdalwarp', '-q', '-overwrite', '-tap', '-tr', str(cell), str(cell), '-te', *map(str, box),
+                            self.dem, theirs], check=True)
+            (ours, size), (wanted, other) = self.grid(out), self.grid(theirs)
+            self.assertEqual(size, other)
+            for a, b in zip(ours, wanted):
+                self.assertAlmostEqual(a, b, delta=1e-7)
+
+    @needs('gdalinfo')
+    def test_rasters_of_one_cell_size_fit_each_other_whatever_is_selected(self):
+        rng = random.Random(5)
+        cloud, store = self.path('returns.csv'), self.path('returns.terrace')
+        with open(cloud, 'w', encoding='ascii') as file:
+            file.write('x,y,z,classification\n1000.013,2000.127,0,2\n1100.013,2100.127,0,2\n')
+            for _ in range(3000):
+                kind = rng.choice((2, 5))
+                reach = 100 if kind == 2 else 97.3
+                file.write(f'{1000.013 + rng.random() * reach},{2000.127 + rng.random() * reach},{rng.random()},{kind}\n')
+        self.run_ok('build', cloud, '-o', store, '--force')
+        grids = []
+        for i, options in enumerate(((), ('--where', 'classification == 2'), ('--where', 'classification == 5'))):
+            out = self.path(f'part{i}.tif')
+            self.run_ok('raster', store, '--cell', 0.5, *options, '-o', out, '--force')
+            grids.append(self.grid(out))
+        self.assertEqual(grids[0], grids[1])
+        self.assertEqual(grids[0], grids[2])
+        self.assertEqual(grids[0][0][::3], [1000.0, 2100.5])
+        part, aligned = self.path('corner.tif'), self.path('aligned.tif')
+        self.run_ok('raster', store, '--cell', 0.5, '--region', '1020.2,2030.3,1040,2050', '-o', part, '--force')
+        (x, _, _, y, _, _), _ = self.grid(part)
+        self.assertEqual((x, y), (1020.0, 2050.0))
+        self.run_ok('raster', store, '--align', part, '-o', aligned, '--force')
+        self.assertEqual(self.grid(part), self.grid(aligned))
+        self.assertEqual(self.samples(part), self.samples(aligned))
+        self.run_ok('raster', store, '--align', self.path('part0.tif'), '--region', '1020,2030,1040,2050', '-o', aligned,
+                    '--force')
+        self.assertEqual(self.grid(aligned), grids[0])
+        self.assertLessEqual(sum(z != -9999 for z in self.samples(aligned)), 41 * 41)
+        out = self.path('none.tif')
+        self.expect_error(2, 'raster', store, '--align', part, '--cell', 1, '-o', out)
+        self.expect_error(1, 'raster', store, '--align', cloud, '-o', out)
+
+    @needs('gdalinfo')
+    def test_a_raster_is_aligned_with_one_of_another_crs(self):
+        theirs, out = self.path('theirs-degrees.tif'), self.path('aligned-degrees.tif')
+        self.run_ok('raster', self.store, '--to-crs', 'EPSG:4326', '--cell', 0.001, '-o', theirs, '--force')
+        self.run_ok('raster', self.store, '--align', theirs, '-o', out, '--force')
+        self.assertEqual(self.grid(theirs), self.grid(out))
+        self.assertEqual(self.samples(theirs), self.samples(out))
 
     @needs('gdalinfo')
     def test_another_reference_system(self):
@@ -352,6 +416,21 @@ class ContourTest(QueryTest):
             for row in self.answers(text, '--points-crs', 'EPSG:4326')[1:]:
                 if row[2]:
                     self.assertAlmostEqual(float(row[2]), feature['properties']['elev'], delta=0.01)
+
+    def test_levels_are_written_as_decimal_multiples(self):
+        ramp, store = self.path('ramp.xyz'), self.path('ramp.terrace')
+        with open(ramp, 'w', encoding='ascii') as file:
+            file.writelines(f'{x} {y} {x * 0.31}\n' for x in range(12) for y in range(12))
+        self.run_ok('build', ramp, '-o', store, '--force')
+        for step, power in (1, 10), (7, 10), (5, 100), (3, 1000):
+            text = self.run_ok('contour', store, '--interval', step / power, '--own-crs', '-o', '-')
+            found = set(re.findall(r'"elev":([^}]*)', text))
+            self.assertLessEqual(found, {repr(i * step / power).removesuffix('.0') for i in range(1200)})
+            self.assertGreater(len(found), 3)
+        # Without a crs member GeoJSON is in longitude and latitude.
+        self.assertIn('"crs":null', text)
+        text = self.run_ok('contour', self.store, '--interval', 500, '--own-crs', '-o', '-')
+        self.assertIn('"crs":{"type":"name","properties":{"name":"urn:ogc:def:crs:EPSG::', text)
 
     def test_threads_do_not_change_a_byte(self):
         one = self.run_ok('contour', self.store, '--interval', 20, '--threads', 1, '-o', '-')

@@ -120,9 +120,9 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
 }
 
 void write_raster(const OpenStore& open, const std::string& path, const std::string& value,
-                  std::optional<double> cell, const py::object& region, const std::string& crs,
-                  const std::string& method, unsigned level, std::optional<double> max_edge,
-                  bool replace, const py::tuple& how) {
+                  std::optional<double> cell, const std::string& align, const py::object& region,
+                  const std::string& crs, const std::string& method, unsigned level,
+                  std::optional<double> max_edge, bool replace, const py::tuple& how) {
   format_of_output(terrain::outputs::kRasterFile, path);
   const stream::Store store = open.get();
   using terrain::RasterValue;
@@ -134,6 +134,7 @@ void write_raster(const OpenStore& open, const std::string& path, const std::str
                                    {"hillshade", RasterValue::hillshade}}),
       .sampler = sampler_of(method, level, max_edge),
       .cell = cell,
+      .align = align,
       .region = region_of(region, store),
       .output = path,
       .replace = replace};

@@ -135,7 +135,7 @@ class Store:
                   crs: _Crs | None = ..., progress: _Progress | None = ..., threads: int | None = ...,
                   memory: int | None = ...) -> _Floats: ...
     def raster(self, value: Literal['height', 'slope', 'aspect', 'hillshade'] = ..., *, cell: float | None = ...,
-               region: _Region | None = ..., crs: _Crs | None = ..., method: _Method = ..., level: int = ...,
+               align: _Path | None = ..., region: _Region | None = ..., crs: _Crs | None = ..., method: _Method = ..., level: int = ...,
                max_edge: float | None = ..., path: _Path | None = ..., replace: bool = ...,
                progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Raster: ...
     def profile(self, line: _Array | _GeoInterface, step: float | None = ..., *, method: _Method = ..., level: int = ...,

@@ -327,19 +327,21 @@ class Store:
         on the ground going east and north (of the store's CRS)."""
         return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 1:]
 
-    def raster(self, value='height', *, cell=None, region=None, crs=None, method='linear', level=0, max_edge=None,
+    def raster(self, value='height', *, cell=None, align=None, region=None, crs=None, method='linear', level=0, max_edge=None,
                path=None, replace=False, progress=None, threads=None, memory=None):
         """The surface on a grid: 'height', 'slope' (degrees), 'aspect' (degrees clockwise from north, downhill) or
         'hillshade' (1 to 255, 0 where there is none).
 
-        cell: side of a cell in units of the output's CRS; by default a raster's own. region: box or polygons. crs: of the
-        output. path: where to write it as a Cloud Optimized GeoTIFF, with ``replace`` over what is there.
+        cell: side of a cell in units of the output's CRS, at whose multiples cells begin, so that rasters of one cell size
+        fit each other; by default a raster's own. align: in its place, the name of a raster whose cells, all of them, and
+        CRS are taken. region: box or polygons. crs: of the output. path: where to write it as a Cloud Optimized GeoTIFF,
+        with ``replace`` over what is there.
 
         Returns: a Raster: ``values``, ``transform``, ``crs``.
         """
         def make(name):
-            _core.write_raster(self._core, os.fsencode(name), value, cell, as_region(region), (crs_text(crs) or ''), method,
-                               whole(level, 'level', bits=32), max_edge, replace, job(progress, threads, memory))
+            _core.write_raster(self._core, os.fsencode(name), value, cell, b'' if align is None else os.fsencode(align),
+                               as_region(region), (crs_text(crs) or ''), method, whole(level, 'level', bits=32), max_edge, replace, job(progress, threads, memory))
             return read_raster(name)
 
         if path is not None:

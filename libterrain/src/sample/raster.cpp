@@ -143,10 +143,11 @@ SamplerOptions heights_only(SamplerOptions options) {
 
 class RasterRun {
  public:
-  RasterRun(const stream::Store& store, const RasterRequest& request, const Context& context)
+  RasterRun(const stream::Store& store, const RasterRequest& request, const RasterGrid& grid,
+            const Context& context)
       : request_(request),
         context_(context),
-        grid_(raster_grid(store, request)),
+        grid_(grid),
         crs_(request.to ? request.to->to().crs_with_keys() : crs_with_keys(store)),
         ground_(store),
         sampler_(make_sampler(store, heights_only(request.sampler), context)),
@@ -191,6 +192,7 @@ class RasterRun {
     writer.commit();
     outcome_.columns = grid_.columns;
     outcome_.rows = grid_.rows;
+    if (outcome_.cells_with_data == 0) context_.say(request_.output + ": no cell has data");
     if (request_.value != RasterValue::height && !shader_.assumption().empty()) {
       context_.say(shader_.assumption());
     }
@@ -253,9 +255,7 @@ class RasterRun {
           if (request_.to) request_.to->reverse(line);
           for (Point2& p : line) {
             p = ground_.turned(p);
-            const bool wanted = !request_.region || request_.region->polygons().empty() ||
-                                request_.region->covers(p);
-            p = wanted ? ground_.stored(p) : Point2{NAN, NAN};
+            p = !clips_ || request_.region->covers(p) ? ground_.stored(p) : Point2{NAN, NAN};
           }
         },
         context_.stop);
@@ -321,6 +321,9 @@ class RasterRun {
 
   const RasterRequest& request_;
   const Context& context_;
+  /// Whether cells may be outside the region. A box is grown to whole cells instead, unless the
+  /// grid is given.
+  bool clips_ = request_.region && !(request_.region->polygons().empty() && request_.align.empty());
   RasterGrid grid_;
   stream::Crs crs_;
   GroundSlope ground_;
@@ -346,7 +349,10 @@ RasterOutcome write_raster(const stream::Store& store, const RasterRequest& requ
   need_terrain(store, "a raster");
   const stream::Store source = store.with_stop(context.stop);
   const ProgressReport report(context, "cells");
-  return RasterRun(source, request, context).run(store.schema().coordinates[2], report);
+  RasterRequest wanted = request;
+  const RasterGrid grid =
+      request.align.empty() ? raster_grid(source, request) : aligned_grid(source, wanted, context);
+  return RasterRun(source, wanted, grid, context).run(store.schema().coordinates[2], report);
 }
 
 }  // namespace terrace::terrain

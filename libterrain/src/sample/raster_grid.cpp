@@ -5,17 +5,21 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/source.hpp>
 #include <terrace/stream/store_query.hpp>
 
+#include "base/decimal_multiples.hpp"
 #include "base/portable_math.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/region_crs.hpp"
+#include "earth/source_crs.hpp"
 #include "earth/whole_turns.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -25,7 +29,7 @@ namespace {
 
 constexpr double kMostGridCells = 2147483647.0;
 
-/// The store's area in its CRS: of a raster with half a cell around the samples.
+/// The area of a store's points in its CRS: of a raster with half a cell around the samples.
 stream::Box3 area_of(const stream::Store& store) {
   stream::Box3 stored = store.bounds();
   if (store.schema().grid) {
@@ -100,23 +104,82 @@ std::uint32_t count_of(double cells) {
   return static_cast<std::uint32_t>(std::max(1.0, cells));
 }
 
+/// The cells between multiples of their size that hold a range.
+struct CellRange {
+  CellRange(double low, double high, double cell)
+      : first(std::floor(low / cell + kRounding)), last(std::ceil(high / cell - kRounding)) {}
+
+  [[nodiscard]] std::uint32_t count() const { return count_of(last - first); }
+
+  /// Of a cell: a range that ends this close to a multiple ends at it.
+  static constexpr double kRounding = 1e-6;
+  double first, last;  ///< multiples of the cell
+};
+
 }  // namespace
+
+RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
+                        const Context& context) {
+  if (request.cell) throw UsageError("`align` gives the cells: leave `cell` out");
+  need_level(store, request.sampler.level);
+  stream::SourceOptions options;
+  options.stop = context.stop;
+  const stream::SourceInfo info =
+      stream::open_source(std::span(&request.align, 1), options)->info();
+  const auto refuse = [&](const std::string& cause, const std::string& remedy) {
+    throw stream::Error({.file = request.align, .where = {}, .cause = cause, .remedy = remedy});
+  };
+  const std::array<double, 6>& m = info.world.xy;
+  if (!info.grid) refuse("is not a raster, and has no grid to align with", "name a raster");
+  if (m[1] != 0 || m[3] != 0) {
+    refuse("is rotated, and a GeoTIFF of ours is not", "align with a raster that is north up");
+  }
+  const std::optional<CoordinateSystem> theirs = crs_of_source(info).system;
+  const std::optional<CoordinateSystem> own =
+      CoordinateSystem::of(store.schema().crs, store.path().string());
+  if (theirs && own && !theirs->same_places(*own)) {
+    if (request.to && !request.to->to().same_places(*theirs)) {
+      throw UsageError("`align` takes the CRS of " + request.align + ", " + theirs->title() +
+                       ": leave `to_crs` out");
+    }
+    if (!request.to) {
+      request.to.emplace(system_of(store), *theirs);
+      if (!request.to->note().empty()) context.say(request.to->note());
+    }
+  } else if (request.to) {
+    throw UsageError("`align` takes the CRS of " + request.align + ": leave `to_crs` out");
+  } else if (theirs.has_value() != own.has_value()) {
+    context.say(request.align + ": its grid is taken in the CRS of the store, because " +
+                (theirs ? "that of the store" : "its own") + " is not known");
+  }
+  return {.x = m[2],
+          .y = m[5],
+          .step_x = m[0],
+          .step_y = m[4],
+          .columns = count_of(static_cast<double>(info.columns)),
+          .rows = count_of(static_cast<double>(info.rows))};
+}
 
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request) {
   const unsigned level = request.sampler.level;
   need_level(store, level);
-  const stream::Box3 area = area_of(store);
-  stream::Box3 box = area;
-  if (request.region) {
-    const stream::Box3& wanted = request.region->extent();
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      box.min[axis] = std::max(box.min[axis], wanted.min[axis]);
-      box.max[axis] = std::min(box.max[axis], wanted.max[axis]);
+  const auto within_region = [&](stream::Box3 box) {
+    if (request.region) {
+      const stream::Box3& wanted = request.region->extent();
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        box.min[axis] = std::max(box.min[axis], wanted.min[axis]);
+        box.max[axis] = std::min(box.max[axis], wanted.max[axis]);
+      }
     }
-  }
-  if (store.points() == 0 || !(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) {
+    return box;
+  };
+  const stream::Box3 selected = area_of(store);
+  const stream::Box3 met = within_region(selected);
+  if (store.points() == 0 || !(met.min[0] <= met.max[0] && met.min[1] <= met.max[1])) {
     throw_none_inside(store);
   }
+  // Where the cells are given a condition does not change the grid.
+  stream::Box3 box = request.cell ? within_region(area_of(store.whole())) : met;
   const std::array<double, 6>& m = store.schema().world.xy;
   const bool straight = m[1] == 0 && m[3] == 0;
   RasterGrid grid;
@@ -141,7 +204,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     grid.rows = count_of(last[1] - first[1] + 1);
     return grid;
   }
-  double cell = request.cell.value_or(spacing_of(store, area, level));
+  double cell = request.cell.value_or(spacing_of(store, selected, level));
   if (request.to) {
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
     // Both ways: the new CRS may be torn on one side.
@@ -172,10 +235,19 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   }
   grid.step_x = cell;
   grid.step_y = -cell;
-  grid.x = box.min[0] + 0.5 * cell;
-  grid.y = box.max[1] - 0.5 * cell;
-  grid.columns = count_of(std::ceil((box.max[0] - box.min[0]) / cell - 1e-6));
-  grid.rows = count_of(std::ceil((box.max[1] - box.min[1]) / cell - 1e-6));
+  if (!request.cell) {
+    grid.x = box.min[0] + 0.5 * cell;
+    grid.y = box.max[1] - 0.5 * cell;
+    grid.columns = count_of(std::ceil((box.max[0] - box.min[0]) / cell - CellRange::kRounding));
+    grid.rows = count_of(std::ceil((box.max[1] - box.min[1]) / cell - CellRange::kRounding));
+    return grid;
+  }
+  const CellRange across(box.min[0], box.max[0], cell), down(box.min[1], box.max[1], cell);
+  const DecimalMultiples multiple(cell);
+  grid.x = multiple(across.first + 0.5);
+  grid.y = multiple(down.last - 0.5);
+  grid.columns = across.count();
+  grid.rows = down.count();
   return grid;
 }
 

@@ -18,4 +18,8 @@ struct RasterGrid {
 /// As write_raster() has it, with its errors.
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request);
 
+/// The grid of the raster that the request aligns with. Sets request.to if its CRS is not the
+/// store's.
+RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request, const Context& context);
+
 }  // namespace terrace::terrain

@@ -30,11 +30,15 @@ class RasterCommand final : public Command {
         ->capture_default_str()
         ->type_name("NAME");
     add_number(app, "--cell", cell_,
-               "width and height of a cell in units of the output's CRS (default: the "
-               "raster's own cells; of points and of coarser levels, about as many cells as "
-               "there are points)",
+               "width and height of a cell in units of the output's CRS; cells begin at its "
+               "multiples, so that rasters of one cell size fit each other (default: the raster's "
+               "own cells; of points and of coarser levels, about as many cells as there are "
+               "points)",
                kAboveZero)
         ->type_name("SIZE");
+    app.add_option("--align", align_, "a raster: the cells are its cells, in its CRS, all of them")
+        ->type_name("FILE")
+        ->excludes("--cell");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
     crs_.define(app);
@@ -46,6 +50,7 @@ class RasterCommand final : public Command {
     RasterRequest request;
     request.value = parse_raster_value(value_);
     request.cell = cell_;
+    request.align = align_;
     const stream::Store store = surface_.open(request.sampler);
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
     request.to = crs_.to(store, common);
@@ -68,7 +73,7 @@ class RasterCommand final : public Command {
 
  private:
   SurfaceOptions surface_;
-  std::string output_, value_ = "height", region_;
+  std::string output_, value_ = "height", region_, align_;
   std::optional<double> cell_;
   CrsOptions crs_;
 };

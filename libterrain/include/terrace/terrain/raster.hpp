@@ -22,6 +22,7 @@ struct RasterRequest {
   RasterValue value = RasterValue::height;
   SamplerOptions sampler{};
   std::optional<double> cell{};        ///< width and height in units of the output's CRS
+  std::string align{};                 ///< in place of `cell`: a raster, whose grid is taken
   std::optional<Region> region{};      ///< in the store's CRS
   std::optional<Transformation> to{};  ///< to the output's CRS if it is not the store's
   std::string output;                  ///< a GeoTIFF
@@ -37,10 +38,15 @@ struct RasterOutcome {
 /// of aspect, which has no mean, the first of them.
 ///
 /// The grid: without a cell size, at level 0 and in the store's CRS it is a raster's own lattice
-/// (rotated ones have none); else cells of that size from the upper left corner of the region, or
-/// of the store's area, on. Without a cell size they have about the area that a point of the level
-/// has on average, the size rounded to two digits. The grid never reaches beyond the store's area;
-/// cells whose centres lie outside the region's polygons are nodata.
+/// (rotated ones have none). Cells of a given size have their borders at its multiples (as gdalwarp
+/// -tap has them), so that all rasters of one cell size fit each other, whatever was selected;
+/// together they hold the part of the region that is in the area of the store, conditions aside.
+/// Else cells go from the upper left corner of the region, or of the selected area, on; they have
+/// about the area that a point of the level has on average, the size rounded to two digits. Cells
+/// whose centres are outside the region's polygons are nodata.
+///
+/// With `align` the grid is that of another raster, cell by cell: its CRS, origin, cell and size.
+/// Cells whose centres are outside the region are nodata then, those outside of a box too.
 ///
 /// Slope, aspect and hillshade come from the 3 x 3 heights around a cell of this grid by Horn's
 /// formula (B. K. P. Horn, "Hill shading and the reflectance map", doi:10.1109/PROC.1981.11918),
@@ -50,9 +56,10 @@ struct RasterOutcome {
 ///
 /// Tiles come in the order of a quadtree, so that a store of points is triangulated little more
 /// than once. Memory: some tiles at a time within the context's bound. Reports "cells"; notes an
-/// assumption about units that slopes rest on. Throws:
-/// stream::Error if the region does not meet the store; UsageError for a grid of more than 2^31
-/// columns or rows.
+/// assumption about units that slopes rest on, and that no cell has data. Throws: stream::Error if
+/// the region does not meet the store, or for a raster to align with that is rotated, or in a CRS
+/// that is not known; UsageError for a grid of more than 2^31 columns or rows, and for `align` with
+/// `cell` or another `to`.
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
                            const Context& context = {});
 
