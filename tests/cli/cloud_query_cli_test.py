@@ -307,16 +307,16 @@ class NothingSelectedTest(unittest.TestCase):
     def path(self, name):
         return os.path.join(self.folder.name, name)
 
-    def test_no_points_are_an_answer_but_no_mesh(self):
+    def test_an_empty_selection_is_an_error(self):
         store = self.build(f'{x} {y} {x * y % 7}\n' for x in range(20) for y in range(20))
         extent = 'have x from 0 to 19, y from 0 to 19, z from 0 to 6'
         region, where = ['--region', '50,50,60,60'], ['--where', 'z < 0']
         for options in (region, where, [*where, '--near', '1,1', '-k', '3']):
             result = terrace('points', store, *options, '-o', self.path('none.csv'), '--force')
-            self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertIn('0 points', result.stderr)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertFalse(os.path.exists(self.path('none.csv')))
             if '--near' not in options:
-                self.assertIn('no point is selected; all of the store\'s ' + extent, result.stderr)
+                self.assertIn(extent, result.stderr)
         for bound in ([], ['--max-error', '1']):
             for options, message in ((region, extent), (where, "no point meets the condition 'z < 0'")):
                 result = terrace('mesh', store, *options, *bound, '-o', self.path('none.ply'))

@@ -59,12 +59,12 @@ bool parse(std::string_view name, const std::string& value) {
   } else if (name == "line") {
     // Not the name of a file of this machine.
     if (value.find_first_not_of("0123456789+-.,;eE ") != std::string::npos) return false;
-    for (const Point2& p : parse_line(value)) {
+    for (const Point2& p : parse_line(value).places) {
       require(std::isfinite(p[0]) && std::isfinite(p[1]), "a line has places");
     }
   } else if (name == "line-file") {
     const MemoryFile file(value);
-    require(parse_line(file.name()).size() >= 2, "a line has two places");
+    require(parse_line(file.name()).places.size() >= 2, "a line has two places");
   } else if (name == "criterion") {
     static_cast<void>(parse_criterion(value));
   } else if (name == "channel") {

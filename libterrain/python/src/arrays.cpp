@@ -3,8 +3,9 @@
 
 #include <limits>
 #include <optional>
+#include <utility>
 
-#include <terrace/terrain/crs.hpp>
+#include <pybind11/stl.h>
 
 namespace terrace::python {
 namespace {
@@ -101,9 +102,18 @@ std::vector<std::array<double, 3>> points3_of(const Array<double>& given) {
   return {rows.begin(), rows.end()};
 }
 
+void log_note(const std::string& line) {
+  py::module_::import("terrace._job").attr("notes").attr("info")("%s", message_of(line));
+}
+
+terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion) {
+  conversion.on_note(log_note);
+  return conversion(region);
+}
+
 std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store) {
   std::optional<terrain::Region> region = region_of(given);
-  if (region) region = terrain::RegionConversion(store)(*region);
+  if (region) region = converted(*region, terrain::RegionConversion(store));
   return region;
 }
 
@@ -117,8 +127,9 @@ std::optional<terrain::Region> region_of(const py::object& given) {
     }
     return terrain::Region::of_box(box);
   }
+  const auto geojson = given.cast<py::dict>();
   std::vector<terrain::Polygon> polygons;
-  for (const py::handle polygon : given) {
+  for (const py::handle polygon : geojson["polygons"].cast<py::list>()) {
     terrain::Polygon& rings = polygons.emplace_back();
     for (const py::handle ring : polygon) {
       const auto array = ring.cast<Array<double>>();
@@ -127,7 +138,12 @@ std::optional<terrain::Region> region_of(const py::object& given) {
     }
   }
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return terrain::Region::of_polygons(std::move(polygons), -kInfinity, kInfinity);
+  const auto name = geojson["name"].cast<std::string>();
+  const terrain::Region region =
+      terrain::Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name);
+  const auto crs = geojson["crs"].cast<std::optional<std::string>>();
+  if (!crs) return region;
+  return region.in_crs(terrain::PlacesCrs{.name = *crs, .file = name});
 }
 
 }  // namespace terrace::python

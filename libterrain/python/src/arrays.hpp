@@ -16,6 +16,7 @@
 #include <pybind11/numpy.h>
 #include <terrace/stream/schema.hpp>
 #include <terrace/stream/store.hpp>
+#include <terrace/terrain/crs.hpp>
 #include <terrace/terrain/region.hpp>
 
 #include "core.hpp"
@@ -113,9 +114,14 @@ py::dict crs_info(const stream::Crs& crs);
 /// Records of such a type.
 py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type);
 
-/// None; a tuple of six numbers: a box; a list of polygons, each a list of arrays (n, 2).
+/// None; a tuple of six numbers: a box; a dict of polygons, each a list of arrays (n, 2), crs, None
+/// or a name as of terrain::PlacesCrs, and name, for messages.
 std::optional<terrain::Region> region_of(const py::object& given);
-/// The same for a store: longitudes may be off by whole turns.
+/// A line for the package's log.
+void log_note(const std::string& line);
+/// A region in the CRS of the data; what was assumed is logged.
+terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion);
+/// Of `given`, for a store.
 std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store);
 
 }  // namespace terrace::python

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -26,9 +27,10 @@ terrain::Transformation transformation(const std::string& from, const std::strin
   return {own, other};
 }
 
-/// A region of another CRS as polygons of the store's.
-std::vector<terrain::Polygon> own_region(const OpenStore& open, const py::object& region,
-                                         const std::string& crs) {
+/// A region of another CRS as polygons of the store's, and the name of that CRS.
+std::pair<std::vector<terrain::Polygon>, std::string> own_region(const OpenStore& open,
+                                                                 const py::object& region,
+                                                                 const std::string& crs) {
   const stream::Store store = open.get();
   const auto given = region_of(region);
   const terrain::Region made = released([&]() -> std::optional<terrain::Region> {
@@ -43,7 +45,8 @@ std::vector<terrain::Polygon> own_region(const OpenStore& open, const py::object
                   {box.max[0], box.max[1]},
                   {box.min[0], box.max[1]}}}};
   }
-  return polygons;
+  const stream::Crs& own = store.schema().crs;
+  return {std::move(polygons), own.epsg != 0 ? "EPSG:" + std::to_string(own.epsg) : own.wkt};
 }
 
 }  // namespace

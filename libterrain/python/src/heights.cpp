@@ -52,7 +52,9 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
 }
 
 /// Rows of metres, x, y, height.
-py::array profile(const OpenStore& open, const Array<double>& line, std::optional<double> step,
+/// crs: of GeoJSON, as of terrain::PlacesCrs; None: the line is in the store's.
+py::array profile(const OpenStore& open, const Array<double>& line,
+                  const std::optional<std::string>& crs, std::optional<double> step,
                   const std::string& method, unsigned level, std::optional<double> max_edge,
                   const py::tuple& how) {
   const stream::Store store = open.get();
@@ -60,6 +62,14 @@ py::array profile(const OpenStore& open, const Array<double>& line, std::optiona
   request.sampler = sampler_of(method, level, max_edge);
   const auto places = rows_of<2>(line, "line");
   request.line.assign(places.begin(), places.end());
+  if (crs) {
+    terrain::RegionConversion conversion(store);
+    conversion.on_note(log_note);
+    stream::Box3 box;
+    for (const terrain::Point2& p : request.line) box.include(stream::Point3{p[0], p[1], 0});
+    const auto to_line = conversion.to_places({.name = *crs, .file = "`line`"}, box);
+    if (to_line) to_line->reverse(request.line);
+  }
   if (step && !(*step > 0)) throw py::value_error("`step` must be above 0");
   request.step = step;
   return to_array(Job(how).run([&](const terrain::Context& context) {

@@ -97,7 +97,8 @@ stream::Selection selection_of(const py::object& source, const py::dict& given,
   auto region = region_of(given["region"]);
   if (region && terrain::RegionConversion::may_turn(*region) && opens_twice(source)) {
     const OpenSource open = opener_of(source);
-    region = released([&] { return terrain::RegionConversion(open(options)->info())(*region); });
+    const auto info = released([&] { return open(options)->info(); });
+    region = converted(*region, terrain::RegionConversion(info));
   }
   if (region) region->restrict(selection);
   return selection;

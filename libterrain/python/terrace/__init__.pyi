@@ -138,7 +138,7 @@ class Store:
                align: _Path | None = ..., region: _Region | None = ..., crs: _Crs | None = ..., method: _Method = ..., level: int = ...,
                max_edge: float | None = ..., path: _Path | None = ..., replace: bool = ...,
                progress: _Progress | None = ..., threads: int | None = ..., memory: int | None = ...) -> Raster: ...
-    def profile(self, line: _Array | _GeoInterface, step: float | None = ..., *, method: _Method = ..., level: int = ...,
+    def profile(self, line: _Array | _GeoInterface | Mapping[str, Any], step: float | None = ..., *, method: _Method = ..., level: int = ...,
                 max_edge: float | None = ..., progress: _Progress | None = ..., threads: int | None = ...) -> _Floats: ...
     def contours(self, interval: float, *, level: int = ..., max_edge: float | None = ..., region: _Region | None = ...,
                  lonlat: bool | None = ..., progress: _Progress | None = ..., threads: int | None = ...,

@@ -33,7 +33,7 @@ class Transformation:
                 raise ValueError(f'`datum_shift` is three or seven numbers, not {len(datum_shift)}')
             datum_shift += [0.0] * (7 - len(datum_shift))
         area = as_region(area)
-        if isinstance(area, list):
+        if isinstance(area, dict):
             raise ValueError('`area` is a box')
         self._core = _core.Transformation(*texts, datum_shift, area)
 

@@ -8,6 +8,7 @@ import os
 import numpy as np
 
 from ._pictures import lines_svg
+from ._sources import crs_text
 
 
 class FeatureCollection(dict):
@@ -35,24 +36,43 @@ def _polygons(geometry):
     if kind == 'MultiPolygon':
         return [_rings(polygon) for polygon in geometry['coordinates']]
     if kind == 'Feature':
-        return _polygons(geometry['geometry'])
+        return _polygons(geometry['geometry']) if geometry['geometry'] is not None else []
     parts = {'GeometryCollection': 'geometries', 'FeatureCollection': 'features'}.get(kind)
     if parts is None:
         raise ValueError(f'`region` is a box or polygons, not a {kind}')
     return [polygon for part in geometry[parts] for polygon in _polygons(part)]
 
 
-def region(given):
-    """A box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]); an object with
-    ``__geo_interface__``, a GeoJSON dict or the name of a GeoJSON file, of polygons. In the CRS of the
-    store or source. None: everywhere."""
-    if given is None:
-        return None
+def geojson(given):
+    """(A GeoJSON dict, the name of its CRS): of a dict, an object with ``__geo_interface__`` or the name of a file. The
+    name is that of the object's ``crs``, as geopandas has it, or of the dict's; '' if neither says anything, None if the
+    dict says that it is not known."""
+    crs = None
     if isinstance(given, (str, os.PathLike)):
         with open(given, encoding='utf-8') as file:
             given = json.load(file)
     if hasattr(given, '__geo_interface__'):
+        crs = crs_text(getattr(given, 'crs', None))
         given = given.__geo_interface__
+    if not isinstance(given, dict) or crs is not None:
+        return given, crs or ''
+    crs = given.get('crs', '')
+    if isinstance(crs, dict):
+        crs = (crs.get('properties') or {}).get('name')
+        if not isinstance(crs, str) or not crs:
+            raise ValueError('the `crs` of GeoJSON does not name a CRS')
+    return given, crs
+
+
+def region(given):
+    """A box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]), in the CRS of the store or source; an
+    object with ``__geo_interface__``, a GeoJSON dict or the name of a GeoJSON file, of polygons, in the CRS that it names.
+    Without one they are in longitude and latitude, as GeoJSON is, if the CRS of the store or source is known and the
+    numbers can be that; else in the CRS of the store or source. None: everywhere."""
+    if given is None:
+        return None
+    name = os.fspath(given) if isinstance(given, (str, os.PathLike)) else '`region`'
+    given, crs = geojson(given)
     if isinstance(given, dict):
         try:
             polygons = _polygons(given)
@@ -60,7 +80,7 @@ def region(given):
             raise ValueError('`region` is not GeoJSON of polygons') from fault
         if not polygons:
             raise ValueError('`region` has no polygons')
-        return polygons
+        return {'polygons': polygons, 'crs': crs, 'name': name}
     try:
         numbers = [float(number) for number in given]
     except TypeError:

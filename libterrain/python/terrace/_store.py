@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import as_rows, whole
-from ._geo import FeatureCollection, region as as_region
+from ._geo import FeatureCollection, geojson, region as as_region
 from ._job import job, notes
 from ._mesh import BoundedMesh, Mesh
 from ._raster import read_raster
@@ -226,8 +226,9 @@ class Store:
         """The points of a level and above, inside a region, that meet a condition.
 
         region: a box of four or six numbers in the store's CRS, polygons (an object with ``__geo_interface__``, a
-        GeoJSON dict or file), or None. where: a condition on attributes, x, y and z, such as 'classification == 2 &&
-        z < 100'. focus: pairs (region, level) with finer levels. cluster: in place of region and focus, a pair (L, N): the
+        GeoJSON dict or file) in the CRS that they name, or None. Polygons that name none are in longitude and latitude, as
+        GeoJSON is, if the store's CRS is known and the numbers can be that; else in the store's. where: a condition on
+        attributes, x, y and z, such as 'classification == 2 && z < 100'. focus: pairs (region, level) with finer levels. cluster: in place of region and focus, a pair (L, N): the
         points that cluster N of level L stands for. level: 0 unless given; with a cluster, its own. crs: that the coordinates
         are wanted in.
 
@@ -274,14 +275,15 @@ class Store:
         return self._core.count(box)
 
     def own_region(self, region, crs):
-        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon, with so many corners that
+        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon that names its CRS, with so many corners that
         outlines are within a millionth of their length; without the heights of a box. Raises: Error where nothing leads
         from there."""
         text = crs_text(crs)
         if region is None or text is None:
             raise ValueError('own_region() needs a region and its CRS')
-        polygons = _core.own_region(self._core, as_region(region), text)
-        return {'type': 'MultiPolygon', 'coordinates': [[ring + ring[:1] for ring in polygon] for polygon in polygons]}
+        polygons, name = _core.own_region(self._core, as_region(region), text)
+        return {'type': 'MultiPolygon', 'crs': {'type': 'name', 'properties': {'name': name}},
+                'coordinates': [[ring + ring[:1] for ring in polygon] for polygon in polygons]}
 
     def query(self, *, box=None, near=None, k=None, radius=None, level=0, where=''):
         """The points in a box, or near a place: the ``k`` nearest, or all within a ``radius`` in metres.
@@ -352,15 +354,18 @@ class Store:
     def profile(self, line, step=None, *, method='linear', level=0, max_edge=None, progress=None, threads=None):
         """The surface along a line.
 
-        line: shape (n, 2), in the store's CRS, or an object with ``__geo_interface__`` of a LineString. step: metres;
+        line: shape (n, 2), in the store's CRS, or a GeoJSON dict or an object with ``__geo_interface__`` of a LineString,
+        in the CRS that points() takes a region in. step: metres;
         without it the line's own places and every place where the linear surface bends.
 
         Returns: float64, shape (m, 4): metres from the line's begin (geodesic where the CRS is known), x, y, height
         (NaN where there is none).
         """
-        if hasattr(line, '__geo_interface__'):
-            line = np.asarray([place[:2] for place in line.__geo_interface__['coordinates']])
-        return _core.profile(self._core, as_rows(line, 'line', (2,)), step, method, whole(level, 'level', bits=32), max_edge,
+        crs = None
+        if hasattr(line, '__geo_interface__') or isinstance(line, dict):
+            line, crs = geojson(line)
+            line = np.asarray([place[:2] for place in line['coordinates']])
+        return _core.profile(self._core, as_rows(line, 'line', (2,)), crs, step, method, whole(level, 'level', bits=32), max_edge,
                              job(progress, threads))
 
     def contours(self, interval, *, level=0, max_edge=None, region=None, lonlat=None, progress=None, threads=None,

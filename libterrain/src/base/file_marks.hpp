@@ -13,7 +13,7 @@ namespace terrace::terrain {
 inline constexpr const char* kWriterMark = "written by terrace";
 /// How files begin in formats without comments.
 inline constexpr std::string_view kContourHead =
-    R"({"type":"FeatureCollection","generator":"terrace contour","features":[)";
+    R"({"type":"FeatureCollection","generator":"terrace contour",)";
 /// How all GeoJSON of ours begins.
 inline constexpr std::string_view kGeoJsonMark =
     R"({"type":"FeatureCollection","generator":"terrace)";

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/geojson_crs.hpp"
 #include "base/json_of_file.hpp"
 #include "base/orientation.hpp"
 #include "base/region_shape.hpp"
@@ -57,6 +58,13 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   if (!json.is_object() || !json.contains("type") || !json["type"].is_string() || depth > 8) {
     fail(file, "not a GeoJSON object");
   }
+  if (depth > 0 && json.contains("crs") && !json["crs"].is_null()) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "an object within it has a crs of its own",
+                         .remedy = "write the crs of all once, as the first member of the file, or "
+                                   "give `region_crs`"});
+  }
   const std::string type = json["type"].get<std::string>();
   const auto member = [&](const char* name) -> const nlohmann::json& {
     if (!json.contains(name)) fail(file, type + " without '" + name + "'");
@@ -85,13 +93,15 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   }
 }
 
-std::vector<Polygon> read_geojson(const std::string& name) {
+Region read_geojson(const std::string& name) {
   const auto json = json_of_file(name, kMostGeoJsonBytes, convert_to_geojson(name));
   if (!json) fail(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
   collect_polygons(*json, name, 0, polygons);
   if (polygons.empty()) fail(name, "holds no polygon");
-  return polygons;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name)
+      .in_crs(crs_of_geojson(*json, name));
 }
 
 /// A box is a list of numbers: whatever begins like one and has a comma is taken as such.
@@ -101,6 +111,30 @@ bool looks_like_numbers(const std::string& text) {
 }
 
 }  // namespace
+
+std::optional<PlacesCrs> crs_of_geojson(const nlohmann::json& object, const std::string& file) {
+  if (!object.is_object() || !object.contains("crs")) return PlacesCrs{.name = {}, .file = file};
+  const nlohmann::json& crs = object["crs"];
+  if (crs.is_null()) return std::nullopt;
+  const nlohmann::json::json_pointer name("/properties/name");
+  if (!crs.is_object() || !crs.contains(name) || !crs.at(name).is_string() ||
+      crs.at(name).get_ref<const std::string&>().empty()) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "its crs does not name a CRS",
+                         .remedy = "write {\"type\": \"name\", \"properties\": {\"name\": "
+                                   "\"EPSG:n\"}}, or give `region_crs`"});
+  }
+  return PlacesCrs{.name = crs.at(name).get<std::string>(), .file = file};
+}
+
+std::string geojson_crs_member(const stream::Crs& crs) {
+  if (crs.epsg == 4326) return {};
+  const std::string name =
+      crs.epsg != 0 ? "urn:ogc:def:crs:EPSG::" + std::to_string(crs.epsg) : crs.wkt;
+  if (name.empty()) return "\"crs\":null,";
+  return R"("crs":{"type":"name","properties":{"name":)" + nlohmann::json(name).dump() + "}},";
+}
 
 Region Region::parse(const std::string& text) {
   Region region;
@@ -123,12 +157,18 @@ Region Region::parse(const std::string& text) {
     }
     return region;
   }
-  return of_shape(std::make_shared<RegionShape>(read_geojson(text), text), -kInfinity, kInfinity);
+  return read_geojson(text);
 }
 
 Region Region::of_box(const stream::Box3& box) {
   Region region;
   region.box_ = box;
+  return region;
+}
+
+Region Region::in_crs(std::optional<PlacesCrs> crs) const {
+  Region region = *this;
+  region.crs_ = std::move(crs);
   return region;
 }
 
@@ -138,8 +178,9 @@ Region Region::with_extent(const stream::Box3& extent) const {
   return region;
 }
 
-Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high) {
-  return of_shape(std::make_shared<RegionShape>(std::move(polygons), ""), low, high);
+Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high,
+                           const std::string& file) {
+  return of_shape(std::make_shared<RegionShape>(std::move(polygons), file), low, high);
 }
 
 Region Region::of_shape(std::shared_ptr<const RegionShape> shape, double low, double high) {

@@ -68,7 +68,8 @@ void throw_none_inside(const stream::Store& store, const std::string& what) {
       {.file = store.path().string(),
        .where = {},
        .cause = "no " + what + " is in the region; the points have " + extent_text(store),
-       .remedy = "look also at the CRS in which the `region` is given"});
+       .remedy = "give a `region` that meets them: boxes are in their CRS or in `region_crs`, "
+                 "GeoJSON is in the CRS that it names, or else in longitude and latitude"});
 }
 
 }  // namespace terrace::terrain

@@ -235,6 +235,31 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
   context.say(line);
 }
 
+[[noreturn]] void throw_no_points(const BuildRequest& request, const stream::SourceInfo& info,
+                                  const stream::Progress& read) {
+  const stream::Selection& selection = request.selection;
+  const bool selected = !selection.where.empty() || selection.region;
+  std::string cause, remedy;
+  if (selected && (read.excluded > 0 || read.nodata == 0)) {
+    // Parts that the region does not meet are neither read nor counted.
+    cause = "none of its " +
+            (read.excluded > 0 ? std::to_string(read.excluded) + ' ' : std::string()) +
+            "points is selected";
+    remedy = "give another `where` or `region`";
+  } else {
+    cause = "there is not one point" + std::string(info.grid ? " with data" : "") + " in it";
+    if (read.nodata > 0) {
+      cause += " (" + std::to_string(read.nodata) +
+               (info.grid ? " cells, all nodata)" : " points, all without a coordinate)");
+    }
+    remedy = info.grid ? "check the file and its nodata value" : "check the file";
+  }
+  throw stream::Error({.file = info.files.empty() ? std::string() : info.files.front(),
+                       .where = {},
+                       .cause = cause,
+                       .remedy = remedy});
+}
+
 }  // namespace
 
 std::optional<cluster::Effort> effort_of(const std::string& name) {
@@ -363,23 +388,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     report.update(so_far.points, so_far.fraction);
   }
   so_far = points->progress();
-  if (so_far.points == 0) {
-    throw stream::Error(
-        {.file = info.files.empty() ? std::string() : info.files.front(),
-         .where = {},
-         .cause = so_far.excluded > 0
-                      ? "none of its " + std::to_string(so_far.excluded) + " points is selected"
-                      : "there is not one point" + std::string(info.grid ? " with data" : "") +
-                            " in it" +
-                            (so_far.nodata == 0
-                                 ? std::string()
-                                 : " (" + std::to_string(so_far.nodata) +
-                                       (info.grid ? " cells, all nodata)"
-                                                  : " points, all without a coordinate)")),
-         .remedy = so_far.excluded > 0 ? "give another `where` or `region`"
-                   : info.grid         ? "check the file and its nodata value"
-                                       : "check the file"});
-  }
+  if (so_far.points == 0) throw_no_points(request, info, so_far);
   writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();
   outcome.points = result.points;

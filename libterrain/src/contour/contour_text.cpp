@@ -11,6 +11,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/file_marks.hpp"
+#include "base/geojson_crs.hpp"
 #include "base/parallel.hpp"
 #include "base/units.hpp"
 #include "earth/whole_turns.hpp"
@@ -75,6 +76,9 @@ ContourText::ContourText(const stream::Store& store, const ContourRequest& reque
       threads_(std::max(1U, threads)),
       write_(std::move(write)),
       number_(request.own_crs ? kOwnDecimals : kDecimals) {
+  head_ = std::string(kContourHead) +
+          (request.own_crs ? geojson_crs_member(store.schema().crs) : std::string()) +
+          "\"features\":[";
   if (!request.own_crs) {
     const stream::Box3 box = world_box(store.schema(), store.bounds());
     geography_.emplace(system_of(store, ", or ask for `own_crs`"), box);
@@ -161,7 +165,7 @@ void ContourText::flush() {
       append(text, lines_[i], places);
     }
   });
-  if (first_) write_(kContourHead);
+  if (first_) write_(head_);
   for (std::size_t piece = 0; piece + 1 < begin.size(); ++piece) write_(texts_[piece]);
   first_ = false;
   lines_.clear();

@@ -38,7 +38,7 @@ class ContourText {
   void append(std::string& text, const ContourLine& line, std::vector<Point2>& places) const;
   void flush();
 
-  std::string file_;
+  std::string file_, head_;
   GroundSlope ground_;
   std::optional<BoxGeography> geography_;  ///< nothing: places stay in the store's CRS
   double middle_ = 0;                      ///< longitude of the store's, NaN if it has none

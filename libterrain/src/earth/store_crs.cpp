@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +18,7 @@
 #include "earth/whole_turns.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 
@@ -50,13 +53,58 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
   return {own, other};
 }
 
-RegionConversion::RegionConversion(const stream::Store& store)
-    : bounds_(world_box(store.schema(), store.whole().bounds())),
+namespace {
+
+/// A shift counts for the system whose datum is another than WGS 84's.
+CoordinateSystem shifted(const CoordinateSystem& system, const std::optional<DatumShift>& shift) {
+  if (!shift || system.counts_as_wgs84()) return system;
+  CrsDefinition definition = system.definition();
+  definition.shift = shift;
+  return CoordinateSystem(definition);
+}
+
+/// The CRS that GeoJSON names. Never a file's name: whoever wrote the file does not choose which
+/// files are read.
+CoordinateSystem system_named_in(const PlacesCrs& given) {
+  std::string name = given.name;
+  // http://www.opengis.net/def/crs/EPSG/0/4326
+  constexpr std::string_view kUrl = "opengis.net/def/crs/";
+  if (const std::size_t at = name.find(kUrl); at != name.npos) {
+    const std::string_view rest = std::string_view(name).substr(at + kUrl.size());
+    name = std::string(rest.substr(0, rest.find('/'))) + ':' +
+           std::string(rest.substr(rest.rfind('/') + 1));
+  }
+  if (name.ends_with("CRS84")) name = "OGC:CRS84";
+  try {
+    const bool code = name.find(':') != name.npos && name.find('/') == name.npos;
+    if (code || name.find('[') != name.npos) return CoordinateSystem::parse(name);
+  } catch (const UsageError&) {
+    // Reported below, with the file.
+  }
+  throw stream::Error({.file = given.file,
+                       .where = {},
+                       .cause = "its crs \"" + given.name.substr(0, 80) + "\" is not known",
+                       .remedy = "name one that is, as EPSG:n, or give `region_crs`"});
+}
+
+}  // namespace
+
+RegionConversion::RegionConversion(const stream::Store& store,
+                                   const std::optional<DatumShift>& shift)
+    : system_([store, shift]() -> std::optional<CoordinateSystem> {
+        try {
+          return shifted(system_of(store), shift);
+        } catch (const stream::Error&) {
+          return std::nullopt;  // none, or one that is not known
+        }
+      }),
+      bounds_(world_box(store.schema(), store.whole().bounds())),
       tolerance_(border_tolerance(store.schema())),
       turn_(WholeTurns(store.schema(), store.whole().bounds()).turn()) {}
 
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
     : RegionConversion(store) {
+  given_ = true;
   if (!to_regions.identity()) to_regions_ = std::move(to_regions);
 }
 
@@ -96,21 +144,60 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
     // wrong, the points are elsewhere.
     bounds_.include(stream::Box3{{-0.5 * turn_, -0.5 * turn_, 0}, {turn_, 0.5 * turn_, 0}});
   }
+  if (system && stored) system = system->over(area);
+  system_ = [system] { return system; };
   if (named.empty()) return;
-  Transformation change(stored ? system->over(area) : *system, CoordinateSystem::parse(named));
+  given_ = true;
+  Transformation change(*system, CoordinateSystem::parse(named));
   if (!change.identity()) to_regions_ = std::move(change);
 }
 
 bool RegionConversion::may_turn(const Region& region) {
+  if (region.crs()) return true;
   constexpr double kFourTurns = 1600, kPole = 100;  // in gradians, the smallest unit
   const stream::Box3& box = region.box();
   return box.min[0] <= kFourTurns && box.max[0] >= -kFourTurns && box.min[1] <= kPole &&
          box.max[1] >= -kPole;
 }
 
+std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given,
+                                                          const stream::Box3& box) const {
+  const std::optional<CoordinateSystem> own = system_ ? system_() : std::nullopt;
+  if (!own && given.name.empty()) return std::nullopt;
+  if (!own) {
+    throw stream::Error({.file = given.file,
+                         .where = {},
+                         .cause = "its crs is " + system_named_in(given).title() +
+                                  ", and the CRS of the data is not known",
+                         .remedy = "name that of the data with `crs` EPSG:n when they are read or "
+                                   "built, or leave the crs out if it is the same"});
+  }
+  if (given.name.empty()) {
+    // Longitudes may be counted to 360, and go on beyond the antimeridian.
+    const bool fits =
+        box.min[0] >= -360 && box.max[0] <= 540 && box.min[1] >= -90 && box.max[1] <= 90;
+    if (!fits || !own->reaches_wgs84()) {
+      say(given.file + ": has no crs, and its places are taken in that of the data, " +
+          own->title() + (fits ? "" : ", because they are not longitudes and latitudes"));
+      return std::nullopt;
+    }
+  }
+  Transformation change(*own, given.name.empty() ? CoordinateSystem() : system_named_in(given));
+  if (change.identity()) return std::nullopt;
+  say(change.note());
+  return change;
+}
+
 Region RegionConversion::operator()(Region region) const {
-  return to_regions_ ? region_in(region, *to_regions_, bounds_)
-                     : with_turns(region, turn_, bounds_, tolerance_);
+  const std::optional<PlacesCrs> given = region.crs();
+  region = region.in_crs({});
+  if (to_regions_) return region_in(region, *to_regions_, bounds_);
+  if (given && !given_) {
+    if (const auto change = to_places(*given, region.box())) {
+      return region_in(region, *change, bounds_);
+    }
+  }
+  return with_turns(region, turn_, bounds_, tolerance_);
 }
 
 PlaceConversion::PlaceConversion(Transformation change) {

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "base/file_marks.hpp"
+#include "base/geojson_crs.hpp"
 #include "base/stored_entities.hpp"
 #include "mesh/wanted_entities.hpp"
 #include "terrace/terrain/error.hpp"
@@ -119,14 +120,7 @@ void write_geojson(const LineSet& lines, const stream::Crs& crs,
     throw UsageError("GeoJSON names where it lies by an EPSG code, which the CRS of these lines " +
                      std::string("does not have; with `to_crs` EPSG:4326 it needs none"));
   }
-  std::string text(kLinesHead);
-  if (!known) {
-    text += R"("crs":null,)";
-  } else if (crs.epsg != 4326) {
-    text += R"("crs":{"type":"name","properties":{"name":"urn:ogc:def:crs:EPSG::)" +
-            std::to_string(crs.epsg) + R"("}},)";
-  }
-  text += "\"features\":[";
+  std::string text = std::string(kLinesHead) + geojson_crs_member(crs) + "\"features\":[";
   for (std::size_t i = 0; i < lines.lines.size(); ++i) {
     const LineSet::Line& line = lines.lines[i];
     text += i == 0 ? "\n" : ",\n";

@@ -2,9 +2,11 @@
 #include "cli/option_values.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "base/geojson_crs.hpp"
 #include "base/json_of_file.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
@@ -162,14 +164,14 @@ Focus parse_focus(const std::string& text) {
           .level = parse_level(text.substr(colon + 1))};
 }
 
-std::vector<Point2> parse_line(const std::string& text) {
+Line parse_line(const std::string& text) {
   const auto bad = [&](const std::string& cause) {
     return stream::Error({.file = text,
                           .where = {},
                           .cause = cause,
                           .remedy = "give x1,y1,x2,y2,... or a GeoJSON file with one LineString"});
   };
-  std::vector<Point2> line;
+  Line line;
   if (text.find(',') != std::string::npos &&
       text.find_first_not_of("0123456789+-.,eE ") == std::string::npos) {
     const std::vector<double> v = parse_numbers(text, "--line");
@@ -177,7 +179,7 @@ std::vector<Point2> parse_line(const std::string& text) {
       throw UsageError("--line has " + std::to_string(v.size()) +
                        " numbers; write x1,y1,x2,y2 and more pairs if wanted");
     }
-    for (std::size_t i = 0; i < v.size(); i += 2) line.push_back({v[i], v[i + 1]});
+    for (std::size_t i = 0; i < v.size(); i += 2) line.places.push_back({v[i], v[i + 1]});
     return line;
   }
   const auto json = json_of_file(text, kMostGeoJsonBytes, convert_to_geojson(text));
@@ -185,12 +187,14 @@ std::vector<Point2> parse_line(const std::string& text) {
   std::vector<std::vector<Point2>> lines;
   try {
     collect_line(*json, 0, lines);
+    line.crs = crs_of_geojson(*json, text);
   } catch (const nlohmann::json::exception& error) {
     throw bad(std::string("is not GeoJSON (") + error.what() + ")");
   }
   if (lines.size() != 1) throw bad("holds " + std::to_string(lines.size()) + " lines");
   if (lines.front().size() < 2) throw bad("the line has fewer than two places");
-  return lines.front();
+  line.places = std::move(lines.front());
+  return line;
 }
 
 std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text) {

@@ -68,9 +68,13 @@ std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text);
 /// NAME:WEIGHT of --channel; the name may hold colons, the weight is a number from 0 up.
 std::pair<std::string, double> channel_of(const std::string& text);
 
+struct Line {
+  std::vector<Point2> places;      ///< at least two
+  std::optional<PlacesCrs> crs{};  ///< as of Region::crs()
+};
 /// "x1,y1,x2,y2[,...]", or a GeoJSON file with one LineString (plain, in a Feature, or in a
-/// FeatureCollection of one). At least two places. Throws: stream::Error for a bad file.
-std::vector<Point2> parse_line(const std::string& text);
+/// FeatureCollection of one). Throws: stream::Error for a bad file.
+Line parse_line(const std::string& text);
 
 /// A number from 0 to 255; nullopt for "top".
 std::optional<unsigned> parse_level(const std::string& text);

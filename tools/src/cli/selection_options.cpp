@@ -53,7 +53,8 @@ void SelectionOptions::define(CLI::App& app) {
       "a GeoJSON file of polygons; of rasters, COPC and EPT little else is read");
   app.add_option("--region-crs", region_crs_,
                  "the CRS of the region (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
-                 "input's")
+                 "input's or, of GeoJSON, the one that the file names, or else longitude and "
+                 "latitude")
       ->needs("--region");
   add_number(app, "--resolution", resolution_,
              "of COPC and EPT only the points down to this spacing, in units of its CRS",
@@ -66,12 +67,22 @@ void SelectionOptions::define(CLI::App& app) {
 
 terrain::RegionConversion SelectionOptions::conversion(
     std::span<const std::string> inputs, const stream::SourceOptions& reading,
-    const std::optional<terrain::DatumShift>& shift) const {
+    const std::optional<terrain::DatumShift>& shift, const terrain::Region& region) const {
   for (const std::string& input : inputs) {
     if (stream::reads_once(input)) {
-      if (region_crs_.empty()) return {};
-      throw terrain::UsageError("--region-crs looks up the CRS of the input before it is read: " +
-                                input + " can be read only once; name a file");
+      if (region_crs_.empty() && reading.crs) {
+        stream::SourceInfo named;
+        named.files = {input};
+        named.crs = *reading.crs;
+        return terrain::RegionConversion(named, {}, shift);
+      }
+      const bool stated = region.crs() && !region.crs()->name.empty();
+      if (region_crs_.empty() && !stated) return {};
+      throw terrain::UsageError(
+          (region_crs_.empty() ? "the crs of " + region.crs()->file + " makes it necessary to look"
+                               : std::string("--region-crs looks")) +
+          " up the CRS of the input before it is read: " + input +
+          " can be read only once; name a file");
     }
   }
   return terrain::RegionConversion(stream::open_source(inputs, reading)->info(), region_crs_,
@@ -86,7 +97,8 @@ stream::Selection SelectionOptions::selection(std::span<const std::string> input
   if (!region_.empty()) {
     terrain::Region region = terrain::Region::parse(region_);
     if (!region_crs_.empty() || terrain::RegionConversion::may_turn(region)) {
-      const terrain::RegionConversion converted = conversion(inputs, reading, shift);
+      terrain::RegionConversion converted = conversion(inputs, reading, shift, region);
+      converted.on_note([&common](const std::string& line) { common.say(line); });
       region = converted(std::move(region));
       if (!converted.note().empty()) common.say(converted.note());
     }

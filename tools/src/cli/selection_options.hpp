@@ -12,6 +12,10 @@
 
 /// --where, --region, --region-crs, --resolution, --keep and --drop of what reads files.
 
+namespace terrace::terrain {
+class Region;
+}
+
 namespace terrace::tools {
 
 struct CommonOptions;
@@ -19,6 +23,8 @@ struct CommonOptions;
 class SelectionOptions {
  public:
   void define(CLI::App& app);
+  /// Whether points may be left out.
+  [[nodiscard]] bool selects() const { return !where_.empty() || !region_.empty(); }
   /// inputs: what will be read, by `reading`; opened beforehand if their CRS may matter. shift: of
   /// it. Throws: UsageError for a list or a region that makes no sense; stream::Error.
   [[nodiscard]] stream::Selection selection(std::span<const std::string> inputs,
@@ -29,7 +35,7 @@ class SelectionOptions {
  private:
   [[nodiscard]] terrain::RegionConversion conversion(
       std::span<const std::string> inputs, const stream::SourceOptions& reading,
-      const std::optional<terrain::DatumShift>& shift) const;
+      const std::optional<terrain::DatumShift>& shift, const terrain::Region& region) const;
 
   std::string where_, region_, region_crs_, keep_, drop_;
   std::optional<double> resolution_;

@@ -23,7 +23,10 @@ std::optional<Transformation> CrsOptions::given(const stream::Store& store,
 RegionConversion CrsOptions::regions(const stream::Store& store,
                                      const CommonOptions& common) const {
   std::optional<Transformation> change = given(store, common);
-  return change ? RegionConversion(store, std::move(*change)) : RegionConversion(store);
+  RegionConversion regions = change ? RegionConversion(store, std::move(*change))
+                                    : RegionConversion(store, parse_datum_shift(shift_));
+  regions.on_note([&common](const std::string& line) { common.say(line); });
+  return regions;
 }
 
 PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {
@@ -56,7 +59,9 @@ void CrsOptions::define(CLI::App& app, const std::string& name, const std::strin
 void CrsOptions::define_given(CLI::App& app, const std::string& name, const std::string& given) {
   app.add_option(
       name, given_,
-      "the CRS of " + given + " (EPSG:n or a WKT file; x,y is lon,lat), if it is not the store's");
+      "the CRS of " + given +
+          " (EPSG:n or a WKT file; x,y is lon,lat), if it is not the store's or, of GeoJSON, the "
+          "one that the file names, or else longitude and latitude");
   app.add_option("--towgs84", shift_,
                  "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
                  "if it is another");

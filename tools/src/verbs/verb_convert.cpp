@@ -90,6 +90,13 @@ class ConvertCommand : public Command {
           return writer->encode(*block);
         },
         [&](stream::PointWriter::EncodedPtr points) { writer->append(std::move(points)); });
+    if (writer->points() == 0 && selection_.selects()) {
+      throw stream::Error(
+          {.file = inputs_.front(),
+           .where = {},
+           .cause = "none of its " + selected_of(source->progress()) + "points is selected",
+           .remedy = "give another --where or --region"});
+    }
     writer->finish();
     tell_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
@@ -122,6 +129,10 @@ class ConvertCommand : public Command {
   }
 
  private:
+  /// "1,234 ": the points that were looked at; parts that the region does not meet were not.
+  static std::string selected_of(const stream::Progress& done) {
+    return done.excluded > 0 ? with_commas(done.excluded) + ' ' : std::string();
+  }
   /// The CRS of the file, or of the .prj beside it.
   static std::function<stream::Crs()> crs_of(const stream::SourceInfo& info) {
     return [&info] {

@@ -24,6 +24,7 @@
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/detail_points.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
@@ -82,6 +83,7 @@ class PointsCommand final : public Command {
     const std::uint64_t replaced = write_points(store, detail, *writer, places(to),
                                                 overlay ? &*overlay : nullptr, common.context());
     const std::uint64_t points = writer->points();
+    if (points == 0) need_some(store, detail);
     writer->finish();
 
     Summary summary;
@@ -89,10 +91,6 @@ class PointsCommand final : public Command {
     summary.add_cost(watch);
     summary.text = output_ + ": " + counted(points, "point") + " in " +
                    readable_seconds(watch.seconds()) + "\n";
-    if (points == 0) {
-      common.say(part_.path + ": no point is selected; all of the store's have " +
-                 extent_text(store.whole()));
-    }
     tell_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = replaced;
@@ -102,6 +100,16 @@ class PointsCommand final : public Command {
   }
 
  private:
+  /// Throws: stream::Error if the options left nothing of a store that has points.
+  void need_some(const stream::Store& store, const Detail& detail) const {
+    if (store.whole().points() == 0) return;
+    if (detail.region) throw_none_inside(store);
+    throw stream::Error(
+        {.file = part_.path,
+         .where = {},
+         .cause = "no point is selected; all of the store's have " + extent_text(store.whole()),
+         .remedy = "give another --where, --focus or --cluster"});
+  }
   static PlaceConversion places(const std::optional<Transformation>& to) {
     return to ? PlaceConversion(*to) : PlaceConversion();
   }
@@ -129,6 +137,7 @@ class PointsCommand final : public Command {
           "another ending, e.g. .csv");
     }
     LineSet lines = detail_lines(store, detail, common.context());
+    if (lines.lines.empty()) need_some(store, detail);
     const std::optional<Transformation> to = part_.crs.to(store, common);
     places(to)(lines.vertices);
     stream::Sink file(output_, may_replace(output_, common.force), stop_token());
@@ -162,6 +171,14 @@ class PointsCommand final : public Command {
     const std::vector<stream::FoundPoint> found =
         count_ ? nearest_points(query, place, *count_, detail.level)
                : points_within(query, place, *radius_, detail.level);
+    if (found.empty() && count_ != 0 && store.whole().points() > 0) {
+      throw stream::Error(
+          {.file = part_.path,
+           .where = {},
+           .cause = "no point is selected " +
+                    (radius_ ? "within " + number_text(*radius_) + " m of " : "near ") + near_,
+           .remedy = radius_ ? "raise --within" : "give another --where"});
+    }
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
     const std::optional<Transformation> to = part_.crs.to(store, common);

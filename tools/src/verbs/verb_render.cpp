@@ -181,11 +181,11 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
 /// The finest level with no more points, in clusters that reach into the region, than a picture
 /// needs.
 std::string finest_level(const stream::Store& store, const std::string& region) {
+  const RegionConversion regions(store);
   constexpr std::uint64_t kMost = 4000000;
   if (region.empty()) return std::to_string(level_within(store, kMost));
   for (unsigned level = 0; level < store.top(); ++level) {
-    const Detail detail =
-        parse_detail(store, std::to_string(level), region, {}, RegionConversion(store));
+    const Detail detail = parse_detail(store, std::to_string(level), region, {}, regions);
     if (wanted_points(store, detail) <= kMost) return std::to_string(level);
   }
   return "top";
@@ -214,8 +214,9 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   }
   const bool chosen = !selection.level.empty() || !selection.focuses.empty();
   const std::string level = chosen ? selection.level : finest_level(store, selection.region);
-  const Detail detail =
-      parse_detail(store, level, selection.region, selection.focuses, RegionConversion(store));
+  RegionConversion regions(store);
+  regions.on_note([&common](const std::string& line) { common.say(line); });
+  const Detail detail = parse_detail(store, level, selection.region, selection.focuses, regions);
   memory_for_points(path, size, wanted_points(store, detail) * kDrawnBytesPerPoint, common);
   // These positions are in the CRS already.
   stream::Placement world;

@@ -19,7 +19,7 @@ struct ContourRequest {
   /// Triangles with a longer side, in metres on the ground, are left out.
   std::optional<double> max_edge{};
   std::optional<Region> region{};  ///< in the store's CRS
-  /// Lines keep the store's x and y, which need not have a CRS, and are then no RFC 7946.
+  /// Lines keep the store's x and y, and a `crs` member names their CRS, null if it is not known.
   bool own_crs = false;
 };
 

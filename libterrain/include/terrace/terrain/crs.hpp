@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include <terrace/stream/point.hpp>
 #include <terrace/stream/source.hpp>
@@ -167,14 +169,20 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
                                  const std::optional<DatumShift>& shift = std::nullopt);
 
 /// Regions, of another CRS too, as regions in that of the data; made by default, it leaves them as
-/// they are. Longitudes may be off by whole turns, and a box of a raster holds what lies within a
+/// they are. Longitudes may be off by whole turns, and a box of a raster holds what is within a
 /// millionth of a cell.
+///
+/// Unless a CRS is given for all regions, boxes and polygons of the caller's are in that of the
+/// data, and GeoJSON is in the CRS that it names. GeoJSON that names none is in longitude and
+/// latitude (RFC 7946) if the CRS of the data is known and its numbers can be that, else in the CRS
+/// of the data.
 class RegionConversion {
  public:
   RegionConversion() = default;
-  /// Regions in the store's own CRS.
-  explicit RegionConversion(const stream::Store& store);
-  /// to_regions: from the store's CRS to that of the regions.
+  /// Regions without a CRS of their own are in the store's. shift: see transformation_to().
+  explicit RegionConversion(const stream::Store& store,
+                            const std::optional<DatumShift>& shift = std::nullopt);
+  /// to_regions: from the store's CRS to that of all regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
   /// For Region::restrict() of a source that is opened again. named: the CRS of the regions, as for
   /// CoordinateSystem::parse; empty: the source's own, be it known or not. shift: of --towgs84.
@@ -186,13 +194,27 @@ class RegionConversion {
   /// it stays as it is, and a source need not be opened to learn its CRS.
   static bool may_turn(const Region& region);
   /// Outlines, a box's too, get so many corners that they run within a millionth of their length of
-  /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows.
+  /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows, or if
+  /// a region's CRS is not known, or the data have none.
   [[nodiscard]] Region operator()(Region region) const;
+  /// From the CRS of the data to that of a GeoJSON file, whose places are in `box`; nullopt if its
+  /// places are in that of the data. Throws: as above.
+  [[nodiscard]] std::optional<Transformation> to_places(const PlacesCrs& given,
+                                                        const stream::Box3& box) const;
+  /// Sets who is told what was assumed of a GeoJSON file's CRS, and which operation leads there.
+  void on_note(std::function<void(const std::string&)> note) { note_ = std::move(note); }
   /// What the user should know of it; empty: nothing.
   [[nodiscard]] std::string note() const { return to_regions_ ? to_regions_->note() : ""; }
 
  private:
+  void say(const std::string& line) const {
+    if (note_ && !line.empty()) note_(line);
+  }
+
+  bool given_ = false;  ///< the CRS of all regions, whatever they say themselves
   std::optional<Transformation> to_regions_;
+  std::function<std::optional<CoordinateSystem>()> system_;  ///< of the data, found when needed
+  std::function<void(const std::string&)> note_;
   stream::Box3 bounds_;
   Point2 tolerance_{};
   double turn_ = 0;  ///< of longitudes; 0: none

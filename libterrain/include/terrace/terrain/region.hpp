@@ -31,6 +31,12 @@ enum class Overlap : std::uint8_t {
 
 class RegionShape;
 
+/// What GeoJSON says of the CRS of its places.
+struct PlacesCrs {
+  std::string name;  ///< of its `crs` member; empty: it has none
+  std::string file;  ///< where it is from, for messages
+};
+
 /// A part of space in the coordinates of a CRS, closed: a box, or polygons, of which a place is
 /// inside if it is on a ring, or within an outer ring and no hole of it. Polygons may overlap.
 ///
@@ -40,7 +46,8 @@ class RegionShape;
 class Region {
  public:
   /// text: "minx,miny,maxx,maxy", "minx,miny,minz,maxx,maxy,maxz", or the name of a GeoJSON file
-  /// (Polygon, MultiPolygon, GeometryCollection, Feature or FeatureCollection of these).
+  /// (Polygon, MultiPolygon, GeometryCollection, Feature or FeatureCollection of these), of which
+  /// crs() tells the CRS: RegionConversion leads from there to the data.
   /// Throws: UsageError for numbers that are not a box, stream::Error for a file that is not a
   /// region or has an invalid polygon, as of_polygons().
   static Region parse(const std::string& text);
@@ -48,12 +55,17 @@ class Region {
   static Region of_box(const stream::Box3& box);
   /// The same region with another extent().
   [[nodiscard]] Region with_extent(const stream::Box3& extent) const;
-  /// The union of polygons, each with heights from `low` to `high`.
+  /// The union of polygons, each with heights from `low` to `high`. file: named in errors.
   /// Throws: stream::Error without polygons, or for an invalid one (a ring that crosses or
   /// touches itself along a line, has fewer than three corners, no area or a coordinate that is not
   /// finite; a hole outside; holes that cross), naming polygon, ring and place.
-  static Region of_polygons(std::vector<Polygon> polygons, double low, double high);
+  static Region of_polygons(std::vector<Polygon> polygons, double low, double high,
+                            const std::string& file = {});
 
+  /// In which CRS the places are; nullopt: in that of the data.
+  [[nodiscard]] const std::optional<PlacesCrs>& crs() const { return crs_; }
+  /// The same places of another CRS.
+  [[nodiscard]] Region in_crs(std::optional<PlacesCrs> crs) const;
   /// The smallest box around the region. Without heights its z is unbounded.
   [[nodiscard]] const stream::Box3& box() const { return box_; }
   /// The box that rasters of the region cover: box(), unless that was widened to hold what rounding
@@ -78,6 +90,7 @@ class Region {
 
   stream::Box3 box_;
   std::optional<stream::Box3> extent_;
+  std::optional<PlacesCrs> crs_;
   std::shared_ptr<const RegionShape> shape_;  ///< none: the box itself
 };
 

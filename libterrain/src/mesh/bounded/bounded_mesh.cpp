@@ -52,7 +52,8 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
            .remedy = remedy});
     }
   }
-  if (result.samples == 0 && options.region) throw_none_inside(store, "sample");
+  if (result.samples == 0 && (options.region || store.condition() != nullptr))
+    throw_none_inside(store, "sample");
   stream::WriterOptions writer = options.writer;
   writer.stop = stop;
   spool->write(options.path, writer, mesher.bounds(), mesher.coordinates().frame);
