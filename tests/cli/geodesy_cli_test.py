@@ -7,6 +7,7 @@ What compares with PROJ (cs2cs) or GDAL is skipped where those are not installed
 """
 
 import json
+import math
 import os
 import random
 import shutil
@@ -462,8 +463,8 @@ class GeodesyTest(unittest.TestCase):
         found = self.points(store, '--region', '8,46,10,49', '--region-crs', 'EPSG:4326')
         self.assertEqual({z for _, _, z in found}, inside)
         self.assertGreater(len(inside), 100)
-        outside = self.points(store, '--region', '100,46,101,49', '--region-crs', 'EPSG:4326')
-        self.assertEqual(outside, [])
+        error = self.refused(1, 'points', store, '--region', '100,46,101,49', '--region-crs', 'EPSG:4326', '-o', '-')
+        self.assertIn('no point is in the region', error)
         for box in ('8,46,10,95', '-170,-80,170,80'):
             error = self.refused(1, 'points', store, f'--region={box}', '--region-crs', 'EPSG:4326',
                                  '-o', '-')
@@ -484,7 +485,157 @@ class GeodesyTest(unittest.TestCase):
         self.assertTrue(all(6e5 < x < 9.5e5 for x, _, _ in there))
         box = self.points(store, '--region', '179.45,-21,180.45,-10', '--region-crs', 'EPSG:4326')
         self.assertEqual(len(box), 100)
-        self.assertEqual({x > 0 for x, _, _ in box}, {True, False})
+        self.assertEqual(sorted({round(x, 1) for x, _, _ in box}), [round(179.5 + 0.1 * i, 1) for i in range(10)])
+
+    def test_clouds_are_joined_across_the_antimeridian(self):
+        random.seed(3)
+        cloud = self.cloud([(west + random.random() / 10, -17 + random.random() / 10)
+                            for west in (179.9, -180) for _ in range(300)])
+        store = self.path('joined.terrace')
+        result = terrace('build', cloud, '--crs', 'EPSG:4326', '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('on both sides of the antimeridian', result.stderr)
+        low, high = (self.info(store)['bounds'][end][0] for end in ('min', 'max'))
+        self.assertTrue(179.9 <= low < 179.91 and 180.09 < high <= 180.1)
+        # The neighbours of a place at the seam are on both sides of it, whichever way it is written.
+        for place in '180,-16.95', '-180,-16.95':
+            near = self.points(store, f'--near={place}', '-k', 20)
+            self.assertEqual({x > 180 for x, _, _ in near}, {True, False})
+        places = self.path('places.csv')
+        with open(places, 'w', encoding='utf-8') as file:
+            file.write('0,-16.95\n180,-16.95\n-179.95,-16.95\n')
+        heights = [line.split(',')[2] for line in self.ok('sample', store, '--points', places).splitlines()]
+        self.assertEqual([height != '' for height in heights], [False, True, True])
+        # Counted from 0 to 360, the seam is at Greenwich.
+        cloud = self.cloud([(west + random.random(), 50 + random.random()) for west in (0, 359) for _ in range(99)])
+        low, high = (self.info(self.build(cloud, '--crs', 'EPSG:4326'))['bounds'][end][0] for end in ('min', 'max'))
+        self.assertTrue(-1 <= low < high <= 1)
+        # What goes around the globe stays as it is.
+        cloud = self.cloud([(random.uniform(-180, 180), random.uniform(-60, 60)) for _ in range(900)])
+        low, high = (self.info(self.build(cloud, '--crs', 'EPSG:4326'))['bounds'][end][0] for end in ('min', 'max'))
+        self.assertTrue(-180 <= low < -170 and 170 < high <= 180)
+        with open(self.path('cloud.xyz'), 'w', encoding='utf-8') as file:
+            file.write('179.5 1 2\n-179.5 1 3\n179.6 2 3\n')
+        with open(file.name, encoding='utf-8') as given:
+            result = subprocess.run([TERRACE, 'build', '-', '--crs', 'EPSG:4326', '-o', self.path('once.terrace')],
+                                    capture_output=True, text=True, timeout=120, stdin=given)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('on both sides of the antimeridian', result.stderr)
+
+    def test_latitudes_beyond_a_pole_are_refused(self):
+        random.seed(1)
+        swapped = [(-12 + random.random() / 100, 130 + random.random() / 100) for _ in range(200)]
+        error = self.refused(1, 'build', self.cloud(swapped), '--crs', 'EPSG:4326', '-o', self.path('swapped'))
+        for word in 'the latitude 130.', 'is beyond a pole', 'exchange them', '--crs':
+            self.assertIn(word, error)
+        self.assertFalse(os.path.exists(self.path('swapped')))
+        dem = self.path('metres.tif')
+        write_tiff(dem, 4, 4, range(16), corner=(500000, 5200000), cell=10.0, keys=GEOGRAPHIC)
+        self.assertIn('is beyond a pole', self.refused(1, 'build', dem, '-o', self.path('metres')))
+        # The pole itself is a place, to the rounding of what was written.
+        self.build(self.cloud([(i, 89 + j / 9) for i in range(9) for j in range(10)] + [(3, 90.0000000001)]),
+                   '--crs', 'EPSG:4326')
+        store = self.build(self.cloud([(5e5 + i, 5.2e6 + i * i) for i in range(9)]), '--crs', 'EPSG:32632')
+        places = self.path('places.csv')
+        with open(places, 'w', encoding='utf-8') as file:
+            file.write('lon,lat\n9,46.9\n8,146.9\n')
+        error = self.refused(1, 'sample', store, '--points', places, '--points-crs', 'EPSG:4326')
+        self.assertIn('line 3: the latitude 146.9 is beyond a pole', error)
+
+    def geojson(self, name, ring, **members):
+        path = self.path(name)
+        with open(path, 'w', encoding='utf-8') as file:
+            json.dump({'type': 'FeatureCollection', **members, 'features': [
+                {'type': 'Feature', 'properties': {}, 'geometry': None},
+                {'type': 'Feature', 'properties': {},
+                 'geometry': {'type': 'Polygon', 'coordinates': [ring + ring[:1]]}}]}, file)
+        return path
+
+    def test_geojson_is_in_the_crs_that_it_names_or_else_in_longitude_and_latitude(self):
+        random.seed(4)
+        places = [(random.uniform(3e5, 7e5), random.uniform(5e6, 6e6)) for _ in range(3000)]
+        cloud = self.cloud(places)
+        store = self.build(cloud, '--crs', 'EPSG:32632', '--block', 500)
+        degrees = {z: (x, y) for x, y, z in self.points(store, '--to-crs', 'EPSG:4326')}
+        ring = [[8, 46], [10, 46], [10, 49], [8, 49]]
+        inside = {z for z, (x, y) in degrees.items() if 8 <= x <= 10 and 46 <= y <= 49}
+        metres = [[4e5, 5.2e6], [6e5, 5.2e6], [6e5, 5.4e6], [4e5, 5.4e6]]
+        within = {i for i, (x, y) in enumerate(places) if 4e5 <= x <= 6e5 and 5.2e6 <= y <= 5.4e6}
+
+        def crs(name):
+            return {'type': 'name', 'properties': {'name': name}}
+        mercator = [[x / 180 * 20037508.342789244, math.log(math.tan(math.radians(45 + y / 2))) * 6378137]
+                    for x, y in ring]
+        for region, expected in (
+                (self.geojson('plain.geojson', ring), inside),
+                (self.geojson('84.geojson', ring, crs=crs('urn:ogc:def:crs:OGC:1.3:CRS84')), inside),
+                (self.geojson('4326.geojson', ring, crs=crs('urn:ogc:def:crs:EPSG::4326')), inside),
+                (self.geojson('url.geojson', ring, crs=crs('http://www.opengis.net/def/crs/EPSG/0/4326')), inside),
+                (self.geojson('3857.geojson', mercator, crs=crs('EPSG:3857')), inside),
+                (self.geojson('own.geojson', metres, crs=crs('urn:ogc:def:crs:EPSG::32632')), within),
+                (self.geojson('null.geojson', metres, crs=None), within),
+                (self.geojson('metres.geojson', metres), within)):
+            with self.subTest(region):
+                self.assertEqual({z for _, _, z in self.points(store, '--region', region)}, expected)
+                part, text = self.path('part.terrace'), self.path('part.csv')
+                self.ok('build', cloud, '--crs', 'EPSG:32632', '--region', region, '-o', part, '--force')
+                self.assertEqual({z for _, _, z in self.points(part)}, expected)
+                las = self.path('cloud.las')
+                if not os.path.exists(las):
+                    self.ok('points', store, '-o', las)
+                self.ok('convert', las, '--region', region, '-o', text, '--force')
+                with open(text, encoding='utf-8') as file:
+                    self.assertEqual(len(file.read().splitlines()) - 1, len(expected))
+        result = terrace('points', store, '--region', self.path('metres.geojson'), '-o', self.path('m.csv'))
+        self.assertIn('has no crs, and its places are taken in that of the data, EPSG:32632', result.stderr)
+        # What --region-crs says counts before what the file says.
+        self.assertEqual({z for _, _, z in self.points(store, '--region', self.geojson('wrong.geojson', metres,
+                                                       crs=crs('EPSG:4326')), '--region-crs', 'EPSG:32632')}, within)
+        for members, words in (({'crs': crs('EPSG:0')}, 'its crs "EPSG:0" is not known'),
+                               ({'crs': crs('/etc/hostname')}, 'its crs "/etc/hostname" is not known'),
+                               ({'crs': {'type': 'link'}}, 'its crs does not name a CRS')):
+            error = self.refused(1, 'points', store, '--region', self.geojson('bad.geojson', ring, **members), '-o', '-')
+            self.assertIn(words, error)
+        without = self.build(self.cloud([(random.uniform(0, 20), random.uniform(40, 50)) for _ in range(500)]))
+        self.assertEqual(len(self.points(without, '--region', self.path('plain.geojson'))),
+                         len(self.points(without, '--region', '8,46,10,49')))
+        self.assertIn('the CRS of the data is not known', self.refused(
+            1, 'points', without, '--region', self.path('84.geojson'), '-o', '-'))
+
+    def test_a_line_of_geojson_is_in_longitude_and_latitude(self):
+        dem = self.path('dem.tif')
+        write_tiff(dem, 30, 30, [i % 30 for i in range(900)], corner=(500000, 5200000), cell=30.0,
+                   keys={1024: 1, 1025: 1, 3072: 32632})
+        store = self.build(dem)
+        rows = []
+        for name, places in (('degrees', [[9.001, 46.952], [9.008, 46.952]]),
+                             ('metres', [[500100.0, 5199900.0], [500800.0, 5199900.0]])):
+            with open(self.path(name), 'w', encoding='utf-8') as file:
+                json.dump({'type': 'LineString', 'coordinates': places}, file)
+            rows.append([line.split(',') for line in
+                         self.ok('profile', store, '--line', self.path(name), '-o', '-').splitlines()[1:]])
+        for profile in rows:
+            self.assertTrue(all(500000 < float(row[1]) < 501000 and row[3] for row in profile))
+
+    def test_an_empty_selection_is_an_error(self):
+        cloud = self.cloud([(5e5 + i, 5.2e6 + i % 7) for i in range(50)])
+        store = self.build(cloud, '--crs', 'EPSG:32632')
+        las = self.path('cloud.las')
+        self.ok('points', store, '-o', las)
+        far = self.geojson('far.geojson', [[8, 56], [8.1, 56], [8.1, 56.1]])
+        for args in (('points', store), ('mesh', store), ('mesh', store, '--max-error', 1), ('raster', store),
+                     ('contour', store, '--interval', 1), ('convert', las), ('build', las), ('convert', cloud)):
+            verb = args[0]
+            out = self.path({'mesh': 'o.ply', 'raster': 'o.tif', 'contour': 'o.geojson', 'build': 'o.st',
+                             'convert': 'o.laz', 'points': 'o.laz'}[verb])
+            for option in ('--region', '1,2,3,4'), ('--region', far), ('--where', 'z < -1000'):
+                if args == ('convert', cloud) and option[1] == far:
+                    continue  # a file without a CRS
+                with self.subTest(args=args, option=option):
+                    self.refused(1, *args, *option, '-o', out)
+                    self.assertFalse(os.path.exists(out))
+        error = self.refused(1, 'points', store, '--near', '500001.5,5200004', '--within', 0.01, '-o', '-')
+        self.assertIn('within 0.01 m of 500001.5,5200004', error)
 
     def test_rasters_joined_at_the_antimeridian_answer_for_both_longitudes(self):
         west, east = self.path('west.tif'), self.path('east.tif')

@@ -14,6 +14,7 @@
 
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/input.hpp>
 #include <terrace/stream/raster.hpp>
 #include <terrace/stream/spatial_order.hpp>
 #include <terrace/stream/store.hpp>
@@ -24,6 +25,7 @@
 #include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
 #include "build/clustering.hpp"
+#include "build/joined_longitudes.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/latitudes.hpp"
@@ -260,6 +262,35 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
                        .remedy = remedy});
 }
 
+/// Ends a build whose points are to be joined across the antimeridian.
+struct AcrossAntimeridian {
+  double middle;  ///< see JoinedLongitudes
+};
+
+/// Throws: AcrossAntimeridian if the input can be read again; else stream::Error.
+void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longitudes,
+                     const Context& context) {
+  const std::optional<double> middle = longitudes.middle();
+  if (!middle || request.most_points > 0) return;
+  const std::string what = "is on both sides of the antimeridian";
+  if (request.entities != stream::Entities::points) {
+    // Their corners are in attributes.
+    context.say("the input " + what +
+                ", and what crosses it goes around the earth: count longitudes on beyond 180");
+    return;
+  }
+  if (!request.open &&
+      std::any_of(request.inputs.begin(), request.inputs.end(),
+                  [](const std::string& name) { return stream::reads_once(name); })) {
+    throw stream::Error(
+        {.file = request.inputs.front(),
+         .where = {},
+         .cause = what + ", which is known at its end, and can be read only once",
+         .remedy = "name a file, or count longitudes from 0 to 360 or on beyond 180"});
+  }
+  throw AcrossAntimeridian{*middle};
+}
+
 }  // namespace
 
 std::optional<cluster::Effort> effort_of(const std::string& name) {
@@ -273,7 +304,12 @@ std::string name_of(cluster::Effort effort) {
   return kEfforts[static_cast<std::size_t>(effort)].first;
 }
 
-BuildOutcome build_store(const BuildRequest& request, const Context& context) {
+namespace {
+
+/// middle: of points that are joined across the antimeridian. Throws: AcrossAntimeridian without
+/// it if they must be.
+BuildOutcome build_once(const BuildRequest& request, const Context& context,
+                        std::optional<double> middle) {
   const std::uint64_t memory_bytes = context.memory_or(kMemory);
   stream::SourceOptions source_options;
   source_options.format = request.input_format;
@@ -357,6 +393,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);
 
+  JoinedLongitudes longitudes(schema, middle);
   const LatitudeCheck check_latitude(schema,
                                      info.files.empty() ? std::string() : info.files.front());
   stream::PointBlock block;
@@ -375,6 +412,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   while (next()) {
     check_latitude(block.positions);
     voids.add(block);
+    if (!info.grid) longitudes(block.positions);
     if (payload_bytes > info.payload_size()) {  // room for the mark
       append_zero_byte(block.payload, info.payload_size(), block.positions.size(), marked);
       builder.push(block.positions, marked);
@@ -389,6 +427,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   }
   so_far = points->progress();
   if (so_far.points == 0) throw_no_points(request, info, so_far);
+  if (!middle) join_longitudes(request, longitudes, context);
   writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();
   outcome.points = result.points;
@@ -420,6 +459,19 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   if (!crs.note.empty()) context.say(crs.note);
   if (!ground.assumption().empty()) context.say(ground.assumption());
   return outcome;
+}
+
+}  // namespace
+
+BuildOutcome build_store(const BuildRequest& request, const Context& context) {
+  try {
+    return build_once(request, context, std::nullopt);
+  } catch (const AcrossAntimeridian& across) {
+    context.say(
+        "the points are on both sides of the antimeridian: they are read again and joined, "
+        "with longitudes that go on beyond 180 degrees");
+    return build_once(request, context, across.middle);
+  }
 }
 
 }  // namespace terrace::terrain

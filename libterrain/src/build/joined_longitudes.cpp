@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "build/joined_longitudes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "earth/whole_turns.hpp"
+
+namespace terrace::terrain {
+
+JoinedLongitudes::JoinedLongitudes(const stream::Placement& placement, std::optional<double> middle)
+    : degrees_(placement.crs.geographic && placement.crs.horizontal_unit == "degree" &&
+               placement.world.xy[1] == 0 && placement.world.xy[0] != 0),
+      scale_(placement.world.xy[0]),
+      offset_(placement.world.xy[2]),
+      middle_(middle) {}
+
+void JoinedLongitudes::operator()(std::span<stream::Point3> stored) {
+  if (!degrees_) return;
+  if (middle_) {
+    const WholeTurns turned(*middle_, 360);
+    for (stream::Point3& p : stored) {
+      const double longitude = p[0] * scale_ + offset_;
+      const double turns = std::round((turned({longitude, 0})[0] - longitude) / 360);
+      if (turns == 0) continue;
+      // Stored integers stay integers where their scale divides a turn, as decimal ones do.
+      const double step = 360 / scale_, whole = std::round(step);
+      p[0] += turns * (std::abs(step - whole) < 1e-6 ? whole : step);
+    }
+    return;
+  }
+  for (const stream::Point3& p : stored) {
+    const double longitude = p[0] * scale_ + offset_;
+    least_ = std::min(least_, longitude);
+    most_ = std::max(most_, longitude);
+    const double degree = std::floor(longitude - 360 * std::floor(longitude / 360));
+    // NaN is in the first.
+    seen_[degree > 0 ? std::min(static_cast<std::size_t>(degree), kBins - 1) : 0] = true;
+  }
+}
+
+std::optional<double> JoinedLongitudes::middle() const {
+  if (!(most_ - least_ > 180 && most_ - least_ <= 720)) return std::nullopt;
+  // The widest gap, around the circle; a gap that goes on beyond the last degree counts once.
+  std::size_t gap = 0, gap_end = 0, run = 0;
+  for (std::size_t i = 0; i < 2 * kBins; ++i) {
+    run = seen_[i % kBins] ? 0 : run + 1;
+    if (run > gap) {
+      gap = run;
+      gap_end = i + 1;
+    }
+  }
+  if (gap <= kBins / 2) return std::nullopt;
+  const double middle =
+      std::remainder(static_cast<double>(gap_end) + 0.5 * static_cast<double>(kBins - gap), 360);
+  return middle < -90 ? middle + 360 : middle;
+}
+
+}  // namespace terrace::terrain
