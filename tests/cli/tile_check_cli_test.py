@@ -192,9 +192,11 @@ class VerifyTest(TileTestCase):
 
     def test_a_step_on_the_line_of_180_degrees(self):
         tile = self.set.tiles[0, 0, 0]
-        heights = [h + 20 if u == 0 else h for u, h in zip(tile.u, tile.h)]
-        self.assertLess(max(heights), UNITS)
-        self.change((0, 0, 0), self.columns(tile, h=heights))
+        # Flat, far from the data.
+        self.assertEqual((tile.low, tile.high), (0, 0))
+        data = bytearray(self.columns(tile, h=[UNITS if u == 0 else 0 for u in tile.u]))
+        struct.pack_into('<f', data, 28, 20)
+        self.change((0, 0, 0), data)
         self.found('0/1/0.terrain: its eastern side and that of 0/0/0.terrain have heights',
                    also=('sphere', 'horizon'))
 
@@ -295,7 +297,8 @@ class VerifyTest(TileTestCase):
         tile = self.set.tiles[key]
         vertex = next(i for i in range(len(tile.u)) if tile.v[i] == 0 and 0 < tile.u[i] < UNITS)
         h = list(tile.h)
-        h[vertex] += 2 if h[vertex] < UNITS - 2 else -2
+        step = round(1 / ((tile.high - tile.low) / UNITS))
+        h[vertex] += step if h[vertex] + step < UNITS else -step
         self.change(key, self.columns(tile, h=h))
         header = ('bounding sphere', 'horizon occlusion')
         problems = self.found('its southern side', also=header)
@@ -309,12 +312,22 @@ class VerifyTest(TileTestCase):
         self.change(key, self.columns(tile, h=h))
         self.found('m off the tile, more than 4 m', also=header, store=True)
 
+    def test_a_header_has_the_tiles_own_heights(self):
+        key = self.inner_tile()
+        tile = self.set.tiles[key]
+        self.assertEqual((min(tile.h), max(tile.h)), (0, UNITS))
+        for scaled, text in (([h // 2 for h in tile.h], 'its highest height is'),
+                             ([(h + UNITS) // 2 for h in tile.h], 'its lowest height is')):
+            self.change(key, self.columns(tile, h=scaled))
+            self.found(text, also=('bounding sphere', 'horizon occlusion', 'heights that differ', 'the centre'))
+
     def test_headers(self):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         for at, code, value, text in (
                 (0, '<d', tile.centre[0] + 1e6, 'the centre lies outside'),
                 (24, '<f', tile.high + 1, 'lowest and highest'),
+                (28, '<f', tile.high + 900, 'differ by up to'),
                 (24, '<f', tile.low - 1, 'differ by up to'),
                 (32, '<d', tile.sphere[0] + 500, 'bounding sphere'),
                 (56, '<d', tile.radius - 5, 'leaves out vertices'),

@@ -114,12 +114,20 @@ class TileTest(TileTestCase):
                           for lon, lat, _ in samples}
                 deepest = {key for key in tiles.tiles if key[0] == 9}
                 self.assertEqual(deepest, inside)
-                # No spikes where nothing is known.
+                # No spikes where nothing is known, and no land beyond the outline.
                 for key in deepest:
                     tile = tiles.tiles[key]
                     heights = [tile.metres(i) for i in range(len(tile.u))]
-                    self.assertGreater(min(heights), 300)
+                    self.assertGreaterEqual(min(heights), -1)
                     self.assertLess(max(heights), 560)
+                    self.assertEqual((tile.low, tile.high), (min(heights), max(heights)))
+                hole = [(*dem.place(c, r), 430) for c in range(21, 31, 3) for r in range(16, 29, 4)]
+                self.assertLess(tiles.errors(hole)[9][0], 130)
+                for key in (0, 0, 0), (0, 1, 0):
+                    tile = tiles.tiles[key]
+                    for i in range(len(tile.u)):
+                        if tile.u[i] in (0, 32767) and tile.v[i] in (0, 32767):
+                            self.assertEqual(tile.metres(i), 0)
                 self.assertEqual(self.verify(name, '--store', store, '--vertical',
                                              'ellipsoidal')['problems'], [])
                 self.check_water(tiles, dem)

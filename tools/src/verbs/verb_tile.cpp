@@ -63,9 +63,10 @@ class TileCommand final : public Command {
         ->type_name("METRES");
     app.add_option("--quality", quality_, "greedy, removal (fewer triangles) or fitted")
         ->capture_default_str();
-    app.add_option("--fill", fill_,
-                   "heights where there is no data, or beyond the hull of irregular points: "
-                   "interpolate, flat (the store's lowest) or flat:METRES")
+    app.add_option(
+           "--fill", fill_,
+           "heights where there is no data: interpolate (0 beyond the outline of the data), "
+           "or everywhere flat (the store's lowest) or flat:METRES")
         ->capture_default_str();
     app.add_flag("--gzip", gzip_,
                  "compressed tiles: the server must send Content-Encoding: gzip with them");

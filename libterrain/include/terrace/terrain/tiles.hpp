@@ -27,8 +27,10 @@ struct TilesRequest {
   std::optional<double> max_error{};
   tri::TinQuality quality = tri::TinQuality::kRemoval;
   HeightReference vertical = HeightReference::recorded;
-  std::string geoid{};            ///< file of a geoid grid of GeographicLib, goes before PROJ's
-  Fill fill = Fill::interpolate;  ///< globes have no holes: not `none`
+  std::string geoid{};  ///< file of a geoid grid of GeographicLib, goes before PROJ's
+  /// Globes have no holes: not `none`. `interpolate` fills voids within the convex outline of the
+  /// data; beyond it the surface is at 0 m above the ellipsoid.
+  Fill fill = Fill::interpolate;
   std::optional<double> flat_height{};  ///< of Fill::flat, metres above the ellipsoid
   /// A mask of water: where there is no data, or where the height is this one (store's unit).
   bool water = false;

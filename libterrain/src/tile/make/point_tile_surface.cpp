@@ -269,14 +269,14 @@ void PointTileSurface::heights(std::span<const double> longitude, std::span<cons
   for (std::size_t i = 0; i < places.size(); ++i) {
     // The line of 180 degrees has two numbers, and tiles on both sides of it.
     if (places[i][0] == 180.0) places[i][0] = -180.0;
-    if (std::isnan(out[i]) && !cloud_.flat_fill) {
+    // Points on one line have no hull to be beyond.
+    if (std::isnan(out[i]) && !cloud_.flat_fill && cloud_.hull.is_flat()) {
       out[i] = cloud_.fill.height(stored[i][0], stored[i][1]);
     }
   }
   cloud_.vertical.convert(places, out);
-  if (!cloud_.flat_fill) return;
   for (double& height : out) {
-    if (std::isnan(height)) height = *cloud_.flat_fill;
+    if (std::isnan(height)) height = cloud_.height_beyond();
   }
 }
 

@@ -53,6 +53,7 @@ class PointTileSurface final : public TileSurface {
   void expect(const GeographicBox& box) override;
   [[nodiscard]] double widest_part() const override { return 360.0; }
   bool crowded(const GeographicBox& box) override;
+  [[nodiscard]] double height_beyond() const override { return cloud_.height_beyond(); }
   [[nodiscard]] bool sides_take_samples() const override { return true; }
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
@@ -60,7 +61,7 @@ class PointTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
-  /// Depends on the whole store: a point changes the triangles around it, and the fill far away.
+  /// Depends on the whole store: a point changes the triangles around it, and the hull far away.
   std::uint64_t digest(const GeographicBox& box) override;
 
  private:

@@ -78,7 +78,7 @@ void RasterTileSurface::expect(const GeographicBox& box) {
   LatticeWindow window = window_around(box);
   if (window.size() == 0) return;
   // What lies around places on the box's sides, outside the raster too.
-  window = {window.column - 2, window.row - 2, window.columns + 4, window.rows + 4};
+  window = {window.column - 3, window.row - 3, window.columns + 6, window.rows + 6};
   view(window);
 }
 
@@ -89,9 +89,9 @@ HeightRange RasterTileSurface::above_ellipsoid(const HeightBlocks::Range& range,
   const double high = range.high * raster_.vertical.metres_per_unit();
   out.low = std::min(low, high);
   out.high = std::max(low, high);
-  if (filled && raster_.flat_fill) {
-    out.low = std::min(out.low, *raster_.flat_fill);
-    out.high = std::max(out.high, *raster_.flat_fill);
+  if (filled) {
+    out.low = std::min(out.low, raster_.height_beyond());
+    out.high = std::max(out.high, raster_.height_beyond());
   }
   if (raster_.vertical.has_geoid()) {
     out.low += kLowestGeoid;
@@ -105,7 +105,7 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
   if (window.size() == 0) return std::nullopt;
   const auto range = raster_.blocks.range(window);
   if (!range) return std::nullopt;
-  HeightRange out = above_ellipsoid(*range, true);
+  HeightRange out = above_ellipsoid(*range, raster_.flat_fill.has_value());
   // A block of the lattice all of whose corners are inside.
   if (const auto block = raster_.blocks.some_block_within(window)) {
     std::array<Point2, 4> corners;
@@ -150,9 +150,12 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = {longitude[i], latitude[i]};
   raster_.places.to_stored(places);
   const auto [last_column, last_row] = raster_.places.stored_bounds().max;
-  // Far places are moved to just outside the raster's border, where it is filled.
+  // Far places are moved to just beyond the outline. The rows and columns of the border are filled
+  // one sample farther than the raster goes: its cells reach half as far.
+  constexpr double kBeyond = 2.0;
   for (Point2& p : places) {
-    p = {std::clamp(p[0], -1.0, last_column + 1.0), std::clamp(p[1], -1.0, last_row + 1.0)};
+    p = {std::clamp(p[0], -kBeyond, last_column + kBeyond),
+         std::clamp(p[1], -kBeyond, last_row + kBeyond)};
   }
   std::vector<std::uint32_t> order(places.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -223,11 +226,12 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
                    const double weight = (right != 0 ? fx : 1.0 - fx) * (down != 0 ? fy : 1.0 - fy);
                    if (!(weight > 0.0)) continue;
                    const double sample = at[down * stride + right];
-                   if (std::isnan(sample) && raster_.flat_fill) {
-                     out[i] += weight * *raster_.flat_fill;
+                   const double column = std::floor(p[0]) + right, row = std::floor(p[1]) + down;
+                   if (std::isnan(sample) &&
+                       (raster_.flat_fill || !raster_.is_within_outline(column, row))) {
+                     out[i] += weight * raster_.height_beyond();
                      continue;
                    }
-                   const double column = std::floor(p[0]) + right, row = std::floor(p[1]) + down;
                    out[i] +=
                        weight *
                        ((std::isnan(sample) ? raster_.fill.height(column, row) : sample) * metres);

@@ -25,6 +25,7 @@ class RasterTileSurface : public TileSurface {
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
   SurfacePart part(const GeographicBox& box) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
+  [[nodiscard]] double height_beyond() const override { return raster_.height_beyond(); }
   std::optional<HeightRange> surface_range(const GeographicBox& box) override;
   void heights(std::span<const double> longitude, std::span<const double> latitude,
                std::span<double> out) override;

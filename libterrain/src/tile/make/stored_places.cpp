@@ -338,7 +338,7 @@ void StoredPlaces::to_stored(std::span<Point2> places) const {
     if (crs_.is_geographic() || goes_around_) p[0] = in_turn(p[0]);
     p = stored_place(placement_, p);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) {
-      p = {stored_.min[0] - 1.0, stored_.min[1] - 1.0};
+      p = {stored_.min[0] - 2.0, stored_.min[1] - 2.0};
     }
   }
 }

@@ -150,9 +150,9 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   }
 }
 
-/// Heights as 15-bit numbers above the lowest. The highest is always as far above: then a number
-/// is one step, and neighbours decode the heights that they share to the same value.
-void set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
+/// Heights as 15-bit numbers from the lowest to the highest, which clients cull by. What neighbours
+/// share they decode to within half of such a number each. Returns how far a vertex moves at most.
+double set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
   std::int64_t lowest = pieces.vertices.front().height, highest = lowest;
   for (const TileSideVertex& vertex : pieces.vertices) {
     lowest = std::min(lowest, vertex.height);
@@ -160,17 +160,23 @@ void set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
   }
   // As floats both ends must be exact.
   constexpr std::int64_t kExactAsFloat = std::int64_t{1} << 24;
-  if (highest - lowest > kTileUnits || lowest < -kExactAsFloat ||
-      lowest + kTileUnits > kExactAsFloat) {
+  const std::int64_t range = highest - lowest;
+  if (range > kTileUnits || lowest < -kExactAsFloat || highest > kExactAsFloat) {
     throw HeightsTooFar();
   }
   mesh.lowest = static_cast<float>(static_cast<double>(lowest) * step);
-  mesh.highest = static_cast<float>(static_cast<double>(lowest + kTileUnits) * step);
+  mesh.highest = static_cast<float>(static_cast<double>(highest) * step);
+  double moved = 0.0;
   for (const TileSideVertex& vertex : pieces.vertices) {
     mesh.u.push_back(static_cast<std::uint16_t>(vertex.u));
     mesh.v.push_back(static_cast<std::uint16_t>(vertex.v));
-    mesh.height.push_back(static_cast<std::uint16_t>(vertex.height - lowest));
+    const std::int64_t above = vertex.height - lowest;
+    mesh.height.push_back(static_cast<std::uint16_t>(
+        range == 0 ? 0 : (2 * above * kTileUnits + range) / (2 * range)));
+    moved = std::max(
+        moved, std::abs(mesh.metres(mesh.size() - 1) - static_cast<double>(vertex.height) * step));
   }
+  return moved;
 }
 
 TileHeader header_of(const TileAddress& tile, const TileMesh& mesh) {
@@ -261,9 +267,8 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
     mesh_leaf(tile, leaf, plan, surface, options.quality, sides.around(leaf), pieces);
   }
   MadeTile made;
-  made.max_error = pieces.max_error;
   made.has_data = pieces.has_data;
-  set_heights(pieces, plan.height_step, made.mesh);
+  made.max_error = pieces.max_error + set_heights(pieces, plan.height_step, made.mesh);
   made.mesh.triangles = std::move(pieces.triangles);
   order_vertices(made.mesh);
   made.header = header_of(tile, made.mesh);

@@ -37,11 +37,13 @@ bool boxes_meet(const GeographicBox& a, const GeographicBox& b) {
 ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface) {
   ZoomPlan plan;
   plan.zoom = zoom;
-  plan.max_error = max_error;
   // All heights of a tile must fit into 32767 steps, and be exact as floats. A step is never below
   // half a millimetre.
   plan.height_step = 0x1p-11;
   while (plan.height_step * (kTileUnits - 2) < range) plan.height_step *= 2.0;
+  // A tile's own range is divided into 32767 parts, of which vertices take the nearest: they move
+  // by half a step at most.
+  plan.max_error = std::max(max_error - 0.5 * plan.height_step, 0.5 * max_error);
   // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
   // expects of the zoom.
   plan.longest_edge = std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / kDegree;

@@ -21,7 +21,7 @@ namespace terrace::terrain {
 /// What all tiles of a zoom have in common.
 struct ZoomPlan {
   unsigned zoom = 0;
-  double max_error = 0.0;     ///< metres
+  double max_error = 0.0;     ///< metres, less what the tile's encoding may add
   double height_step = 0.0;   ///< a power of two: heights of vertices are multiples of it
   double longest_edge = 0.0;  ///< degrees: longer ones would cut off too much of the Earth's curve
   double widest_leaf = 0.0;   ///< degrees: wider parts of a tile with samples are cut in four

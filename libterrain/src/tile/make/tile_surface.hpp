@@ -80,6 +80,8 @@ class TileSurface {
   /// The range of the samples' heights in the box, without reading them. nullopt if there is no
   /// sample.
   virtual std::optional<HeightRange> range(const GeographicBox& box) = 0;
+  /// The height beyond the outline of all samples.
+  [[nodiscard]] virtual double height_beyond() const { return 0.0; }
   /// The range of the samples' heights in the box and of the surface over it, without reading them;
   /// nullopt if it is not known. It saves reading and changes no tile.
   virtual std::optional<HeightRange> surface_range(const GeographicBox& /*box*/) { return {}; }

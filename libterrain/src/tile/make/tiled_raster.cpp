@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -60,8 +61,11 @@ StoredBox box_of(const LatticeWindow& window) {
 void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& digest) {
   digest.add(raster.blocks.digest(window));
   if (raster.flat_fill) return;
-  raster.blocks.for_each_incomplete(
-      window, [&](const LatticeWindow& block) { digest.add(raster.fill.digest(box_of(block))); });
+  bool filled = false;
+  raster.blocks.for_each_incomplete(window, [&](const LatticeWindow& block) {
+    digest.add(raster.fill.digest(box_of(block)));
+    filled = true;
+  });
   // What hangs over the raster's borders.
   const stream::StoreSchema& schema = raster.store.schema();
   const auto columns = static_cast<std::int64_t>(schema.columns);
@@ -73,7 +77,14 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
         LatticeWindow{columns, window.row, right, window.rows},
         LatticeWindow{window.column, window.row, window.columns, -window.row},
         LatticeWindow{window.column, rows, window.columns, bottom}}) {
-    if (strip.columns > 0 && strip.rows > 0) digest.add(raster.fill.digest(box_of(strip)));
+    if (strip.columns <= 0 || strip.rows <= 0) continue;
+    digest.add(raster.fill.digest(box_of(strip)));
+    filled = true;
+  }
+  if (!filled) return;
+  for (const Point2& corner : raster.hull.corners()) {
+    digest.add(corner[0]);
+    digest.add(corner[1]);
   }
 }
 
@@ -148,7 +159,8 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
     : TiledStore(checked(tiled), std::move(system), std::move(heights)),
       geography(places.crs(), tiled.schema().world),
       blocks(tiled, threads),
-      height_cache(tiled, kHeightsOfThread * threads) {
+      height_cache(tiled, kHeightsOfThread * threads),
+      hull(tiled, 0) {
   const auto columns = static_cast<std::int64_t>(tiled.schema().columns);
   const auto rows = static_cast<std::int64_t>(tiled.schema().rows);
   // TiledStore has seen a sample with data.
@@ -157,6 +169,24 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
   const CoordinateSystem& crs = places.crs();
   upright = crs.is_geographic() && crs.counts_as_wgs84() && world[1] == 0.0 && world[3] == 0.0;
   spacing = places.lattice_spacing();
+}
+
+bool TiledRaster::is_within_outline(double column, double row) const {
+  const Point2 place{column, row};
+  if (!hull.is_flat() && hull.find(place).side != PointHull::Side::kOutside) return true;
+  // To the diagonal neighbour and no farther.
+  constexpr double kReach = 1.5;
+  const std::span<const Point2> corners = hull.corners();
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Point2 &a = corners[i], &b = corners[(i + 1) % corners.size()];
+    const Point2 side{b[0] - a[0], b[1] - a[1]}, off{place[0] - a[0], place[1] - a[1]};
+    const double squared = side[0] * side[0] + side[1] * side[1];
+    const double along =
+        squared > 0.0 ? std::clamp((off[0] * side[0] + off[1] * side[1]) / squared, 0.0, 1.0) : 0.0;
+    const double dx = off[0] - along * side[0], dy = off[1] - along * side[1];
+    if (dx * dx + dy * dy <= kReach * kReach) return true;
+  }
+  return false;
 }
 
 LatticeWindow TiledRaster::window_around(const GeographicBox& box) const {

@@ -6,6 +6,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/grid_geography.hpp"
+#include "surface/point_hull.hpp"
 #include "surface/store_window.hpp"
 #include "tile/make/height_blocks.hpp"
 #include "tile/make/height_cache.hpp"
@@ -19,12 +20,18 @@ struct TiledRaster : TiledStore {
   HeightBlocks blocks;
   mutable HeightCache height_cache;  ///< 24 MiB per thread
   HeightBlocks::Range everywhere;    ///< of all samples
+  PointHull hull;                    ///< of the samples with data, in columns and rows
   /// Columns run along meridians, rows along parallels, at equal distances.
   bool upright = false;
 
   /// Reads the store twice. Throws: stream::Error if no place of it has a longitude and latitude.
   TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
               unsigned threads);
+
+  /// Whether a place of the lattice without a sample is within the outline of those with data: in
+  /// their hull or so near that it belongs to the cells around them, as half a cell beyond the last
+  /// row does, and the gap between the ends of a raster around the globe.
+  [[nodiscard]] bool is_within_outline(double column, double row) const;
 
   /// The window of the lattice that has all samples in the box; empty if there is none.
   [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;

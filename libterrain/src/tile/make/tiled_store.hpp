@@ -22,8 +22,11 @@ struct TiledStore {
   EllipsoidalHeights vertical;
   StoreFill fill;
   double spacing = 0.0;  ///< see TileSurface::spacing()
-  /// The height in metres where there are no samples; nullopt interpolates those around.
+  /// The height in metres where there are no samples; nullopt interpolates those around, as far as
+  /// the outline of all samples goes.
   std::optional<double> flat_fill{};
+  /// The height in metres beyond the outline: no land is invented there.
+  [[nodiscard]] double height_beyond() const { return flat_fill.value_or(0.0); }
   /// Water is where the surface has this height (in the store's unit); nullopt: where a raster has
   /// no data.
   std::optional<double> water_height{};

@@ -38,10 +38,17 @@ std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface, const C
 /// The largest difference of heights within a tile, as far as it is known without reading.
 double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface) {
   double widest = 0.0;
+  const GeographicBox data = surface.bounds();
   for (const TileAddress& tile : tiles) {
-    if (const auto range = surface.range(box_of(tile))) {
-      widest = std::max(widest, range->high - range->low);
+    const GeographicBox box = box_of(tile);
+    auto range = surface.range(box);
+    if (!range) continue;
+    if (box.west < data.west || box.east > data.east || box.south < data.south ||
+        box.north > data.north) {
+      range->low = std::min(range->low, surface.height_beyond());
+      range->high = std::max(range->high, surface.height_beyond());
     }
+    widest = std::max(widest, range->high - range->low);
   }
   return widest;
 }
@@ -242,7 +249,8 @@ void TileSetWriter::take_larger_steps(Zoom& zoom) {
                          .remedy = "look at the unit and the nodata value of the source"});
   }
   zoom.range = std::max(1.0, 2.0 * zoom.range);
-  zoom.plan = plan_zoom(zoom.plan.zoom, zoom.plan.max_error, zoom.range, *surfaces_.front());
+  zoom.plan =
+      plan_zoom(zoom.plan.zoom, options_.max_error(zoom.plan.zoom), zoom.range, *surfaces_.front());
   zoom.too_far = false;
 }
 

@@ -37,11 +37,15 @@ constexpr double kHeightSlack = 1e-4;
 
 /// What a tile may unpack to.
 constexpr std::uint64_t kMostBorderBytes = std::uint64_t{1} << 28;
-/// Metres by which neighbours' heights may differ.
+/// Metres by which neighbours' heights may differ, besides the rounding of each.
 constexpr double kBorderSlack = 1e-3;
 
-/// Vertices on a side of a tile: place along it in units of the tile, and metres.
-using BorderSide = std::vector<std::pair<std::uint16_t, double>>;
+/// A side of a tile.
+struct BorderSide {
+  /// Place along it in units of the tile, and metres.
+  std::vector<std::pair<std::uint16_t, double>> vertices;
+  double rounding = 0.0;  ///< metres, of a height
+};
 
 struct TileBorders {
   BorderSide west, south, east, north;
@@ -49,10 +53,13 @@ struct TileBorders {
 
 TileBorders borders_of(const TileMesh& mesh) {
   const TileEdges edges = edges_of(mesh);
+  const double range = static_cast<double>(mesh.highest) - static_cast<double>(mesh.lowest);
   const auto take = [&](const std::vector<std::uint32_t>& list,
                         const std::vector<std::uint16_t>& along) {
-    BorderSide side;
-    for (const std::uint32_t vertex : list) side.emplace_back(along[vertex], mesh.metres(vertex));
+    BorderSide side{.vertices = {}, .rounding = 0.5 * range / kTileUnits};
+    for (const std::uint32_t vertex : list) {
+      side.vertices.emplace_back(along[vertex], mesh.metres(vertex));
+    }
     return side;
   };
   return {take(edges.west, mesh.v), take(edges.south, mesh.u), take(edges.east, mesh.v),
@@ -60,7 +67,8 @@ TileBorders borders_of(const TileMesh& mesh) {
 }
 
 /// What is wrong between the sides of two neighbours; empty if they fit.
-std::string misfit(const BorderSide& a, const BorderSide& b) {
+std::string misfit(const BorderSide& one, const BorderSide& other) {
+  const auto &a = one.vertices, &b = other.vertices;
   const bool same_places = a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
                                                               [](const auto& p, const auto& q) {
                                                                 return p.first == q.first;
@@ -70,7 +78,9 @@ std::string misfit(const BorderSide& a, const BorderSide& b) {
   for (std::size_t i = 0; i < a.size(); ++i) {
     most = std::max(most, std::abs(a[i].second - b[i].second));
   }
-  return most > kBorderSlack ? "heights that differ by up to " + readable_number(most) + " m" : "";
+  return most > kBorderSlack + one.rounding + other.rounding
+             ? "heights that differ by up to " + readable_number(most) + " m"
+             : "";
 }
 
 /// Decodes the bytes of a tile's file, compressed or not. Throws: stream::Error, with `name`.
@@ -296,18 +306,18 @@ void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
           const bool next = last && last->zoom == tile.zoom && last->y + 1 == tile.y;
           below = next ? std::move(row) : std::map<std::uint32_t, BorderSide>{};
           row.clear();
-          before.clear();
-          first.clear();
+          before = {};
+          first = {};
         }
         if (checked.decoded) {
-          if (!before.empty() && last && last->x + 1 == tile.x) {
+          if (!before.vertices.empty() && last && last->x + 1 == tile.x) {
             compare(tile, "western", checked.borders.west, *last, before);
           }
           if (const auto under = below.find(tile.x); under != below.end()) {
             compare(tile, "southern", checked.borders.south, {tile.zoom, tile.x, tile.y - 1},
                     under->second);
           }
-          if (!first.empty() && tile.x + 1 == tile_columns(tile.zoom)) {
+          if (!first.vertices.empty() && tile.x + 1 == tile_columns(tile.zoom)) {
             compare(tile, "eastern", checked.borders.east, {tile.zoom, 0, tile.y}, first);
           }
           if (tile.x == 0) first = std::move(checked.borders.west);

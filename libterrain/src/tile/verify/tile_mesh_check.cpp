@@ -23,16 +23,17 @@ using stream::Point3;
 /// Metres and shares that a header may be off: what rounding does, and no more.
 constexpr double kLengthSlack = 1e-3;
 constexpr double kShareSlack = 1e-3;
-constexpr std::uint64_t kSphereAt = 32, kHorizonAt = 64;
+constexpr std::uint64_t kLowestAt = 24, kHighestAt = 28, kSphereAt = 32, kHorizonAt = 64;
 
 double distance(const Point3& a, const Point3& b) {
   const Point3 d{a[0] - b[0], a[1] - b[1], a[2] - b[2]};
   return std::sqrt(dot(d, d));
 }
 
-/// What is wrong in a tile's header: the sphere holds all vertices and is not wider than its centre
-/// asks for, the centre lies in the tile, the horizon occlusion point is not hidden while a vertex
-/// is seen, and not farther out than that takes. The tile has a vertex. O(n).
+/// What is wrong in a tile's header: its heights are those of the lowest and the highest vertex,
+/// the sphere holds all vertices and is not wider than its centre asks for, the centre lies in the
+/// tile, the horizon occlusion point is not hidden while a vertex is seen, and not farther out than
+/// that takes. The tile has a vertex. O(n).
 std::vector<TileFault> check_tile_header(const TileAddress& address, const DecodedTile& tile) {
   std::vector<TileFault> faults;
   const auto fault = [&](std::uint64_t offset, std::string what) {
@@ -44,6 +45,17 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     points.push_back(geocentric(longitude_at(address, mesh.u[i]), latitude_at(address, mesh.v[i]),
                                 mesh.metres(i)));
+  }
+  const auto [low, high] = std::minmax_element(mesh.height.begin(), mesh.height.end());
+  if (mesh.lowest<mesh.highest&& * low> 0) {
+    fault(kLowestAt, "its lowest height is " +
+                         readable_number(static_cast<double>(mesh.lowest), 6) +
+                         " m, and no vertex is there");
+  }
+  if (mesh.lowest < mesh.highest && *high < kTileUnits) {
+    fault(kHighestAt, "its highest height is " +
+                          readable_number(static_cast<double>(mesh.highest), 6) +
+                          " m, and no vertex is there");
   }
   const Sphere& sphere = tile.header.sphere;
   double farthest = 0.0;
