@@ -140,6 +140,11 @@ class Rasters(StoreCase):
         with self.assertRaises(FileExistsError):
             self.scan.raster(cell=25, path=path)
         self.scan.raster(cell=25, path=path, replace=True)
+        # Of one cell size all fit each other, and others are told to.
+        part = self.scan.raster(cell=25, region=(300110, 5200110, 300290, 5200190))
+        np.testing.assert_array_equal(np.array(part.transform)[[2, 5]], (300100, 5200200))
+        same = self.scan.raster(align=path)
+        self.assertEqual((same.transform, same.shape), (self.scan.raster(cell=25).transform, self.scan.raster(cell=25).shape))
         shade = self.scan.raster('hillshade', cell=25)
         self.assertEqual(shade.values.dtype, np.uint8)
         with self.assertRaises(ValueError):

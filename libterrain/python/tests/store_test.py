@@ -200,6 +200,39 @@ class Stores(StoreCase):
             with self.assertRaises(ValueError):
                 wrong()
 
+    def test_geojson_is_in_its_own_crs_or_else_in_longitude_and_latitude(self):
+        corners = np.array([[300200, 5200100], [300800, 5200150], [300500, 5200700], [300200, 5200100]], float)
+        metres = {'type': 'Polygon', 'coordinates': [corners.tolist()]}
+        degrees = {'type': 'Polygon', 'coordinates': [terrace.Transformation(32632, 4326).forward(corners).tolist()]}
+        expected = len(self.scan.points(region=metres))
+        self.assertGreater(expected, 1000)
+
+        class Frame:
+            """As geopandas has it."""
+            def __init__(self, geometry, crs):
+                self.__geo_interface__ = {'type': 'FeatureCollection', 'features': [
+                    {'type': 'Feature', 'geometry': None}, {'type': 'Feature', 'geometry': geometry}]}
+                self.crs = crs
+
+        named = {'crs': {'type': 'name', 'properties': {'name': 'urn:ogc:def:crs:OGC:1.3:CRS84'}}, **degrees}
+        path = self.path('region.geojson')
+        with open(path, 'w', encoding='utf-8') as file:
+            json.dump(named, file)
+        for region in (degrees, named, path, Frame(degrees, None), Frame(degrees, 4326), Frame(metres, 'EPSG:32632'),
+                       {'crs': None, **metres}):
+            self.assertAlmostEqual(len(self.scan.points(region=region)), expected, delta=2)
+            self.assertAlmostEqual(len(terrace.build(self.points, self.path('part'), crs='EPSG:32632', region=region,
+                                                     replace=True)), expected, delta=2)
+        with self.assertLogs('terrace', 'INFO') as log:
+            self.scan.points(region=metres)
+        self.assertIn('they are not longitudes and latitudes', log.output[0])
+        with self.assertRaises(ValueError):
+            self.scan.points(region={'crs': {'type': 'link'}, **degrees})
+        with self.assertRaises(terrace.Error):
+            self.scan.points(region={'crs': {'type': 'name', 'properties': {'name': 'EPSG:0'}}, **degrees})
+        line = {'type': 'LineString', 'coordinates': degrees['coordinates'][0][:2]}
+        np.testing.assert_allclose(self.scan.profile(line)[[0, -1], 1:3], corners[:2], atol=1e-3)
+
     def test_nearest(self):
         place = (300500.0, 5200400.0)
         distances = np.hypot(*(self.points[:, :2] - place).T)
