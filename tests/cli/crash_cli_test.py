@@ -396,11 +396,14 @@ class StrangerTest(CrashCase):
             steps = file.read().split()
         return next(i + 1 for i, step in enumerate(steps) if step == 'rename')
 
-    def run_while(self, command, change, exchange=True):
-        """Runs a command that pauses before it renames, and calls change() then."""
+    def run_while(self, command, change, fresh=False):
+        """Runs a command that pauses before it renames, and calls change() then. With `fresh`, in an empty folder."""
         step = self.before_the_names(command)
+        if fresh:
+            shutil.rmtree(self.folder)
+            os.mkdir(self.folder)
         process = subprocess.Popen([TERRACE, *command], cwd=self.folder, text=True,
-                                   env=self.environment(step, 'pause', exchange),
+                                   env=self.environment(step, 'pause'),
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         _, status = os.waitpid(process.pid, os.WUNTRACED)
         self.assertTrue(os.WIFSTOPPED(status))
@@ -485,7 +488,7 @@ class StrangerTest(CrashCase):
             with open(self.path(precious), 'w', encoding='ascii') as file:
                 file.write('precious')
 
-        code, error = self.run_while(command, change)
+        code, error = self.run_while(command, change, fresh=True)
         self.assertEqual(code, 1, error)
         with open(self.path(precious), encoding='ascii') as file:
             self.assertEqual(file.read(), 'precious')

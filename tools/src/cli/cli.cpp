@@ -236,16 +236,20 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   } catch (const CLI::CallForHelp&) {
     print_result(app.help());
     return kDone;
-  } catch (const CLI::ExtrasError&) {
-    // CLI11 would list them all: a pattern in the shell can stand for thousands of files.
-    const std::vector<std::string> extras = app.remaining();
-    throw UsageError(
-        "'" + extras.front() + "'" +
-        (extras.size() > 1 ? " and " + std::to_string(extras.size() - 1) + " more" : "") +
-        " cannot be taken; " + meant_option(app, extras.front()) + "`terrace " + verb.name +
-        " --help` lists what can");
   } catch (const CLI::ParseError& error) {
-    throw UsageError(std::string(error.what()) + "; `terrace " + verb.name + " --help` tells more");
+    // What cannot be taken comes first: an option that is missing may be the one that is misspelt.
+    // CLI11 would list all of it: a pattern in the shell can stand for thousands of files.
+    const std::vector<std::string> extras = app.remaining();
+    const bool option = !extras.empty() && extras.front().starts_with("--");
+    if (!option && dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr) {
+      throw UsageError(std::string(error.what()) + "; `terrace " + verb.name +
+                       " --help` tells more");
+    }
+    const std::size_t more = option ? 0 : extras.size() - 1;
+    throw UsageError("'" + extras.front() + "'" +
+                     (more > 0 ? " and " + std::to_string(more) + " more" : "") +
+                     " cannot be taken; " + meant_option(app, extras.front()) + "`terrace " +
+                     verb.name + " --help` lists what can");
   }
   refuse_empty_values(app);
   if (common.json && writes_to_stdout(app)) {
