@@ -101,6 +101,9 @@ class MeshCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     format_of_output(outputs::kMeshFile, output_, format_);
+    if (save_overlay_ == output_) {
+      throw UsageError("--save-overlay and --output are the same file");
+    }
     if (!save_overlay_.empty()) format_of_output(outputs::kOverlayFile, save_overlay_);
     return max_error_ || !max_points_.empty() ? bounded(common) : multiresolution(common);
   }
@@ -212,9 +215,6 @@ class MeshCommand final : public Command {
                               MetricChoice::parse(metric_)};
     const bool save = !save_overlay_.empty();
     if (save && smooth_.empty()) throw UsageError("--save-overlay needs --smooth");
-    if (save && save_overlay_ == output_) {
-      throw UsageError("--save-overlay and --output are the same file");
-    }
     const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
     const PlaceConversion places = part_.crs.places(store, common);
