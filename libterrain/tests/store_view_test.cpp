@@ -391,7 +391,9 @@ TEST_F(StoreViews, MeshesByAMetricCoverWhatMeshesWithoutCover) {
         }
         EXPECT_NEAR(covered, land, 1e-6);
         EXPECT_NEAR(over_voids, 0, 1e-6);
-        if (turn == 2) EXPECT_GT(slanted, 1000u);
+        if (turn == 2) {
+          EXPECT_GT(slanted, 1000u);
+        }
       }
     }
   }
