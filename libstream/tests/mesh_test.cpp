@@ -241,10 +241,12 @@ TEST_F(MeshFile, GlbIsInTheMetresOfItsFrame) {
   for (const bool local : {true, false}) {
     SCOPED_TRACE(local);
     // Names are not always UTF-8.
-    const MeshFrame frame{.metres = {77000.25, 111000.5, 0.3048}, .local = local, .crs = "EPSG \xff"};
-    write(path("m.glb"), mesh, {.bounds = bounds, .frame = frame});
-    const MeshRounding rounding(path("m.glb"), bounds, {}, frame);
-    const Glb glb(read_text(path("m.glb")));
+    const MeshFrame frame{
+        .metres = {77000.25, 111000.5, 0.3048}, .local = local, .crs = "EPSG \xff"};
+    const std::string file = path(local ? "local.glb" : "far.glb");
+    write(file, mesh, {.bounds = bounds, .frame = frame});
+    const MeshRounding rounding(file, bounds, {}, frame);
+    const Glb glb(read_text(file));
     const auto& extras = glb.json["asset"]["extras"];
     EXPECT_EQ(extras["metres_per_unit"].get<Point3>(), frame.metres);
     EXPECT_TRUE(extras["crs"].get<std::string>().starts_with("EPSG "));
