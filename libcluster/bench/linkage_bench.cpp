@@ -55,6 +55,15 @@ void complete(benchmark::State& state, Input input, MatrixEntry entry) {
   state.counters["peak_MiB"] = status_mebibytes("VmHWM") - before;
 }
 
+void by_method(benchmark::State& state, Input input, LinkageMethod method) {
+  const std::vector<Point3> points = make_points(input, static_cast<std::size_t>(state.range(0)));
+  const LinkageOptions options{.threads = static_cast<unsigned>(state.range(1))};
+  for ([[maybe_unused]] const auto iteration : state) {
+    const Dendrogram dendrogram = linkage(points, method, options);
+    benchmark::DoNotOptimize(dendrogram.merges.data());
+  }
+}
+
 void complete_function(benchmark::State& state, bool row) {
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::vector<Point3> points = make_points(Input::cube, count);
@@ -106,6 +115,13 @@ int main(int argc, char** argv) {
     sizes(benchmark::RegisterBenchmark(("complete/double/" + text).c_str(), complete, input,
                                        MatrixEntry::float64),
           {10000});
+  }
+  for (const char* method : {"average", "weighted", "ward", "centroid", "median"}) {
+    for (const auto& [name, input] : {std::pair{"/cube", Input::cube}, {"/grid", Input::grid}}) {
+      sizes(benchmark::RegisterBenchmark((std::string(method) + name).c_str(), by_method, input,
+                                         *linkage_method_named(method)),
+            {10000});
+    }
   }
   sizes(benchmark::RegisterBenchmark("complete/float/shuffled", complete_function, false), {10000});
   sizes(benchmark::RegisterBenchmark("complete/float/row", complete_function, true), {10000});

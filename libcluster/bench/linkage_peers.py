@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares linkage of this library with fastcluster, on the same machine in the same run.
+"""Compares linkage of this library with fastcluster and SciPy, on the same machine in the same run.
 
-    linkage_peers.py PROGRAM [single] [complete] [memory] [--full]
+    linkage_peers.py PROGRAM [single] [complete] [methods] [memory] [--full]
 
-PROGRAM is cluster_linkage_bench; without further arguments all three parts run. Points are uniform in a
+PROGRAM is cluster_linkage_bench; without further arguments all parts run; `methods` are the other five. Points are uniform in a
 cube. fastcluster's single linkage without a matrix is quadratic: it is timed at 20 000 points and
 scaled to 100 000, or timed there with --full. Its complete linkage is timed including the distances
 it needs (SciPy's pdist); peak memory is that of the process minus its previous memory. Times are
@@ -90,6 +90,22 @@ def compare_complete(program, modules):
         print(f"{name}: {value / own:.2f} times as fast")
 
 
+def compare_methods(program, modules):
+    for method in "average", "weighted", "ward", "centroid", "median":
+        times = ours(program, f"{method}/cube")
+        for name, value in times.items():
+            print(f"{name:45} {value:9.1f} ms")
+        if modules is None:
+            continue
+        from scipy.cluster import hierarchy
+        fastcluster, numpy, _ = modules
+        points = numpy.random.default_rng(20).random((10000, 3))
+        fast = fastcluster.linkage if method in ("average", "weighted") else fastcluster.linkage_vector
+        for name, run in (f"fastcluster.{fast.__name__}", fast), ("scipy.cluster.hierarchy.linkage", hierarchy.linkage):
+            value = timed(2, lambda: run(points, method))
+            print(f"{f'{name} {method}/10000':45} {value:9.1f} ms: {value / min(times.values()):.1f} times ours")
+
+
 def compare_memory(program, modules):
     for entry in "float", "double":  # each in a process of its own
         peak = counters(program, f"complete/{entry}/cube/10000/1/")[0]["peak_MiB"]
@@ -113,6 +129,8 @@ def main():
         compare_memory(program, modules)
     if "complete" in words or not words:
         compare_complete(program, modules)
+    if "methods" in words or not words:
+        compare_methods(program, modules)
     if "single" in words or not words:
         compare_single(program, modules, "--full" in sys.argv)
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads points, one per line with two or three coordinates, from standard input and prints their
 // dendrogram, one row per merge as in SciPy's linkage matrix: cluster, cluster, height, size.
-//     linkage single|complete|complete-float [THREADS] < points
-// Without arguments it clusters two small rings, and prints the number of clusters below a height
-// for each linkage.
+//     linkage METHOD [THREADS] < points
+// METHOD is single, complete, average, weighted, ward, centroid or median, or complete-float: with
+// a matrix of half the size. Without arguments it clusters two small rings, and prints the number
+// of clusters below a height for some methods.
 #include "terrace/cluster/linkage.hpp"
 
 #include <algorithm>
@@ -33,13 +34,14 @@ std::vector<Point3> read_points(std::istream& in) {
   return points;
 }
 
-Dendrogram linkage(const std::string& method, const std::vector<Point3>& points, unsigned threads) {
-  if (method == "single") return single_linkage(points, {.threads = threads});
-  if (method == "complete") return complete_linkage(points, {.threads = threads});
+Dendrogram tree_of(const std::string& method, const std::vector<Point3>& points, unsigned threads) {
   if (method == "complete-float") {
     return complete_linkage(points, {.threads = threads, .entry = MatrixEntry::float32});
   }
-  throw std::runtime_error("the method is single, complete or complete-float, not " + method);
+  if (const auto known = linkage_method_named(method)) {
+    return linkage(points, *known, {.threads = threads});
+  }
+  throw std::runtime_error("there is no method " + method);
 }
 
 int demonstrate() {
@@ -49,9 +51,9 @@ int demonstrate() {
     const double radius = i % 2 == 0 ? 1.0 : 2.0;
     points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0.0});
   }
-  // Single linkage follows the rings, complete linkage makes compact pieces.
-  for (const char* method : {"single", "complete"}) {
-    const std::vector<std::uint32_t> labels = cut_height(linkage(method, points, 1), 0.5);
+  // Single linkage follows the rings, the others make compact pieces.
+  for (const char* method : {"single", "complete", "average"}) {
+    const std::vector<std::uint32_t> labels = cut_height(tree_of(method, points, 1), 0.5);
     std::printf("%s linkage: %u clusters below 0.5\n", method,
                 *std::max_element(labels.begin(), labels.end()) + 1);
   }
@@ -64,7 +66,7 @@ int main(int argc, char** argv) {
   if (argc < 2) return demonstrate();
   try {
     const unsigned threads = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 1;
-    for (const Merge& merge : linkage(argv[1], read_points(std::cin), threads).merges) {
+    for (const Merge& merge : tree_of(argv[1], read_points(std::cin), threads).merges) {
       std::printf("%u %u %.17g %u\n", merge.a, merge.b, merge.height, merge.size);
     }
   } catch (const std::exception& error) {

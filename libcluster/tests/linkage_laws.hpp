@@ -10,6 +10,7 @@
 
 #include "inputs.hpp"
 #include "terrace/cluster/dendrogram.hpp"
+#include "terrace/cluster/linkage.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// The laws of linkage by brute force, and inputs that break careless code.
@@ -103,15 +104,53 @@ inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dend
 /// Relative tolerance of heights computed from a float matrix, whose entries are rounded once.
 inline constexpr double kFloatTolerance = 1e-7;
 
-/// Checks a dendrogram as a run of complete linkage: each row must merge two clusters than which
-/// none are nearer, at the distance of their farthest points, up to `tolerance` (relative). Returns
-/// the fault, or an empty string. This is the complete law: if distances are equal several runs are
-/// valid, and even their heights may differ. O(n^2) unless many distances are equal.
-inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, double tolerance) {
+/// The distance of a cluster to one that was made of two, from those of its parts: the definitions
+/// of the methods as G. Lance and W. Williams wrote them.
+inline double combined_distance(LinkageMethod method, double a, double b, double between, double na,
+                                double nb, double n) {
+  const auto root = [](double square) { return std::sqrt(std::max(square, 0.0)); };
+  switch (method) {
+    case LinkageMethod::single:
+      return std::min(a, b);
+    case LinkageMethod::complete:
+      return std::max(a, b);
+    case LinkageMethod::average:
+      return (na * a + nb * b) / (na + nb);
+    case LinkageMethod::weighted:
+      return (a + b) / 2;
+    case LinkageMethod::ward:
+      return root(((n + na) * a * a + (n + nb) * b * b - n * between * between) / (n + na + nb));
+    case LinkageMethod::centroid:
+      return root((na * a * a + nb * b * b) / (na + nb) -
+                  na * nb * between * between / ((na + nb) * (na + nb)));
+    case LinkageMethod::median:
+      return root((a * a + b * b) / 2 - between * between / 4);
+  }
+  return 0.0;
+}
+
+/// Checks a dendrogram as a run of linkage: each row must merge two clusters than which none are
+/// nearer, at their distance, up to `tolerance` (relative) and `floor` (about a share of the
+/// largest distance). Returns the fault, or an empty string. This is the complete law: if distances
+/// are equal several runs are valid, and even their heights may differ. O(n^2) unless many
+/// distances are equal.
+inline std::string linkage_fault(const Dendrogram& dendrogram, Distances d, LinkageMethod method,
+                                 double tolerance, double floor = 0.0) {
   if (std::string fault = dendrogram_fault(dendrogram); !fault.empty()) return fault;
+  // The largest near 1, exactly: squares of distances may overflow.
+  double largest = 0.0;
+  for (const auto& row : d) {
+    for (const double v : row) largest = std::max(largest, v);
+  }
+  int exponent = 0;
+  if (largest > 0.0) std::frexp(largest, &exponent);
+  for (auto& row : d) {
+    for (double& v : row) v = std::ldexp(v, -exponent);
+  }
   std::vector<std::size_t> place(dendrogram.points);  // row of d of each cluster
   for (std::size_t i = 0; i < place.size(); ++i) place[i] = i;
   std::vector<std::size_t> active = place;
+  std::vector<double> size(place.size(), 1.0);
   // for each active row the other one nearest to it
   std::vector<std::size_t> nearest(place.size());
   const auto find_nearest = [&](std::size_t i) {
@@ -126,20 +165,31 @@ inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, dou
     const std::string row = "row " + std::to_string(place.size() - dendrogram.points) + ": ";
     const std::size_t a = place[merge.a];
     const std::size_t b = place[merge.b];
-    if (std::abs(merge.height - d[a][b]) > tolerance * d[a][b]) return row + "wrong height";
+    const double height = std::ldexp(merge.height, -exponent), between = d[a][b];
+    if (std::abs(height - between) > tolerance * between + floor) return row + "wrong height";
     for (const std::size_t i : active) {
-      if (d[i][nearest[i]] * (1 + tolerance) < merge.height) return row + "others are nearer";
+      if (d[i][nearest[i]] * (1 + tolerance) + floor < height) return row + "others are nearer";
     }
     active.erase(std::find(active.begin(), active.end(), b));
     for (const std::size_t k : active) {
-      if (k != a) d[a][k] = d[k][a] = std::max(d[a][k], d[b][k]);
+      if (k == a) continue;
+      d[a][k] = d[k][a] =
+          combined_distance(method, d[a][k], d[b][k], between, size[a], size[b], size[k]);
     }
+    size[a] += size[b];
     for (const std::size_t k : active) {
-      if (k == a || nearest[k] == a || nearest[k] == b) find_nearest(k);
+      if (k == a || nearest[k] == a || nearest[k] == b || d[k][a] < d[k][nearest[k]]) {
+        find_nearest(k);
+      }
     }
     place.push_back(a);
   }
   return {};
+}
+
+inline std::string complete_fault(const Dendrogram& dendrogram, const Distances& d,
+                                  double tolerance) {
+  return linkage_fault(dendrogram, d, LinkageMethod::complete, tolerance);
 }
 
 /// Inputs of about `count` points, including degenerate ones.

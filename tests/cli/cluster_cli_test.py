@@ -17,8 +17,9 @@ import time
 import unittest
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
-METHODS = ['facility', 'primal-dual', 'k-means', 'k-median', 'single', 'complete']
-COUNTING = ['k-means', 'k-median', 'single', 'complete']
+LINKAGE = ['single', 'complete', 'average', 'weighted', 'ward', 'centroid', 'median']
+COUNTING = ['k-means', 'k-median', *LINKAGE]
+METHODS = ['facility', 'primal-dual', *COUNTING]
 
 
 def terrace(*args):
@@ -33,15 +34,36 @@ def diagonal(points):
     return math.dist([min(axis) for axis in zip(*points)], [max(axis) for axis in zip(*points)])
 
 
-def agglomerate(points, farthest):
-    """Heights of complete (farthest) or single linkage by brute force."""
-    clusters, heights = [[p] for p in points], []
-    between = max if farthest else min
-    while len(clusters) > 1:
-        height, i, j = min((between(distance(p, q) for p in a for q in b), i, j)
-                           for i, a in enumerate(clusters) for j, b in enumerate(clusters[:i]))
-        heights.append(height)
-        clusters[j] += clusters.pop(i)
+def mean(points):
+    return [sum(axis) / len(points) for axis in zip(*points)]
+
+
+def agglomerate(points, method):
+    """Heights of linkage by the definitions of the methods."""
+    def apart(a, b):
+        if method == 'ward':
+            return math.sqrt(2 * len(a) * len(b) / (len(a) + len(b))) * distance(mean(a), mean(b))
+        if method == 'centroid':
+            return distance(mean(a), mean(b))
+        pairs = [distance(p, q) for p in a for q in b]
+        return {'single': min, 'complete': max, 'average': lambda all_: sum(all_) / len(all_)}[method](pairs)
+
+    # A cluster: its points, and the middle between those of its parts.
+    clusters, heights = [([p], p) for p in points], []
+    between = {(j, i): distance(points[i], points[j]) for i in range(len(points)) for j in range(i)}
+    while between:
+        a, b = min(between, key=between.get)
+        heights.append(between.pop((a, b)))
+        new = len(clusters)
+        clusters.append((clusters[a][0] + clusters[b][0], mean([clusters[a][1], clusters[b][1]])))
+        for k in {other for pair in between for other in pair} - {a, b}:
+            to_a, to_b = (between.pop((min(k, part), max(k, part))) for part in (a, b))
+            if method == 'weighted':
+                between[k, new] = (to_a + to_b) / 2
+            elif method == 'median':
+                between[k, new] = distance(clusters[k][1], clusters[new][1])
+            else:
+                between[k, new] = apart(clusters[k][0], clusters[new][0])
     return heights
 
 
@@ -162,20 +184,38 @@ class ClusterTest(unittest.TestCase):
     def test_dendrograms_have_the_heights_of_brute_force(self):
         few = self.path('few.csv')
         self.write(few, ['x', 'y', 'z'], self.points[:40])
-        for method in ('single', 'complete'):
+        for method in LINKAGE:
             out = self.path(f'{method}-tree.csv')
             self.run_ok('cluster', few, '--method', method, '--dendrogram', out)
             rows = self.read(out)
             self.assertEqual(list(rows[0]), ['a', 'b', 'height', 'size'])
             heights = [float(row['height']) for row in rows]
-            for ours, theirs in zip(heights, agglomerate(self.points[:40], method == 'complete'),
-                                    strict=True):
-                self.assertAlmostEqual(ours / theirs, 1, places=12)
+            for ours, theirs in zip(heights, agglomerate(self.points[:40], method), strict=True):
+                self.assertAlmostEqual(ours / theirs, 1, places=11)
             self.assertEqual(int(rows[-1]['size']), 40)
             picture = self.path(f'{method}.png')
             summary = json.loads(self.run_ok('render', out, '-o', picture, '--json', '--size',
                                              '300x200'))
             self.assertEqual(summary['merges'], 39)
+
+    def test_an_inversion_is_drawn_and_cut(self):
+        triangle = self.path('triangle.csv')
+        self.write(triangle, ['x', 'y', 'z'], [[0, 0, 0], [2, 0, 0], [1, 1.75, 0], [50, 0, 0]])
+        out, labels, picture = self.path('inversion.csv'), self.path('inversion.txt'), self.path('inversion.png')
+        self.run_ok('cluster', triangle, '--method', 'centroid', '--dendrogram', out, '--labels', labels,
+                    '--height', 1.9)
+        self.assertEqual([float(row['height']) for row in self.read(out)][:2], [2, 1.75])
+        with open(labels) as file:
+            self.assertEqual(len(set(file.read().split())), 4)  # the pair is 2 apart
+        self.run_ok('render', out, '-o', picture, '--size', '100x100')
+
+    def test_other_metrics_are_averaged(self):
+        few = self.path('taxi.csv')
+        self.write(few, ['x', 'y', 'z'], [[0, 0, 0], [1, 1, 0], [0, 5, 0]])
+        for method, last in (('average', 5.0), ('weighted', 5.0)):
+            out = self.path(f'taxi-{method}.csv')
+            self.run_ok('cluster', few, '--method', method, '--metric', 'minkowski:1', '--dendrogram', out)
+            self.assertEqual([float(row['height']) for row in self.read(out)], [2, last])
 
     def test_trees_are_cut_by_height_and_by_count(self):
         labels = self.path('labels.txt')
@@ -267,7 +307,9 @@ class ClusterTest(unittest.TestCase):
 
     def test_usage_errors_are_one_line_and_leave_nothing(self):
         none = self.path('none.csv')
-        for options in (['--method', 'k-means'], ['--method', 'k-median'], ['--method', 'ward'],
+        for options in (['--method', 'k-means'], ['--method', 'k-median'], ['--method', 'upgma'],
+                        ['--method', 'ward'], ['--method', 'ward', '-k', 2, '--metric', 'minkowski:1'],
+                        ['--method', 'average', '-k', 2, '--device', 'cuda'],
                         ['--method', 'single'], ['-k', 3], ['--method', 'k-means', '-k', 0],
                         ['--method', 'k-means', '-k', 1000], ['--height', 3],
                         ['--method', 'single', '-k', 2, '--height', 3],
@@ -296,10 +338,10 @@ class ClusterTest(unittest.TestCase):
     def test_what_is_too_much_for_memory_says_how_much_it_needs(self):
         many = self.path('many.ply')
         self.run_ok('synth', 'uniform', '--points', 30000, '-o', many)
-        for method in ('complete', 'primal-dual'):
+        for method in ('complete', 'average', 'weighted', 'primal-dual'):
             message = self.expect_error(1, 'cluster', many, '--method', method, '--labels',
                                         self.path('none.txt'), '--memory', '100M',
-                                        *(['-k', 2] if method == 'complete' else []))
+                                        *(['-k', 2] if method in LINKAGE else []))
             self.assertRegex(message, r'\d+ (bytes|MiB|GiB|B)')
 
     def test_ctrl_c_stops_what_does_not_look_up(self):

@@ -15,44 +15,8 @@ namespace terrace::cluster {
 namespace {
 
 template <class T>
-const LinkageKernels<T>& kernels_of(SimdPath path) {
-  const SimdPath best = best_simd_path();
-  if (path == SimdPath::automatic) path = best;
-  if (path > best) {
-    throw std::invalid_argument(
-        "this processor lacks the instructions of the requested SIMD path; "
-        "SimdPath::automatic takes the best available");
-  }
-#ifdef TERRACE_CLUSTER_X86
-  if constexpr (sizeof(T) == sizeof(float)) {
-    if (path == SimdPath::avx512) return kLinkageFloatAvx512;
-    if (path == SimdPath::avx2) return kLinkageFloatAvx2;
-  } else {
-    if (path == SimdPath::avx512) return kLinkageDoubleAvx512;
-    if (path == SimdPath::avx2) return kLinkageDoubleAvx2;
-  }
-#endif
-  if constexpr (sizeof(T) == sizeof(float)) {
-    return kLinkageFloatPortable;
-  } else {
-    return kLinkageDoublePortable;
-  }
-}
-
-std::string pair_text(std::size_t i, std::size_t j) {
-  return "the distance of " + std::to_string(std::min(i, j)) + " and " +
-         std::to_string(std::max(i, j));
-}
-
-void check_distance(double value, double most, std::size_t i, std::size_t j) {
-  if (value >= 0.0 && value <= most) return;
-  throw std::invalid_argument(pair_text(i, j) + " is " + std::to_string(value) +
-                              "; distances must be finite and not negative");
-}
-
-template <class T>
 Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& options) {
-  const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
+  const LinkageKernels<T>& kernels = linkage_kernels<T>(options.path);
   const LinkagePoints linkage_points(points);
   BandMatrix<T> matrix(points.size(), options.memory_limit);
   if (points.size() < 2) return make_dendrogram(points.size(), {});
@@ -116,7 +80,7 @@ void order_by_distance(std::span<std::uint32_t> things, const PairDistance& dist
 template <class T>
 Dendrogram of_function(std::size_t count, const PairDistance& distance,
                        const LinkageOptions& options) {
-  const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
+  const LinkageKernels<T>& kernels = linkage_kernels<T>(options.path);
   BandMatrix<T> matrix(count, options.memory_limit);
   const auto checked = [&](std::uint32_t i, std::uint32_t j) {
     const double value = distance(std::min(i, j), std::max(i, j));
@@ -162,7 +126,7 @@ Dendrogram complete_linkage(BandMatrix<T>&& distances, const LinkageOptions& opt
                                   " is in the matrix twice, with different values");
     }
   }
-  CompleteRounds<T> rounds(distances, kernels_of<T>(options.path), options.threads);
+  CompleteRounds<T> rounds(distances, linkage_kernels<T>(options.path), options.threads);
   const std::vector<Link> links = rounds.run([&](std::size_t i, const T* row) {
     for (std::size_t k = 0; k < distances.width(); ++k) {
       check_distance(row[k], std::numeric_limits<T>::max(), i, band_partner(n, {i, k}));

@@ -34,18 +34,35 @@ std::vector<std::uint32_t> by_height(std::span<const Link> links) {
   return order;
 }
 
-/// Flat clusters after the first `count` merges.
-std::vector<std::uint32_t> labels_after(const Dendrogram& dendrogram, std::size_t count) {
+/// Of each merge the greatest height in its subtree, itself included.
+std::vector<double> crests_of(const Dendrogram& dendrogram) {
+  const std::size_t n = dendrogram.points;
+  std::vector<double> crest;
+  crest.reserve(dendrogram.merges.size());
+  for (const Merge& merge : dendrogram.merges) {
+    double most = merge.height;
+    for (const std::uint32_t part : {merge.a, merge.b}) {
+      if (part >= n) most = std::max(most, crest[part - n]);
+    }
+    crest.push_back(most);
+  }
+  return crest;
+}
+
+/// Flat clusters of the merges whose crest is not above `height`.
+std::vector<std::uint32_t> labels_below(const Dendrogram& dendrogram,
+                                        const std::vector<double>& crest, double height) {
   const std::size_t n = dendrogram.points;
   // A cluster that is not merged further names itself, others get the name from above.
-  std::vector<std::uint32_t> name(n + count, kNoLabel);
-  for (std::size_t r = count; r-- > 0;) {
+  std::vector<std::uint32_t> name(n + crest.size(), kNoLabel);
+  for (std::size_t r = crest.size(); r-- > 0;) {
+    if (crest[r] > height) continue;
     const Merge& merge = dendrogram.merges[r];
     const auto self = static_cast<std::uint32_t>(n + r);
     if (name[self] == kNoLabel) name[self] = self;
     name[merge.a] = name[merge.b] = name[self];
   }
-  std::vector<std::uint32_t> label(n + count, kNoLabel);
+  std::vector<std::uint32_t> label(n + crest.size(), kNoLabel);
   std::vector<std::uint32_t> result(n);
   std::uint32_t next = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -56,15 +73,33 @@ std::vector<std::uint32_t> labels_after(const Dendrogram& dendrogram, std::size_
   return result;
 }
 
-std::size_t merges_up_to(const Dendrogram& dendrogram, double height) {
-  const auto end = std::upper_bound(dendrogram.merges.begin(), dendrogram.merges.end(), height,
-                                    [](double h, const Merge& merge) { return h < merge.height; });
-  return static_cast<std::size_t>(end - dendrogram.merges.begin());
+/// The dendrogram of links that are taken in the given order.
+Dendrogram join(std::size_t points, std::span<const Link> links,
+                std::span<const std::uint32_t> order) {
+  Dendrogram dendrogram{.points = points, .merges = {}};
+  dendrogram.merges.reserve(links.size());
+  UnionFind sets(points);
+  std::vector<std::uint32_t> cluster(points);
+  std::vector<std::uint32_t> size(points, 1);
+  std::iota(cluster.begin(), cluster.end(), 0u);
+  auto next = static_cast<std::uint32_t>(points);
+  for (const std::uint32_t r : order) {
+    const std::uint32_t x = sets.find(links[r].i);
+    const std::uint32_t y = sets.find(links[r].j);
+    if (!sets.unite(x, y)) {
+      throw std::invalid_argument("link " + std::to_string(r) + ": " + text_of(links[r]) +
+                                  " are already in one cluster; links must form a tree");
+    }
+    const std::uint32_t root = std::min(x, y);
+    const auto [a, b] = std::minmax(cluster[x], cluster[y]);
+    size[root] = size[x] + size[y];
+    dendrogram.merges.push_back({a, b, links[r].height, size[root]});
+    cluster[root] = next++;
+  }
+  return dendrogram;
 }
 
-}  // namespace
-
-Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
+void check_links(std::size_t points, std::span<const Link> links) {
   if (points > kMostDendrogramPoints) {
     throw std::invalid_argument(std::to_string(points) + " points are too many: a dendrogram has " +
                                 "at most 2^31");
@@ -82,32 +117,25 @@ Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
     if (link.i >= points || link.j >= points) fail("names a point that does not exist");
     if (!(link.height >= 0.0)) fail("has a height that is negative or NaN");
   }
-  Dendrogram dendrogram{.points = points, .merges = {}};
-  dendrogram.merges.reserve(links.size());
-  UnionFind sets(points);
-  std::vector<std::uint32_t> cluster(points);
-  std::vector<std::uint32_t> size(points, 1);
-  std::iota(cluster.begin(), cluster.end(), 0u);
-  auto next = static_cast<std::uint32_t>(points);
-  for (const std::uint32_t r : by_height(links)) {
-    const std::uint32_t x = sets.find(links[r].i);
-    const std::uint32_t y = sets.find(links[r].j);
-    if (!sets.unite(x, y)) {
-      throw std::invalid_argument("link " + std::to_string(r) + ": " + text_of(links[r]) +
-                                  " are already in one cluster; links must form a tree");
-    }
-    const std::uint32_t root = std::min(x, y);
-    const auto [a, b] = std::minmax(cluster[x], cluster[y]);
-    size[root] = size[x] + size[y];
-    dendrogram.merges.push_back({a, b, links[r].height, size[root]});
-    cluster[root] = next++;
-  }
-  return dendrogram;
+}
+
+}  // namespace
+
+Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
+  check_links(points, links);
+  return join(points, links, by_height(links));
+}
+
+Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> links) {
+  check_links(points, links);
+  std::vector<std::uint32_t> order(links.size());
+  std::iota(order.begin(), order.end(), 0u);
+  return join(points, links, order);
 }
 
 std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double height) {
   if (std::isnan(height)) throw std::invalid_argument("the height of the cut is NaN");
-  return labels_after(dendrogram, merges_up_to(dendrogram, height));
+  return labels_below(dendrogram, crests_of(dendrogram), height);
 }
 
 std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t count) {
@@ -116,9 +144,13 @@ std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t c
     throw std::invalid_argument("a cut into " + std::to_string(count) + " clusters of " +
                                 std::to_string(n) + " points; it must be from 1 to their number");
   }
-  if (count == n) return labels_after(dendrogram, 0);
-  return labels_after(dendrogram,
-                      merges_up_to(dendrogram, dendrogram.merges[n - count - 1].height));
+  const std::vector<double> crest = crests_of(dendrogram);
+  if (count == n) return labels_below(dendrogram, crest, -1.0);
+  // The lowest height up to which there are enough merges.
+  std::vector<double> sorted = crest;
+  const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(n - count - 1);
+  std::nth_element(sorted.begin(), last, sorted.end());
+  return labels_below(dendrogram, crest, *last);
 }
 
 std::string dendrogram_fault(const Dendrogram& dendrogram) {
@@ -131,7 +163,6 @@ std::string dendrogram_fault(const Dendrogram& dendrogram) {
   const auto size_of = [&](std::uint32_t cluster) {
     return cluster < n ? 1u : dendrogram.merges[cluster - n].size;
   };
-  double last = 0.0;
   for (std::size_t r = 0; r < dendrogram.merges.size(); ++r) {
     const Merge& merge = dendrogram.merges[r];
     const std::string row = "row " + std::to_string(r) + ": ";
@@ -140,8 +171,7 @@ std::string dendrogram_fault(const Dendrogram& dendrogram) {
     if (merged[merge.a] || merged[merge.b]) return row + "a cluster that is already merged";
     merged[merge.a] = merged[merge.b] = true;
     if (merge.size != size_of(merge.a) + size_of(merge.b)) return row + "the size is wrong";
-    if (!(merge.height >= last)) return row + "the height is below the row before, or negative";
-    last = merge.height;
+    if (!(merge.height >= 0.0)) return row + "the height is negative or NaN";
   }
   return {};
 }

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <type_traits>
 
-/// The inner loops of complete linkage. Private to it. All instruction sets give the same bytes.
+#include "terrace/cluster/block.hpp"
+
+/// The inner loops of linkage. Private to it. All instruction sets give the same bytes.
 
 namespace terrace::cluster {
 
@@ -37,5 +39,9 @@ struct LinkageKernels {
 extern const LinkageKernels<float> kLinkageFloatPortable, kLinkageFloatAvx2, kLinkageFloatAvx512;
 extern const LinkageKernels<double> kLinkageDoublePortable, kLinkageDoubleAvx2,
     kLinkageDoubleAvx512;
+
+/// Throws std::invalid_argument if the processor lacks the instructions of the path.
+template <class T>
+const LinkageKernels<T>& linkage_kernels(SimdPath path);
 
 }  // namespace terrace::cluster

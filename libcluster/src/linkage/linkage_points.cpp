@@ -41,4 +41,15 @@ double LinkagePoints::height(double square) const {
   return std::ldexp(std::sqrt(square), exponent_);
 }
 
+std::string pair_text(std::size_t i, std::size_t j) {
+  return "the distance of " + std::to_string(std::min(i, j)) + " and " +
+         std::to_string(std::max(i, j));
+}
+
+void check_distance(double value, double most, std::size_t i, std::size_t j) {
+  if (value >= 0.0 && value <= most) return;
+  throw std::invalid_argument(pair_text(i, j) + " is " + std::to_string(value) +
+                              "; distances must be finite and not negative");
+}
+
 }  // namespace terrace::cluster

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "terrace/cluster/point.hpp"
@@ -22,11 +23,19 @@ class LinkagePoints {
   [[nodiscard]] const std::vector<Point3>& scaled() const { return scaled_; }
   /// The distance whose square after scaling is given.
   [[nodiscard]] double height(double square) const;
+  /// Lengths are 2^exponent times those after scaling.
+  [[nodiscard]] int exponent() const { return exponent_; }
 
  private:
   std::vector<Point3> scaled_;
   int exponent_ = 0;
 };
+
+/// "the distance of 3 and 5": for messages.
+[[nodiscard]] std::string pair_text(std::size_t i, std::size_t j);
+
+/// Throws std::invalid_argument, naming the pair, unless the distance is from 0 to `most`.
+void check_distance(double value, double most, std::size_t i, std::size_t j);
 
 /// Symmetric to the last bit.
 [[nodiscard]] inline double squared_distance(const Point3& p, const Point3& q) {

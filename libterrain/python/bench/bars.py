@@ -98,11 +98,15 @@ def cloud():
     return fast, one, theirs
 
 
-def linkage(method):
-    import fastcluster
+def linkage(method, peer='fastcluster'):
     points = np.random.default_rng(3).random((10_000, 2))
-    theirs = seconds(lambda: fastcluster.linkage_vector(points, 'single') if method == 'single'
-                     else fastcluster.linkage(points, method), 1)
+    if peer == 'scipy':
+        from scipy.cluster import hierarchy
+        theirs = seconds(lambda: hierarchy.linkage(points, method), 1)
+    else:
+        import fastcluster
+        theirs = seconds(lambda: fastcluster.linkage_vector(points, method) if method in ('single', 'ward', 'centroid', 'median')
+                         else fastcluster.linkage(points, method), 1)
     return (seconds(lambda: terrace.linkage(points, method)), seconds(lambda: terrace.linkage(points, method, threads=1)),
             theirs)
 
@@ -165,6 +169,11 @@ def main():
             ('heights, 1 M places in 1 M points, all in: SciPy', 'scipy', '10', cloud),
             ('linkage, single, 10,000 points: fastcluster', 'fastcluster', '3', lambda: linkage('single')),
             ('linkage, complete, 10,000 points: fastcluster', 'fastcluster', '3', lambda: linkage('complete')),
+            *((f'linkage, {method}, 10,000 points: fastcluster', 'fastcluster', '-', lambda method=method: linkage(method))
+              for method in ('average', 'weighted', 'ward', 'centroid', 'median')),
+            ('linkage, average, 10,000 points: SciPy', 'scipy', '-', lambda: linkage('average', 'scipy')),
+            ('linkage, ward, 10,000 points: SciPy', 'scipy', '-', lambda: linkage('ward', 'scipy')),
+            ('linkage, centroid, 10,000 points: SciPy', 'scipy', '-', lambda: linkage('centroid', 'scipy')),
             ('matching, 2,000 points: networkx (60 s at most)', 'networkx', '100', matching),
             ('Delaunay2, 1 M points: SciPy', 'scipy', '5', lambda: delaunay(terrace.Delaunay2, 1_000_000, 2)),
             ('Delaunay3, 200,000 points: SciPy', 'scipy', '-', lambda: delaunay(terrace.Delaunay3, 200_000, 3)),

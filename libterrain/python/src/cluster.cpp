@@ -46,11 +46,23 @@ cluster::LinkageOptions linkage_options(const py::dict& how) {
   return options;
 }
 
+cluster::LinkageMethod linkage_named(const std::string& method) {
+  using enum cluster::LinkageMethod;
+  return named<cluster::LinkageMethod>(method, "method",
+                                       {{"single", single},
+                                        {"complete", complete},
+                                        {"average", average},
+                                        {"weighted", weighted},
+                                        {"ward", ward},
+                                        {"centroid", centroid},
+                                        {"median", median}});
+}
+
 /// edges: if given, single linkage restricted to these pairs.
 py::array linkage(const Array<double>& given, const std::string& method,
                   const std::optional<Array<std::uint32_t>>& edges, const py::dict& how) {
   const std::vector<cluster::Point3> points = points3_of(given);
-  const bool single = named<bool>(method, "method", {{"single", true}, {"complete", false}});
+  const cluster::LinkageMethod kind = linkage_named(method);
   const cluster::LinkageOptions options = linkage_options(how);
   bool gpu = false;
   take_option(how, "gpu", gpu);
@@ -60,11 +72,11 @@ py::array linkage(const Array<double>& given, const std::string& method,
     const std::span<const cluster::Point3> all(points);
     if (edges) return rows_of_merges(cluster::single_linkage(all, pairs));
     if (gpu) {
-      return rows_of_merges(single ? cluster::cuda_single_linkage(all)
-                                   : cluster::cuda_complete_linkage(all, options.entry));
+      return rows_of_merges(kind == cluster::LinkageMethod::single
+                                ? cluster::cuda_single_linkage(all)
+                                : cluster::cuda_complete_linkage(all, options.entry));
     }
-    return rows_of_merges(single ? cluster::single_linkage(all, options)
-                                 : cluster::complete_linkage(all, options));
+    return rows_of_merges(cluster::linkage(all, kind, options));
   }));
 }
 
@@ -87,7 +99,9 @@ py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& le
 }
 
 /// distances: of all pairs i < j of `count` things, by i, then j.
-py::array linkage_of_distances(std::size_t count, const Array<double>& given, const py::dict& how) {
+py::array linkage_of_distances(std::size_t count, const Array<double>& given,
+                               const std::string& method, const py::dict& how) {
+  const cluster::LinkageMethod kind = linkage_named(method);
   const auto distances = numbers_of(given, "distances");
   if (count == 0 || count > cluster::kMostDendrogramPoints ||
       distances.size() != count * (count - 1) / 2) {
@@ -98,7 +112,7 @@ py::array linkage_of_distances(std::size_t count, const Array<double>& given, co
   };
   const cluster::LinkageOptions options = linkage_options(how);
   return to_array(
-      released([&] { return rows_of_merges(complete_linkage(count, of_pair, options)); }));
+      released([&] { return rows_of_merges(cluster::linkage(count, of_pair, kind, options)); }));
 }
 
 /// (ends of each edge, lengths)

@@ -21,15 +21,21 @@ def _weights(weights):
 
 
 def linkage(points, method='single', *, edges=None, single_precision=False, memory=None, gpu=False, threads=None):
-    """Single or complete linkage of points with Euclidean distances, or complete linkage of given distances.
+    """Hierarchical clustering by the methods of scipy.cluster.hierarchy.linkage.
 
-    points: shape (n, 2) or (n, 3), finite; or the distances of all pairs in one dimension, as
-    scipy.spatial.distance.pdist. Returns: float64, shape (n - 1, 4), as scipy.cluster.hierarchy.linkage: the two
-    clusters of each merge, its height and the number of points; the merges ascend. 'single' takes O(n log n);
-    'complete' O(n^2) and 4 n^2 bytes, half of that with ``single_precision``, at most ``memory`` bytes. edges: whole
-    numbers, shape (m, 2): single linkage looks at these pairs alone, which suffices if those of a Delaunay
-    triangulation are among them. gpu: on the first CUDA device, if the module was built with CUDA. Raises: ValueError;
-    RuntimeError without such a device. Source: J. Skala, 4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree.
+    points: shape (n, 2) or (n, 3), finite, with Euclidean distances; or the distances of all pairs in one dimension, as
+    scipy.spatial.distance.pdist. method: 'single', 'complete', 'average', 'weighted', 'ward', 'centroid', 'median'; of
+    distances the last three are meaningful only if these are Euclidean. Returns: float64, shape (n - 1, 4), as SciPy: the
+    two clusters of each merge, its height and the number of points. Heights ascend, except with 'centroid' and
+    'median', where a merge may be lower than its parts. Equal distances allow several results; 'average' and
+    'weighted' give SciPy's, to the last bit.
+
+    Of points 'single' takes O(n log n) time; 'ward', 'centroid' and 'median' O(n^2), and 120 n bytes; 'complete',
+    'average' and 'weighted', and all of distances, O(n^2) and 4 n^2 bytes, half of that with ``single_precision``.
+    memory: the most bytes they may take. edges: whole numbers, shape (m, 2): single linkage looks at these pairs alone,
+    which suffices if those of a Delaunay triangulation are among them. gpu: 'single' or 'complete' on the first CUDA
+    device, if the module was built with CUDA. Raises: ValueError; RuntimeError without such a device. Source: J. Skala,
+    4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree; D. Muellner, 2011.
 
     >>> linkage([[0, 0], [1, 0], [5, 0]])
     array([[0., 1., 1., 2.],
@@ -38,6 +44,8 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
     array = as_numbers(points, 'points')
     how = {'threads': _threads(threads), 'single_precision': bool(single_precision), 'gpu': bool(gpu),
            'memory': 0 if memory is None else whole(memory, 'memory', 1)}
+    if gpu and method not in ('single', 'complete'):
+        raise ValueError("`gpu` is for method='single' or 'complete'")
     if edges is not None:
         if method != 'single' or gpu:
             raise ValueError("`edges` are for method='single', not on a GPU")
@@ -45,12 +53,10 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
     if array.ndim == 1 and array.size > 0:
         if edges is not None or gpu:
             raise ValueError('`edges` and `gpu` are for points')
-        if method != 'complete':
-            raise ValueError("of distances there is only method='complete'")
         count = (1 + math.isqrt(1 + 8 * array.size)) // 2
         if count * (count - 1) // 2 != array.size:
             raise ValueError(f'{array.size} distances are not those of all pairs')
-        return _core.linkage_of_distances(count, array, how)
+        return _core.linkage_of_distances(count, array, method, how)
     return _core.linkage(as_rows(array, 'points'), method, edges, how)
 
 
@@ -81,7 +87,7 @@ def spanning_tree(points, *, threads=None):
 
 def flat_clusters(rows, *, count=None, height=None):
     """The label of each point, 0, 1, .. in the order of appearance, by a cut of a linkage: at most ``count``
-    clusters, or all merges up to a ``height``.
+    clusters, or the largest clusters inside which no merge is higher than ``height``.
 
     >>> flat_clusters(linkage([[0, 0], [1, 0], [5, 0]]), count=2)
     array([0, 0, 1], dtype=uint32)

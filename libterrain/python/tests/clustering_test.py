@@ -21,36 +21,134 @@ except ImportError as missing:
     raise unittest.SkipTest(f'{missing.name} is missing')
 
 
+try:
+    import fastcluster
+except ImportError:
+    fastcluster = None
+
+METHODS = ['single', 'complete', 'average', 'weighted', 'ward', 'centroid', 'median']
+
+
+def combined(method, a, b, between, na, nb, n):
+    """The distances of others, of n points, to a cluster made of two: those to its parts are a and b (Lance, Williams)."""
+    if method == 'single':
+        return np.minimum(a, b)
+    if method == 'complete':
+        return np.maximum(a, b)
+    if method == 'average':
+        return (na * a + nb * b) / (na + nb)
+    if method == 'weighted':
+        return (a + b) / 2
+    if method == 'ward':
+        square = ((n + na) * a ** 2 + (n + nb) * b ** 2 - n * between ** 2) / (n + na + nb)
+    elif method == 'centroid':
+        square = (na * a ** 2 + nb * b ** 2) / (na + nb) - na * nb * between ** 2 / (na + nb) ** 2
+    else:
+        square = (a ** 2 + b ** 2) / 2 - between ** 2 / 4
+    return np.sqrt(np.maximum(square, 0))
+
+
+def runs(points, method):
+    """The distances of clusters at each merge of a run that the caller chooses: yields the matrix (infinite on the diagonal
+    and for clusters that are gone), takes the rows a and b that merge; b then stands for both."""
+    distances, sizes = cdist(points, points), np.ones(len(points))
+    np.fill_diagonal(distances, np.inf)
+    for _ in range(len(points) - 1):
+        a, b = yield distances
+        with np.errstate(invalid='ignore'):
+            new = combined(method, distances[a], distances[b], distances[a, b], sizes[a], sizes[b], sizes)
+        new[~np.isfinite(distances[b])] = np.inf
+        new[a] = new[b] = np.inf
+        distances[b] = distances[:, b] = new
+        distances[a] = distances[:, a] = np.inf
+        sizes[b] += sizes[a]
+
+
+def run_fault(rows, points, method):
+    """What is wrong with a linkage, or None: each row must merge the nearest two clusters."""
+    tolerance = 1e-9 * max(np.ptp(points), 1)
+    place = list(range(len(points)))
+    run = runs(points, method)
+    distances = next(run)
+    for number, (a, b, height, _) in enumerate(rows):
+        a, b = place[int(a)], place[int(b)]
+        if abs(height - distances[a, b]) > tolerance:
+            return f'row {number}: height {height} is not {distances[a, b]}'
+        if height > distances.min() + tolerance:
+            return f'row {number}: others are nearer'
+        place.append(b)
+        if number < len(rows) - 1:
+            distances = run.send((a, b))
+    return None
+
+
+def one_way(points, method):
+    """Whether no two pairs are ever equally near, so that there is one linkage."""
+    run = runs(points, method)
+    distances = next(run)
+    for left in range(len(points) - 1, 0, -1):
+        order = np.argsort(distances, axis=None)[:3]  # each pair is there twice
+        a, b = np.unravel_index(order[0], distances.shape)
+        least, next_ = distances.flat[order[0]], distances.flat[order[2]]
+        if next_ - least < 1e-6 * max(np.ptp(points), 1):
+            return False
+        if left > 1:
+            distances = run.send((a, b))
+    return True
+
+
 def some_points(most, width=2, least=2):
     return arrays.arrays(np.float64, st.tuples(st.integers(least, most), st.just(width)),
                          elements=st.floats(-100, 100, width=32))
 
 
 class Linkage(unittest.TestCase):
-    @settings(max_examples=60, deadline=None, derandomize=True)
-    @given(some_points(60), st.sampled_from(['single', 'complete']))
+    @settings(max_examples=200, deadline=None, derandomize=True)
+    @given(some_points(60), st.sampled_from(METHODS))
     def test_heights_are_scipys(self, points, method):
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # points may look like a matrix of distances
             made, expected = terrace.linkage(points, method), hierarchy.linkage(points, method)
         self.assertTrue(hierarchy.is_valid_linkage(made))
-        if method == 'single' or len(np.unique(expected[:, 2])) == len(expected):
+        if method in ('average', 'weighted'):
+            np.testing.assert_array_equal(made, expected)
+        elif method == 'single' or one_way(points, method):
             np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-9, atol=1e-9)
+
+    def test_ties_are_a_valid_choice(self):
+        # Which of several equally near pairs merges first is free, and later heights follow from it. So each row is
+        # judged by the distances of the clusters that there are at that moment.
+        grid = np.array(np.meshgrid(range(5), range(4), range(3)), float).reshape(3, -1).T
+        for points in (grid, np.repeat(grid, 2, axis=0), np.zeros((40, 2)), np.arange(50.0)[:, None] * (1, 1),
+                       np.random.default_rng(5).integers(0, 4, (90, 2)).astype(float)):
+            for method in METHODS:
+                with self.subTest(method=method, points=len(points)):
+                    self.assertEqual(run_fault(terrace.linkage(points, method), points, method), None)
+                    self.assertEqual(run_fault(terrace.linkage(pdist(points), method), points, method), None)
 
     def test_rows_and_cuts_are_scipys(self):
         points = np.random.default_rng(2).random((400, 3))
-        for method in ('single', 'complete'):
+        for method in METHODS:
             made = terrace.linkage(points, method)
             expected = hierarchy.linkage(points, method)
             np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
-            for count in (1, 5, 40):
-                ours = terrace.flat_clusters(made, count=count)
-                theirs = hierarchy.fcluster(expected, count, 'maxclust')
-                self.assertEqual(len({*zip(ours, theirs)}), count)
+            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-9)
+            np.testing.assert_allclose(terrace.linkage(pdist(points), method), expected, rtol=1e-9)
+            if fastcluster is not None:
+                np.testing.assert_allclose(fastcluster.linkage(points, method)[:, 2], made[:, 2], rtol=1e-9)
             height = float(np.median(made[:, 2]))
             ours = terrace.flat_clusters(made, height=height)
             theirs = hierarchy.fcluster(expected, height, 'distance')
             self.assertEqual(len({*zip(ours, theirs)}), len(set(theirs)))
+            if method in ('centroid', 'median'):  # SciPy's count may be exceeded after an inversion
+                self.assertLessEqual(len(set(terrace.flat_clusters(made, count=40))), 40)
+                self.assertFalse(hierarchy.is_monotonic(made))
+                continue
+            self.assertTrue(hierarchy.is_monotonic(made))
+            for count in (1, 5, 40):
+                ours = terrace.flat_clusters(made, count=count)
+                theirs = hierarchy.fcluster(expected, count, 'maxclust')
+                self.assertEqual(len({*zip(ours, theirs)}), count)
 
     def test_misuse(self):
         self.assertEqual(terrace.linkage(np.zeros((1, 2))).shape, (0, 4))
@@ -58,7 +156,9 @@ class Linkage(unittest.TestCase):
             with self.assertRaises(ValueError):
                 terrace.linkage(wrong)
         with self.assertRaises(ValueError):
-            terrace.linkage([[0, 0], [1, 1]], 'average')
+            terrace.linkage([[0, 0], [1, 1]], 'mean')
+        with self.assertRaisesRegex(ValueError, 'gpu'):
+            terrace.linkage([[0, 0], [1, 1]], 'ward', gpu=True)
         for rows in ([[0, 0, 1, 2]], [[0, 5, 1, 2]], [[0, -1, 1, 2]], [[0, np.nan, 1, 2]], [[0, 1, -1, 2]]):
             with self.assertRaises(ValueError):
                 terrace.flat_clusters(rows, count=1)
@@ -70,11 +170,12 @@ class Linkage(unittest.TestCase):
 
     def test_of_distances(self):
         points = np.random.default_rng(12).random((150, 3))
-        made = terrace.linkage(pdist(points, 'cityblock'), 'complete')
-        expected = hierarchy.linkage(pdist(points, 'cityblock'), 'complete')
-        np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
-        np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-12)
-        for wrong, method in ((np.ones(4), 'complete'), (np.ones(3), 'single'), (-np.ones(3), 'complete'), ([np.nan], 'complete')):
+        for method in METHODS:
+            made = terrace.linkage(pdist(points, 'cityblock'), method)
+            expected = hierarchy.linkage(pdist(points, 'cityblock'), method)
+            np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
+            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-12)
+        for wrong, method in ((np.ones(4), 'complete'), (np.ones(3), 'mean'), (-np.ones(3), 'complete'), ([np.nan], 'ward')):
             with self.assertRaises(ValueError):
                 terrace.linkage(wrong, method)
 
@@ -108,13 +209,16 @@ class Linkage(unittest.TestCase):
         with self.assertRaises(TypeError):
             terrace.tree_linkage([[0.0, 1.0]], [1])
 
-    def test_the_matrix_of_complete_linkage(self):
+    def test_the_matrix(self):
         points = np.random.default_rng(18).random((200, 3))
-        exact, rounded = (terrace.linkage(points, 'complete', single_precision=single) for single in (False, True))
-        np.testing.assert_allclose(rounded[:, 2], exact[:, 2], rtol=1e-6)
-        self.assertTrue((rounded[:, 2] != exact[:, 2]).any())
-        with self.assertRaisesRegex(ValueError, '160000'):
-            terrace.linkage(points, 'complete', memory=1000)
+        for method in ('average', 'weighted', 'complete'):
+            exact, rounded = (terrace.linkage(points, method, single_precision=single) for single in (False, True))
+            np.testing.assert_allclose(rounded[:, 2], exact[:, 2], rtol=1e-6)
+            self.assertTrue((rounded[:, 2] != exact[:, 2]).any())
+            with self.assertRaisesRegex(ValueError, '160000'):
+                terrace.linkage(points, method, memory=1000)
+        with self.assertRaisesRegex(ValueError, '24000'):
+            terrace.linkage(points, 'ward', memory=1000)
         try:
             np.testing.assert_allclose(terrace.linkage(points, 'complete', gpu=True)[:, 2], exact[:, 2])
         except RuntimeError as error:

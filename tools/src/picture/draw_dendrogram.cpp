@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <terrace/cluster/dendrogram.hpp>
@@ -70,7 +71,9 @@ void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
   if (tree.merges.empty()) return;
   const double margin = 0.03 * std::min(canvas.width(), canvas.height());
   const double wide = canvas.width() - 2 * margin, high = canvas.height() - 2 * margin;
-  const double top = tree.merges.back().height;
+  // An inversion may be lower than its parts, the last one too.
+  double top = 0.0;
+  for (const Merge& merge : tree.merges) top = std::max(top, merge.height);
   // All merges of equal points lie at 0.
   const double scale = top > 0 ? high / top : 0.0;
   const double step = wide / static_cast<double>(tree.points);
@@ -94,8 +97,10 @@ void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
     };
     const double a = place(merge.a), b = place(merge.b), y = row(merge.height);
     middle[r] = 0.5 * (a + b);
-    fill(a - half, y, a + half, row(height(merge.a)), colour, canvas);
-    fill(b - half, y, b + half, row(height(merge.b)), colour, canvas);
+    for (const auto& [x, node] : {std::pair{a, merge.a}, std::pair{b, merge.b}}) {
+      const double end = row(height(node));
+      fill(x - half, std::min(y, end), x + half, std::max(y, end), colour, canvas);
+    }
     fill(std::min(a, b) - half, y - half, std::max(a, b) + half, y + half, colour, canvas);
   }
 }

@@ -51,13 +51,14 @@ enum class ClusterMethod : std::uint8_t {
   primal_dual,
   k_means,
   k_median,
-  single,
-  complete,
+  linkage,
 };
 
 /// The request of `terrace cluster`, for points on the ground.
 struct ClusterRequest {
   ClusterMethod method = ClusterMethod::facility;
+  cluster::LinkageMethod linkage = cluster::LinkageMethod::single;
+  std::string linkage_name;  ///< as the user writes it
   cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< of facility
   std::string iterations;  ///< of facility: tenth, log10, log2, a number; empty: by effort
   cluster::Effort effort = cluster::Effort::standard;
@@ -66,7 +67,7 @@ struct ClusterRequest {
   std::optional<double> height;
   std::optional<std::uint32_t> bound_iterations;  ///< of the lower bound; 0: none
   std::size_t restarts = 1;
-  bool single_precision = false;  ///< of the matrix of complete linkage
+  bool single_precision = false;  ///< of the matrix of linkage
   bool cuda = false;
   std::uint64_t seed = 1;
   unsigned threads = 1;
@@ -226,31 +227,47 @@ ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const Facility
   return outcome;
 }
 
-cluster::Dendrogram complete_tree(const ClusterRequest& request, const FacilityPoints& problem,
-                                  const std::optional<std::vector<Point3>>& points) {
+/// The whole tree, on the CPU.
+cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints& problem,
+                            const std::optional<std::vector<Point3>>& points) {
+  const std::string method = "--method " + request.linkage_name;
   cluster::LinkageOptions options;
   options.threads = request.threads;
   options.entry =
       request.single_precision ? cluster::MatrixEntry::float32 : cluster::MatrixEntry::float64;
   options.memory_limit = request.memory_bytes;
-  if (points) return cluster::complete_linkage(*points, options);
-  if (!cluster::is_symmetric(problem.metric)) {
-    throw UsageError(
-        "--method complete needs a symmetric metric: a field of ellipses is not symmetric "
-        "(the points lie in several of its regions)");
+  if (points) return cluster::linkage(*points, request.linkage, options);
+  switch (request.linkage) {
+    case cluster::LinkageMethod::complete:
+    case cluster::LinkageMethod::average:
+    case cluster::LinkageMethod::weighted:
+      break;
+    case cluster::LinkageMethod::single:
+      throw UsageError(method +
+                       " goes through the Euclidean minimum spanning tree: it takes --metric "
+                       "euclidean, or elliptical with one region for all points");
+    case cluster::LinkageMethod::ward:
+    case cluster::LinkageMethod::centroid:
+    case cluster::LinkageMethod::median:
+      throw UsageError(method +
+                       " measures distances of means: it takes --metric euclidean, or elliptical "
+                       "with one region for all points");
   }
-  return cluster::complete_linkage(
+  if (!cluster::is_symmetric(problem.metric)) {
+    throw UsageError(method +
+                     " needs a symmetric metric: a field of ellipses is not symmetric (the points "
+                     "lie in several of its regions)");
+  }
+  return cluster::linkage(
       problem.points.size(),
       [&](std::uint32_t i, std::uint32_t j) {
         return cluster::distance(problem.metric, problem.points[i], problem.points[j]);
       },
-      options);
+      request.linkage, options);
 }
 
-/// Single and complete linkage.
 ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityPoints& problem) {
-  const bool single = request.method == ClusterMethod::single;
-  no_channels(problem, single ? "single" : "complete");
+  no_channels(problem, request.linkage_name.c_str());
   if (!problem.weights.empty())
     throw UsageError("--weight is not for linkage: it counts no points");
   const std::optional<std::vector<Point3>> points =
@@ -259,18 +276,13 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
   if (request.cuda) {
     if (!points) throw UsageError("--device cuda takes --metric euclidean or elliptical");
     outcome.dendrogram =
-        single ? cluster::cuda_single_linkage(*points)
-               : cluster::cuda_complete_linkage(*points, request.single_precision
-                                                             ? cluster::MatrixEntry::float32
-                                                             : cluster::MatrixEntry::float64);
-  } else if (!single) {
-    outcome.dendrogram = complete_tree(request, problem, points);
-  } else if (points) {
-    outcome.dendrogram = cluster::single_linkage(*points, {.threads = request.threads});
+        request.linkage == cluster::LinkageMethod::single
+            ? cluster::cuda_single_linkage(*points)
+            : cluster::cuda_complete_linkage(*points, request.single_precision
+                                                          ? cluster::MatrixEntry::float32
+                                                          : cluster::MatrixEntry::float64);
   } else {
-    throw UsageError(
-        "--method single goes through the Euclidean minimum spanning tree: it takes "
-        "--metric euclidean, or elliptical with one region for all points");
+    outcome.dendrogram = tree_of(request, problem, points);
   }
   if (request.k != 0) outcome.labels = cluster::cut_count(*outcome.dendrogram, request.k);
   if (request.height) outcome.labels = cluster::cut_height(*outcome.dendrogram, *request.height);
@@ -308,8 +320,7 @@ ClusterOutcome run_clustering(const ClusterRequest& request, const cluster::Faci
       return cluster_by_k_means(request, problem);
     case ClusterMethod::k_median:
       return cluster_by_k_median(request, problem);
-    case ClusterMethod::single:
-    case ClusterMethod::complete:
+    case ClusterMethod::linkage:
       break;
   }
   return cluster_by_linkage(request, problem);
@@ -458,18 +469,19 @@ class ClusterCommand final : public Command {
     app.add_option("--labels", labels_, "One cluster number per line, in the order of the input")
         ->type_name("FILE");
     app.add_option("--dendrogram", dendrogram_,
-                   "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
+                   "Linkage: the whole tree as rows a,b,height,size (SciPy's)")
         ->type_name("FILE.csv");
     add_point_format(app, format_);
     add_input_format(app, input_format_);
     app.add_option("--method", method_,
-                   "facility, primal-dual, k-means, k-median, single or complete")
+                   "facility, primal-dual, k-means, k-median, or of linkage: single, complete, "
+                   "average, weighted, ward, centroid, median")
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option("-k", request_.k, "Number of clusters")
         ->check(CLI::Range(1U, 4294967295U))
         ->type_name("K");
-    add_number(app, "--height", request_.height, "single, complete: cut the tree at this distance",
+    add_number(app, "--height", request_.height, "Linkage: cut the tree at this distance",
                kNotNegative)
         ->type_name("H");
     add_number(app, "--facility-cost", facility_cost_,
@@ -509,7 +521,7 @@ class ClusterCommand final : public Command {
     app.add_option("--weight", weight_, "The column of the points' weights")->type_name("NAME");
     add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
     app.add_flag("--single-precision", request_.single_precision,
-                 "complete: a matrix of half the size");
+                 "complete, average, weighted: a matrix of half the size");
     app.add_option("--device", device_, "single, complete: cpu or cuda")
         ->check(CLI::IsMember({"cpu", "cuda"}))
         ->capture_default_str();
@@ -589,23 +601,37 @@ class ClusterCommand final : public Command {
                                                {"primal-dual", ClusterMethod::primal_dual},
                                                {"k-means", ClusterMethod::k_means},
                                                {"k-median", ClusterMethod::k_median},
-                                               {"single", ClusterMethod::single},
-                                               {"complete", ClusterMethod::complete}});
+                                               {"single", ClusterMethod::linkage},
+                                               {"complete", ClusterMethod::linkage},
+                                               {"average", ClusterMethod::linkage},
+                                               {"weighted", ClusterMethod::linkage},
+                                               {"ward", ClusterMethod::linkage},
+                                               {"centroid", ClusterMethod::linkage},
+                                               {"median", ClusterMethod::linkage}});
     request_.method = method;
     request_.strategy = parse_strategy(strategy_);
     request_.effort = *effort_of(effort_);
     request_.cuda = device_ == "cuda";
     request_.seed = common.seed;
     request_.threads = common.threads;
-    const bool tree = method == ClusterMethod::single || method == ClusterMethod::complete;
+    const bool tree = method == ClusterMethod::linkage;
+    if (tree) {
+      request_.linkage = *cluster::linkage_method_named(method_);
+      request_.linkage_name = method_;
+    }
     const bool flat = !output_.empty() || !labels_.empty();
     if (!flat && dendrogram_.empty()) {
       throw UsageError(
           "there is nothing to write: name -o FILE, --labels FILE or --dendrogram FILE");
     }
-    if (!tree && (!dendrogram_.empty() || request_.height || request_.cuda)) {
+    if (!tree && (!dendrogram_.empty() || request_.height)) {
       throw UsageError(
-          "--dendrogram, --height and --device are for the methods single and complete");
+          "--dendrogram and --height are for the methods of linkage: single, complete, "
+          "average, weighted, ward, centroid and median");
+    }
+    if (request_.cuda && (!tree || (request_.linkage != cluster::LinkageMethod::single &&
+                                    request_.linkage != cluster::LinkageMethod::complete))) {
+      throw UsageError("--device cuda is for the methods single and complete");
     }
     if (tree && flat && request_.k == 0 && !request_.height) {
       throw UsageError("--method " + method_ +
@@ -618,7 +644,7 @@ class ClusterCommand final : public Command {
     if (!counts && !tree && request_.k != 0) {
       throw UsageError("--method " + method_ +
                        " finds the number of clusters itself, by --facility-cost; -k is for "
-                       "k-means, k-median, single and complete");
+                       "k-means, k-median and linkage");
     }
     if (method != ClusterMethod::facility &&
         (outlier_price_ || strategy_ != "automatic" || !request_.iterations.empty() ||

@@ -23,7 +23,10 @@ struct Merge {
 
 struct Dendrogram {
   std::size_t points = 0;
-  std::vector<Merge> merges;  ///< points - 1 rows, heights ascending; empty for no points
+  /// points - 1 rows, in the order of the merges; empty for no points. Heights ascend, except for
+  /// centroid and median linkage, where a merge may be lower than those of its parts (an
+  /// inversion).
+  std::vector<Merge> merges;
   friend bool operator==(const Dendrogram&, const Dendrogram&) = default;
 };
 
@@ -45,19 +48,23 @@ inline constexpr std::size_t kMostDendrogramPoints = std::size_t{1} << 31;
 /// is NaN or negative; the message names the link.
 [[nodiscard]] Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links);
 
-/// Flat clusters in which no two points have a cophenetic distance greater than `height`: all
-/// merges up to and including it (SciPy: fcluster with criterion 'distance'). Returns the label of
-/// each point; labels are 0, 1, .. in the order of first appearance. O(n). Throws
-/// std::invalid_argument if the height is NaN.
+/// The same with the merges in the order of the links, whatever their heights. O(n).
+[[nodiscard]] Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> links);
+
+/// Flat clusters inside which no merge is higher than `height` (SciPy: fcluster with criterion
+/// 'distance'). Returns the label of each point; labels are 0, 1, .. in the order of first
+/// appearance. O(n). Throws std::invalid_argument if the height is NaN.
 [[nodiscard]] std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double height);
 
 /// At most `count` flat clusters, by a cut at the lowest height that leaves no more. There are
 /// fewer if merges of equal height leave no choice (SciPy: fcluster with criterion 'maxclust',
-/// which however never cuts below its second row and so gives fewer than possible for n and n - 1).
-/// Throws std::invalid_argument if count is 0 or exceeds the number of points.
+/// which however never cuts below its second row and so gives fewer than possible for n and n - 1,
+/// and may leave more than possible after an inversion). O(n log n). Throws std::invalid_argument
+/// if count is 0 or exceeds the number of points.
 [[nodiscard]] std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t count);
 
-/// The first fault of a dendrogram from another source, naming the row; empty if it is valid. O(n).
+/// The first fault of a dendrogram from another source, naming the row; empty if it is valid.
+/// Inversions are valid. O(n).
 [[nodiscard]] std::string dendrogram_fault(const Dendrogram& dendrogram);
 
 }  // namespace terrace::cluster

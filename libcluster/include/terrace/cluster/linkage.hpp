@@ -5,8 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "terrace/cluster/band_matrix.hpp"
@@ -14,13 +16,14 @@
 #include "terrace/cluster/dendrogram.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// Single and complete linkage with the complete dendrogram, on the CPU and on a GPU, of points in
-/// space or, with z = 0, in the plane, with Euclidean distances; complete linkage also of things
-/// with any other distance.
+/// Hierarchical clustering with the complete dendrogram, by the seven methods of SciPy's linkage(),
+/// of points in space or, with z = 0, in the plane, with Euclidean distances, or of things with any
+/// other distance; single and complete linkage also on a GPU.
 ///
 /// If distances are equal there are several valid dendrograms; which one is returned depends only
 /// on the input and its order, not on threads or instruction set.
-/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.1, 7.6.
+/// Sources: J. Skála, Algorithms for manipulating large geometric data, 4.2.1, 7.6; D. Müllner,
+/// Modern hierarchical, agglomerative clustering algorithms, 2011.
 
 namespace terrace::cluster {
 
@@ -37,9 +40,10 @@ enum class MatrixEntry {
 
 struct LinkageOptions {
   unsigned threads = 1;  ///< does not change the result
-  // For complete linkage, which uses a matrix:
+  /// For what uses a matrix: complete, average and weighted linkage, and all linkage of distances.
   MatrixEntry entry = MatrixEntry::float64;
-  std::uint64_t memory_limit = 0;  ///< bytes the matrix may take; 0: no limit
+  /// Bytes the matrix may take, or the means of ward, centroid and median linkage; 0: no limit.
+  std::uint64_t memory_limit = 0;
   SimdPath path = SimdPath::automatic;
 };
 
@@ -102,6 +106,42 @@ template <class T>
 
 extern template Dendrogram complete_linkage(BandMatrix<float>&&, const LinkageOptions&);
 extern template Dendrogram complete_linkage(BandMatrix<double>&&, const LinkageOptions&);
+
+/// The distance of two clusters.
+enum class LinkageMethod : std::uint8_t {
+  single,    ///< of their nearest points
+  complete,  ///< of their farthest points
+  average,   ///< the mean over all pairs of points (UPGMA)
+  weighted,  ///< the mean of the distances of the two parts of a cluster (WPGMA)
+  ward,      ///< sqrt(2 |a| |b| / (|a| + |b|)) times that of their means
+  centroid,  ///< of their means (UPGMC)
+  median,  ///< of their middles: that of a new cluster is midway between those of its parts (WPGMC)
+};
+
+/// By the name above; nullopt for any other.
+[[nodiscard]] std::optional<LinkageMethod> linkage_method_named(std::string_view name);
+
+/// Linkage by any method. O(n^2) time except for single linkage.
+/// - ward: a nearest-neighbour chain over means, without a matrix; 120 bytes per point.
+/// - average, weighted: a chain over a matrix of n (n - 1) / 2 entries, and some 50 bytes per
+/// point.
+///   With float entries each merge rounds its distances to float. Equal to SciPy's result in every
+///   bit, ties included: a chain begins at the first cluster and prefers the cluster before in the
+///   chain, then the first one; a new cluster takes the place of its later part.
+/// - centroid, median: repeatedly the nearest two clusters, the first pair of equally near ones,
+///   without a matrix; 120 bytes per point. A merge may be lower than those of its parts;
+///   rows are in the order of the merges.
+/// Throws: std::invalid_argument as single_linkage() and, naming the bytes needed, if they exceed
+/// the memory limit. Sources: F. Murtagh, 1983; W. Day, H. Edelsbrunner, Efficient algorithms for
+/// agglomerative hierarchical clustering methods, 1984.
+[[nodiscard]] Dendrogram linkage(std::span<const Point3> points, LinkageMethod method,
+                                 const LinkageOptions& options = {});
+
+/// Linkage of `count` things of any kind by any method, over a matrix. Ward, centroid and median
+/// linkage are meaningful for Euclidean distances only. Throws: std::invalid_argument as
+/// complete_linkage() of things.
+[[nodiscard]] Dendrogram linkage(std::size_t count, const PairDistance& distance,
+                                 LinkageMethod method, const LinkageOptions& options = {});
 
 struct CudaStatus {
   bool available = false;

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "linkage/cluster_means.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+/// Of squared distances, by Ward: 2 |a| |b| / (|a| + |b|). Symmetric to the last bit.
+double ward_factor(double a, double b) { return 2.0 * a * b / (a + b); }
+
+/// Subtracts the least coordinate of an axis if that is exact for all: the mean of places far from
+/// the origin would lose digits that their differences have.
+void move_to_origin(std::vector<double>& axis) {
+  if (axis.empty()) return;
+  const double low = *std::min_element(axis.begin(), axis.end());
+  std::vector<double> moved(axis.size());
+  for (std::size_t i = 0; i < axis.size(); ++i) {
+    const double difference = axis[i] - low;
+    // The rounding error of the difference (D. Knuth).
+    const double back = axis[i] - difference;
+    if ((axis[i] - (difference + back)) + (back - low) != 0.0) return;
+    moved[i] = difference;
+  }
+  axis = std::move(moved);
+}
+
+}  // namespace
+
+ClusterMeans::ClusterMeans(const LinkagePoints& points, LinkageMethod method, SimdPath path)
+    : ClusterSlots(points.scaled().size()),
+      points_of_(points),
+      method_(method),
+      kernels_(linkage_kernels<double>(path)),
+      row_(points.scaled().size()) {
+  for (unsigned a = 0; a < 3; ++a) {
+    axis_[a].reserve(size());
+    for (const Point3& p : points.scaled()) axis_[a].push_back(p[a]);
+    move_to_origin(axis_[a]);
+  }
+}
+
+double ClusterMeans::distance(std::uint32_t a, std::uint32_t b) const {
+  const double square = squared_distance({axis_[0][a], axis_[1][a], axis_[2][a]},
+                                         {axis_[0][b], axis_[1][b], axis_[2][b]});
+  return method_ == LinkageMethod::ward ? square * ward_factor(points(b), points(a)) : square;
+}
+
+NearCluster ClusterMeans::nearest(std::uint32_t x, std::uint32_t begin, std::uint32_t end,
+                                  NearCluster best) {
+  if (begin >= end) return best;
+  const std::size_t count = end - begin;
+  kernels_.distances(axis_[0].data() + begin, axis_[1].data() + begin, axis_[2].data() + begin,
+                     count, axis_[0][x], axis_[1][x], axis_[2][x], row_.data());
+  if (method_ == LinkageMethod::ward) {
+    // Dead ones become NaN, which is not nearer than anything.
+    const double own = points(x);
+    const double* const others = points() + begin;
+    for (std::size_t k = 0; k < count; ++k) row_[k] *= ward_factor(others[k], own);
+  }
+  if (x >= begin && x < end) row_[x - begin] = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < count; ++k) {
+    if (row_[k] < best.distance) best = {row_[k], begin + static_cast<std::uint32_t>(k)};
+  }
+  return best;
+}
+
+void ClusterMeans::join(std::uint32_t low, std::uint32_t high, double /*between*/) {
+  const bool middle = method_ == LinkageMethod::median;
+  const double a = middle ? 1.0 : points(low), b = middle ? 1.0 : points(high);
+  for (std::vector<double>& axis : axis_) {
+    // Equal places stay where they are.
+    axis[high] = axis[low] == axis[high] ? axis[high] : (a * axis[low] + b * axis[high]) / (a + b);
+    axis[low] = std::numeric_limits<double>::infinity();
+  }
+}
+
+void ClusterMeans::move(const std::vector<std::uint32_t>& kept) {
+  for (std::vector<double>& axis : axis_) {
+    for (std::size_t k = 0; k < kept.size(); ++k) axis[k] = axis[kept[k]];
+    axis.resize(kept.size());
+  }
+}
+
+}  // namespace terrace::cluster

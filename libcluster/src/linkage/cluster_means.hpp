@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "linkage/cluster_slots.hpp"
+#include "linkage/linkage_kernels.hpp"
+#include "linkage/linkage_points.hpp"
+#include "terrace/cluster/linkage.hpp"
+
+/// Clusters of points, each represented by one place: no matrix of distances. Private to linkage.
+
+namespace terrace::cluster {
+
+/// Distances are squares, of the scaled points. Ward: the mean, and the growth of the sum of
+/// squares; centroid: the mean; median: the middle between the places of the two parts.
+class ClusterMeans : public ClusterSlots {
+ public:
+  ClusterMeans(const LinkagePoints& points, LinkageMethod method, SimdPath path);
+
+  [[nodiscard]] double distance(std::uint32_t a, std::uint32_t b) const;
+  [[nodiscard]] NearCluster nearest(std::uint32_t x, std::uint32_t begin, std::uint32_t end,
+                                    NearCluster best);
+  void join(std::uint32_t low, std::uint32_t high, double between);
+  void move(const std::vector<std::uint32_t>& kept);
+  [[nodiscard]] double height(double distance) const { return points_of_.height(distance); }
+
+ private:
+  const LinkagePoints& points_of_;
+  const LinkageMethod method_;
+  const LinkageKernels<double>& kernels_;
+  std::vector<double> axis_[3];  ///< infinite if dead
+  std::vector<double> row_;      ///< scratch memory
+};
+
+}  // namespace terrace::cluster
