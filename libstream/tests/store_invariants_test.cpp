@@ -16,6 +16,7 @@
 #include "store_mending.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace terrace::stream {
@@ -219,6 +220,36 @@ TEST(StoreInvariants, ManifestsWhosePlacesCannotBeAreRefused) {
     StoreFiles files = grid_files();
     testing::edit_manifest(files, c.edit);
     expect_refused(files, c.expected);
+  }
+}
+
+TEST(StoreInvariants, ManifestsWithUnknownWordsAreRefused) {
+  const auto parameter = [](ordered_json& m, const char* value) {
+    m["parameters"].push_back({{"name", "entities"}, {"value", value}});
+  };
+  const std::vector<ManifestCase> cases{
+      {"the kind is unknown", [](auto& m) { m["kind"] = "<b>grid</b>"; }},
+      {"unknown type", [](auto& m) { m["coordinates"][2]["type"] = "int24"; }},
+      {"unknown type", [](auto& m) { m["attributes"][0]["type"] = "<i>"; }},
+      {"what heights refer to", [](auto& m) { m["vertical"] = "<b>ellipsoidal</b>"; }},
+      {"the entities are unknown", [&](auto& m) { parameter(m, "<img src=x onerror=alert(1)>"); }},
+      {"the entities are unknown", [&](auto& m) { parameter(m, "triangle"); }},
+      {"the entities are unknown", [&](auto& m) { parameter(m, ""); }},
+  };
+  for (const ManifestCase& c : cases) {
+    SCOPED_TRACE(c.expected);
+    StoreFiles files = cloud_files();
+    testing::edit_manifest(files, c.edit);
+    expect_refused(files, c.expected);
+  }
+  for (const Entities known :
+       {Entities::points, Entities::triangles, Entities::segments, Entities::polylines}) {
+    StoreFiles files = cloud_files();
+    testing::edit_manifest(
+        files, [&](ordered_json& m) { parameter(m, std::string(name_of(known)).c_str()); });
+    const TemporaryFolder folder;
+    testing::write_files(folder.path(), files);
+    EXPECT_EQ(opening(folder.path()), "") << name_of(known);
   }
 }
 

@@ -42,6 +42,10 @@ class Stores(unittest.TestCase):
     def path(self, *parts):
         return os.path.join(self.folder, *parts)
 
+    def read(self, *parts):
+        with open(self.path(*parts), 'rb') as file:
+            return file.read()
+
 
 class ViewTest(Stores):
     @classmethod
@@ -270,6 +274,27 @@ class ViewErrorTest(Stores):
             done = terrace('view', self.store, '--no-open', '--port', str(taken.getsockname()[1]))
             self.assertEqual(done.returncode, 1)
             self.assertIn('another port', done.stderr)
+
+    def test_words_of_a_manifest(self):
+        """One whose checksum is right but whose words are unknown, as markup for a page is, is refused by all."""
+        for key, value in [('"vertical": "', '<b>x</b>'), ('"kind": "', '<i>'), ('"parameters": [', None)]:
+            store = self.path('words.store')
+            shutil.copytree(self.store, store)
+            text = self.read('words.store', 'manifest.json').decode()
+            if value is None:
+                text = text.replace(key, key + '\n    {\n      "name": "entities",\n      "value": "<img src=x onerror=alert(1)>"\n    },', 1)
+            else:
+                text = re.sub(f'({key})[a-z]*"', lambda match: f'{match[1]}{value}"', text, count=1)
+            end = '"\n}\n'
+            text = text[:-len(end) - 8] + '00000000' + end
+            text = text[:-len(end) - 8] + f'{zlib.crc32(text.encode()):08x}' + end
+            with open(os.path.join(store, 'manifest.json'), 'w') as file:
+                file.write(text)
+            for verb in [['view', store, '--no-open'], ['verify', store], ['info', store], ['publish', store, '-o', self.path('no')]]:
+                done = terrace(*verb)
+                self.assertEqual((key, verb[0], done.returncode), (key, verb[0], 1))
+                self.assertRegex(done.stderr + done.stdout, 'damaged manifest: .* unknown')
+            shutil.rmtree(store)
 
     def test_links_are_not_served(self):
         store = self.path('linked.store')

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "store/manifest.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 
 #include "store/codec/bytes.hpp"
 #include "store/codec/layout.hpp"
@@ -200,6 +202,20 @@ void check_places(const Manifest& m) {
   }
 }
 
+/// Words of which the format knows a few: programs compare them, and show them as they are.
+void check_words(const Manifest& m) {
+  const auto check = [](const std::string& word, std::initializer_list<const char*> known,
+                        const char* otherwise) {
+    if (std::find(known.begin(), known.end(), word) == known.end()) throw Damage(otherwise);
+  };
+  check(m.schema.vertical, {"", "ellipsoidal", "orthometric"}, "what heights refer to is unknown");
+  for (const auto& [name, value] : m.schema.parameters) {
+    if (name != "entities") continue;
+    // The names of Entities.
+    check(value, {"points", "triangles", "segments", "polylines"}, "the entities are unknown");
+  }
+}
+
 [[noreturn]] void damaged(const std::string& file, const std::string& cause) {
   throw Error({.file = file,
                .where = {},
@@ -269,6 +285,7 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     Manifest manifest = from_json(json);
     check_counts(manifest);
     check_places(manifest);
+    check_words(manifest);
     manifest.checksum = checksum;
     return manifest;
   } catch (const Damage& error) {

@@ -30,6 +30,7 @@
 #include "earth/ground.hpp"
 #include "earth/latitudes.hpp"
 #include "earth/source_crs.hpp"
+#include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_sink.hpp"
 
 namespace terrace::terrain {
@@ -43,6 +44,10 @@ constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
 
 stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
                               const BuildRequest& request) {
+  const std::string& vertical = request.vertical;
+  if (!vertical.empty() && vertical != "ellipsoidal" && vertical != "orthometric") {
+    throw UsageError("`vertical` is ellipsoidal or orthometric, not '" + vertical + "'");
+  }
   stream::StoreSchema schema{info};
   add_outlier_mark(request, schema.attributes);
   schema.crs = crs.crs;
