@@ -18,6 +18,7 @@
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "earth/line_distance.hpp"
+#include "sample/lattice_crossings.hpp"
 #include "sample/surface_crossings.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/error.hpp"
@@ -110,45 +111,15 @@ class ProfileRun {
 
   /// At each crossing with the lattice.
   void cross(const Point2& a, const Point2& b) {
-    const Point2 from = ground_.stored(a), to = ground_.stored(b);
-    // Columns, rows, and the diagonals, on which column plus row is whole.
-    const std::array<double, 3> begin{from[0], from[1], from[0] + from[1]};
-    const std::array<double, 3> end{to[0], to[1], to[0] + to[1]};
-    std::array<double, 3> next{}, at{};
-    constexpr double kNever = std::numeric_limits<double>::infinity();
-    const auto t_of = [&](std::size_t k) {
-      const double t = (next[k] - begin[k]) / (end[k] - begin[k]);
-      return t < 1 ? t : kNever;
-    };
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (begin[k] == end[k]) {
-        at[k] = kNever;
-        continue;
-      }
-      next[k] = begin[k] < end[k] ? std::floor(begin[k]) + 1 : std::ceil(begin[k]) - 1;
-      at[k] = t_of(k);
-    }
     Point2 last = a;
-    double last_t = 0;
-    while (true) {
-      const double t = *std::min_element(at.begin(), at.end());
-      if (t == kNever) break;
-      Point2 stored = between(from, to, t);
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (at[k] > t) continue;
-        if (k < 2) stored[k] = next[k];
-        next[k] += begin[k] < end[k] ? 1 : -1;
-        at[k] = t_of(k);
-      }
-      context_.check_stop();
-      // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
-      if (t - last_t <= 1e-12 && last_t > 0) continue;
-      const Point2 here = between(a, b, t);
-      outcome_.metres += distance_.along(last, here);
-      add(here, outcome_.metres, stored);
-      last = here;
-      last_t = t;
-    }
+    for_lattice_crossings(ground_.stored(a), ground_.stored(b),
+                          [&](double t, const Point2& stored) {
+                            context_.check_stop();
+                            const Point2 here = between(a, b, t);
+                            outcome_.metres += distance_.along(last, here);
+                            add(here, outcome_.metres, stored);
+                            last = here;
+                          });
     outcome_.metres += distance_.along(last, b);
     add(b, outcome_.metres);
   }

@@ -72,9 +72,10 @@ inline SquareTriangles triangles_at(const LatticeSquare& s, double u, double v) 
 
 /// On a lattice line or a diagonal: the height from the samples there alone, the gradient as the
 /// mean of the triangles that meet there.
-template <class T>
-SurfacePoint linear_on_lines(const LatticeView<T>& view, std::int64_t column, std::int64_t row,
-                             double u, double v) {
+/// view: like LatticeView, with at().
+template <class View>
+SurfacePoint linear_on_lines(const View& view, std::int64_t column, std::int64_t row, double u,
+                             double v) {
   SurfacePoint result;
   double per_column = 0, per_row = 0, height = 0;
   int count = 0;
