@@ -102,10 +102,10 @@ def main():
 
         port = 18000 + os.getpid() % 10000
         view = subprocess.Popen([options.terrace, 'view', store, '--no-open', '--port', str(port)],
-                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        site = f'http://127.0.0.1:{port}'
-        shown = json.loads(wait_for(f'{site}/stores.json'))['stores'][0]['name']
-        servers = {'terrace view': (view, f'{site}/stores/{shown}/{name}')}
+                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        site, token = re.search(r'(http://\S+)/(\?token=\w+)', view.stderr.readline()).groups()
+        shown = json.loads(wait_for(f'{site}/stores.json{token}'))['stores'][0]['name']
+        servers = {'terrace view': (view, f'{site}/stores/{shown}/{name}{token}')}
         if shutil.which('nginx') is not None:
             config = os.path.join(folder, 'nginx.conf')
             with open(config, 'w') as file:

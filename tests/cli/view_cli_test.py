@@ -27,6 +27,13 @@ def terrace(*args, **kwargs):
     return subprocess.run([TERRACE, *args], timeout=120, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **kwargs)
 
 
+def view(*stores):
+    """Starts the server; returns it, its port and the query that has the token."""
+    server = subprocess.Popen([TERRACE, 'view', *stores, '--no-open'], stderr=subprocess.PIPE, text=True)
+    port, query = re.search(r'http://127\.0\.0\.1:(\d+)/(\?token=[0-9a-f]{32}) ', server.stderr.readline()).groups()
+    return server, int(port), query
+
+
 class Stores(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -51,8 +58,7 @@ class ViewTest(Stores):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.server = subprocess.Popen([TERRACE, 'view', cls.store, '--no-open'], stderr=subprocess.PIPE, text=True)
-        cls.port = int(re.search(r'127\.0\.0\.1:(\d+)', cls.server.stderr.readline()).group(1))
+        cls.server, cls.port, cls.query = view(cls.store)
 
     @classmethod
     def tearDownClass(cls):
@@ -83,9 +89,12 @@ class ViewTest(Stores):
             pass
         return data
 
-    def get(self, path, method='GET', **headers):
+    def get(self, path, method='GET', query=None, host=None, **headers):
+        """As one who has the address, unless told otherwise."""
         lines = ''.join(f'{name.replace("_", "-")}: {value}\r\n' for name, value in headers.items())
-        data = self.answer(f'{method} {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n{lines}\r\n'.encode())
+        target = path + (self.query if query is None else query)
+        host = f'127.0.0.1:{self.port}' if host is None else host
+        data = self.answer(f'{method} {target} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{lines}\r\n'.encode())
         head, _, body = data.partition(b'\r\n\r\n')
         status, *fields = head.decode().split('\r\n')
         return int(status.split()[1]), dict(field.split(': ', 1) for field in fields), body
@@ -103,8 +112,6 @@ class ViewTest(Stores):
             status, headers, body = self.get(path)
             self.assertEqual((path, status, headers['Content-Type']), (path, 200, kind))
             self.assertEqual(int(headers['Content-Length']), len(body))
-            self.assertEqual(headers['Access-Control-Allow-Origin'], '*')
-            self.assertIn('Content-Range', headers['Access-Control-Expose-Headers'])
             self.assertEqual(self.get(path, 'HEAD')[::2], (200, b''))
         self.assertEqual(self.get(self.URL)[2], self.data())
         self.assertEqual(json.loads(self.get('/stores.json')[2])['stores'][0]['name'], 'alps')
@@ -125,6 +132,52 @@ class ViewTest(Stores):
         self.assertEqual(self.get(self.URL, Range='bytes=0-1', If_Range=tag)[0], 206)
         self.assertEqual(self.get(self.URL, Range='bytes=0-1', If_Range='"x"')[0], 200)
         self.assertEqual(self.get(self.URL, If_None_Match=tag)[::2], (304, b''))
+
+    def test_pages_of_other_origins(self):
+        """They get no leave to read, and one that a name server has led here has another Host."""
+        self.assertEqual(self.get('/', 'OPTIONS', Origin='http://evil.example', Access_Control_Request_Method='GET')[0], 405)
+        for path in ['/', '/stores.json', self.URL, '/nothing']:
+            headers = self.get(path, Origin='http://evil.example')[1]
+            self.assertEqual([name for name in headers if name.lower().startswith('access-control-')], [])
+            self.assertEqual(headers['Cross-Origin-Resource-Policy'], 'same-origin')
+            self.assertEqual(headers['Referrer-Policy'], 'no-referrer')
+        for host in ['127.0.0.1', 'localhost', 'LocalHost', '[::1]']:
+            self.assertEqual((host, self.get('/stores.json', host=f'{host}:{self.port}')[0]), (host, 200))
+        for host in ['', 'evil.example', f'evil.example:{self.port}', f'localhost.evil.example:{self.port}', f'127.0.0.1.evil:{self.port}',
+                     '127.0.0.1', f'127.0.0.1:{self.port + 1}', f'x@127.0.0.1:{self.port}', f':{self.port}', f'[::1]:{self.port}.evil']:
+            for path in ['/', '/stores.json']:
+                self.assertEqual((host, self.get(path, host=host)[0]), (host, 403))
+        self.assertIn(b' 403 ', self.answer(f'GET /stores.json{self.query} HTTP/1.0\r\n\r\n'.encode()).split(b'\r\n')[0])
+
+    def test_others_who_reach_the_port(self):
+        """What is the user's needs the token of the address; the viewer itself is no secret."""
+        token = self.query.removeprefix('?token=')
+        for query in ['', '?', '?token', '?token=', f'?token={token[:-1]}', f'?token={token}0', f'?token={token.upper()}x', f'?x={token}',
+                      f'?tokens={token}', '?token=' + '0' * 32, f'#?token={token}', f'?x=1&token={token[1:]}']:
+            for path in ['/stores.json', '/stores/alps.start', '/stores/alps/manifest.json', self.URL, '/stores/alps/nothing', '/nothing']:
+                status, _, body = self.get(path, query=query)
+                self.assertEqual((query, path, status, body), (query, path, 403, b'no token\n'))
+        for path in ['/', '/index.html', '/viewer.js', '/viewer.css', '/worker.js', '/core.wasm', '/body.wasm']:
+            self.assertEqual((path, self.get(path, query='')[0]), (path, 200))
+        self.assertEqual(self.get('/stores.json', query=f'?x=1&token={token}')[0], 200)
+        other, _, query = view(self.store)
+        other.send_signal(signal.SIGINT)
+        other.wait(10)
+        other.stderr.close()
+        self.assertNotEqual(query, self.query)
+
+    def test_what_the_page_may_run(self):
+        """The page and the server say the same: nothing from elsewhere, and no script in the page itself."""
+        _, headers, page = self.get('/')
+        policy = re.search(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page.decode()).group(1)
+        self.assertEqual(headers['Content-Security-Policy'], policy)
+        self.assertIn("default-src 'none'", policy)
+        self.assertIn("script-src 'self' 'wasm-unsafe-eval';", policy)
+        self.assertNotIn('unsafe-inline', policy)
+        self.assertNotIn("'unsafe-eval'", policy)
+        script = self.get('/viewer.js')[2].decode()
+        for word in ['innerHTML', 'outerHTML', 'insertAdjacentHTML', 'document.write', 'eval(']:
+            self.assertNotIn(word, script)
 
     def test_no_path_leaves_the_store(self):
         for path in ['/../../etc/passwd', '/stores/alps/../../../../etc/passwd', '/stores/alps/%2e%2e/%2e%2e/etc/passwd',
@@ -147,7 +200,6 @@ class ViewTest(Stores):
         self.assertEqual(status(b'\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03' + b'\0' * 200), 400)
         self.assertEqual(self.get('/', 'POST', Content_Length='5')[0], 413)
         self.assertEqual(self.get('/', 'DELETE')[0], 405)
-        self.assertEqual(self.get('/', 'OPTIONS')[0], 204)
         self.assertIsNone(status(b'GET / HT'))
         # And it still serves.
         self.assertEqual(self.get('/')[0], 200)
@@ -156,7 +208,9 @@ class ViewTest(Stores):
         connection = self.connect()
         data = self.data()
         # All at once, and answered in order.
-        connection.sendall(b''.join(f'GET {self.URL} HTTP/1.1\r\nRange: bytes={i}-{i + 9}\r\n\r\n'.encode() for i in range(50)))
+        connection.sendall(b''.join(
+            f'GET {self.URL}{self.query} HTTP/1.1\r\nHost: localhost:{self.port}\r\nRange: bytes={i}-{i + 9}\r\n\r\n'.encode()
+            for i in range(50)))
         stream = connection.makefile('rb')
         for i in range(50):
             self.assertEqual(stream.readline(), b'HTTP/1.1 206 Partial Content\r\n')
@@ -171,7 +225,8 @@ class ViewTest(Stores):
             if i % 3 == 0:
                 connection.sendall(b'GET / HT')  # and no more
             elif i % 3 == 1:
-                connection.sendall(f'GET {self.URL} HTTP/1.1\r\n\r\n'.encode())  # and never reads
+                # And never reads.
+                connection.sendall(f'GET {self.URL}{self.query} HTTP/1.1\r\nHost: localhost:{self.port}\r\n\r\n'.encode())
         begin = time.monotonic()
         self.assertEqual(len(self.get(self.URL)[2]), len(self.data()))
         self.assertLess(time.monotonic() - begin, 5)
@@ -201,7 +256,7 @@ class ReplacedTest(Stores):
             self.assertEqual(done.returncode, 0, done.stderr)
 
         def ask(connection, path, lines=''):
-            connection.sendall(f'GET {path} HTTP/1.1\r\n{lines}\r\n'.encode())
+            connection.sendall(f'GET {path}{query} HTTP/1.1\r\nHost: localhost:{port}\r\n{lines}\r\n'.encode())
             head = b''
             while not head.endswith(b'\r\n\r\n'):
                 head += connection.recv(1)
@@ -221,9 +276,8 @@ class ReplacedTest(Stores):
                 return data.read()
 
         build('--block', '1000')
-        server = subprocess.Popen([TERRACE, 'view', self.store, '--no-open'], stderr=subprocess.PIPE, text=True)
+        server, port, query = view(self.store)
         try:
-            port = int(re.search(r'127\.0\.0\.1:(\d+)', server.stderr.readline()).group(1))
             first, second = (socket.create_connection(('127.0.0.1', port), timeout=20) for _ in range(2))
             self.addCleanup(first.close)
             self.addCleanup(second.close)

@@ -17,6 +17,7 @@ export class Flyer {
     this.worker.tell({
       type: 'open',
       base,
+      query: '',
       name,
       choose,
       asPoints,

@@ -3,6 +3,7 @@
 // the command, FLIGHT_HASHES the native flight, CHROMIUM the browser. Pictures stay in PACKAGES.
 import assert from 'node:assert/strict';
 import {spawn} from 'node:child_process';
+import {writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, describe, test} from 'node:test';
 
@@ -52,6 +53,12 @@ async function settled(page) {
   }
 }
 const state = page => page.evaluate(() => window.terrace?.state);
+/// The rows of the panel of a place, once the store has told what it holds there.
+async function place(page) {
+  await page.waitForSelector('#place:not([hidden])');
+  await page.waitForFunction(() => !/reading/.test(document.getElementById('place-text').textContent));
+  return Object.fromEntries(await page.$$eval('#place-text dt', dts => dts.map(dt => [dt.textContent, dt.nextElementSibling.textContent])));
+}
 
 /// Colours of the picture at some places, 0 to 255.
 const pixels = (page, places) => page.evaluate(places => {
@@ -167,6 +174,35 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   assert.deepEqual([...errors, ...again.errors], []);
   await again.close();
   await close();
+});
+
+test('what data say is text: no markup of a store gets into the page, and none would run', async () => {
+  const name = '<img src=x onerror=document.title=1>';
+  const points = Array.from({length: 3600}, (_, i) => `${i % 60},${Math.floor(i / 60)},0,${i}`);
+  writeFileSync(join(sites.folder, 'marked.csv'), `x,y,z,${name}\n${points.join('\n')}\n`);
+  sites.terrace('build', 'marked.csv', '-o', 'marked.store', '-q');
+  sites.terrace('publish', 'marked.store', 'corners.store', '-o', 'marked', '-q');
+  const server = await serveSite(join(sites.folder, 'marked'));
+  const {page, errors, close} = await open('#s=marked', {url: server.url, size: {width: 700, height: 600}});
+  await page.waitForTimeout(300);
+  await page.mouse.click(330, 300);
+  assert.ok(name in await place(page));
+  assert.equal(await page.$$eval('img', images => images.length), 0);
+  assert.deepEqual(errors, []);
+  await page.evaluate(() => {
+    const made = document.createElement('div');
+    made.innerHTML = '<img src="data:," onerror="document.title = 1"><b onclick="document.title = 1">x</b>';
+    document.body.append(made);
+    made.querySelector('b').click();
+  });
+  await page.waitForTimeout(300);
+  assert.equal(await page.title(), 'marked · terrace');
+  assert.ok(errors.some(error => /Content Security Policy/.test(error)), errors.join());
+  await close();
+  const corners = await open('#s=corners', {url: server.url});
+  assert.match(await corners.page.textContent('#status'), /^[\d,]+ triangles, the first corner of each · /);
+  await corners.close();
+  await server.close();
 });
 
 test('lines have the colours of levels, from violet at the top to yellow', async () => {
@@ -682,8 +718,16 @@ describe('pages side by side', {concurrency: 3}, () => {
       assert.equal((await state(page)).store, 'alps');
       await page.selectOption('#store', 'cloud');
       await page.waitForFunction(() => window.terrace.settled && window.terrace.state.store === 'cloud');
+      await page.reload();
+      await settled(page);
+      assert.equal((await state(page)).store, 'cloud');
       assert.deepEqual([errors, outside], [[], []]);
       await close();
+      // Without the token of the address a page says what to do.
+      const stranger = await open('', {url: new URL(url).origin + '/', settle: false});
+      await stranger.page.waitForSelector('#message:not([hidden])');
+      assert.match(await stranger.page.textContent('#message-text'), /whole address .* token/);
+      await stranger.close();
     } finally {
       server.kill('SIGINT');
     }

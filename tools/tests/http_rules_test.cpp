@@ -68,20 +68,28 @@ class HttpAnswers : public testing::Test {
  protected:
   HttpAnswers() {
     site_["index.html"] = {stream::bytes_in_memory("i", std::vector<std::byte>(7)), "text/html",
-                           "\"i\""};
+                           "\"i\"", true};
     site_["stores/a/data"] = {stream::bytes_in_memory("d", std::vector<std::byte>(100)),
                               "application/octet-stream", "\"t\""};
   }
-  [[nodiscard]] Answer get(const char* target, const char* range = "", const char* if_range = "",
-                           const char* if_none_match = "") const {
-    return answer_to({.method = "GET",
-                      .target = target,
-                      .range = range,
-                      .if_range = if_range,
-                      .if_none_match = if_none_match},
-                     site_);
+  /// With the token.
+  [[nodiscard]] Answer get(const std::string& target, const char* range = "",
+                           const char* if_range = "", const char* if_none_match = "") const {
+    return answer_to(
+        {.method = "GET",
+         .target = target + (target.find('?') == target.npos ? "?" : "&") + "token=abc",
+         .range = range,
+         .if_range = if_range,
+         .if_none_match = if_none_match,
+         .host = "localhost:8000"},
+        site_, access_);
+  }
+  [[nodiscard]] unsigned status(const char* target, const char* host = "localhost:8000",
+                                const char* method = "GET") const {
+    return answer_to({.method = method, .target = target, .host = host}, site_, access_).status;
   }
   Site site_;
+  Access access_{8000, "abc"};
 };
 
 TEST_F(HttpAnswers, ServeWhatTheSiteHasAndNothingElse) {
@@ -95,8 +103,52 @@ TEST_F(HttpAnswers, ServeWhatTheSiteHasAndNothingElse) {
     EXPECT_EQ(get(path).status, 404u) << path;
   }
   EXPECT_EQ(get("index.html").status, 400u);
-  EXPECT_EQ(answer_to({.method = "POST", .target = "/"}, site_).status, 405u);
-  EXPECT_EQ(answer_to({.method = "OPTIONS", .target = "/"}, site_).status, 204u);
+  EXPECT_EQ(status("/", "localhost:8000", "POST"), 405u);
+  EXPECT_EQ(status("/", "localhost:8000", "OPTIONS"), 405u);
+}
+
+TEST(HttpQuery, ParametersHaveWholeNames) {
+  EXPECT_EQ(query_value("/a?token=x", "token"), "x");
+  EXPECT_EQ(query_value("/a?b=1&token=x&c", "token"), "x");
+  EXPECT_EQ(query_value("/a?token=x&token=y#z", "token"), "x");
+  for (const char* without : {"", "/", "/a", "/a?", "/a?token", "/a?token=", "/a?tokens=x",
+                              "/a?xtoken=x", "/a?x=token=y", "/token=x", "/a#?token=x"}) {
+    EXPECT_EQ(query_value(without, "token"), "") << without;
+  }
+}
+
+TEST_F(HttpAnswers, NeedTheTokenForWhatIsTheUsers) {
+  EXPECT_EQ(status("/stores/a/data?token=abc"), 200u);
+  for (const char* target : {"/stores/a/data", "/stores/a/data?token=", "/stores/a/data?token=ab",
+                             "/stores/a/data?token=abcd", "/stores/a/data?token=abd", "/nothing"}) {
+    EXPECT_EQ(status(target), 403u) << target;
+  }
+  EXPECT_EQ(status("/nothing?token=abc"), 404u);
+  EXPECT_EQ(status("/"), 200u);
+}
+
+TEST_F(HttpAnswers, NameTheServerInTheHeaderHost) {
+  for (const char* host : {"127.0.0.1:8000", "localhost:8000", "LOCALHOST:8000", "[::1]:8000"}) {
+    EXPECT_EQ(status("/", host), 200u) << host;
+  }
+  for (const char* host :
+       {"", "localhost", "127.0.0.1", "127.0.0.1:80", "127.0.0.1:80000", "evil.example:8000",
+        "localhost.evil:8000", "x@localhost:8000", ":8000"}) {
+    EXPECT_EQ(status("/", host), 403u) << host;
+  }
+  // Browsers leave out port 80 alone.
+  EXPECT_EQ(
+      answer_to({.method = "GET", .target = "/", .host = "localhost"}, site_, {80, "abc"}).status,
+      200u);
+}
+
+TEST_F(HttpAnswers, GiveOtherOriginsNoLeave) {
+  for (const Answer& answer : {get("/"), get("/stores/a/data", "bytes=0-1"), get("/nothing")}) {
+    const std::string header = header_of(answer);
+    EXPECT_EQ(header.find("Access-Control-"), header.npos) << header;
+    EXPECT_NE(header.find("Cross-Origin-Resource-Policy: same-origin\r\n"), header.npos);
+    EXPECT_NE(header.find("Content-Security-Policy: default-src 'none';"), header.npos);
+  }
 }
 
 TEST_F(HttpAnswers, SendPartsOfWhatTheClientKnows) {

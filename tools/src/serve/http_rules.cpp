@@ -41,18 +41,44 @@ bool lists(std::string_view tags, std::string_view tag) {
   return false;
 }
 
+/// Whether a header Host names the loopback interface at this port.
+bool names_this_server(std::string_view host, std::uint16_t port) {
+  const std::string ending = ':' + std::to_string(port);
+  if (host.ends_with(ending)) {
+    host.remove_suffix(ending.size());
+  } else if (port != 80) {  // the only one that browsers leave out
+    return false;
+  }
+  std::string name(host);
+  for (char& c : name) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return name == "127.0.0.1" || name == "localhost" || name == "[::1]";
+}
+
+/// In a time that does not depend on where they differ.
+bool same(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    difference |=
+        static_cast<unsigned char>(a[i]) ^ static_cast<unsigned>(static_cast<unsigned char>(b[i]));
+  }
+  return difference == 0;
+}
+
 const char* phrase(unsigned status) {
   switch (status) {
     case 200:
       return "OK";
-    case 204:
-      return "No Content";
     case 206:
       return "Partial Content";
     case 304:
       return "Not Modified";
     case 400:
       return "Bad Request";
+    case 403:
+      return "Forbidden";
     case 404:
       return "Not Found";
     case 405:
@@ -116,8 +142,24 @@ RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span)
   return RangeKind::single;
 }
 
-Answer answer_to(const Request& request, const Site& site) {
-  if (request.method == "OPTIONS") return {.status = 204};
+std::string_view query_value(std::string_view target, std::string_view name) {
+  target = target.substr(0, target.find('#'));
+  std::size_t at = target.find('?');
+  while (at < target.size()) {
+    const std::size_t end = std::min(target.find('&', at + 1), target.size());
+    const std::string_view one = target.substr(at + 1, end - at - 1);
+    if (one.starts_with(name) && one.substr(name.size()).starts_with('=')) {
+      return one.substr(name.size() + 1);
+    }
+    at = end;
+  }
+  return {};
+}
+
+Answer answer_to(const Request& request, const Site& site, const Access& access) {
+  if (!names_this_server(request.host, access.port)) {
+    return {.status = 403, .close = true, .reason = "the header Host names another server"};
+  }
   if (request.method != "GET" && request.method != "HEAD") {
     return {.status = 405, .close = true, .reason = "only GET and HEAD"};
   }
@@ -125,7 +167,12 @@ Answer answer_to(const Request& request, const Site& site) {
   if (!path) return {.status = 400, .reason = "this is not a path"};
   if (path->empty()) path = "index.html";
   const auto at = site.find(*path);
-  if (at == site.end()) return {.status = 404, .reason = "there is nothing here"};
+  if (at == site.end() || !at->second.open_to_all) {
+    if (!same(query_value(request.target, "token"), access.token)) {
+      return {.status = 403, .reason = "no token"};
+    }
+    if (at == site.end()) return {.status = 404, .reason = "there is nothing here"};
+  }
   const Resource& resource = at->second;
   const std::uint64_t size = resource.bytes->size();
   Answer answer{.type = resource.type, .tag = resource.tag, .size = size};
@@ -152,7 +199,7 @@ Answer answer_to(const Request& request, const Site& site) {
 }
 
 std::string header_of(const Answer& a) {
-  const bool bodiless = a.status == 204 || a.status == 304;
+  const bool bodiless = a.status == 304;
   const std::string body = a.bytes || bodiless || a.reason.empty() ? "" : a.reason + "\n";
   std::string text = "HTTP/1.1 " + std::to_string(a.status) + " " + phrase(a.status) + "\r\n";
   const auto field = [&](std::string_view name, const std::string& value) {
@@ -169,12 +216,13 @@ std::string header_of(const Answer& a) {
   }
   if (a.status == 416) field("Content-Range", "bytes */" + std::to_string(a.size));
   if (!a.tag.empty()) field("ETag", a.tag);
-  if (a.status == 405 || a.status == 204) field("Allow", "GET, HEAD, OPTIONS");
+  if (a.status == 405) field("Allow", "GET, HEAD");
   field("Accept-Ranges", "bytes");
   field("Cache-Control", "no-cache");
-  field("Access-Control-Allow-Origin", "*");
-  field("Access-Control-Allow-Headers", "Range, If-Range, If-None-Match");
-  field("Access-Control-Expose-Headers", "Content-Range, Content-Length, ETag, Accept-Ranges");
+  // No page of another origin may read or use what is here, and the token stays here.
+  field("Content-Security-Policy", kContentPolicy);
+  field("Cross-Origin-Resource-Policy", "same-origin");
+  field("Referrer-Policy", "no-referrer");
   field("X-Content-Type-Options", "nosniff");
   if (a.close) field("Connection", "close");
   return text + "\r\n" + body;

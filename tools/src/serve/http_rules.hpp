@@ -16,6 +16,13 @@ namespace terrace::tools {
 struct Request {
   std::string_view method, target;
   std::string_view range{}, if_range{}, if_none_match{};  ///< empty: not given
+  std::string_view host{};                                ///< likewise
+};
+
+/// Who may ask: web pages of other origins and other users of the machine can reach the port too.
+struct Access {
+  std::uint16_t port = 0;  ///< the server's own
+  std::string token{};     ///< the value of `token` in the query of whoever was given the address
 };
 
 struct Answer {
@@ -39,7 +46,19 @@ enum class RangeKind : std::uint8_t { none, single, unsatisfiable };
 /// A header Range against a body of `size` bytes. none: not one range of bytes, so it is ignored.
 RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span);
 
-Answer answer_to(const Request& request, const Site& site);
+/// The value of a parameter in the query of a target; empty if it is not there.
+std::string_view query_value(std::string_view target, std::string_view name);
+
+/// Refuses (403) a Host that does not name this server, as a page has that a name server has led
+/// here (DNS rebinding), and a request without the token for anything but the viewer's own files.
+Answer answer_to(const Request& request, const Site& site, const Access& access);
+
+/// What the viewer may load and run: its own files, WebAssembly, an icon within the page. The page
+/// says the same, for other servers (tools/viewer/src/index.html).
+inline constexpr const char* kContentPolicy =
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src "
+    "'self'; "
+    "img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'";
 /// Status line and header fields, and the reason as the body where there are no bytes.
 std::string header_of(const Answer& answer);
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <cerrno>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +17,7 @@
 #include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <unistd.h>
 
 #include "serve/http_rules.hpp"
 #include "terrace/stream/error.hpp"
@@ -32,12 +33,25 @@ using boost::system::error_code;
 
 constexpr std::size_t kPiece = std::size_t{64} * 1024;
 
+/// 128 bits from the operating system, in hexadecimal digits.
+std::string random_token() {
+  std::array<unsigned char, 16> bytes{};
+  if (::getentropy(bytes.data(), bytes.size()) != 0) {
+    throw stream::system_error("getentropy", "cannot get random numbers", errno);
+  }
+  std::string text;
+  for (const unsigned byte : bytes) {
+    for (const unsigned digit : {byte >> 4U, byte & 15U}) text += "0123456789abcdef"[digit];
+  }
+  return text;
+}
+
 /// One connection: a request, its answer, and so on.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(tcp::socket socket, const std::function<const Site&()>& site, const ServerLimits& limits,
-          std::size_t& open)
-      : stream_(std::move(socket)), site_(site), limits_(limits), open_(open) {
+  Session(tcp::socket socket, const std::function<const Site&()>& site, const Access& access,
+          const ServerLimits& limits, std::size_t& open)
+      : stream_(std::move(socket)), site_(site), access_(access), limits_(limits), open_(open) {
     ++open_;
   }
   ~Session() { --open_; }
@@ -89,8 +103,9 @@ class Session : public std::enable_shared_from_this<Session> {
                               .target = text(request.target()),
                               .range = field(http::field::range),
                               .if_range = field(http::field::if_range),
-                              .if_none_match = field(http::field::if_none_match)},
-                             site_());
+                              .if_none_match = field(http::field::if_none_match),
+                              .host = field(http::field::host)},
+                             site_(), access_);
     reply.close = reply.close || !request.keep_alive();
     answer(std::move(reply), request.method() == http::verb::head);
   }
@@ -129,6 +144,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   beast::tcp_stream stream_;
   const std::function<const Site&()>& site_;
+  const Access& access_;
   const ServerLimits& limits_;
   std::size_t& open_;
   beast::flat_buffer buffer_;
@@ -150,7 +166,7 @@ struct Server::Impl {
       if (error == asio::error::operation_aborted) return;
       if (!error) {
         const bool full = open >= limits.connections;
-        std::make_shared<Session>(std::move(socket), site, limits, open)->start(full);
+        std::make_shared<Session>(std::move(socket), site, access, limits, open)->start(full);
         return accept();
       }
       // Without descriptors for another connection: as soon as one may have ended.
@@ -170,6 +186,7 @@ struct Server::Impl {
   }
 
   std::function<const Site&()> site;
+  Access access;
   ServerLimits limits;
   std::size_t open = 0;
   asio::io_context context{1};
@@ -191,11 +208,12 @@ Server::Server(std::function<const Site&()> site, std::uint16_t port, const Serv
                          .cause = "cannot be served: " + error.code().message(),
                          .remedy = "name another port"});
   }
+  impl_->access = {impl_->acceptor.local_endpoint().port(), random_token()};
 }
 
 Server::~Server() = default;
 
-std::uint16_t Server::port() const { return impl_->acceptor.local_endpoint().port(); }
+const Access& Server::access() const { return impl_->access; }
 
 void Server::run(const std::function<bool()>& stopped) {
   impl_->accept();

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 
+#include "serve/http_rules.hpp"
 #include "serve/site.hpp"
 
 namespace terrace::tools {
@@ -18,17 +19,18 @@ struct ServerLimits {
   std::chrono::milliseconds piece{30'000};    ///< for a client to take 64 KiB
 };
 
-/// Serves a site on 127.0.0.1 by HTTP/1.1: GET and HEAD, single ranges, entity tags, CORS. One
-/// thread, and no client holds it: all waiting is for the operating system.
+/// Serves a site on 127.0.0.1 by HTTP/1.1: GET and HEAD, single ranges, entity tags, to requests
+/// that have the token. One thread, and no client holds it: all waiting is for the operating system.
 class Server {
  public:
-  /// site: asked for each request. port 0: any that is free. Throws: stream::Error if it is taken.
+  /// site: asked for each request. port 0: any that is free. Throws: stream::Error if it is taken,
+  /// or without random numbers for the token.
   Server(std::function<const Site&()> site, std::uint16_t port, const ServerLimits& limits = {});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  [[nodiscard]] std::uint16_t port() const;
+  [[nodiscard]] const Access& access() const;
   /// Serves until `stopped` returns true, which is asked a few times a second.
   void run(const std::function<bool()>& stopped);
 

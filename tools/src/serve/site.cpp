@@ -52,12 +52,12 @@ std::uint64_t hash_of(std::string_view bytes) {
   return hash;
 }
 
-void add_text(Site& site, const std::string& name, std::string_view text) {
+Resource& add_text(Site& site, const std::string& name, std::string_view text) {
   std::vector<std::byte> bytes(text.size());
   std::transform(text.begin(), text.end(), bytes.begin(),
                  [](char c) { return static_cast<std::byte>(c); });
-  site[name] = {stream::bytes_in_memory(name, std::move(bytes)), type_of(name),
-                '"' + hexadecimal(hash_of(text)) + '"'};
+  return site[name] = {stream::bytes_in_memory(name, std::move(bytes)), type_of(name),
+                       '"' + hexadecimal(hash_of(text)) + '"'};
 }
 
 /// The manifest and the files that it lists.
@@ -180,7 +180,9 @@ std::vector<std::string> site_names(std::span<const stream::Store> stores) {
 
 Site make_site(std::span<const stream::Store> stores) {
   Site site;
-  for (const ViewerFile& file : viewer_files()) add_text(site, std::string(file.name), file.bytes);
+  for (const ViewerFile& file : viewer_files()) {
+    add_text(site, std::string(file.name), file.bytes).open_to_all = true;
+  }
   Json list = Json::array();
   const std::vector<std::string> names = site_names(stores);
   for (std::size_t i = 0; i < stores.size(); ++i) {

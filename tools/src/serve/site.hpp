@@ -20,8 +20,9 @@ namespace terrace::tools {
 
 struct Resource {
   std::shared_ptr<const stream::ByteSource> bytes;
-  std::string type;  ///< of the media
-  std::string tag;   ///< the entity tag, quoted
+  std::string type;          ///< of the media
+  std::string tag;           ///< the entity tag, quoted
+  bool open_to_all = false;  ///< holds nothing of the user's: the viewer's own files
 };
 
 /// By path, without the slash at the front. There is nothing besides: no path of a request ever

@@ -52,7 +52,8 @@ class ViewCommand final : public Command {
     LiveSite site(stores_, [](const std::string& path) { return open_store(path); });
     Server server([&site]() -> const Site& { return site.now(); },
                   static_cast<std::uint16_t>(port_));
-    const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
+    const std::string address = "http://127.0.0.1:" + std::to_string(server.access().port) +
+                                "/?token=" + server.access().token;
     common.say(address + " shows " +
                (stores_.size() == 1 ? "the store" : std::to_string(stores_.size()) + " stores") +
                " until Ctrl-C");

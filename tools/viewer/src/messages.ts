@@ -6,9 +6,9 @@ import type {Stats} from './ranges';
 import type {Listed, Manifest} from './store';
 
 export type ToWorker =
-    /// base: the URL of a published folder; name: of a store in it. choose: stores.json is read, and if it does not have the
-    /// name, its first store is opened.
-    |{type: 'open', base: string, name: string, choose: boolean, asPoints: boolean, maxPoints: number}
+    /// base: the URL of a published folder; query: of the URLs of what is the user's in it, with the token of "terrace view";
+    /// name: of a store in it. choose: stores.json is read, and if it does not have the name, its first store is opened.
+    |{type: 'open', base: string, query: string, name: string, choose: boolean, asPoints: boolean, maxPoints: number}
     |{type: 'show', asPoints: boolean}  ///< how to show a scan
     |{type: 'view', camera: Camera, serial: number}
     |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame

@@ -16,6 +16,7 @@ const INDEX_BLOCK = 1024;
 const SMALL = 4096, PAUSE = 20;
 const MOST_REQUESTS = 4;
 const TRIES = 4;
+const FORBIDDEN = 'the server refuses it (HTTP 403). Open the whole address that "terrace view" printed: it ends with a token, which each run has of its own.';
 /// Milliseconds for which a server may be silent, before its answer begins and until the bytes are there; this is tried twice.
 const SILENCE = 10_000;
 /// A request that another view does not want is given up after this time.
@@ -66,6 +67,7 @@ export async function fetchWhole(url: string, what: string): Promise<Uint8Array<
   try {
     const response = await fetch(url, {signal: watch.signal});
     watch.heard();
+    if (response.status === 403) throw new FetchFault(`${what}: ${FORBIDDEN}`, false);
     if (!response.ok) throw new FetchFault(`${what}: the server answers with HTTP ${response.status}.`, false);
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
@@ -152,10 +154,10 @@ export class Ranges {
   private begun = -PAUSE;  ///< when the last request was
   private pause: ReturnType<typeof setTimeout>|undefined;
 
-  /// sizes: of the files, by name. `give`: takes what has come. `failed`: what cannot be had. `ended`: after
-  /// each request, however it went.
+  /// query: of each URL. sizes: of the files, by name. `give`: takes what has come. `failed`: what cannot be had. `ended`:
+  /// after each request, however it went.
   constructor(
-      private readonly base: string, private readonly sizes: Map<string, number>,
+      private readonly base: string, private readonly query: string, private readonly sizes: Map<string, number>,
       private readonly give: (range: ByteRange, bytes: Uint8Array) => void,
       private readonly failed: (fault: FetchFault) => void, private readonly ended: () => void) {}
 
@@ -256,7 +258,7 @@ export class Ranges {
     }
   }
   private url({file}: ByteRange): string {
-    return this.base + encodeURIComponent(file);
+    return this.base + encodeURIComponent(file) + this.query;
   }
   private async answer(range: ByteRange, watch: Watch): Promise<Uint8Array> {
     const last = range.offset + range.bytes - 1;
@@ -277,6 +279,7 @@ export class Ranges {
               'It must support range requests, as "terrace view" and most web servers do.',
           true);
     }
+    if (response.status === 403) throw fault(FORBIDDEN, true);
     if (response.status === 404) throw fault('the server has no such file (HTTP 404).', true);
     if (response.status === 416) throw fault('the file on the server is smaller than the store says (HTTP 416).', true);
     if (response.status !== 206) {

@@ -16,6 +16,8 @@ const MOST_POINTS = phone.matches ? 400_000 : 1_500_000;
 const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation', 'medium vegetation', 'high vegetation',
                  'building', 'low point', 'model key', 'water', 'rail', 'road', 'overlap', 'wire guard', 'wire conductor',
                  'transmission tower', 'wire connector', 'bridge deck', 'high noise'];
+/// The token of "terrace view", for what is the user's; published folders need none.
+const TOKEN = new URLSearchParams(location.search).get('token');
 
 function element<T extends HTMLElement>(id: string): T {
   return document.getElementById(id) as T;
@@ -25,7 +27,15 @@ const readable = (bytes: number) =>
     bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} KB` : `${(bytes / 1e6).toFixed(1)} MB`;
 const rounded = (n: number) => n.toFixed(Math.abs(n) < 10 ? 2 : Math.abs(n) < 1000 ? 1 : 0);
 const metres = (n: number) => Math.abs(n) < 10_000 ? `${rounded(n)} m` : `${(n / 1000).toFixed(2)} km`;
-const counted = (n: number, what: string) => `<b>${count(n)}</b> ${what}${n === 1 ? '' : 's'}`;
+/// What data say goes into the page as text, never as markup.
+function make(tag: string, kind: string, ...content: Array<Node|string>): HTMLElement {
+  const made = document.createElement(tag);
+  if (kind) made.className = kind;
+  made.append(...content);
+  return made;
+}
+const bold = (text: string) => make('b', '', text);
+const counted = (n: number, what: string) => [bold(count(n)), ` ${what}${n === 1 ? '' : 's'}`];
 /// Short names of units.
 const UNITS: Record<string, string> = {metre: 'm', foot: 'ft', 'US survey foot': 'ft'};
 
@@ -45,7 +55,8 @@ function fail(message: string, again = true): void {
 /// Starts a worker, which begins to fetch a store. choose: as in ToWorker.
 function launch(name: string, choose: boolean, asPoints: boolean): Worker {
   const worker = new Worker('worker.js'), base = new URL('.', document.baseURI).href;
-  worker.postMessage({type: 'open', base, name, choose, asPoints, maxPoints: MOST_POINTS} satisfies ToWorker);
+  const query = TOKEN === null ? '' : `?token=${encodeURIComponent(TOKEN)}`;
+  worker.postMessage({type: 'open', base, query, name, choose, asPoints, maxPoints: MOST_POINTS} satisfies ToWorker);
   return worker;
 }
 
@@ -331,14 +342,13 @@ class Viewer {
     const s = this.status;
     if (!s) return;
     const what = this.manifest?.parameters.find(({name}) => name === 'entities')?.value.replace(/s$/, '');
-    const parts = [what ? `${counted(s.state.points, what)}, the first corner of each` : counted(s.state.points, 'point')];
-    if (this.kind !== 'points') parts.push(counted(s.state.triangles, 'triangle'));
-    parts.push(`<b>${readable(s.stats.bytes)}</b>`);
-    parts[parts.length - 1] += `<span class="wide"> · ${counted(s.stats.requests, 'request')} · ` +
-        `<b>${this.frameTime.toFixed(0)}</b> ms a frame</span>`;
+    const parts = what ? [...counted(s.state.points, what), ', the first corner of each'] : counted(s.state.points, 'point');
+    if (this.kind !== 'points') parts.push(' · ', ...counted(s.state.triangles, 'triangle'));
+    parts.push(' · ', bold(readable(s.stats.bytes)));
+    parts.push(make('span', 'wide', ' · ', ...counted(s.stats.requests, 'request'), ' · ', bold(this.frameTime.toFixed(0)), ' ms a frame'));
     const [brief, whole] = !s.state.settled ? ['refining', ''] : s.state.worst > 1 ? ['full', 'as fine as memory allows'] : ['done', 'as fine as asked for'];
-    parts.push(whole ? `<span class="wide">${whole}</span><span class="brief">${brief}</span>` : brief);
-    element('status').innerHTML = parts.join(' · ');
+    parts.push(' · ', ...(whole ? [make('span', 'wide', whole), make('span', 'brief', brief)] : [brief]));
+    element('status').replaceChildren(...parts);
   }
   /// Whether the store can be drawn by it.
   private offers(colour: Colour): boolean {

@@ -65,7 +65,7 @@ class Session {
 
   async open(): Promise<void> {
     try {
-      const fetched = this.choose().then(name => fetchWhole(this.at(`stores/${encodeURIComponent(name)}.start`), 'the store'));
+      const fetched = this.choose().then(name => fetchWhole(this.at(`stores/${encodeURIComponent(name)}.start`) + this.request.query, 'the store'));
       const [core, bytes] = await Promise.all([this.load('core.wasm'), fetched]);
       this.core = this.points = core;
       let start;
@@ -81,7 +81,7 @@ class Session {
       for (const [name, size] of this.manifest.files) this.core.addFile(name, size);
       for (const part of start.parts) this.give(part.file, part.offset, part.data);
       this.ranges = new Ranges(
-          this.at(`stores/${encodeURIComponent(this.request.name)}/`), this.manifest.files,
+          this.at(`stores/${encodeURIComponent(this.request.name)}/`), this.request.query, this.manifest.files,
           (range, data) => this.give(range.file, range.offset, data), fault => this.fail(fault.message),
           () => this.wake());
       this.ranges.stats.requests = 1;
@@ -103,7 +103,7 @@ class Session {
     if (this.request.choose) {
       let stores: Listed[];
       try {
-        stores = JSON.parse(new TextDecoder().decode(await fetchWhole(this.at('stores.json'), 'stores.json'))).stores;
+        stores = JSON.parse(new TextDecoder().decode(await fetchWhole(this.at('stores.json') + this.request.query, 'stores.json'))).stores;
       } catch (error) {
         throw error instanceof FetchFault ? error : new FetchFault(`stores.json: ${(error as Error).message}`, false);
       }
