@@ -392,6 +392,15 @@ class PublishTest(Stores):
         # Nothing else is left beside it.
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
 
+    def test_classes_of_a_cloud(self):
+        """The start file names those of all points, for the legend, not only of the coarsest."""
+        rows = ['x,y,z,classification'] + [f'{i % 100},{i // 100},0,{7 if i == 5000 else 18 if i == 7777 else 2 + i % 2}' for i in range(20_000)]
+        with open(self.path('cloud.csv'), 'w') as file:
+            file.write('\n'.join(rows) + '\n')
+        self.assertEqual(terrace('build', self.path('cloud.csv'), '-o', self.path('cloud.store'), '-q').returncode, 0)
+        self.assertEqual(terrace('publish', self.path('cloud.store'), '-o', self.path('classes'), '-q').returncode, 0)
+        self.assertEqual(json.loads(self.read('classes', 'stores', 'cloud.start').partition(b'\n')[0])['classes'], [2, 3, 7, 18])
+
     def test_repacked(self):
         """The same points, in a store that is valid and does not depend on threads, under the name it would have anyway."""
         for threads in '1', '3':

@@ -664,8 +664,13 @@ describe('pages side by side', {concurrency: 3}, () => {
     await page.screenshot({path: join(packages, 'viewer-cloud.png')});
     await page.click('text=Class');
     assert.deepEqual(await page.$$eval('#classes li', items => items.map(item => item.textContent)), ['2 ground', '9 water']);
-    const classes = kinds(await seen());
-    assert.equal(classes.red.length, 0);
+    const rare = await open('#s=rare&c=class&q=32');
+    assert.deepEqual(await rare.page.$$eval('#classes li', items => items.map(item => item.textContent)), ['2 ground', '7 low point', '9 water']);
+    await rare.close();
+    const classed = await seen(), of = (colour, near) => classed.filter(c => Math.hypot(...c.map((v, i) => v - colour[i])) < near).length;
+    assert.equal(kinds(classed).red.length, 0);
+    // Ground is brown, water is blue.
+    assert.ok(of([152, 104, 64], 40) > 20 && of([48, 112, 208], 40) > 20, 'classes have other colours');
     await page.click('text=Intensity');
     const greys = await seen();
     assert.ok(greys.filter(([r, g, b]) => Math.abs(r - g) < 12 && Math.abs(g - b) < 16 && r < 200).length > 40);

@@ -2,7 +2,7 @@
 // worker_test.mjs: the viewer's worker, as it is shipped, in node over published stores. TERRACE names the command,
 // FLIGHT_HASHES the native flight.
 import assert from 'node:assert/strict';
-import {readFileSync, statSync} from 'node:fs';
+import {cpSync, readFileSync, statSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
@@ -508,6 +508,23 @@ test('profiles: of points a strip, of a body its cut', async () => {
     assert.ok(line.length > 100);
     assert.ok([...ends.values()].every(count => count === 2), 'the cut is open');
   }
+});
+
+test('the legend has the classes of all points, those of a store that does not say it as they come', async () => {
+  const known = new Tested('cloud');
+  assert.deepEqual([...(await known.opened()).scene.colours.classes], [2, 9]);
+  // As of a store of too many points.
+  const site = join(sites.folder, 'unsaid');
+  cpSync(sites.site, site, {recursive: true});
+  const start = readFileSync(join(site, 'stores', 'rare.start')), end = start.indexOf(10);
+  const {classes, ...head} = JSON.parse(start.subarray(0, end).toString());
+  assert.deepEqual(classes, [2, 7, 9]);
+  writeFileSync(join(site, 'stores', 'rare.start'), Buffer.concat([Buffer.from(JSON.stringify(head)), start.subarray(end)]));
+  const flyer = new Tested('rare', {site});
+  assert.deepEqual([...(await flyer.opened()).scene.colours.classes], [2, 9]);
+  const told = flyer.until(message => message.type === 'classes');
+  await flyer.settle({eye: [0, 0, 300], direction: [0, 0.01, -1], error: 0.01});
+  assert.deepEqual([...(await told).classes], [2, 7, 9]);
 });
 
 test('an open scan: a ray through its opening meets the far side', async () => {

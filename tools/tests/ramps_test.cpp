@@ -57,6 +57,35 @@ TEST(Ramps, TheViewerHasThoseOfTheCommand) {
               categories[i % categories.size()])
         << i;
   }
+  const Json& classes = ramps["classes"];
+  for (std::size_t i = 0; i < 256; ++i) {
+    EXPECT_EQ(Json(class_colour(static_cast<std::int64_t>(i))),
+              i < classes.size() ? classes[i] : categories[i % categories.size()])
+        << i;
+  }
+}
+
+TEST(Ramps, ClassesHaveTheCustomaryColours) {
+  const auto is_most = [](const Rgb& c, std::size_t channel) {
+    return std::max_element(c.begin(), c.end()) - c.begin() == static_cast<std::ptrdiff_t>(channel);
+  };
+  const Rgb ground = class_colour(2), building = class_colour(6), road = class_colour(11);
+  EXPECT_TRUE(ground[0] > ground[1] && ground[1] > ground[2]) << "ground is brown";
+  int brightness = 766;
+  for (const int vegetation : {3, 4, 5}) {  // the higher, the darker
+    const Rgb c = class_colour(vegetation);
+    EXPECT_TRUE(is_most(c, 1)) << vegetation;
+    EXPECT_LT(c[0] + c[1] + c[2], brightness);
+    brightness = c[0] + c[1] + c[2];
+  }
+  EXPECT_TRUE(is_most(building, 0) && building[0] > 2 * building[1]) << "buildings are red";
+  EXPECT_TRUE(is_most(class_colour(9), 2)) << "water is blue";
+  for (const int noise : {7, 18}) {
+    const Rgb c = class_colour(noise);
+    EXPECT_TRUE(c[0] > c[1] + 100 && c[2] > c[1] + 100) << "noise is magenta";
+  }
+  EXPECT_LE(std::max({road[0], road[1], road[2]}) - std::min({road[0], road[1], road[2]}), 20);
+  EXPECT_EQ(class_colour(64), category_colour(64));
 }
 
 TEST(Ramps, TheViewerHasTheLightOfTheCommand) {

@@ -85,6 +85,38 @@ Rgb category_colour(std::int64_t category) {
   return kCategories[static_cast<std::size_t>(((category % count) + count) % count)];
 }
 
+Rgb class_colour(std::int64_t number) {
+  static constexpr std::array<Rgb, 23> kClasses{{
+      {190, 190, 190},  // never classified
+      {150, 150, 150},  // unclassified
+      {152, 104, 64},   // ground
+      {168, 208, 96},   // low vegetation
+      {96, 176, 72},    // medium vegetation
+      {32, 120, 48},    // high vegetation
+      {224, 80, 48},    // building
+      {216, 32, 200},   // low point
+      {200, 152, 96},   // model key
+      {48, 112, 208},   // water
+      {112, 88, 120},   // rail
+      {100, 100, 110},  // road
+      {240, 216, 72},   // overlap
+      {176, 136, 208},  // wire guard
+      {128, 88, 184},   // wire conductor
+      {72, 56, 136},    // transmission tower
+      {208, 176, 232},  // wire connector
+      {184, 96, 112},   // bridge deck
+      {255, 120, 232},  // high noise
+      {144, 160, 184},  // overhead structure
+      {116, 84, 60},    // ignored ground
+      {216, 236, 248},  // snow
+      {70, 70, 70},     // temporal exclusion
+  }};
+  if (number < 0 || number >= static_cast<std::int64_t>(kClasses.size())) {
+    return category_colour(number);
+  }
+  return kClasses[static_cast<std::size_t>(number)];
+}
+
 Rgb cluster_colour(std::int64_t cluster) {
   if (cluster < 0) return {200, 200, 200};
   const std::uint64_t scattered = scramble(static_cast<std::uint64_t>(cluster));

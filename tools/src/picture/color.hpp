@@ -25,8 +25,11 @@ Rgb sea_colour(double share);
 Rgb slope_colour(double degrees);
 /// Levels of a store: dark blue for the coarsest, `top`, to yellow for level 0.
 Rgb store_level_colour(unsigned level, unsigned top);
-/// Colours that differ well for small numbers: classes, clusters.
+/// Colours that differ well for small numbers: groups, clusters.
 Rgb category_colour(std::int64_t category);
+/// The classes of ASPRS LAS 1.4 as is customary: ground brown, vegetation green, buildings red,
+/// water blue, noise magenta. Those that it does not define have the colours of categories.
+Rgb class_colour(std::int64_t number);
 /// The same for clusters, scattered, because consecutive numbers are not neighbours. Negative
 /// numbers, points without a cluster, are light grey.
 Rgb cluster_colour(std::int64_t cluster);

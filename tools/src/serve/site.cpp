@@ -2,8 +2,11 @@
 #include "serve/site.hpp"
 
 #include <algorithm>
+#include <array>
+#include <functional>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -128,6 +131,51 @@ std::string packed(const std::string& bytes) {
   return result;
 }
 
+std::uint8_t class_in(double value) {
+  return value > 0 ? static_cast<std::uint8_t>(std::min(value, 255.0)) : 0;
+}
+
+/// The classes that the points of a cloud have, for a legend; nothing if there are none, or where
+/// it takes too long to look for them. Reads the clusters that may have one that is not yet known.
+std::optional<std::vector<int>> classes_of(const stream::Store& store) {
+  constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 26;
+  const stream::StoreSchema& schema = store.schema();
+  if (schema.grid || store.points() > kMostPoints) return std::nullopt;
+  std::size_t number = 0;
+  const auto find = [&](std::string_view name) {
+    const auto is_it = [&](const stream::Channel& channel) { return channel.name == name; };
+    number = static_cast<std::size_t>(
+        std::find_if(schema.attributes.begin(), schema.attributes.end(), is_it) -
+        schema.attributes.begin());
+    return number < schema.attributes.size();
+  };
+  if (!find("classification") && !find("class")) return std::nullopt;  // as the viewer looks
+  const stream::ScalarType type = schema.attributes[number].type;
+  const std::size_t offset = schema.attribute_offset(number), bytes = schema.payload_size();
+  std::array<bool, 256> seen{};
+  stream::ClusterPoints points;
+  for (const stream::LevelInfo& level : store.levels()) {
+    for (std::uint64_t i = 0; i < level.clusters; ++i) {
+      const stream::ClusterId id = stream::cluster_id(level.level, i);
+      if (const auto ranges = store.attribute_ranges(id); !ranges.empty()) {
+        const auto first = seen.begin() + class_in(ranges[number].low);
+        const auto end = seen.begin() + class_in(ranges[number].high) + 1;
+        if (!ranges[number].nan && first < end && std::all_of(first, end, std::identity()))
+          continue;
+      }
+      store.read(id, points);
+      for (std::size_t at = offset; at < points.payload.size(); at += bytes) {
+        seen[class_in(stream::to_double(type, points.payload.data() + at))] = true;
+      }
+    }
+  }
+  std::vector<int> classes;
+  for (int c = 0; c < 256; ++c) {
+    if (seen[static_cast<std::size_t>(c)]) classes.push_back(c);
+  }
+  return classes;
+}
+
 template <class Shown>
 stream::LinearMap ground_of(const stream::Store& store) {
   using View = terrain::StoreView<Shown>;
@@ -167,8 +215,8 @@ std::string start_file(const stream::Store& store) {
       file->read(begin, std::as_writable_bytes(std::span(bytes).subspan(size)));
     }
   }
-  const Json head = {
-      {"format", "terrace-start"}, {"version", 2}, {"ground", ground}, {"parts", parts}};
+  Json head = {{"format", "terrace-start"}, {"version", 2}, {"ground", ground}, {"parts", parts}};
+  if (const auto classes = classes_of(store)) head["classes"] = *classes;
   return head.dump() + "\n" + packed(bytes);
 }
 

@@ -511,7 +511,7 @@ class RenderCommand : public Command {
       if (by == "height") colours[i] = tint.colour(heights[i]);
       if (by == "slope") colours[i] = slope_colour(slope_degrees(normals[i]));
       if (by == "level") colours[i] = store_level_colour(mesh.levels[i], top);
-      if (by == "class") colours[i] = category_colour(mesh.classes[i]);
+      if (by == "class") colours[i] = class_colour(mesh.classes[i]);
       if (by == "cluster") colours[i] = cluster_colour(mesh.classes[i]);
     }
     return colours;

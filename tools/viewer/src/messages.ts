@@ -27,6 +27,7 @@ export type FromWorker =
     |{type: 'frame', serial: number, state: State, changes: Changes, stats: Stats, milliseconds: number, loading: boolean, time: number}
     |{type: 'picked', id: number, hit: Hit|null}
     |{type: 'profiled', id: number, line: Array<[number, number]>}
+    |{type: 'classes', classes: number[]}  ///< more have come
     |{type: 'outlined', lines: Uint32Array}
     |{type: 'hashed', id: number, hash: string}
     |{type: 'failed', message: string};

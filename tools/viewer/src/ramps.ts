@@ -12,8 +12,10 @@ export const LEVELS: Stop[] = ramps.levels;
 export const GREYS: Stop[] = [[0, 28, 30, 34], [1, 245, 245, 240]];
 /// Surfaces without other colours, as `terrace render` draws them.
 export const PLAIN: Stop[] = [[0, 205, 205, 200], [1, 205, 205, 200]];
-/// The colours of classes; after the last they begin again.
-export const CATEGORIES = ramps.categories;
+/// The colour of a class: of the standard ones of ASPRS LAS 1.4 the customary one.
+export function classColour(group: number): number[] {
+  return ramps.classes[group] ?? ramps.categories[group % ramps.categories.length];
+}
 export const LIGHT = ramps.light;
 
 /// The tint of heights from low to high as shares of these: with a shore at 0 where there is land and sea.

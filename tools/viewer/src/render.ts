@@ -3,7 +3,7 @@
 
 import {BLOCK, type Changes, type Kind, type State, VERTEX_BYTES} from './core';
 import {add, dot, type OrbitCamera, unit, type Vec3} from './camera';
-import {CATEGORIES, GREYS, heightStops, LEVELS, LIGHT, PLAIN, SLOPE, type Stop, texels} from './ramps';
+import {classColour, GREYS, heightStops, LEVELS, LIGHT, PLAIN, SLOPE, type Stop, texels} from './ramps';
 
 export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity', 'grey'] as const;
 export type Colour = typeof COLOURS[number];
@@ -81,7 +81,7 @@ void main() {
   float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-30)
       : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
       : abs(mode) == 2 ? 1.0 - levelOf / max(top, 1.0)
-      : mode == 4 ? (mod(floor(attributesOf.x * 255.0 + 0.5), ${CATEGORIES.length}.0) + 0.5) / ${CATEGORIES.length}.0
+      : mode == 4 ? (floor(attributesOf.x * 255.0 + 0.5) + 0.5) / 256.0
       : attributesOf.y;
   vec3 base = mode == 3 ? own : texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
   if (mode == -2) {
@@ -169,13 +169,12 @@ export class Renderer {
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
       throw new Error(`The graphics driver refuses the viewer's shaders: ${gl.getProgramInfoLog(this.program)}`);
     }
-    const categories = CATEGORIES.flatMap((c, i) => [[i, ...c], [i + 0.999, ...c]]);
     this.ramps = {
       height: gl.createTexture()!,
       slope: this.ramp(SLOPE),
       level: this.ramp(LEVELS),
       rgb: this.ramp(GREYS),
-      class: this.ramp(categories),
+      class: this.ramp(Array.from({length: 256}, (_, group) => [group, ...classColour(group)])),
       intensity: this.ramp(GREYS),
       grey: this.ramp(PLAIN)
     };

@@ -46,7 +46,8 @@ export function parseManifest(bytes: Uint8Array): Manifest {
 /// The parts of a store that the first picture needs, in one file: a line of JSON, and then the bytes of the parts in
 /// turn, packed as zlib does it.
 export interface Start {
-  ground: number[];  ///< from stored coordinates to metres
+  ground: number[];    ///< from stored coordinates to metres
+  classes?: number[];  ///< of all points, where that is known
   parts: Array<ByteRange&{data: Uint8Array}>;
 }
 
@@ -63,7 +64,7 @@ export async function parseStart(bytes: Uint8Array<ArrayBuffer>): Promise<Start>
     at += size;
   }
   if (at !== body.length) throw new Error(`${body.length} bytes came where ${at} were expected`);
-  return {ground: head.ground, parts};
+  return {ground: head.ground, classes: head.classes, parts};
 }
 
 /// Coordinates of the CRS for a point in stored coordinates.

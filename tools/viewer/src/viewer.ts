@@ -4,7 +4,7 @@
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
 import {type Hit, type Kind, type Opened, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
-import {CATEGORIES, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
+import {classColour, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
 import {type Colour, COLOURS, type Look, Renderer} from './render';
 import {type Listed, type Manifest, worldPoint} from './store';
 
@@ -15,7 +15,8 @@ const MOST_POINTS = phone.matches ? 400_000 : 1_500_000;
 /// The standard classes of ASPRS LAS 1.4.
 const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation', 'medium vegetation', 'high vegetation',
                  'building', 'low point', 'model key', 'water', 'rail', 'road', 'overlap', 'wire guard', 'wire conductor',
-                 'transmission tower', 'wire connector', 'bridge deck', 'high noise'];
+                 'transmission tower', 'wire connector', 'bridge deck', 'high noise', 'overhead structure', 'ignored ground', 'snow',
+                 'temporal exclusion'];
 /// The token of "terrace view", for what is the user's; published folders need none.
 const TOKEN = new URLSearchParams(location.search).get('token');
 
@@ -256,6 +257,10 @@ class Viewer {
         this.renderer.outline(this.hit ? message.lines : new Uint32Array());
         this.redraw = true;
         break;
+      case 'classes':
+        this.colours.classes = message.classes;
+        this.legend();
+        break;
       case 'hashed':
         this.hashes.get(message.id)?.(message.hash);
         this.hashes.delete(message.id);
@@ -365,10 +370,9 @@ class Viewer {
     element('legend').hidden = !ramp;
     element('classes').hidden = colour !== 'class';
     element('classes').replaceChildren(...this.colours.classes.map(group => {
-      const item = document.createElement('li'), swatch = document.createElement('i');
-      swatch.style.background = `rgb(${CATEGORIES[group % CATEGORIES.length].join(' ')})`;
-      item.append(swatch, `${group} ${CLASSES[group] ?? ''}`);
-      return item;
+      const swatch = make('i', '');
+      swatch.style.background = `rgb(${classColour(group).join(' ')})`;
+      return make('li', '', swatch, `${group} ${CLASSES[group] ?? ''}`);
     }));
     if (!ramp) return;
     const texts: Partial<Record<Colour, [string, string]>> = {

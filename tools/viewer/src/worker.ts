@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The worker: the core, the bytes that it lacks, and a frame whenever there is something to do.
 
-import {type Camera, Core, CoreError, type Kind} from './core';
+import {type Camera, type Changes, Core, CoreError, type Kind, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {FetchFault, fetchWhole, Ranges} from './ranges';
 import {type Listed, type Manifest, parseManifest, parseStart} from './store';
@@ -42,6 +42,8 @@ class Session {
   private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< of a scan
   private givenBytes = 0;
   private ranges!: Ranges;
+  private classes = new Set<number>();  ///< of the points, as far as they are known
+  private classKind: Kind|null = null;  ///< in which points have classes
   private manifest!: Manifest;
   private ground: number[] = [];
   private camera: Camera|null = null;
@@ -84,6 +86,7 @@ class Session {
           this.at(`stores/${encodeURIComponent(this.request.name)}/`), this.request.query, this.manifest.files,
           (range, data) => this.give(range.file, range.offset, data), fault => this.fail(fault.message),
           () => this.wake());
+      for (const group of start.classes ?? []) this.classes.add(group);
       this.ranges.stats.requests = 1;
       this.ranges.stats.bytes = bytes.length;
       post({type: 'progress', bytes: bytes.length});
@@ -226,9 +229,25 @@ class Session {
     }
     if (!this.scan) this.dropGiven();
     this.opened = true;
+    if (result.colours.classes.length > 0) this.classKind = result.kind;
+    for (const group of result.colours.classes) this.classes.add(group);
+    result.colours.classes = this.listed();
     const heightUnit = this.ground[8] / this.manifest.coordinates[2].scale || 1;
     post({type: 'opened', manifest: this.manifest, scene: {...result, scan: this.scan}, heightUnit});
     this.schedule();
+  }
+  private listed(): number[] {
+    return [...this.classes].sort((a, b) => a - b);
+  }
+  /// Tells of classes that no point had before: the store may have too many points for the start file to know them all.
+  private noteClasses({vertices}: Changes): void {
+    if (this.classKind === null) return;
+    const before = this.classes.size;
+    // ScenePoint of scene.hpp: the level, 255 for none, and the class.
+    for (let at = 0; at < vertices.length; at += VERTEX_BYTES[this.classKind]) {
+      if (vertices[at + 15] !== 255) this.classes.add(vertices[at + 19]);
+    }
+    if (this.classes.size > before) post({type: 'classes', classes: this.listed()});
   }
   private dropGiven(): void {
     this.given = [];
@@ -277,6 +296,7 @@ class Session {
     const begin = performance.now();
     const {state, missing} = this.core.frame(this.camera, (FRAME - IN_HAND) / 1000, begin / 1000);
     const changes = this.core.changes();
+    this.noteClasses(changes);
     this.ranges.want(missing, this.serial, begin);
     const milliseconds = performance.now() - begin;
     const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
