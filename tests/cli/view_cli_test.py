@@ -17,6 +17,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.request
 import zlib
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
@@ -319,6 +320,44 @@ class ReplacedTest(Stores):
         self.assertEqual(code, 0)
 
 
+    def test_a_store_that_is_copied_over(self):
+        """Its files become those of another, one after the other: that one is served once it is whole, whichever file comes first."""
+        def made(name, *args):
+            done = terrace('build', ALPS, '-o', self.path(name), '-q', *args)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return {file: self.read(name, file) for file in os.listdir(self.path(name))}
+
+        shown, other = made('shown.store', '--block', '1000'), made('other.store', '--seed', '7', '--block', '2000')
+        server, port, query = view(self.path('shown.store'))
+        address = f'http://127.0.0.1:{port}/'
+
+        def fetch(path):
+            with urllib.request.urlopen(address + path + query, timeout=20) as answer:
+                return answer.read()
+
+        try:
+            for target, manifest_first in [(other, True), (shown, False), (other, False), (shown, True)]:
+                names = sorted(target, key=lambda name: (name == 'manifest.json') != manifest_first)
+                for name in names:
+                    fetch('stores.json')  # finds files of two stores
+                    with open(self.path('shown.store', name), 'wb') as file:  # as cp does
+                        file.write(target[name])
+                for name in set(os.listdir(self.path('shown.store'))) - set(target):
+                    os.remove(self.path('shown.store', name))
+                checksum = json.loads(target['manifest.json'])['checksum'].lstrip('0')
+                for _ in range(600):
+                    if json.loads(fetch('stores.json'))['stores'][0]['checksum'] == checksum and \
+                            all(fetch(f'stores/shown/{name}') == data for name, data in target.items()):
+                        break
+                    time.sleep(0.05)
+                else:
+                    self.fail(f'the store is not served, manifest first: {manifest_first}')
+        finally:
+            server.send_signal(signal.SIGINT)
+            server.wait(10)
+            server.stderr.close()
+
+
 class ViewErrorTest(Stores):
     def test_errors(self):
         self.assertEqual(terrace('view').returncode, 2)
@@ -391,6 +430,20 @@ class PublishTest(Stores):
         self.assertLess(os.path.getsize(self.path('site', 'stores', 'alps.start')), 300_000)
         # Nothing else is left beside it.
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
+
+    def test_names_that_would_meet(self):
+        """A store is a folder and a start file next to it: x and x.start get other names, in view too."""
+        for name in 'x', 'x.start':
+            shutil.copytree(self.store, self.path(f'{name}.store'))
+        for number, order in enumerate([['x', 'x.start'], ['x.start', 'x']]):
+            site = self.path(f'met{number}')
+            done = terrace('publish', *(self.path(f'{name}.store') for name in order), '-o', site)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            names = [store['name'] for store in json.loads(self.read(site, 'stores.json'))['stores']]
+            self.assertEqual(names, [order[0], f'{order[1]}-2'])
+            for name in names:
+                self.assertEqual(terrace('verify', os.path.join(site, 'stores', name)).returncode, 0)
+                self.assertTrue(os.path.isfile(os.path.join(site, 'stores', f'{name}.start')))
 
     def test_classes_of_a_cloud(self):
         """The start file names those of all points, for the legend, not only of the coarsest."""

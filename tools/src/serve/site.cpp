@@ -24,6 +24,13 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kManifest = "manifest.json";
+constexpr const char* kStartEnding = ".start";
+/// How long a look at all files, and a failed attempt to serve them, counts.
+constexpr std::chrono::milliseconds kLook{100};
+/// To serve stores whose files change meanwhile, at the start.
+constexpr int kAttempts = 20;
+
 std::string type_of(const std::string& name) {
   static constexpr std::pair<std::string_view, std::string_view> kTypes[] = {
       {".html", "text/html; charset=utf-8"},
@@ -65,10 +72,10 @@ Resource& add_text(Site& site, const std::string& name, std::string_view text) {
 
 /// The manifest and the files that it lists.
 std::vector<std::string> files_of(const stream::Store& store) {
-  const auto source = stream::open_file(store.path() / "manifest.json");
+  const auto source = stream::open_file(store.path() / kManifest);
   std::string text(source->size(), '\0');
   source->read(0, std::as_writable_bytes(std::span(text)));
-  std::vector<std::string> names{"manifest.json"};
+  std::vector<std::string> names{kManifest};
   const Json manifest = Json::parse(text);
   for (const Json& level : manifest.at("levels")) {
     for (const Json& segment : level.at("segments")) {
@@ -99,8 +106,11 @@ std::string name_of(const stream::Store& store, const std::vector<std::string>& 
     if (!plain) c = '_';
   }
   std::string unique = name;
+  // A store is a folder of that name and a file next to it.
   const auto is_taken = [&] {
-    return std::find(taken.begin(), taken.end(), unique) != taken.end();
+    return std::any_of(taken.begin(), taken.end(), [&](const std::string& other) {
+      return unique == other || unique == other + kStartEnding || other == unique + kStartEnding;
+    });
   };
   for (int i = 2; is_taken(); ++i) unique = name + "-" + std::to_string(i);
   return unique;
@@ -251,7 +261,7 @@ Site make_site(std::span<const stream::Store> stores) {
       const std::string tag = '"' + checksum + "-" + hexadecimal(bytes->size()) + '"';
       site[folder + file] = {std::move(bytes), type_of(file), tag};
     }
-    add_text(site, "stores/" + name + ".start", start_file(store));
+    add_text(site, "stores/" + name + kStartEnding, start_file(store));
     list.push_back({{"name", name}, {"points", store.points()}, {"checksum", checksum}});
   }
   add_text(site, "stores.json",
@@ -261,36 +271,68 @@ Site make_site(std::span<const stream::Store> stores) {
 
 LiveSite::LiveSite(std::vector<std::string> paths,
                    std::function<stream::Store(const std::string& path)> open)
-    : paths_(std::move(paths)), open_(std::move(open)), stamps_(stamps()), site_(made()) {}
+    : paths_(std::move(paths)), open_(std::move(open)) {
+  for (const std::string& path : paths_) manifests_.push_back(fs::path(path) / kManifest);
+  for (int attempts = 1; !make(); ++attempts) {
+    if (attempts < kAttempts) continue;
+    throw stream::Error({.file = paths_.front(),
+                         .where = {},
+                         .cause = "the files of a store change all the time",
+                         .remedy = "wait until they have been copied"});
+  }
+}
 
 const Site& LiveSite::now() {
-  std::vector<Stamp> found = stamps();
-  if (found == stamps_) return site_;
+  const std::vector<Stamp> manifests = stamps(manifests_);
+  const Clock::time_point begin = Clock::now();
+  const bool replaced = manifests != (stale_ ? tried_ : manifest_stamps_);
+  if (!replaced && begin < next_look_) return site_;
+  next_look_ = begin + kLook;
+  if (!replaced && !stale_ && stamps(files_) == file_stamps_) return site_;
+  tried_ = manifests;
   try {
-    Site site = made();
-    // Else a store was replaced meanwhile, and the files may be those of two.
-    if (stamps() == found) site_ = std::move(site);
-  } catch (const stream::Error&) {
+    stale_ = !make();
+  } catch (const stream::Stopped&) {
+    throw;
+  } catch (const std::exception&) {
+    stale_ = true;  // missing, damaged, or still being copied
   }
-  stamps_ = std::move(found);
+  const Clock::time_point end = Clock::now();
+  next_look_ = end + std::max<Clock::duration>(kLook, 3 * (end - begin));
   return site_;
 }
 
-std::vector<LiveSite::Stamp> LiveSite::stamps() const {
-  std::vector<Stamp> stamps(paths_.size());
-  for (std::size_t i = 0; i < stamps.size(); ++i) {
-    struct stat status {};
-    if (::stat((paths_[i] + "/manifest.json").c_str(), &status) != 0) continue;
-    stamps[i] = {static_cast<std::int64_t>(status.st_dev), static_cast<std::int64_t>(status.st_ino),
-                 status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
-  }
+LiveSite::Stamp LiveSite::stamp(const fs::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return {};
+  return {static_cast<std::int64_t>(status.st_dev), static_cast<std::int64_t>(status.st_ino),
+          status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+}
+
+std::vector<LiveSite::Stamp> LiveSite::stamps(std::span<const fs::path> files) {
+  std::vector<Stamp> stamps(files.size());
+  std::transform(files.begin(), files.end(), stamps.begin(), stamp);
   return stamps;
 }
 
-Site LiveSite::made() const {
+bool LiveSite::make() {
+  std::vector<Stamp> manifests = stamps(manifests_);
   std::vector<stream::Store> stores;
-  for (const std::string& path : paths_) stores.push_back(open_(path));
-  return make_site(stores);
+  std::vector<fs::path> files;
+  for (const std::string& path : paths_) {
+    stores.push_back(open_(path));
+    for (const std::string& name : files_of(stores.back())) {
+      if (name != kManifest) files.push_back(fs::path(path) / name);
+    }
+  }
+  std::vector<Stamp> others = stamps(files);
+  Site site = make_site(stores);
+  if (stamps(manifests_) != manifests || stamps(files) != others) return false;
+  site_ = std::move(site);
+  files_ = std::move(files);
+  manifest_stamps_ = std::move(manifests);
+  file_stamps_ = std::move(others);
+  return true;
 }
 
 }  // namespace terrace::tools

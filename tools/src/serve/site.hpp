@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -31,12 +32,12 @@ using Site = std::map<std::string, Resource>;
 
 /// The viewer, `stores.json`, and of each store its files in `stores/NAME/` and
 /// `stores/NAME.start`, which has the parts that the first picture is made of. Names are those of
-/// the folders, made unique. Files are opened here and stay open. Throws: stream::Error, also if a
-/// file of a store is a link.
+/// the folders, made unique together with those of the start files. Files are opened here and stay
+/// open. Throws: stream::Error, also if a file of a store is a link.
 Site make_site(std::span<const stream::Store> stores);
 
-/// The site of stores, made anew when one of them has been replaced. An answer under way keeps the
-/// files that it began with.
+/// The site of stores, made again when one of them has been replaced: by a rename, or by copying
+/// files over its own, which takes a while. An answer under way keeps the files that it began with.
 class LiveSite {
  public:
   /// open: opens the store at a path. Throws: stream::Error.
@@ -44,18 +45,26 @@ class LiveSite {
            std::function<stream::Store(const std::string& path)> open);
 
   /// The site of the stores that are at their paths now; the last one while one of them is missing
-  /// or cannot be served. Throws: stream::Stopped if a store is to stop.
+  /// or cannot be served, which is tried again until it can. A new manifest is seen at once, other
+  /// changed files within a tenth of a second. Throws: stream::Stopped if a store is to stop.
   const Site& now();
 
  private:
-  /// What tells the manifest of a store from another at its path.
+  using Clock = std::chrono::steady_clock;
+  /// What tells a file from another, or from a changed one, at its path.
   using Stamp = std::array<std::int64_t, 5>;
-  [[nodiscard]] std::vector<Stamp> stamps() const;
-  [[nodiscard]] Site made() const;
+  static Stamp stamp(const std::filesystem::path& file);
+  static std::vector<Stamp> stamps(std::span<const std::filesystem::path> files);
+  /// Whether the files stayed the same meanwhile, so that the site is of one state of the stores.
+  bool make();
 
   std::vector<std::string> paths_;
   std::function<stream::Store(const std::string& path)> open_;
-  std::vector<Stamp> stamps_;  ///< before the stores were opened last
+  std::vector<std::filesystem::path> manifests_, files_;  ///< files: the others
+  std::vector<Stamp> manifest_stamps_, file_stamps_;      ///< of what the site was made from
+  std::vector<Stamp> tried_;                              ///< manifests of the last attempt
+  bool stale_ = false;                                    ///< the last attempt failed
+  Clock::time_point next_look_{};
   Site site_;
 };
 
