@@ -14,6 +14,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -156,11 +157,21 @@ class ViewTest(Stores):
         for query in ['', '?', '?token', '?token=', f'?token={token[:-1]}', f'?token={token}0', f'?token={token.upper()}x', f'?x={token}',
                       f'?tokens={token}', '?token=' + '0' * 32, f'#?token={token}', f'?x=1&token={token[1:]}']:
             for path in ['/stores.json', '/stores/alps.start', '/stores/alps/manifest.json', self.URL, '/stores/alps/nothing', '/nothing']:
-                status, _, body = self.get(path, query=query)
+                # As a browser asks: programs of this session need no token.
+                status, _, body = self.get(path, query=query, Sec_Fetch_Site='none')
                 self.assertEqual((query, path, status, body), (query, path, 403, b'no token\n'))
         for path in ['/', '/index.html', '/viewer.js', '/viewer.css', '/worker.js', '/core.wasm', '/body.wasm']:
             self.assertEqual((path, self.get(path, query='')[0]), (path, 200))
         self.assertEqual(self.get('/stores.json', query=f'?x=1&token={token}')[0], 200)
+        # Programs: those of the same session, as what is typed in the same terminal, are served; others are not.
+        ask = [sys.executable, '-c', 'import sys, urllib.request; print(urllib.request.urlopen(sys.argv[1]).status)',
+               f'http://127.0.0.1:{self.port}/stores.json']
+        for strange in False, True:
+            done = subprocess.run(ask, capture_output=True, text=True, timeout=60, start_new_session=strange)
+            self.assertEqual(done.stdout, '' if strange else '200\n', done.stderr)
+        for name in 'Origin', 'Referer', 'Sec_Fetch_Site':
+            self.assertEqual(self.get('/stores.json', query='', **{name: 'http://evil.example'})[0], 403)
+        self.assertEqual(self.get('/stores.json', query='')[0], 200)
         other, _, query = view(self.store)
         other.send_signal(signal.SIGINT)
         other.wait(10)

@@ -17,6 +17,7 @@ struct Request {
   std::string_view method, target;
   std::string_view range{}, if_range{}, if_none_match{};  ///< empty: not given
   std::string_view host{};                                ///< likewise
+  bool trusted = false;                                   ///< needs no token
 };
 
 /// Who may ask: web pages of other origins and other users of the machine can reach the port too.

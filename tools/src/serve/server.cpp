@@ -17,9 +17,11 @@
 #include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <netinet/in.h>
 #include <unistd.h>
 
 #include "serve/http_rules.hpp"
+#include "serve/own_session.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
@@ -104,10 +106,31 @@ class Session : public std::enable_shared_from_this<Session> {
                               .range = field(http::field::range),
                               .if_range = field(http::field::if_range),
                               .if_none_match = field(http::field::if_none_match),
-                              .host = field(http::field::host)},
+                              .host = field(http::field::host),
+                              .trusted = is_trusted()},
                              site_(), access_);
     reply.close = reply.close || !request.keep_alive();
     answer(std::move(reply), request.method() == http::verb::head);
+  }
+  /// Whether a request without a token comes from a program that was started like this one. A
+  /// browser is none: it acts for the pages that it shows.
+  bool is_trusted() {
+    const auto& request = parser_->get();
+    const beast::string_view target = request.target();
+    if (!query_value({target.data(), target.size()}, "token").empty() ||
+        request.find("Sec-Fetch-Site") != request.end() ||
+        request.find(http::field::origin) != request.end() ||
+        request.find(http::field::referer) != request.end()) {
+      return false;
+    }
+    if (!own_session_) {
+      error_code gone;
+      const tcp::endpoint client = stream_.socket().remote_endpoint(gone);
+      own_session_ = !gone && client.address().is_v4() &&
+                     is_of_this_session(htonl(client.address().to_v4().to_uint()), client.port(),
+                                        access_.port);
+    }
+    return *own_session_;
   }
   void answer(Answer reply, bool head) {
     reply_ = std::move(reply);
@@ -153,6 +176,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::string header_;
   std::vector<std::byte> piece_;
   std::uint64_t at_ = 0, left_ = 0;
+  std::optional<bool> own_session_;  ///< of the client, once it was asked
 };
 
 }  // namespace

@@ -20,7 +20,8 @@ struct ServerLimits {
 };
 
 /// Serves a site on 127.0.0.1 by HTTP/1.1: GET and HEAD, single ranges, entity tags, to requests
-/// that have the token. One thread, and no client holds it: all waiting is for the operating system.
+/// that have the token or come from programs of this process's session. One thread, and no client
+/// holds it: all waiting is for the operating system.
 class Server {
  public:
   /// site: asked for each request. port 0: any that is free. Throws: stream::Error if it is taken,
