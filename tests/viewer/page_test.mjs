@@ -2,7 +2,7 @@
 // page_test.mjs PACKAGES: the viewer in headless Chromium over published stores and over `terrace view`. TERRACE names
 // the command, FLIGHT_HASHES the native flight, CHROMIUM the browser. Pictures stay in PACKAGES.
 import assert from 'node:assert/strict';
-import {spawn} from 'node:child_process';
+import {spawn, spawnSync} from 'node:child_process';
 import {writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, describe, test} from 'node:test';
@@ -59,6 +59,14 @@ async function place(page) {
   await page.waitForFunction(() => !/reading/.test(document.getElementById('place-text').textContent));
   return Object.fromEntries(await page.$$eval('#place-text dt', dts => dts.map(dt => [dt.textContent, dt.nextElementSibling.textContent])));
 }
+/// The texts and the line of the profile.
+async function profile(page) {
+  await page.waitForSelector('#profile:not([hidden])');
+  return page.evaluate(() => [
+    ...['low', 'length', 'high'].map(part => document.getElementById(`profile-${part}`).textContent),
+    document.querySelector('#profile path').getAttribute('d')
+  ]);
+}
 
 /// Colours of the picture at some places, 0 to 255.
 const pixels = (page, places) => page.evaluate(places => {
@@ -114,10 +122,7 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
 
   // The legend's colour of a height is that of the pixel: by level there is no light from the side.
   await page.mouse.click(480, 330);
-  await page.waitForSelector('#place:not([hidden])');
-  const rows = async () => Object.fromEntries(await page.$$eval(
-      '#place-text dt', dts => dts.map(dt => [dt.textContent, dt.nextElementSibling.textContent])));
-  const first = await rows();
+  const rows = () => place(page), first = await rows();
   assert.ok(Number(first.Longitude) > 8 && Number(first.Longitude) < 9, JSON.stringify(first));
   assert.ok(Number(first.Latitude) > 46 && Number(first.Latitude) < 47);
   assert.match(first.Height, /^\d+\.\d\d m$/);
@@ -174,6 +179,58 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   assert.deepEqual([...errors, ...again.errors], []);
   await again.close();
   await close();
+});
+
+/// What the command says of a place of the CRS.
+function sampled(store, x, y) {
+  const {stdout} = spawnSync(process.env.TERRACE, ['sample', store, '-q'], {cwd: sites.folder, encoding: 'utf8', input: `x,y\n${x},${y}\n`});
+  return number(stdout.split('\n')[1].split(',')[2]);
+}
+const number = text => text === '' ? NaN : Number(text);
+
+test('a click reads the store, not what is drawn: heights and profiles that are true and stay', async () => {
+  for (const name of ['alps', 'hills']) {
+    const {page, errors, close} = await open(`#s=${name}&q=32`, {size: {width: 960, height: 600}});
+    const before = await state(page);
+    const told = [];
+    // Two places one after the other. Where there are no data nothing is met, or the panel says so.
+    for (let i = 0; told.length < 2; ++i) {
+      assert.ok(i < 60, 'no places are met');
+      await page.mouse.click(400 + 13 * (i % 12), 280 + 37 * (i % 5));
+      await page.waitForTimeout(250);
+      if (!await page.isVisible('#place')) {
+        told.length = 0;
+        continue;
+      }
+      const rows = await place(page), east = rows.Longitude ?? rows.East, north = rows.Latitude ?? rows.North;
+      // The place is shown to a tenth of a metre.
+      const height = sampled(`${name}.store`, east, north);
+      if (rows.Height === 'no data') {
+        assert.ok(Number.isNaN(height), `no data at ${east} ${north}`);
+        told.length = 0;
+        continue;
+      }
+      assert.ok(Math.abs(parseFloat(rows.Height) - height) < 0.5, `${rows.Height} for ${height} at ${east} ${north}`);
+      told.push([east, north]);
+    }
+    const shown = await profile(page), line = told.flat().join();
+    const {stdout} = spawnSync(process.env.TERRACE, ['profile', `${name}.store`, '--line', line, '-o', '-', '-q'], {cwd: sites.folder, encoding: 'utf8'});
+    const rows = stdout.trim().split('\n').slice(1).map(row => row.split(',').map(number));
+    const heights = rows.map(row => row[3]).filter(height => !Number.isNaN(height));
+    const metres = text => parseFloat(text) * (text.includes('km') ? 1000 : 1);
+    assert.ok(Math.abs(metres(shown[1]) / rows.at(-1)[0] - 1) < 0.005, `${shown[1]} for ${rows.at(-1)[0]} m`);
+    assert.ok(Math.abs(parseFloat(shown[0]) - Math.min(...heights)) < 1, `${shown[0]} for ${Math.min(...heights)}`);
+    assert.ok(Math.abs(parseFloat(shown[2]) - Math.max(...heights)) < 1, `${shown[2]} for ${Math.max(...heights)}`);
+    await page.mouse.move(480, 300);
+    for (let i = 0; i < 5; ++i) await page.mouse.wheel(0, -240);
+    await page.waitForTimeout(600);
+    await settled(page);
+    assert.notEqual((await state(page)).points, before.points);
+    assert.deepEqual(await profile(page), shown);
+    await page.screenshot({path: join(packages, `viewer-place-${name}.png`)});
+    assert.deepEqual(errors, []);
+    await close();
+  }
 });
 
 test('what data say is text: no markup of a store gets into the page, and none would run', async () => {
@@ -687,6 +744,12 @@ describe('pages side by side', {concurrency: 3}, () => {
     const dots = await page.getAttribute('#profile path', 'd');
     assert.ok(dots.split('M').length > 4, dots);
     await page.screenshot({path: join(packages, 'viewer-cloud-profile.png')});
+    const drawn = await profile(page);
+    await page.mouse.move(450, 300);
+    for (let i = 0; i < 3; ++i) await page.mouse.wheel(0, -240);
+    await page.waitForTimeout(600);
+    await settled(page);
+    assert.deepEqual(await profile(page), drawn);
     assert.match(page.url(), /c=intensity/);
     assert.deepEqual(errors, []);
     await close();

@@ -2,6 +2,7 @@
 // worker_test.mjs: the viewer's worker, as it is shipped, in node over published stores. TERRACE names the command,
 // FLIGHT_HASHES the native flight.
 import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
 import {cpSync, readFileSync, statSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
@@ -48,6 +49,14 @@ class Tested extends Flyer {
     const done = this.until(m => m.type === type);
     this.worker.tell(message);
     return done;
+  }
+  /// What the store holds.
+  async probe(stored, reach) {
+    return (await this.ask({type: 'probe', id: 1, stored: [...stored], reach}, 'probed')).found;
+  }
+  async profile(from, to, axis) {
+    const {metres, level, sampled, points} = (await this.ask({type: 'profile', id: 1, from, to, axis}, 'profiled')).profile;
+    return {metres, level, sampled, points: Array.from(points, point => [...point])};
   }
   async hash() {
     const done = this.until(message => message.type === 'hashed');
@@ -378,11 +387,8 @@ test('a raster with cells without data: nothing is drawn, met or cut there', asy
     return places.map((p, i) => Math.hypot(p[0] - places[(i + 1) % 3][0], p[1] - places[(i + 1) % 3][1]));
   }));
   // From north to south over the bay; the middle is at column 74.5 and row 99.5.
-  const [middle, end] = [[-500, 0, 0], 2900], up = [0, 0, 1];
-  const cut = async () => {
-    const {line} = await flyer.ask({type: 'profile', id: 1, from: [middle[0], end, 0], to: [middle[0], -end, 0], up}, 'profiled');
-    return line;
-  };
+  const middle = [-500, 0, 0], column = 74.5 - 500 / 30;
+  const cut = () => flyer.profile([column, 2.5, 0], [column, 196.5, 0], 2);
   const meets = async (x, y) => (await flyer.ask({type: 'pick', id: 1, origin: [x, y, 3000], direction: [0, 0, -1], angle: 0.001}, 'picked')).hit !== null;
   for (const error of [1e6, 0.001, 1e6, 0.001]) {
     const state = await flyer.settle({...above, error});
@@ -394,10 +400,12 @@ test('a raster with cells without data: nothing is drawn, met or cut there', asy
     assert.equal(await meets(...middle), false);
     assert.equal(await meets(middle[0], 2000), true);
     assert.ok(worstNormal(arrays) < 2, `${worstNormal(arrays)} of 127`);
-    const line = await cut();
-    assert.ok(line.some(([at]) => at < 1000) && line.some(([at]) => at > 4800));
-    // The ends of a line each.
-    for (let i = 0; i < line.length; i += 2) assert.ok(line[i + 1][0] - line[i][0] < 1000, `${line[i]} to ${line[i + 1]}`);
+    const {metres, points} = await cut();
+    assert.ok(Math.abs(metres - 194 * 30) < 1e-6, `${metres} m`);
+    for (const [share, height] of points) {
+      const row = 2.5 + 194 * share;
+      if (Math.abs(row - 49) > 1e-6 && Math.abs(row - 150) > 1e-6) assert.equal(Number.isNaN(height), row > 49 && row < 150, `row ${row}`);
+    }
     const fresh = new Arrays(24), other = new Tested('coast', {changed: message => fresh.apply(message)});
     await other.opened();
     await other.settle({...above, error});
@@ -476,38 +484,147 @@ test('a cluster of points expands by hand, and its points are told', async () =>
   for (let i = 0; i < lines.length; i += 2) assert.equal(lines[i], lines[i + 1]);
 });
 
-test('profiles: of points a strip, of a body its cut', async () => {
-  const cloud = new Tested('cloud');
-  await cloud.opened();
-  await cloud.settle({eye: [0, 0, 300], direction: [0, 0.01, -1], error: 0.01});
-  const up = [0, 0, 1], from = [-40, -10, 0], to = [40, 10, 3];
-  const {line} = await cloud.ask({type: 'profile', id: 1, from, to, up}, 'profiled');
-  // Their share of all 40,000 on 100 m x 80 m, and the heights of ground and trees.
-  const length = Math.hypot(80, 20), expected = 40_000 / 8000 * length * 0.02 * length;
-  assert.ok(Math.abs(line.length - expected) < 5 * Math.sqrt(expected), `${line.length} ${expected}`);
-  for (const [i, [along, height]] of line.entries()) {
-    assert.ok(along >= (line[i - 1]?.[0] ?? 0) && along <= length);
-    // A point of the strip is up to 0.8 m aside.
-    const ground = 3 * Math.sin((from[0] + along * 80 / length + 50) / 9);
-    assert.ok(height > ground - 0.1 && height < ground + 4.1, `${height} over ${ground}`);
-  }
-  const ball = new Tested('ball');
-  await ball.opened();
-  await ball.settle({eye: [40, 0, 0], direction: [-1, 0, 0], error: 0.01});
-  for (const up of [[0, 0, 1], [0, 1, 0]]) {
-    const to = up[1] === 1 ? [15, 0, 2] : [15, 2, 0], from = to.map(c => -c);
-    const {line} = await ball.ask({type: 'profile', id: 2, from, to, up}, 'profiled');
-    // A closed curve: each place is the end of two lines.
-    const ends = new Map();
-    for (const [along, height] of line) {
-      const key = `${along.toFixed(9)} ${height.toFixed(9)}`;
-      ends.set(key, (ends.get(key) ?? 0) + 1);
-      const far = Math.hypot(along - Math.hypot(15, 2), height);
-      assert.ok(far > 8.5 && far < 11.2, `${far} from the middle`);
+/// What the command answers, as rows of numbers.
+function command(...args) {
+  const {status, stdout, stderr} = spawnSync(process.env.TERRACE, [...args, '-q'], {cwd: sites.folder, encoding: 'utf8'});
+  assert.equal(status, 0, `terrace ${args.join(' ')}: ${stderr}`);
+  return stdout.trim().split('\n').slice(1).map(line => line.split(',').map(text => text === '' ? NaN : Number(text)));
+}
+/// Places of the CRS in stored coordinates; neither has a rotation.
+const inStored = ({world: w}, [x, y]) => [(x - w[2]) / w[0], (y - w[5]) / w[4]];
+const inWorld = ({world: w, coordinates: [, , z]}, s) => [w[0] * s[0] + w[2], w[4] * s[1] + w[5], s[2] * z.scale + z.offset];
+
+for (const name of ['alps', 'hills', 'coast']) {
+  test(`${name}: heights and profiles are those of the store, whatever is drawn`, async () => {
+    const flyer = new Tested(name);
+    const {manifest, scene} = await flyer.opened(), [x0, y0, , x1, y1] = scene.box;
+    let off = 0, voids = 0;
+    const profiles = [];
+    for (const error of [1e6, 30, 1e6]) {
+      const eye = [(x0 + x1) / 2, (y0 + y1) / 2, 2 * (x1 - x0)];
+      await flyer.settle({eye, direction: [0, 0.001, -1], error});
+      const asked = [];
+      for (let i = 0; i < 24; ++i) {
+        const [s, t] = [0.04 + 0.92 * ((i * 0.618) % 1), 0.04 + 0.92 * i / 24];
+        const origin = [x0 + s * (x1 - x0), y0 + t * (y1 - y0), 2e4];
+        const {hit} = await flyer.ask({type: 'pick', id: i, origin, direction: [0, 0, -1], angle: 0.001}, 'picked');
+        if (hit) asked.push({hit, found: await flyer.probe(hit.stored, hit.reach)});
+      }
+      assert.ok(asked.length > 12, `${asked.length} places met`);
+      writeFileSync(join(sites.folder, 'clicked.csv'), `x,y\n${asked.map(({hit}) => inWorld(manifest, hit.stored).slice(0, 2).join()).join('\n')}\n`);
+      command('sample', `${name}.store`, '--points', 'clicked.csv').forEach(([x, y, height], i) => {
+        const {hit, found} = asked[i];
+        if (found === null) {
+          ++voids;
+          assert.ok(Number.isNaN(height), `a height of ${height} at ${x} ${y} is not found`);
+          return;
+        }
+        const [, , told] = inWorld(manifest, found.stored);
+        assert.ok(Math.abs(told - height) < 1e-4, `${told} m for ${height} m at ${x} ${y}`);
+        assert.deepEqual([...found.stored].slice(0, 2), [...hit.stored].slice(0, 2));
+        off = Math.max(off, Math.abs(inWorld(manifest, hit.stored)[2] - height));
+      });
+      const ends = [[0.12345, 0.13579], [0.81234, 0.77321]].map(([s, t]) => {
+        const {world: w} = manifest;
+        return [w[2] + s * w[0] * manifest.columns, w[5] + t * w[4] * manifest.rows];
+      });
+      profiles.push({ends, profile: await flyer.profile(...ends.map(end => [...inStored(manifest, end), 0]), 2)});
     }
-    assert.ok(line.length > 100);
-    assert.ok([...ends.values()].every(count => count === 2), 'the cut is open');
+    // What is drawn is far from it, or this tests little.
+    if (name !== 'coast') assert.ok(off > 5, `what is drawn is off by ${off} m at most`);
+    if (name === 'hills') assert.equal(voids, 0);
+    const [{ends, profile}] = profiles;
+    for (const other of profiles) assert.deepEqual(other, profiles[0]);
+    assert.deepEqual([profile.level, profile.sampled], [0, false]);
+    command('profile', `${name}.store`, '--line', ends.flat().join(), '-o', '-').forEach(([distance, , , height], i, rows) => {
+      const [share, told] = profile.points[i];
+      assert.equal(Number.isNaN(told), Number.isNaN(height), `row ${i}: ${told} for ${height}`);
+      if (!Number.isNaN(height)) assert.ok(Math.abs(told - height) < 1e-4, `row ${i}: ${told} m for ${height} m`);
+      assert.ok(Math.abs(share - distance / rows.at(-1)[0]) < 0.01);
+      assert.equal(rows.length, profile.points.length);
+    });
+  });
+}
+
+test('a long profile is sampled, and true where it is', async () => {
+  const row = Array.from({length: 9000}, (_, column) => (500 + 300 * Math.sin(column / 40)).toFixed(2)).join(' ');
+  writeFileSync(join(sites.folder, 'strip.asc'), `ncols 9000\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n${`${row}\n`.repeat(3)}`);
+  sites.terrace('build', 'strip.asc', '-o', 'strip.store', '-q');
+  sites.terrace('publish', 'strip.store', '-o', 'strip', '-q');
+  const flyer = new Tested('strip', {site: join(sites.folder, 'strip')});
+  await flyer.opened();
+  const {metres, level, sampled, points} = await flyer.profile([0, 0.2, 0], [8999, 1.9, 0], 2);
+  assert.deepEqual([level, sampled, points.length], [0, true, 1025]);
+  assert.ok(Math.abs(metres - Math.hypot(8999, 1.7)) < 1e-6);
+  for (const [share, height] of points) assert.ok(Math.abs(height - (500 + 300 * Math.sin(8999 * share / 40))) < 0.2, `${height} at ${share}`);
+});
+
+test('a profile of points and of a scan is that of a strip of all of them, whatever is drawn', async () => {
+  for (const [name, from, to, axis] of [['cloud', [10, 30, 0], [90, 50, 3], 2], ['ball', [-15, -2, 0], [15, 2, 0], 2], ['ball', [-15, 0, -2], [15, 0, 2], 1]]) {
+    const flyer = new Tested(name);
+    await flyer.opened();
+    const seen = [];
+    for (const error of [1e6, 0.01]) {
+      await flyer.settle({eye: [40, 0, 300], direction: [0, 0.01, -1], error});
+      seen.push(await flyer.profile(from, to, axis));
+    }
+    assert.deepEqual(seen[0], seen[1]);
+    const [{metres, level, points}] = seen, aside = axis === 2 ? 1 : 2;
+    const length = Math.hypot(to[0] - from[0], to[aside] - from[aside]);
+    assert.ok(Math.abs(metres - length) < 1e-9, `${metres} for ${length}`);
+    assert.equal(level, 0);
+    // All points of the store, one by one.
+    const [dx, dy] = [(to[0] - from[0]) / length, (to[aside] - from[aside]) / length];
+    const expected = readFileSync(join(sites.folder, `${name}.csv`), 'utf8').trim().split('\n').slice(1).flatMap(line => {
+      const p = line.split(',').map(Number), [u, v] = [p[0] - from[0], p[aside] - from[aside]];
+      const along = u * dx + v * dy, off = Math.abs(v * dx - u * dy);
+      return along >= 0 && along <= length && off <= 0.01 * length ? [[along / length, p[axis]]] : [];
+    }).sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+    assert.ok(expected.length > 200, `${expected.length} points`);
+    assert.equal(points.length, expected.length);
+    points.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+    points.forEach(([share, height], i) => assert.ok(Math.hypot(share - expected[i][0], height - expected[i][1]) < 1e-9));
   }
+});
+
+test('a place of a scan is told by the point of the store that is nearest', async () => {
+  const flyer = new Tested('ball');
+  await flyer.opened();
+  const all = readFileSync(join(sites.folder, 'ball.csv'), 'utf8').trim().split('\n').slice(1).map(line => line.split(',').map(Number));
+  for (const error of [1e6, 4]) {
+    await flyer.settle({eye: [40, 0, 0], direction: [-1, 0, 0], error});
+    for (const y of [-6, -2.5, 0, 3, 7]) {
+      const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, y, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
+      const far = p => Math.hypot(...p.map((c, k) => c - hit.stored[k]));
+      const found = await flyer.probe(hit.stored, hit.reach), least = Math.min(...all.map(far));
+      assert.ok(least <= hit.reach);
+      assert.ok(Math.abs(far([...found.stored]) - least) < 1e-9, `${far([...found.stored])} for ${least}`);
+      assert.equal(found.level, 0);
+    }
+  }
+});
+
+test('what a question lacks is fetched in a few rounds, and again after damage', async () => {
+  let damaged = 0;
+  const flyer = new Tested('hills', {
+    fault: (request, response) => {
+      if (request.cache === 'reload' || !request.range || !flyer?.questioned || damaged > 0) return response;
+      ++damaged;
+      return {...response, body: Buffer.from(response.body.map(byte => byte ^ 0x55))};
+    }
+  });
+  const {manifest} = await flyer.opened();
+  await flyer.settle({eye: [0, 0, 1e6], direction: [0, 0.001, -1], error: 1e6});
+  const before = flyer.log.length;
+  const {points} = await flyer.profile([10, 20, 0], [900, 950, 0], 2);
+  const waves = flyer.log.slice(before).filter(({unanswered}) => unanswered === 0).length;
+  assert.ok(points.every(([, height]) => Number.isFinite(height)) && points.length > 1000);
+  assert.ok(waves <= 60, `${waves} waves of requests`);
+  flyer.questioned = true;
+  const found = await flyer.probe([501.25, 17.5, 0], 0);
+  assert.equal(damaged, 1);
+  assert.equal(manifest.kind, 'grid');
+  assert.ok(found !== null);
 });
 
 test('the legend has the classes of all points, those of a store that does not say it as they come', async () => {

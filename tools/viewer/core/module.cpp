@@ -20,6 +20,7 @@
 #include <terrace/terrain/store_view.hpp>
 #include <unistd.h>
 
+#include "sample/store_probe.hpp"
 #include "scene.hpp"
 
 namespace {
@@ -40,6 +41,7 @@ struct Module {
   std::vector<double> numbers;
   std::string text, told;  // told: what the last frame lacked
   std::optional<viewer::SceneHit> hit;
+  std::optional<terrain::StoreProbe> probe;
 };
 
 Module& module() {
@@ -153,6 +155,7 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
     stream::LinearMap ground{};
     std::memcpy(ground.data(), m.input.data(), sizeof ground);
     if (!m.store) m.store = stream::Store::open("store", m.given.open());
+    m.probe.emplace(*m.store, ground);
     reserve_memory(kMemory + kPointMemory * static_cast<std::size_t>(max_points));
     m.scene =
         viewer::Scene::open(*m.store, ground, static_cast<std::size_t>(max_points),
@@ -248,7 +251,8 @@ TERRACE_EXPORT(hash) int terrace_hash() {
 }
 
 /// input: origin, direction, the angle. numbers: nothing met (0) or 1; stored place; place in the
-/// view frame; level; level and ordinal of the cluster; how many attributes are known, and these.
+/// view frame; level; level and ordinal of the cluster; reach; how many attributes are known, and
+/// these.
 TERRACE_EXPORT(pick) int terrace_pick() {
   return guarded([&] {
     Module& m = module();
@@ -266,6 +270,7 @@ TERRACE_EXPORT(pick) int terrace_pick() {
                    static_cast<double>(m.hit->level),
                    static_cast<double>(tri::level_of(m.hit->cluster)),
                    static_cast<double>(tri::ordinal_of(m.hit->cluster)),
+                   m.hit->reach,
                    static_cast<double>(m.hit->attributes.size())};
       m.numbers.insert(m.numbers.end(), m.hit->attributes.begin(), m.hit->attributes.end());
     }
@@ -273,19 +278,50 @@ TERRACE_EXPORT(pick) int terrace_pick() {
   });
 }
 
-/// input: two places in the view frame, the unit vector upward. numbers: how many points the
-/// profile between them has, and distance and height of each.
+#ifndef TERRACE_VIEWER_BODY
+/// input: a stored place, the reach. What the store holds there at full resolution, which depends
+/// on nothing that is drawn: of a raster its surface, else the nearest point within reach. numbers:
+/// nothing (0) or 1; stored place; place in the view frame; level; how many attributes, and these.
+TERRACE_EXPORT(probe) int terrace_probe() {
+  return guarded([&] {
+    Module& m = module();
+    const double* in = m.input.data();
+    const auto found = m.store->schema().grid ? m.probe->on_raster(in[0], in[1])
+                                              : m.probe->nearest(point_of(in), in[3]);
+    m.numbers = {0};
+    if (found) {
+      m.numbers = {1,
+                   found->stored[0],
+                   found->stored[1],
+                   found->stored[2],
+                   found->place[0],
+                   found->place[1],
+                   found->place[2],
+                   static_cast<double>(found->level),
+                   static_cast<double>(found->attributes.size())};
+      m.numbers.insert(m.numbers.end(), found->attributes.begin(), found->attributes.end());
+    }
+    return kDone;
+  });
+}
+
+/// input: two stored places, the axis upward. numbers: metres over ground; level; 1 if a raster is
+/// sampled; how many points the profile has, and share of the way and height of each.
 TERRACE_EXPORT(profile) int terrace_profile() {
   return guarded([&] {
     Module& m = module();
     const double* in = m.input.data();
-    const auto line = m.scene->profile(point_of(in), point_of(in + 3), point_of(in + 6));
-    m.numbers = {static_cast<double>(line.size())};
-    for (const auto& [distance, height] : line)
-      m.numbers.insert(m.numbers.end(), {distance, height});
+    const auto profile =
+        m.probe->profile(point_of(in), point_of(in + 3), static_cast<std::size_t>(in[6]));
+    m.numbers = {profile.metres, static_cast<double>(profile.level), profile.sampled ? 1.0 : 0.0,
+                 static_cast<double>(profile.points.size())};
+    for (const auto& [share, height] : profile.points) {
+      m.numbers.insert(m.numbers.end(), {share, height});
+    }
     return kDone;
   });
 }
+#endif
 
 /// Level and ordinal of a cluster. numbers: how many lines its outline has, and both ends of each.
 TERRACE_EXPORT(outline) int terrace_outline(unsigned level, double ordinal) {

@@ -37,8 +37,6 @@ class SceneOf final : public Scene {
   /// What the page takes for a slide, and for how long what has gone is drawn on: a little longer.
   /// What is drawn on and changes again and again ends in time, too.
   static constexpr double kSlide = 0.45, kWait = 0.5, kLongestWait = 3.0;
-  /// The strip whose points a profile shows, in lengths of the profile.
-  static constexpr double kProfileWidth = 0.02;
 
  public:
   using View = terrain::StoreView<Shown>;
@@ -121,8 +119,6 @@ class SceneOf final : public Scene {
   [[nodiscard]] std::uint64_t hash() const override { return mesh().hash(); }
   [[nodiscard]] std::optional<SceneHit> pick(const Point3& origin, const Point3& direction,
                                              double angle) const override;
-  [[nodiscard]] std::vector<std::array<double, 2>> profile(const Point3& from, const Point3& to,
-                                                           const Point3& up) const override;
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const override;
   void pin(const SceneHit& hit, tri::ViewPin how) override {
@@ -601,6 +597,10 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
       }
       told(vertices[nearest], stored,
            {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
+      const Point3 aside = difference(position(vertices[nearest]), hit->place);
+      // Positions are rounded to floats.
+      const Point3 size = difference(box().max, box().min);
+      hit->reach = 1.001 * std::sqrt(dot(aside, aside)) + 1e-6 * std::sqrt(dot(size, size));
       return hit;
     }
   }
@@ -615,59 +615,6 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     told(vertex, view_.stored(vertex), place);
   }
   return hit;
-}
-
-template <class Shown>
-std::vector<std::array<double, 2>> SceneOf<Shown>::profile(const Point3& from, const Point3& to,
-                                                           const Point3& up) const {
-  std::vector<std::array<double, 2>> line;
-  const Point3 way = difference(to, from);
-  const double rise = dot(way, up);
-  Point3 ahead{way[0] - rise * up[0], way[1] - rise * up[1], way[2] - rise * up[2]};
-  const double length = std::sqrt(dot(ahead, ahead));
-  if (!(length > 0)) return line;
-  for (double& c : ahead) c /= length;
-  const Point3 aside = cross(up, ahead);
-  // How far along the line, how far to its left, how high.
-  const auto seen = [&](tri::VertexId vertex) {
-    const Point3 p = position(vertex), d = difference(p, from);
-    return Point3{dot(d, ahead), dot(d, aside), dot(p, up)};
-  };
-  if constexpr (!kTriangles) {
-    for (const tri::VertexId vertex : mesh().all_vertices()) {
-      const auto [along, left, height] = seen(vertex);
-      if (along >= 0 && along <= length && std::abs(left) <= kProfileWidth / 2 * length)
-        line.push_back({along, height});
-    }
-    return line;
-  } else {
-    for (const tri::TriangleId triangle : mesh().all_triangles()) {
-      const auto corners = mesh().vertices(triangle);
-      const std::array<Point3, 3> at{seen(corners[0]), seen(corners[1]), seen(corners[2])};
-      // Where its edges meet the plane: the first and the last place.
-      std::array<double, 2> first{std::numeric_limits<double>::infinity(), 0}, last{-first[0], 0};
-      const auto meet = [&](double along, double height) {
-        first = std::min(first, {along, height});
-        last = std::max(last, {along, height});
-      };
-      for (std::size_t i = 0; i < 3; ++i) {
-        const Point3 &a = at[i], &b = at[(i + 1) % 3];
-        if (a[1] == 0) meet(a[0], a[2]);
-        if (!((a[1] < 0 && b[1] > 0) || (a[1] > 0 && b[1] < 0))) continue;
-        const double t = a[1] / (a[1] - b[1]);
-        meet(a[0] + t * (b[0] - a[0]), a[2] + t * (b[2] - a[2]));
-      }
-      if (!(first < last) || last[0] < 0 || first[0] > length || is_gap(triangle)) continue;
-      const auto cut = [&](const std::array<double, 2>& end) -> std::array<double, 2> {
-        const double along = std::clamp(end[0], 0.0, length);
-        if (along == end[0]) return end;
-        return {along, first[1] + (along - first[0]) / (last[0] - first[0]) * (last[1] - first[1])};
-      };
-      line.push_back(cut(first));
-      line.push_back(cut(last));
-    }
-  }
-  return line;
 }
 
 template <class Shown>

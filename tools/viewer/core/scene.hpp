@@ -77,6 +77,7 @@ struct SceneHit {
   stream::Point3 place{};            ///< the same in the view frame
   unsigned level = 0;                ///< of the nearest corner
   tri::ClusterId cluster{};          ///< whose member that corner is
+  double reach = 0;                  ///< on a surface: metres to that corner at most; of points 0
   std::vector<double> attributes{};  ///< of that corner, stored values; empty if no longer kept
 };
 
@@ -112,12 +113,6 @@ class Scene {
   /// cluster that it is a member of. They stay so until release().
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
-  /// The cut along the plane through two places of the view frame and the unit vector `up`, as
-  /// pairs of the distance over ground from the first place and the height, both in metres. Of
-  /// triangles the ends of a line each; of points those within 1 % of the length to either side.
-  /// O(what is drawn).
-  [[nodiscard]] virtual std::vector<std::array<double, 2>> profile(
-      const stream::Point3& from, const stream::Point3& to, const stream::Point3& up) const = 0;
   /// The lines, as slots of their ends, around the triangles whose corners all belong to a cluster:
   /// its head and what lies below it. Of points these themselves, each as both ends. Empty for
   /// clusters that are not expanded. O(what is drawn).

@@ -41,14 +41,35 @@ export interface Camera {
   level?: number;  ///< wanted everywhere, whatever the error
 }
 
+/// What was met of what is drawn.
 export interface Hit {
   stored: number[];
   place: number[];
   level: number;
   clusterLevel: number;
   clusterOrdinal: number;
+  reach: number;         ///< metres to the nearest corner; 0 for a point itself
   attributes: number[];  ///< stored values, in the manifest's order; empty if unknown
 }
+
+/// What the store holds at a place, whatever is drawn.
+export interface Found {
+  stored: number[];
+  place: number[];
+  level: number;  ///< 0: of all points; else of this level and above
+  attributes: number[];
+}
+
+/// A profile of the store, whatever is drawn, see StoreProbe::Profile.
+export interface Profile {
+  metres: number;
+  level: number;
+  sampled: boolean;
+  points: Array<[number, number]>;  ///< share of the way, height in the unit of the store
+}
+
+/// An answer, or what it lacks.
+export type Answer<T> = {missing: ByteRange[]}|{answer: T};
 
 /// What a store is shown as.
 export type Kind = 'raster'|'points'|'surface';
@@ -93,6 +114,7 @@ interface Exports {
   restore(time: number): number;
   hash(): number;
   pick(): number;
+  probe(): number;
   profile(): number;
   outline(level: number, ordinal: number): number;
   pin(how: number): number;
@@ -215,24 +237,32 @@ export class Core {
     this.writeNumbers([...origin, ...direction, angle]);
     this.check(this.wasm.pick());
     if (this.numbers(1)[0] === 0) return null;
-    const n = this.numbers(11);
+    const n = this.numbers(12);
     return {
       stored: n.slice(1, 4),
       place: n.slice(4, 7),
       level: n[7],
       clusterLevel: n[8],
       clusterOrdinal: n[9],
-      attributes: this.numbers(11 + n[10]).slice(11)
+      reach: n[10],
+      attributes: this.numbers(12 + n[11]).slice(12)
     };
   }
-  /// Distances and heights, in metres, of the cut between two places of the view frame: as Scene::profile() has it,
-  /// of rasters and points in order.
-  profile(from: number[], to: number[], up: number[]): Array<[number, number]> {
-    this.writeNumbers([...from, ...to, ...up]);
-    this.check(this.wasm.profile());
-    const n = this.numbers(1 + 2 * this.numbers(1)[0]);
-    const line = Array.from({length: n[0]}, (_, i): [number, number] => [n[1 + 2 * i], n[2 + 2 * i]]);
-    return this.kind === 'surface' ? line : line.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  /// Not in the module for surfaces, as profile().
+  probe(stored: number[], reach: number): Answer<Found|null> {
+    this.writeNumbers([...stored, reach]);
+    if (this.check(this.wasm.probe()) === MISSING) return {missing: this.missing()};
+    if (this.numbers(1)[0] === 0) return {answer: null};
+    const n = this.numbers(9);
+    return {answer: {stored: n.slice(1, 4), place: n.slice(4, 7), level: n[7], attributes: this.numbers(9 + n[8]).slice(9)}};
+  }
+  /// Between two stored places; axis: the coordinate that is upward.
+  profile(from: number[], to: number[], axis: number): Answer<Profile> {
+    this.writeNumbers([...from, ...to, axis]);
+    if (this.check(this.wasm.profile()) === MISSING) return {missing: this.missing()};
+    const [metres, level, sampled, count] = this.numbers(4), n = this.numbers(4 + 2 * count);
+    const points = Array.from({length: count}, (_, i): [number, number] => [n[4 + 2 * i], n[5 + 2 * i]]);
+    return {answer: {metres, level, sampled: sampled === 1, points}};
   }
   /// The ends, as slots, of the lines around a cluster.
   outline(level: number, ordinal: number): Uint32Array {

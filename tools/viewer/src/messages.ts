@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// What the page and the worker tell each other.
 
-import type {Camera, Changes, Hit, Opened, State} from './core';
+import type {Camera, Changes, Found, Hit, Opened, Profile, State} from './core';
 import type {Stats} from './ranges';
 import type {Listed, Manifest} from './store';
 
@@ -14,7 +14,9 @@ export type ToWorker =
     |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
     |{type: 'pin', how: number}
-    |{type: 'profile', id: number, from: number[], to: number[], up: number[]}
+    /// Of the store itself: what is missing is fetched. A profile takes the place of one that waits.
+    |{type: 'probe', id: number, stored: number[], reach: number}
+    |{type: 'profile', id: number, from: number[], to: number[], axis: number}
     |{type: 'outline', level: number, ordinal: number}
     |{type: 'hash', id: number}
     |{type: 'retry'};
@@ -26,7 +28,8 @@ export type FromWorker =
     |{type: 'opened', manifest: Manifest, scene: Opened, heightUnit: number}  ///< heightUnit: of the store, in metres
     |{type: 'frame', serial: number, state: State, changes: Changes, stats: Stats, milliseconds: number, loading: boolean, time: number}
     |{type: 'picked', id: number, hit: Hit|null}
-    |{type: 'profiled', id: number, line: Array<[number, number]>}
+    |{type: 'probed', id: number, found: Found|null}
+    |{type: 'profiled', id: number, profile: Profile}
     |{type: 'classes', classes: number[]}  ///< more have come
     |{type: 'outlined', lines: Uint32Array}
     |{type: 'hashed', id: number, hash: string}

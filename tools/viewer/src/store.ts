@@ -75,3 +75,17 @@ export function worldPoint(manifest: Manifest, stored: number[]): number[] {
     stored[2] * z.scale + z.offset
   ];
 }
+
+/// Metres along the line that is straight in longitude and latitude between two places of the CRS, on the ellipsoid of WGS 84;
+/// null where coordinates are not degrees.
+export function wayOnEarth(manifest: Manifest, from: number[], to: number[]): number|null {
+  if (!manifest.crs.geographic || manifest.crs.horizontal_unit !== 'degree') return null;
+  const PIECES = 256, RADIUS = 6378137, SQUARE = 0.00669437999014;  // of the eccentricity
+  const degree = Math.PI / 180, east = (to[0] - from[0]) * degree / PIECES, north = (to[1] - from[1]) * degree / PIECES;
+  let metres = 0;
+  for (let i = 0; i < PIECES; ++i) {
+    const latitude = from[1] * degree + (i + 0.5) * north, w = Math.sqrt(1 - SQUARE * Math.sin(latitude) ** 2);
+    metres += Math.hypot(RADIUS * (1 - SQUARE) / w ** 3 * north, RADIUS / w * Math.cos(latitude) * east);
+  }
+  return metres;
+}

@@ -2,11 +2,11 @@
 /// The page: what the user does goes to the camera and the worker, what comes back to the renderer.
 
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
-import {type Hit, type Kind, type Opened, VERTEX_BYTES} from './core';
+import {type Hit, type Kind, type Opened, type Profile, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {classColour, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
 import {type Colour, COLOURS, type Look, Renderer} from './render';
-import {type Listed, type Manifest, worldPoint} from './store';
+import {type Listed, type Manifest, wayOnEarth, worldPoint} from './store';
 
 const phone = matchMedia('(max-width: 640px)');
 const touch = matchMedia('(pointer: coarse)').matches;
@@ -53,6 +53,12 @@ function fail(message: string, again = true): void {
   element('retry').hidden = !again;
 }
 
+/// A place that was clicked: what was met of what is drawn, until the store has told what it holds there.
+interface Place extends Hit {
+  state: 'asked'|'known'|'none';
+  of: number;  ///< it is that of the points of this level and above
+}
+
 /// Starts a worker, which begins to fetch a store. choose: as in ToWorker.
 function launch(name: string, choose: boolean, asPoints: boolean): Worker {
   const worker = new Worker('worker.js'), base = new URL('.', document.baseURI).href;
@@ -80,10 +86,11 @@ class Viewer {
   private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
   private picks = new Map<number, (hit: Hit|null) => void>();
   private hashes = new Map<number, (hash: string) => void>();
-  private profiles = new Map<number, (line: Array<[number, number]>) => void>();
+  private probes = new Map<number, Place>();  ///< that the store is asked for
+  private profile = 0;  ///< the last that was asked for
   private level = 255;  ///< shown everywhere; 255: none
   private size = 0;     ///< of points, in pixels, that the user or the link chose
-  private detailTimer = 0;  ///< of profile and outline, which follow the surface
+  private outlineTimer = 0;  ///< the outline follows the surface
   private next = 0;
   private serial = 0;  ///< of the last view
   private redraw = true;
@@ -91,8 +98,8 @@ class Viewer {
   private status: FromWorker&{type: 'frame'}|null = null;
   private frameTime = 16;
   private lastDrawn = 0;
-  private hit: Hit|null = null;
-  private before: Hit|null = null;
+  private hit: Place|null = null;
+  private before: Place|null = null;
   private pointer: [number, number] = [0, 0];  ///< over the picture; the middle if it is not
   private linkTimer = 0;
   private pivotTimer = 0;
@@ -238,7 +245,7 @@ class Viewer {
         if (this.kind !== 'points' && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
         this.renderer.apply(message.state, message.changes, this.now);
         this.status = message;
-        if (this.hit && message.changes.vertexBlocks.length > 0) this.followSurface(400);
+        if (this.hit && message.changes.vertexBlocks.length > 0) this.askOutline(400);
         element('progress').hidden = true;
         requestAnimationFrame(showPanels);
         this.redraw = true;
@@ -249,17 +256,26 @@ class Viewer {
         this.picks.get(message.id)?.(message.hit);
         this.picks.delete(message.id);
         break;
-      case 'profiled':
-        this.profiles.get(message.id)?.(message.line);
-        this.profiles.delete(message.id);
+      case 'probed': {
+        const place = this.probes.get(message.id), found = message.found;
+        this.probes.delete(message.id);
+        if (!place) break;
+        place.state = found ? 'known' : 'none';
+        if (found) Object.assign(place, {stored: found.stored, place: found.place, of: found.level, attributes: found.attributes});
+        this.describePlace();
+        if (this.kind === 'surface') this.askProfile();
         break;
-      case 'outlined':
-        this.renderer.outline(this.hit ? message.lines : new Uint32Array());
-        this.redraw = true;
+      }
+      case 'profiled':
+        if (message.id === this.profile) this.showProfile(message.profile);
         break;
       case 'classes':
         this.colours.classes = message.classes;
         this.legend();
+        break;
+      case 'outlined':
+        this.renderer.outline(this.hit ? message.lines : new Uint32Array());
+        this.redraw = true;
         break;
       case 'hashed':
         this.hashes.get(message.id)?.(message.hash);
@@ -387,41 +403,53 @@ class Viewer {
 
   // ---- A place ---------------------------------------------------------------------------------
 
+  /// What is drawn is coarser than the store: the store is asked for the height of a raster's place and for the point nearest to
+  /// a place of a scan. Until it has answered they are not shown.
   private showPlace(hit: Hit|null): void {
     this.before = this.hit;
-    this.hit = hit;
     if (!hit || !this.manifest) return this.closePlace();
-    const crs = this.manifest.crs;
-    const world = worldPoint(this.manifest, hit.stored);
+    this.hit = {...hit, state: this.kind === 'points' ? 'known' : 'asked', of: 0};
+    if (this.hit.state === 'asked') {
+      const id = ++this.next;
+      this.probes.set(id, this.hit);
+      this.tell({type: 'probe', id, stored: hit.stored, reach: hit.reach});
+    }
+    element('place').hidden = false;
+    element('profile').hidden = true;
+    this.describePlace();
+    this.askOutline(0);
+    this.askProfile();
+  }
+  private describePlace(): void {
+    const {hit, before, manifest} = this;
+    if (!hit || !manifest) return;
+    const crs = manifest.crs, known = hit.state === 'known', waits = hit.state === 'none' ? 'no data' : 'reading';
+    const about = hit.of > 0 ? 'about ' : '';
+    const world = worldPoint(manifest, hit.stored);
     const place = (n: number) => crs.geographic ? n.toFixed(6) : this.plain(n, 2);
-    const rows: Array<[string, string]> = this.scan ? world.map((c, i): [string, string] => ['XYZ'[i], this.plain(c)]) : [
-      [crs.geographic ? 'Longitude' : 'East', place(world[0])],
-      [crs.geographic ? 'Latitude' : 'North', place(world[1])],
-      ['Height', `${this.plain(world[2], 2)}${this.unit}`]
-    ];
+    const rows: Array<[string, string]> =
+        this.scan ? world.map((c, i): [string, string] => ['XYZ'[i], known ? `${about}${this.plain(c)}` : waits]) : [
+          [crs.geographic ? 'Longitude' : 'East', place(world[0])],
+          [crs.geographic ? 'Latitude' : 'North', place(world[1])],
+          ['Height', known ? `${about}${this.plain(world[2], 2)}${this.unit}` : waits]
+        ];
     // As the command takes it: --cluster L:N.
     rows.push(['Level', `${hit.level}`], ['Cluster', `${hit.clusterLevel}:${hit.clusterOrdinal}`]);
     if (crs.epsg) rows.push(['CRS', `EPSG:${crs.epsg}`]);
-    this.manifest.attributes.forEach((channel, i) => {
-      if (i >= hit.attributes.length) return;
+    manifest.attributes.forEach((channel, i) => {
+      if (!known || i >= hit.attributes.length) return;
       const value = hit.attributes[i] * channel.scale + channel.offset;
       const named = channel.name === 'classification' && CLASSES[value] ? ` ${CLASSES[value]}` : '';
       rows.push([channel.name.replaceAll('_', ' '), `${Number(value.toPrecision(channel.type === 'float32' ? 7 : 12))}${named}`]);
     });
-    if (this.before) {
-      const way = add(hit.place as Vec3, this.before.place as Vec3, -1);
-      rows.push(['From the last', this.scan ? this.plain(length(way)) : `${this.ground(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${this.height(Math.abs(way[2]))}`]);
+    if (before && before.state !== 'asked' && hit.state !== 'asked') {
+      const way = add(hit.place as Vec3, before.place as Vec3, -1), both = known && before.state === 'known';
+      const over = wayOnEarth(manifest, worldPoint(manifest, before.stored), world) ?? Math.hypot(way[0], way[1]);
+      const rise = both ? `, ${way[2] < 0 ? '−' : '+'}${this.height(Math.abs(way[2]))}` : '';
+      rows.push(['From the last', this.scan ? this.plain(length(way)) : this.ground(over) + rise]);
     }
-    element('place-text').replaceChildren(...rows.flatMap(([name, value]) => {
-      const dt = document.createElement('dt'), dd = document.createElement('dd');
-      dt.textContent = name;
-      dd.textContent = value;
-      return [dt, dd];
-    }));
-    element('place').hidden = false;
-    element('profile').hidden = true;
+    element('place-text').replaceChildren(...rows.flatMap(([name, value]) => [make('dt', '', name), make('dd', '', value)]));
     this.redraw = true;
-    this.followSurface(0);
   }
   /// A number to a hundred-thousandth of the store's size, with so many digits at least.
   private plain(n: number, least = 0): string {
@@ -448,51 +476,63 @@ class Viewer {
   }
   private closePlace(): void {
     this.hit = this.before = null;
+    this.probes.clear();
+    this.profile = 0;
     element('place').hidden = true;
     this.renderer.outline(new Uint32Array());
     this.redraw = true;
   }
-  /// Outline and profile of the places, by the surface as it is after so many milliseconds.
-  private followSurface(delay: number): void {
-    if (this.detailTimer !== 0 && delay > 0) return;
-    clearTimeout(this.detailTimer);
-    this.detailTimer = window.setTimeout(() => {
-      this.detailTimer = 0;
-      if (!this.hit) return;
-      this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
-      if (this.before) void this.showProfile(this.before.place, this.hit);
+  /// The outline of the cluster, by the surface as it is after so many milliseconds.
+  private askOutline(delay: number): void {
+    if (this.outlineTimer !== 0 && delay > 0) return;
+    clearTimeout(this.outlineTimer);
+    this.outlineTimer = window.setTimeout(() => {
+      this.outlineTimer = 0;
+      if (this.hit) this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
     }, delay);
   }
-  private async showProfile(from: number[], {place: to, stored}: Hit): Promise<void> {
-    const axis = this.scan && this.camera.yUp ? 1 : 2;
-    const line = await new Promise<Array<[number, number]>>(resolve => {
-      const id = ++this.next;
-      this.profiles.set(id, resolve);
-      this.tell({type: 'profile', id, from, to, up: [0, axis === 1 ? 1 : 0, axis === 2 ? 1 : 0]});
-    });
-    element('profile').hidden = line.length < 2 || !this.before;
-    if (line.length < 2) return;
-    const heights = line.map(point => point[1]);
-    const low = heights.reduce((a, b) => Math.min(a, b)), high = heights.reduce((a, b) => Math.max(a, b));
-    const length = line.reduce((most, [d]) => Math.max(most, d), 0) || 1, rise = high - low || 1;
-    const path = line.map(([d, h]) => `${(256 * d / length).toFixed(2)},${(80 - 76 * (h - low) / rise).toFixed(2)}`);
+  /// The profile of the store between the places, which does not depend on what is drawn.
+  private askProfile(): void {
+    const {hit, before} = this;
+    if (!hit || !before || (this.kind === 'surface' && !(hit.state === 'known' && before.state === 'known'))) return;
+    this.profile = ++this.next;
+    this.tell({type: 'profile', id: this.profile, from: before.stored, to: hit.stored, axis: this.scan && this.camera.yUp ? 1 : 2});
+  }
+  private showProfile(profile: Profile): void {
+    const {hit, before, manifest} = this;
+    const heights = profile.points.map(point => point[1]).filter(h => !Number.isNaN(h));
+    element('profile').hidden = heights.length < 2 || !before;
+    if (heights.length < 2 || !hit || !before || !manifest) return;
+    const low = heights.reduce((a, b) => Math.min(a, b)), high = heights.reduce((a, b) => Math.max(a, b)), rise = high - low || 1;
+    const at = ([t, h]: [number, number]) => `${(256 * t).toFixed(2)},${(80 - 76 * (h - low) / rise).toFixed(2)}`;
+    // The ground down to the bottom, in parts between voids; or the points.
+    let path = '', part: Array<[number, number]> = [];
+    const close = () => {
+      if (part.length > 1) path += `M${(256 * part[0][0]).toFixed(2)},84 L${part.map(at).join(' ')} L${(256 * part[part.length - 1][0]).toFixed(2)},84 Z`;
+      part = [];
+    };
+    for (const point of profile.points) {
+      if (this.kind !== 'raster') {
+        path += `M${at(point)}h0`;
+      } else if (Number.isNaN(point[1])) {
+        close();
+      } else {
+        part.push(point);
+      }
+    }
+    close();
     const shape = document.createElementNS('http://www.w3.org/2000/svg', 'path');
-    // The ground down to the bottom; the points; or the cut of a body, triangle by triangle.
-    shape.setAttribute('class', this.kind);
-    shape.setAttribute('d', {
-      raster: () => `M0,84 L${path.join(' ')} L256,84 Z`,
-      points: () => path.map(at => `M${at}h0`).join(''),
-      surface: () => path.map((at, i) => (i % 2 ? 'L' : 'M') + at).join('')
-    }[this.kind]());
+    shape.setAttribute('class', this.kind === 'raster' ? 'raster' : 'points');
+    shape.setAttribute('d', path);
     element('profile-plot').replaceChildren(shape);
-    // The view frame counts Y from the middle of the store.
-    const above = axis === 1 ? worldPoint(this.manifest!, stored)[1] - to[1] : 0;
     // As many digits as tell the lowest from the highest.
     const digits = Math.min(12, Math.max(0, 2 - Math.floor(Math.log10(rise))));
-    const at = (n: number) => this.scan ? (n + above).toFixed(digits) : this.height(n);
-    element('profile-low').textContent = `${at(low)} lowest`;
-    element('profile-length').textContent = this.scan ? `${Number(length.toPrecision(3))}` : this.ground(length);
-    element('profile-high').textContent = `${at(high)} highest`;
+    const about = profile.level > 0 || profile.sampled ? 'about ' : '';
+    const told = (h: number) => `${about}${this.scan ? h.toFixed(digits) : `${rounded(h)}${this.unit}`}`;
+    const metres = wayOnEarth(manifest, worldPoint(manifest, before.stored), worldPoint(manifest, hit.stored)) ?? profile.metres;
+    element('profile-low').textContent = `${told(low)} lowest`;
+    element('profile-length').textContent = this.scan ? `${Number(metres.toPrecision(4))}` : this.ground(metres);
+    element('profile-high').textContent = `${told(high)} highest`;
   }
   private showMark(): void {
     this.showMarkAt('mark', this.hit);
@@ -686,6 +726,7 @@ class Viewer {
       element(yUp ? 'up-y' : 'up-z').addEventListener('change', () => {
         this.camera.yUp = yUp;
         this.fit();
+        this.askProfile();
         this.legend();
       });
     }

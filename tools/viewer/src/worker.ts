@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The worker: the core, the bytes that it lacks, and a frame whenever there is something to do.
 
-import {type Camera, type Changes, Core, CoreError, type Kind, VERTEX_BYTES} from './core';
+import {type Answer, type ByteRange, type Camera, type Changes, Core, CoreError, type Kind, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {FetchFault, fetchWhole, Ranges} from './ranges';
 import {type Listed, type Manifest, parseManifest, parseStart} from './store';
@@ -42,6 +42,10 @@ class Session {
   private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< of a scan
   private givenBytes = 0;
   private ranges!: Ranges;
+  private probing!: Ranges;  ///< what questions about the store lack
+  /// Those that wait for an answer; each tries to give it and returns what it lacks.
+  private questions: Array<{type: string, answer: () => Answer<void>}> = [];
+  private lacking: ByteRange[] = [];  ///< by the first of them
   private classes = new Set<number>();  ///< of the points, as far as they are known
   private classKind: Kind|null = null;  ///< in which points have classes
   private manifest!: Manifest;
@@ -82,10 +86,17 @@ class Session {
       this.ground = start.ground;
       for (const [name, size] of this.manifest.files) this.core.addFile(name, size);
       for (const part of start.parts) this.give(part.file, part.offset, part.data);
-      this.ranges = new Ranges(
+      const ranges = (give: (file: string, offset: number, data: Uint8Array) => void, ended: () => void) => new Ranges(
           this.at(`stores/${encodeURIComponent(this.request.name)}/`), this.request.query, this.manifest.files,
-          (range, data) => this.give(range.file, range.offset, data), fault => this.fail(fault.message),
-          () => this.wake());
+          (range, data) => give(range.file, range.offset, data), fault => this.fail(fault.message), ended);
+      this.ranges = ranges((file, offset, data) => this.give(file, offset, data), () => this.wake());
+      this.probing = ranges(
+          (file, offset, data) => {
+            this.points.give(file, offset, data);
+            const end = offset + data.length;
+            this.lacking = this.lacking.filter(range => range.file !== file || range.offset < offset || range.offset + range.bytes > end);
+          },
+          () => this.lacking.length > 0 ? this.fetchLacking() : this.reply());
       for (const group of start.classes ?? []) this.classes.add(group);
       this.ranges.stats.requests = 1;
       this.ranges.stats.bytes = bytes.length;
@@ -125,8 +136,9 @@ class Session {
       return;
     }
     this.damaged = 0;
-    this.ranges.distrust();
+    this.distrust();
     this.wake();
+    this.reply();
   }
   view(camera: Camera, serial: number): void {
     clearTimeout(this.restTimer);
@@ -143,8 +155,11 @@ class Session {
     const hit = this.opened ? this.core.pick(request.origin, request.direction, request.angle) : null;
     post({type: 'picked', id: request.id, hit});
   }
-  profile(request: ToWorker&{type: 'profile'}): void {
-    post({type: 'profiled', id: request.id, line: this.opened ? this.core.profile(request.from, request.to, request.up) : []});
+  probe({id, stored, reach}: ToWorker&{type: 'probe'}): void {
+    this.ask('probe', () => this.points.probe(stored, reach), found => post({type: 'probed', id, found}));
+  }
+  profile({id, from, to, axis}: ToWorker&{type: 'profile'}): void {
+    this.ask('profile', () => this.points.profile(from, to, axis), profile => post({type: 'profiled', id, profile}));
   }
   outline(request: ToWorker&{type: 'outline'}): void {
     if (this.opened) post({type: 'outlined', lines: this.core.outline(request.level, request.ordinal)});
@@ -167,10 +182,46 @@ class Session {
     post({type: 'hashed', id, hash: this.opened ? this.core.hash() : ''});
   }
 
+  private ask<T>(type: string, attempt: () => Answer<T>, tell: (answer: T) => void): void {
+    if (type === 'profile') this.questions = this.questions.filter(question => question.type !== type);
+    this.questions.push({
+      type,
+      answer: () => {
+        const result = attempt();
+        if ('missing' in result) return result;
+        tell(result.answer);
+        return {answer: undefined};
+      }
+    });
+    this.reply();
+  }
+  /// Answers what can be answered, and fetches what the next answer lacks.
+  private reply(): void {
+    while (this.questions.length > 0 && !this.failed) {
+      try {
+        const result = this.questions[0].answer();
+        if ('missing' in result) {
+          this.lacking = result.missing;
+          return this.fetchLacking();
+        }
+        this.questions.shift();
+      } catch (error) {
+        this.suspect(error as Error);
+      }
+    }
+  }
+  private fetchLacking(): void {
+    if (!this.failed) this.probing.want(this.lacking, 0, performance.now());
+  }
+  private distrust(): void {
+    this.ranges.distrust();
+    this.probing.distrust();
+  }
   private fail(message: string): void {
     if (this.failed) return;
     this.failed = true;
     this.ranges?.stop();
+    this.probing?.stop();
     post({type: 'failed', message});
   }
   private wake(): void {
@@ -202,7 +253,7 @@ class Session {
       this.points.forget(name);
       this.surface?.forget(name);
     }
-    this.ranges.distrust();
+    this.distrust();
     this.schedule();
   }
   private give(file: string, offset: number, data: Uint8Array): void {
@@ -313,7 +364,10 @@ class Session {
           serial: this.serial,
           state,
           changes,
-          stats: {...this.ranges.stats},
+          stats: {
+            requests: this.ranges.stats.requests + this.probing.stats.requests,
+            bytes: this.ranges.stats.bytes + this.probing.stats.bytes
+          },
           milliseconds,
           loading: !state.settled,
           time: begin / 1000
@@ -340,6 +394,9 @@ self.onmessage = event => {
       break;
     case 'pick':
       session?.pick(message);
+      break;
+    case 'probe':
+      session?.probe(message);
       break;
     case 'profile':
       session?.profile(message);
