@@ -19,13 +19,13 @@
 #include <terrace/stream/spatial_order.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/damage_report.hpp"
 #include "base/progress_report.hpp"
 #include "base/stored_entities.hpp"
-#include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
 #include "build/clustering.hpp"
+#include "build/damage_report.hpp"
 #include "build/joined_longitudes.hpp"
+#include "build/undeclared_voids.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/latitudes.hpp"
@@ -192,8 +192,8 @@ void check_cells(const stream::SourceInfo& info) {
                 " cannot be told apart: steps of " + number_text(std::hypot(m[0], m[3])) + " x " +
                 number_text(std::hypot(m[1], m[4])) + " from " + number_text(m[2]) + ", " +
                 number_text(m[5]),
-       .remedy = info.grid ? "correct the size of its cells: gdal_edit.py -a_ullr"
-                           : "correct the scale of its coordinates"});
+       .remedy =
+           info.grid ? "correct the size of its cells" : "correct the scale of its coordinates"});
 }
 
 /// The first points of a source.

@@ -11,10 +11,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/damage_report.hpp"
 #include "base/ordered_work.hpp"
-#include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
+#include "build/damage_report.hpp"
+#include "build/undeclared_voids.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"

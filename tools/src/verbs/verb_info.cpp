@@ -13,8 +13,8 @@
 #include <CLI/CLI.hpp>
 
 #include "base/stored_entities.hpp"
-#include "base/undeclared_voids.hpp"
 #include "base/units.hpp"
+#include "build/undeclared_voids.hpp"
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_names.hpp"
