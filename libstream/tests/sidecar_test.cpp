@@ -186,10 +186,10 @@ TEST_F(Sidecars, TheNodataValueOfAuxXmlReplacesThatOfAGeoTiff) {
   for (const Point3& p : all.points.positions) heights.push_back(p[2]);
   std::sort(heights.begin(), heights.end());
   EXPECT_EQ(heights, (std::vector<double>{1, 2, 3, 4, 6, 7, 8, 9}));
-  // All that differs is said.
-  for (const char* const what : {"nodata value", "place", "CRS", "scale and offset"}) {
-    EXPECT_NE(all.info.note.find(std::string("its ") + what + " differs"), std::string::npos)
-        << what << ": " << all.info.note;
+  // A note names all that differs.
+  for (const char* const words : {"its nodata value overrides", "its place overrides",
+                                  "its CRS overrides", "its scale does not count"}) {
+    EXPECT_NE(all.info.note.find(words), std::string::npos) << words << ": " << all.info.note;
   }
   put("f.tif.aux.xml",
       "<PAMDataset><SRS>EPSG:32632</SRS><GeoTransform>100,10,0,200,0,-10</GeoTransform>"
@@ -205,8 +205,9 @@ TEST_F(Sidecars, OtherFormatsKeepWhatTheySay) {
   const AllPoints all = read_file(path("h.asc"));
   EXPECT_EQ(all.points.size(), 8U);
   EXPECT_EQ(all.info.nodata, 4);
-  EXPECT_NE(all.info.note.find("its nodata value differs"), std::string::npos) << all.info.note;
-  EXPECT_NE(all.info.note.find("the file counts"), std::string::npos) << all.info.note;
+  EXPECT_NE(all.info.note.find("its nodata value does not count"), std::string::npos)
+      << all.info.note;
+  EXPECT_NE(all.info.note.find("the file has its own"), std::string::npos) << all.info.note;
   // What a file does not say is added, without a note.
   put("g.asc.aux.xml",
       "<PAMDataset><PAMRasterBand band='1'><NoDataValue>5</NoDataValue>"

@@ -127,13 +127,14 @@ class WithAuxXml final : public Raster {
  private:
   static constexpr std::uint64_t kStripRows = 256;
 
-  /// Whether what the sidecar says counts, of something that the file may say as well. Notes that
-  /// the two differ.
+  /// Whether the sidecar counts in something that the file may say as well. Notes the choice if the
+  /// two differ.
   bool takes(bool file_says_it, bool differs, bool overrides, const std::string& what) {
     if (!file_says_it) return true;
     if (differs) {
-      info_.notes.push_back(sidecar_ + ": its " + what + " differs from that of the file; " +
-                            (overrides ? "the sidecar" : "the file") + " counts, as in GDAL");
+      info_.notes.push_back(sidecar_ + ": its " + what +
+                            (overrides ? " overrides that of the file, as in GDAL"
+                                       : " does not count, as in GDAL: the file has its own"));
     }
     return overrides;
   }
@@ -195,7 +196,7 @@ class WithAuxXml final : public Raster {
     const double scale = number("Scale", 1), offset = number("Offset", 0);
     if (scale != 0 && (scale != 1 || offset != 0) &&
         takes(sample.scale != 1 || sample.offset != 0,
-              scale != sample.scale || offset != sample.offset, false, "scale and offset")) {
+              scale != sample.scale || offset != sample.offset, false, "scale")) {
       sample.scale = scale;
       sample.offset = offset;
     }

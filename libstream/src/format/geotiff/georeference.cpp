@@ -94,7 +94,7 @@ void compare_with_world_file(const std::string& file, RasterInfo& info) {
   }
   if (!beside) return;
   const auto &m = info.world.xy, &n = beside->world.xy;
-  const double cell = std::max(std::hypot(m[0], m[3]), std::hypot(m[1], m[4]));
+  const double cell = std::max({std::abs(m[0]), std::abs(m[1]), std::abs(m[3]), std::abs(m[4])});
   double most = 0;
   for (const double c : {0.0, static_cast<double>(info.columns)}) {
     for (const double r : {0.0, static_cast<double>(info.rows)}) {

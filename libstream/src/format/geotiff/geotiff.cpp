@@ -111,7 +111,7 @@ class GeoTiffRaster final : public Raster {
                                "a nodata value: gdalwarp -dstnodata");
     }
     if (nodata_.unmatched) {
-      info_.comments.push_back("nodata " + nodata_text_ + " is no value of type " +
+      info_.comments.push_back("nodata " + nodata_text_ + " is not a value of type " +
                                std::string(name_of(layout_.type)));
     }
     info_.comments.insert(info_.comments.end(), keys.faults().begin(), keys.faults().end());
