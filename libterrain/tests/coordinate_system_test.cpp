@@ -329,6 +329,14 @@ TEST(CoordinateSystem, TextThatTakesLongToReadIsRefused) {
   const std::string members = "{\"type\":\"GeographicCRS\",\"datum_ensemble\":{\"members\":[" +
                               repeated("{\"name\":\"a\"},", 3000) + "1]}}";
   EXPECT_NE(refusal(members).find("too many parts"), std::string::npos);
+  // Wherever text comes from: a file's WKT, ESRI's citation in GeoTIFF, the caller.
+  stream::Crs crs;
+  crs.wkt = members;
+  EXPECT_THROW(definition_of(crs), CrsError);
+  crs = {};
+  crs.name = "ESRI PE String = " + members;
+  EXPECT_THROW(definition_of(crs), CrsError);
+  EXPECT_THROW(CoordinateSystem::parse(members), UsageError);
   // Brackets in quotes are text.
   EXPECT_EQ(refusal("{\"type\":\"" + repeated("[\\\"", 600)).find("parts"), std::string::npos);
 }
