@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 41> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 42> kOptions{{
     {"align", "--align"},
     {"band", "--band"},
     {"block_points", "--block"},
