@@ -445,6 +445,30 @@ TEST_F(Las, WhatDoesNotFitIsRefused) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
+TEST_F(Las, FilesWhoseCrsDiffersGoTogetherIfTheCallerSaysSo) {
+  LasParts parts{.points = 1, .records = std::string(28, '\0')};
+  std::vector<std::string> files;
+  for (const char* const wkt :
+       {"PROJCS[\"a\"]", "PROJCS[\"b\"]", "PROJCS[\"b\"]", "PROJCS[\"c\"]"}) {
+    LasParts one = parts;
+    one.add_vlr("LASF_Projection", 2112, wkt);
+    files.push_back(
+        write_text(folder_.path() / (std::to_string(files.size()) + ".las"), one.bytes()));
+  }
+  const auto read = [&](const SourceOptions& options) { read_all(files, options); };
+  EXPECT_NE(error_of([&] { read({}); }).find("1.las"), std::string::npos);
+  int asked = 0;
+  SourceOptions options;
+  options.same_crs = [&asked](const Crs& a, const Crs& b) {
+    ++asked;
+    return a.wkt.find("\"a\"") != a.wkt.npos && b.wkt.find("\"c\"") == b.wkt.npos;
+  };
+  EXPECT_NE(error_of([&] { read(options); }).find("3.las"), std::string::npos);
+  EXPECT_EQ(asked, 2);  // of each description once
+  files.pop_back();
+  EXPECT_EQ(read_all(files, options).points.size(), 3u);
+}
+
 // The header's box may be wrong: it selects nothing.
 TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
   LasParts parts{.points = 1, .records = std::string(28, '\0')};

@@ -123,6 +123,43 @@ TEST(CoordinateSystem, WhatFilesAreGivenReadsBack) {
   EXPECT_TRUE(CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt.starts_with("PROJCS["));
 }
 
+/// One system as files spell it.
+TEST(CoordinateSystem, DescriptionsOfOneSystemAreTheSame) {
+  const CoordinateSystem utm = CoordinateSystem::parse("EPSG:25832");
+  const auto keys = [](std::vector<std::pair<std::uint16_t, double>> values) {
+    stream::Crs crs;
+    for (const auto& [key, value] : values) {
+      if (key == 3072) crs.epsg = static_cast<int>(value);
+      crs.geo_keys.push_back({.key = key, .values = {value}, .text = {}});
+    }
+    return crs;
+  };
+  std::string esri = utm.crs_with_wkt1().wkt, shifted = esri;
+  const std::size_t datum_end = shifted.find("]],PRIMEM");
+  ASSERT_NE(datum_end, shifted.npos);
+  shifted.insert(datum_end + 1, ",TOWGS84[0,0,0,0,0,0,0]");
+  for (std::size_t at = esri.find(",AUTHORITY"); at != esri.npos; at = esri.find(",AUTHORITY")) {
+    esri.erase(at, esri.find(']', at) + 1 - at);
+  }
+  const std::vector<stream::Crs> same{keys({{1024, 1}, {3072, 25832}}),
+                                      keys({{1024, 1}, {3072, 25832}, {3076, 9001}}),
+                                      {.wkt = utm.crs().wkt},
+                                      {.wkt = utm.crs_with_wkt1().wkt},
+                                      {.wkt = esri},
+                                      {.wkt = shifted},
+                                      utm.crs()};
+  for (const stream::Crs& a : same) {
+    for (const stream::Crs& b : same) EXPECT_TRUE(same_crs(a, b)) << a.wkt << '\n' << b.wkt;
+  }
+  for (const stream::Crs& other :
+       {CoordinateSystem::parse("EPSG:25833").crs(), CoordinateSystem::parse("EPSG:32632").crs(),
+        CoordinateSystem::parse("EPSG:25832+7837").crs(),
+        keys({{1024, 1}, {3072, 25832}, {3076, 9002}}), stream::Crs{}}) {
+    EXPECT_FALSE(same_crs(other, same.front())) << other.wkt;
+    EXPECT_FALSE(same_crs(same.back(), other)) << other.wkt;
+  }
+}
+
 TEST(CoordinateSystem, AGeocentricSystemIsNamedButHasNoTerrain) {
   const stream::Crs crs = crs_named("EPSG:4978");
   EXPECT_EQ(crs.epsg, 0);

@@ -9,6 +9,7 @@ import csv
 import json
 import os
 import random
+import re
 import shutil
 import struct
 import subprocess
@@ -273,6 +274,20 @@ class LasSurveyTest(LasCase):
         with open(self.path('odd.csv')) as file:
             rows = sorted(tuple(round(float(value), 6) for value in line.split(',')[:3]) for line in list(file)[1:])
         self.assertEqual(rows, sorted(Las(first).places() + Las(odd).places()))
+
+    def test_files_that_spell_one_crs_in_their_ways_make_a_store(self):
+        records = random_records(1, 20)
+        esri = re.sub(r',AUTHORITY\[[^]]*\]', '', UTM_WKT)
+        names = [self.put(f'{i}.las', las(1, records, vlrs=vlrs)) for i, vlrs in enumerate((
+            [geo_keys({1024: 1, 3072: 32633})], [geo_keys({1024: 1, 1025: 1, 3072: 32633, 3076: 9001})],
+            [wkt(UTM_WKT)], [wkt(esri)]))]
+        for first in names:
+            with self.subTest(first=first):
+                self.run_ok('build', first, *names, '-o', self.path('all.st'), '--force', '-q')
+                self.assertEqual(self.info(self.path('all.st'))['crs']['epsg'], 32633)
+                self.run_ok('convert', first, *names, '-o', self.path('all.xyz'), '--force', '-q')
+        other = self.put('other.las', las(1, records, vlrs=[geo_keys({1024: 1, 3072: 32632})]))
+        self.assertIn('reference system is not that of', self.refused('build', names[0], other, '-o', self.path('no.st')))
 
     def test_text_becomes_las_with_as_many_decimals_as_it_has(self):
         with open(self.path('p.csv'), 'w') as file:

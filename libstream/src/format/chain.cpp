@@ -2,12 +2,15 @@
 #include "format/chain.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "crs_agreement.hpp"
 #include "format/selection.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
@@ -37,7 +40,7 @@ std::string difference(const SourceInfo& first, const SourceInfo& other) {
   return "it has the attributes " + more + " where " + name + " has " + less;
 }
 
-void check_agreement(const SourceInfo& first, const SourceInfo& other) {
+void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreement& crs) {
   const auto refuse = [&](std::string cause,
                           std::string remedy = "convert one of them, or read them on their own") {
     throw Error({.file = other.files.front(),
@@ -53,7 +56,7 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other) {
   if (first.attributes != other.attributes) {
     refuse(difference(first, other), "`keep` what all files have, or read them on their own");
   }
-  if (first.crs != other.crs) {
+  if (!crs.agrees(other.crs)) {
     refuse("its coordinate reference system is not that of " + first.files.front(),
            "name the one that both have (`crs` of build), convert one of them, or read them on "
            "their own");
@@ -80,10 +83,15 @@ class Chain final : public PointSource {
       if (i == 0) {
         info_ = info;
         info_.octree.reset();
+        crs_.emplace(info.crs, options.same_crs);
       } else {
-        check_agreement(info_, info);
+        check_agreement(info_, info, *crs_);
         info_.files.push_back(part.file);
-        info_.comments.insert(info_.comments.end(), info.comments.begin(), info.comments.end());
+        const std::size_t room =
+            kMostComments - std::min<std::size_t>(kMostComments, info_.comments.size());
+        info_.comments.insert(info_.comments.end(), info.comments.begin(),
+                              info.comments.begin() + static_cast<std::ptrdiff_t>(
+                                                          std::min(room, info.comments.size())));
         if (info_.stated_bounds && info.stated_bounds) {
           info_.stated_bounds->include(*info.stated_bounds);
         } else {
@@ -116,7 +124,7 @@ class Chain final : public PointSource {
       if (!part.source) {
         part.source = open_one_(part.file, options_);
         if (narrowed_) part.source = narrowed(std::move(part.source));
-        check_agreement(info_, part.source->info());
+        check_agreement(info_, part.source->info(), *crs_);
       }
       if (part.source->next(block)) {
         delivered_ += block.size();
@@ -199,9 +207,13 @@ class Chain final : public PointSource {
     }
   }
 
+  /// Of all files together: thousands of them may have many each.
+  static constexpr std::size_t kMostComments = 1000;
+
   SourceOptions options_;
   OpenOne open_one_;
   SourceInfo info_;
+  std::optional<CrsAgreement> crs_;
   bool narrowed_ = false;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;

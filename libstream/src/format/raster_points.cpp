@@ -65,7 +65,7 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
     return open_one(file, raster);
   };
   return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs, kOpenAtOnce,
-                               options.memory_bytes - window),
+                               options.memory_bytes - window, options.same_crs),
                    options);
 }
 

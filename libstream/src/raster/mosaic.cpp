@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "crs_agreement.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
@@ -209,12 +210,13 @@ bool join_around(std::vector<Member>& members, const WorldTransform& world, std:
 class Mosaic final : public Raster {
  public:
   Mosaic(const std::vector<std::string>& files, RasterOpener opener, const std::optional<Crs>& crs,
-         std::size_t open_at_once, std::uint64_t open_bytes)
+         std::size_t open_at_once, std::uint64_t open_bytes, const SameCrs& same_crs)
       : opener_(std::move(opener)), open_at_once_(open_at_once), open_bytes_(open_bytes) {
     assert(!files.empty());
     std::optional<RasterInfo> first;
     double farthest = 0;
     std::string farthest_file;
+    std::optional<CrsAgreement> agreement;
     for (const std::string& file : files) {
       const std::unique_ptr<Raster> raster = opener_(file);
       // A member may be a part of its file.
@@ -225,9 +227,10 @@ class Mosaic final : public Raster {
       info.files = {file};
       if (!first) {
         first = info;
+        agreement.emplace(first->crs, same_crs);
       } else {
         check_samples(*first, info);
-        if (!crs) check_crs(*first, info);
+        if (!crs && !agreement->agrees(info.crs)) check_crs(*first, info);
       }
       double off = 0;
       members_.push_back(placed(*first, info, off));
@@ -377,8 +380,9 @@ class Mosaic final : public Raster {
 
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
                                     const RasterOpener& opener, const std::optional<Crs>& crs,
-                                    std::size_t open_at_once, std::uint64_t open_bytes) {
-  return std::make_unique<Mosaic>(files, opener, crs, open_at_once, open_bytes);
+                                    std::size_t open_at_once, std::uint64_t open_bytes,
+                                    const SameCrs& same_crs) {
+  return std::make_unique<Mosaic>(files, opener, crs, open_at_once, open_bytes, same_crs);
 }
 
 }  // namespace terrace::stream

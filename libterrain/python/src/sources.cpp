@@ -108,7 +108,8 @@ stream::Selection selection_of(const py::object& source, const py::dict& given,
 
 OpenSource opener_of(const py::object& source) {
   if (py::isinstance<py::list>(source)) {
-    return [names = source.cast<std::vector<std::string>>()](const stream::SourceOptions& options) {
+    return [names = source.cast<std::vector<std::string>>()](stream::SourceOptions options) {
+      options.same_crs = &terrain::same_crs;
       return stream::open_source(names, options);
     };
   }

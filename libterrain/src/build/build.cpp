@@ -326,6 +326,7 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
   source_options.heights_of_colour = request.heights_of_colour;
   source_options.cell = request.cell.value_or(0);
   source_options.crs = request.crs;
+  source_options.same_crs = &same_crs;
   source_options.threads = std::max(1U, context.threads);
   DamageReport damage;
   if (request.skip_damaged) source_options.on_damage = damage.taker();

@@ -192,6 +192,7 @@ class BuildCommand final : public Command {
             .heights_of_colour = request_.heights_of_colour,
             .cell = request_.cell.value_or(0),
             .crs = request_.crs,
+            .same_crs = &terrain::same_crs,
             .stop = stop_token()};
   }
 

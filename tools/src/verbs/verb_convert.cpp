@@ -55,6 +55,7 @@ class ConvertCommand : public Command {
                                   .memory_bytes = common.reading_memory(),
                                   .heights_of_colour = colours_,
                                   .cell = cell_.value_or(0),
+                                  .same_crs = &terrain::same_crs,
                                   .stop = stop_token(),
                                   .blocks_ahead = 8,
                                   .threads = common.threads};

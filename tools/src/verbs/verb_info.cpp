@@ -262,6 +262,7 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
       stream::open_source(files, {.format = format,
                                   .memory_bytes = common.reading_memory(),
                                   .heights_of_colour = colours,
+                                  .same_crs = &terrain::same_crs,
                                   .stop = stop_token(),
                                   .blocks_ahead = 8,
                                   .threads = common.threads});

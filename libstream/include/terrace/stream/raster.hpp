@@ -95,17 +95,18 @@ std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOption
 using RasterOpener = std::function<std::unique_ptr<Raster>(const std::string& file)>;
 
 /// Several rasters as one: where they overlap, the valid sample of the last named wins. They must
-/// agree in sample (type, scale, offset), cell size and phase (to kNearestCell) and in CRS, unless
-/// `crs` gives that of all. Files on both sides of the antimeridian are joined there, by longitudes
-/// beyond 180, if all together are then at most half a turn wide. Keeps at most `open_at_once` of
-/// them open, which together hold at most `open_bytes` (RasterInfo::held_bytes; one may always be
-/// open). Throws: Error naming two files and the difference, or if the union has 2^30 columns or
-/// rows.
+/// agree in sample (type, scale, offset), cell size and phase (to kNearestCell) and in CRS (see
+/// SourceOptions::same_crs), unless `crs` gives that of all. Files on both sides of the
+/// antimeridian are joined there, by longitudes beyond 180, if all together are then at most half a
+/// turn wide. Keeps at most `open_at_once` of them open, which together hold at most `open_bytes`
+/// (RasterInfo::held_bytes; one may always be open). Throws: Error naming two files and the
+/// difference, or if the union has 2^30 columns or rows.
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
                                     const RasterOpener& opener,
                                     const std::optional<Crs>& crs = std::nullopt,
                                     std::size_t open_at_once = 32,
-                                    std::uint64_t open_bytes = 64u << 20);
+                                    std::uint64_t open_bytes = 64u << 20,
+                                    const SameCrs& same_crs = {});
 
 /// The cells of a raster as points (see SourceInfo::grid): in tiles that are square on the ground,
 /// of at most `options.block_points` cells, one block each. The raster is read in windows of at

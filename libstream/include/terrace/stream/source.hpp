@@ -29,7 +29,8 @@ struct OctreeInfo {
 struct SourceInfo : Schema {
   std::string format;              ///< "geotiff", "xyz", "ply", ...
   std::vector<std::string> files;  ///< as the caller named them
-  /// Where the points will lie, in stored coordinates, as the files say: they may be wrong.
+  /// Bounds of the points in stored coordinates, as the files state them. They may be wrong:
+  /// nothing may be left out because of them.
   std::optional<Box3> stated_bounds;
   /// The number of points if known; an upper bound for what has nodata: rasters, PLY, meshes.
   std::optional<std::uint64_t> points;
@@ -105,9 +106,9 @@ struct Selection {
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
-  /// infinite. Of rasters also those within a millionth of a cell are inside. Rasters, COPC, EPT
-  /// and LAS whose header lies outside are read only as far as needed; a raster's columns and rows
-  /// count from its first cell near the box.
+  /// infinite. Of rasters also those within a millionth of a cell are inside. Rasters, COPC and EPT
+  /// are read only as far as needed; a raster's columns and rows count from its first cell near the
+  /// box.
   std::optional<Box3> region{};
   /// Points in `region` at whose x, y this is false are left out too; empty: no others are.
   /// Called by the thread that reads.
@@ -150,6 +151,9 @@ std::string_view name_of(Entities entities);
 /// The entities of that name; nullopt for other names.
 std::optional<Entities> entities_named(std::string_view name);
 
+/// Whether two descriptions mean the same CRS, however they are written.
+using SameCrs = std::function<bool(const Crs&, const Crs&)>;
+
 /// Options of any source.
 struct SourceOptions {
   std::string format{};  ///< name of a registered format; empty: by content, then ending
@@ -160,6 +164,8 @@ struct SourceOptions {
   HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< of PNG images in colour
   double cell = 0.0;         ///< above 0: side of the cells of rasters without georeferencing
   std::optional<Crs> crs{};  ///< replaces what the file says
+  /// Asked where the descriptions of several files differ; empty: then they do not agree.
+  SameCrs same_crs{};
   /// Ends any wait for a pipe, in opening the source and in next(), with Stopped.
   std::stop_token stop{};
   /// Above 0: blocks are read on a separate thread, at most this many ahead (see read_ahead()). The

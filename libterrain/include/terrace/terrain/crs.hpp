@@ -128,6 +128,11 @@ class CoordinateSystem {
   std::shared_ptr<LazyChange> wgs84_;
 };
 
+/// Whether both describe the same system of places and heights: by code or in full, in WKT of any
+/// version or GeoKeys, with the units spelt out or not. Of systems that are not known only equal
+/// descriptions do. For stream::SourceOptions::same_crs.
+bool same_crs(const stream::Crs& a, const stream::Crs& b);
+
 /// What is named as for CoordinateSystem::parse, or a local (engineering) system, as stores and
 /// files record it. Throws: UsageError.
 stream::Crs crs_named(const std::string& text);

@@ -297,6 +297,40 @@ bool CoordinateSystem::same_places(const CoordinateSystem& other) const {
   return data_ == other.data_ || terrain::same_places(definition(), other.definition());
 }
 
+namespace {
+
+/// Without a shift of zeros where the datum counts as WGS 84 anyway: writers add
+/// TOWGS84[0,0,0,...].
+CrsDefinition without_idle_shift(CrsDefinition definition) {
+  if (!definition.shift || *definition.shift != DatumShift{}) return definition;
+  CrsDefinition bare = definition;
+  bare.shift.reset();
+  return CoordinateSystem(bare).counts_as_wgs84() ? bare : definition;
+}
+
+bool same_heights(const CrsDefinition& a, const CrsDefinition& b) {
+  if (a.heights != b.heights || a.vertical_epsg != b.vertical_epsg) return false;
+  if (!(std::abs(a.metres_per_height - b.metres_per_height) <= 1e-9 * a.metres_per_height)) {
+    return false;
+  }
+  if (a.heights != Heights::orthometric || a.vertical_epsg != 0) return true;
+  return a.vertical_name == b.vertical_name;
+}
+
+}  // namespace
+
+bool same_crs(const stream::Crs& a, const stream::Crs& b) {
+  if (a == b) return true;
+  try {
+    const std::optional<CrsDefinition> one = definition_of(a), other = definition_of(b);
+    if (!one || !other) return false;
+    return terrain::same_places(without_idle_shift(*one), without_idle_shift(*other)) &&
+           same_heights(*one, *other);
+  } catch (const CrsError&) {
+    return false;
+  }
+}
+
 Transformation::Transformation(CoordinateSystem from, CoordinateSystem to)
     : from_(std::move(from)),
       to_(std::move(to)),
