@@ -89,6 +89,21 @@ stream::Store store_of_lines(const fs::path& folder, const std::string& columns,
   return stream::Store::open(request.store);
 }
 
+// A store with another word could not be opened.
+TEST(StoreBuild, HeightsReferToOneOfTwo) {
+  const tests::TemporaryFolder folder;
+  std::ofstream(folder.path() / "points.csv") << "x,y,z\n1,2,3\n";
+  BuildRequest request;
+  request.inputs = {(folder.path() / "points.csv").string()};
+  request.store = folder.path() / "store";
+  request.vertical = "<b>ellipsoidal</b>";
+  EXPECT_THROW(build_store(request), UsageError);
+  EXPECT_FALSE(fs::exists(request.store));
+  request.vertical = "ellipsoidal";
+  build_store(request);
+  EXPECT_EQ(stream::Store::open(request.store).schema().vertical, "ellipsoidal");
+}
+
 // By the ranges of their attributes; what comes is what the condition takes of all points.
 TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
   const tests::TemporaryFolder folder;

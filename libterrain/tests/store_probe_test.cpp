@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a viewer asks of a store against the samplers of the library, read with all bytes and with
-// none at first.
+// The answers of StoreProbe against the samplers of the library, with all bytes and with none at
+// first.
 #include "sample/store_probe.hpp"
 
 #include <algorithm>
@@ -52,7 +52,7 @@ std::filesystem::path built_raster(const tests::TemporaryFolder& folder) {
   return request.store;
 }
 
-/// A store of which nothing is there yet, and what brings what a question lacks.
+/// A store without any bytes at first, which brings those that a question lacks.
 class Remote {
  public:
   explicit Remote(const std::filesystem::path& folder) {

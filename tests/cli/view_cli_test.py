@@ -92,7 +92,7 @@ class ViewTest(Stores):
         return data
 
     def get(self, path, method='GET', query=None, host=None, **headers):
-        """As one who has the address, unless told otherwise."""
+        """With the token and the right Host, unless others are given."""
         lines = ''.join(f'{name.replace("_", "-")}: {value}\r\n' for name, value in headers.items())
         target = path + (self.query if query is None else query)
         host = f'127.0.0.1:{self.port}' if host is None else host
@@ -152,7 +152,7 @@ class ViewTest(Stores):
         self.assertIn(b' 403 ', self.answer(f'GET /stores.json{self.query} HTTP/1.0\r\n\r\n'.encode()).split(b'\r\n')[0])
 
     def test_others_who_reach_the_port(self):
-        """What is the user's needs the token of the address; the viewer itself is no secret."""
+        """Stores need the token of the address; the viewer's own files do not."""
         token = self.query.removeprefix('?token=')
         for query in ['', '?', '?token', '?token=', f'?token={token[:-1]}', f'?token={token}0', f'?token={token.upper()}x', f'?x={token}',
                       f'?tokens={token}', '?token=' + '0' * 32, f'#?token={token}', f'?x=1&token={token[1:]}']:
@@ -163,7 +163,7 @@ class ViewTest(Stores):
         for path in ['/', '/index.html', '/viewer.js', '/viewer.css', '/worker.js', '/core.wasm', '/body.wasm']:
             self.assertEqual((path, self.get(path, query='')[0]), (path, 200))
         self.assertEqual(self.get('/stores.json', query=f'?x=1&token={token}')[0], 200)
-        # Programs: those of the same session, as what is typed in the same terminal, are served; others are not.
+        # Programs of the same session, as a command typed in the same terminal, are served; others are not.
         ask = [sys.executable, '-c', 'import sys, urllib.request; print(urllib.request.urlopen(sys.argv[1]).status)',
                f'http://127.0.0.1:{self.port}/stores.json']
         for strange in False, True:

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <iterator>
 #include <limits>
-#include <span>
 #include <utility>
 
 #include <terrace/stream/given_bytes.hpp>
@@ -24,6 +23,13 @@ using stream::Point3;
 constexpr std::uint64_t kAll = UINT64_MAX;
 
 double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// Copies the attributes of a member, `bytes` of them.
+void copy_record(const stream::ClusterPoints& points, std::size_t member, std::size_t bytes,
+                 std::vector<std::byte>& record) {
+  record.resize(bytes);
+  std::copy_n(points.payload.data() + member * bytes, bytes, record.data());
+}
 
 /// The space between two parallel planes in stored coordinates.
 struct Slab {
@@ -89,7 +95,11 @@ class StoreProbe::SomeSamples {
   explicit SomeSamples(const stream::Channel& heights) : heights_(heights) {}
 
   void add(const Point3& p) { samples_.push_back({p[1], p[0], p[2]}); }
-  void sort() { std::sort(samples_.begin(), samples_.end()); }
+  /// By a heap: half as fast as std::sort(), and a quarter of the code, which browsers download.
+  void sort() {
+    std::make_heap(samples_.begin(), samples_.end());
+    std::sort_heap(samples_.begin(), samples_.end());
+  }
   [[nodiscard]] double at(std::int64_t column, std::int64_t row) const {
     const Sample wanted{static_cast<double>(row), static_cast<double>(column),
                         -std::numeric_limits<double>::infinity()};
@@ -149,10 +159,9 @@ unsigned StoreProbe::descend(std::uint64_t most,
     if (read > most) break;
     --level;
     std::sort(here.ordinals.begin(), here.ordinals.end());
-    // There are no duplicates unless the store is damaged.
-    here.ordinals.erase(std::unique(here.ordinals.begin(), here.ordinals.end()),
-                        here.ordinals.end());
+    std::uint64_t last = UINT64_MAX;
     for (const std::uint64_t ordinal : here.ordinals) {
+      if (ordinal == std::exchange(last, ordinal)) continue;  // only if the store is damaged
       if (!have([&] { store_.read(stream::cluster_id(level, ordinal), points_); })) continue;
       visit(points_);
       for (std::size_t i = 0; i < points_.children.size(); i += level) {
@@ -207,9 +216,7 @@ std::optional<StoreProbe::Found> StoreProbe::on_raster(double column, double row
           if (std::abs(p[0] - column) > 1 || std::abs(p[1] - row) > 1) continue;
           samples.add(p);
           if (p[0] != std::floor(column + 0.5) || p[1] != std::floor(row + 0.5)) continue;
-          const std::span<const std::byte> own =
-              std::span(points.payload).subspan(i * bytes, bytes);
-          record.assign(own.begin(), own.end());
+          copy_record(points, i, bytes, record);
         }
       });
   samples.sort();
@@ -248,9 +255,7 @@ std::optional<StoreProbe::Found> StoreProbe::nearest(const Point3& place, double
           if (square > best || (square == best && stored < p)) continue;
           best = square;
           stored = p;
-          const std::span<const std::byte> own =
-              std::span(points.payload).subspan(i * bytes, bytes);
-          record.assign(own.begin(), own.end());
+          copy_record(points, i, bytes, record);
         }
       });
   if (!(best <= reach * reach)) return std::nullopt;

@@ -14,8 +14,8 @@
 
 namespace terrace::terrain {
 
-/// What a store holds at single places, whatever detail is drawn of it: for a viewer, whose
-/// surface is coarser than the store.
+/// Answers questions about single places of a store, whatever detail is drawn of it: for a viewer,
+/// whose surface is coarser than the store.
 ///
 /// Bytes of the store may be missing (stream::GivenBytes). Then each function throws
 /// stream::MissingBytes, which names all bytes that it can tell it lacks and not only the first; it

@@ -219,7 +219,7 @@ std::string header_of(const Answer& a) {
   if (a.status == 405) field("Allow", "GET, HEAD");
   field("Accept-Ranges", "bytes");
   field("Cache-Control", "no-cache");
-  // No page of another origin may read or use what is here, and the token stays here.
+  // Pages of other origins may neither read nor use the stores, and the token stays on this page.
   field("Content-Security-Policy", kContentPolicy);
   field("Cross-Origin-Resource-Policy", "same-origin");
   field("Referrer-Policy", "no-referrer");

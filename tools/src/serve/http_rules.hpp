@@ -23,7 +23,7 @@ struct Request {
 /// Who may ask: web pages of other origins and other users of the machine can reach the port too.
 struct Access {
   std::uint16_t port = 0;  ///< the server's own
-  std::string token{};     ///< the value of `token` in the query of whoever was given the address
+  std::string token{};     ///< `token` in the query of a request that has the printed address
 };
 
 struct Answer {

@@ -23,7 +23,7 @@ struct Resource {
   std::shared_ptr<const stream::ByteSource> bytes;
   std::string type;          ///< of the media
   std::string tag;           ///< the entity tag, quoted
-  bool open_to_all = false;  ///< holds nothing of the user's: the viewer's own files
+  bool open_to_all = false;  ///< needs no token: the viewer's own files
 };
 
 /// By path, without the slash at the front. There is nothing besides: no path of a request ever
@@ -51,7 +51,7 @@ class LiveSite {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// What tells a file from another, or from a changed one, at its path.
+  /// Differs between two files at a path, and between a file and its changed self.
   using Stamp = std::array<std::int64_t, 5>;
   static Stamp stamp(const std::filesystem::path& file);
   static std::vector<Stamp> stamps(std::span<const std::filesystem::path> files);

@@ -41,7 +41,7 @@ export interface Camera {
   level?: number;  ///< wanted everywhere, whatever the error
 }
 
-/// What was met of what is drawn.
+/// The part of the picture that a ray meets first.
 export interface Hit {
   stored: number[];
   place: number[];
@@ -52,7 +52,7 @@ export interface Hit {
   attributes: number[];  ///< stored values, in the manifest's order; empty if unknown
 }
 
-/// What the store holds at a place, whatever is drawn.
+/// A place of the store, whatever detail is drawn.
 export interface Found {
   stored: number[];
   place: number[];
@@ -60,7 +60,7 @@ export interface Found {
   attributes: number[];
 }
 
-/// A profile of the store, whatever is drawn, see StoreProbe::Profile.
+/// A profile of the store, whatever detail is drawn, see StoreProbe::Profile.
 export interface Profile {
   metres: number;
   level: number;

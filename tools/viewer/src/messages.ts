@@ -6,7 +6,7 @@ import type {Stats} from './ranges';
 import type {Listed, Manifest} from './store';
 
 export type ToWorker =
-    /// base: the URL of a published folder; query: of the URLs of what is the user's in it, with the token of "terrace view";
+    /// base: the URL of a published folder; query: of the URLs of its stores, with the token of "terrace view";
     /// name: of a store in it. choose: stores.json is read, and if it does not have the name, its first store is opened.
     |{type: 'open', base: string, query: string, name: string, choose: boolean, asPoints: boolean, maxPoints: number}
     |{type: 'show', asPoints: boolean}  ///< how to show a scan
@@ -14,7 +14,7 @@ export type ToWorker =
     |{type: 'drawn', buffer: ArrayBuffer}  ///< of the changes of a frame
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
     |{type: 'pin', how: number}
-    /// Of the store itself: what is missing is fetched. A profile takes the place of one that waits.
+    /// Answered from the store, whose missing bytes are fetched. A profile replaces one that waits.
     |{type: 'probe', id: number, stored: number[], reach: number}
     |{type: 'profile', id: number, from: number[], to: number[], axis: number}
     |{type: 'outline', level: number, ordinal: number}

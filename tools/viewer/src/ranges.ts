@@ -16,7 +16,7 @@ const INDEX_BLOCK = 1024;
 const SMALL = 4096, PAUSE = 20;
 const MOST_REQUESTS = 4;
 const TRIES = 4;
-const FORBIDDEN = 'the server refuses it (HTTP 403). Open the whole address that "terrace view" printed: it ends with a token, which each run has of its own.';
+const FORBIDDEN = 'the server refuses it (HTTP 403). Open the whole address that "terrace view" printed, with its token.';
 /// Milliseconds for which a server may be silent, before its answer begins and until the bytes are there; this is tried twice.
 const SILENCE = 10_000;
 /// A request that another view does not want is given up after this time.

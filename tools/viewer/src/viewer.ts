@@ -17,7 +17,7 @@ const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation',
                  'building', 'low point', 'model key', 'water', 'rail', 'road', 'overlap', 'wire guard', 'wire conductor',
                  'transmission tower', 'wire connector', 'bridge deck', 'high noise', 'overhead structure', 'ignored ground', 'snow',
                  'temporal exclusion'];
-/// The token of "terrace view", for what is the user's; published folders need none.
+/// The token of "terrace view", for the stores; published folders need none.
 const TOKEN = new URLSearchParams(location.search).get('token');
 
 function element<T extends HTMLElement>(id: string): T {
@@ -28,7 +28,7 @@ const readable = (bytes: number) =>
     bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} KB` : `${(bytes / 1e6).toFixed(1)} MB`;
 const rounded = (n: number) => n.toFixed(Math.abs(n) < 10 ? 2 : Math.abs(n) < 1000 ? 1 : 0);
 const metres = (n: number) => Math.abs(n) < 10_000 ? `${rounded(n)} m` : `${(n / 1000).toFixed(2)} km`;
-/// What data say goes into the page as text, never as markup.
+/// Words of a store go into the page as text, never as markup.
 function make(tag: string, kind: string, ...content: Array<Node|string>): HTMLElement {
   const made = document.createElement(tag);
   if (kind) made.className = kind;
@@ -53,7 +53,7 @@ function fail(message: string, again = true): void {
   element('retry').hidden = !again;
 }
 
-/// A place that was clicked: what was met of what is drawn, until the store has told what it holds there.
+/// A clicked place: that of the picture, until the store has answered.
 interface Place extends Hit {
   state: 'asked'|'known'|'none';
   of: number;  ///< it is that of the points of this level and above
@@ -403,8 +403,8 @@ class Viewer {
 
   // ---- A place ---------------------------------------------------------------------------------
 
-  /// What is drawn is coarser than the store: the store is asked for the height of a raster's place and for the point nearest to
-  /// a place of a scan. Until it has answered they are not shown.
+  /// The picture is coarser than the store, so the store is asked for the height of a raster's place and for the point nearest to
+  /// a place of a scan. Neither is shown before it has answered.
   private showPlace(hit: Hit|null): void {
     this.before = this.hit;
     if (!hit || !this.manifest) return this.closePlace();
@@ -491,7 +491,7 @@ class Viewer {
       if (this.hit) this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
     }, delay);
   }
-  /// The profile of the store between the places, which does not depend on what is drawn.
+  /// Asks for the profile of the store between the places, which does not depend on the picture.
   private askProfile(): void {
     const {hit, before} = this;
     if (!hit || !before || (this.kind === 'surface' && !(hit.state === 'known' && before.state === 'known'))) return;

@@ -42,8 +42,8 @@ class Session {
   private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< of a scan
   private givenBytes = 0;
   private ranges!: Ranges;
-  private probing!: Ranges;  ///< what questions about the store lack
-  /// Those that wait for an answer; each tries to give it and returns what it lacks.
+  private probing!: Ranges;  ///< fetches the bytes that questions about the store lack
+  /// Questions that wait; answer() tries to answer and returns the bytes that it lacks.
   private questions: Array<{type: string, answer: () => Answer<void>}> = [];
   private lacking: ByteRange[] = [];  ///< by the first of them
   private classes = new Set<number>();  ///< of the points, as far as they are known
@@ -195,7 +195,7 @@ class Session {
     });
     this.reply();
   }
-  /// Answers what can be answered, and fetches what the next answer lacks.
+  /// Answers questions in turn, and fetches the bytes that the next answer lacks.
   private reply(): void {
     while (this.questions.length > 0 && !this.failed) {
       try {
@@ -290,7 +290,7 @@ class Session {
   private listed(): number[] {
     return [...this.classes].sort((a, b) => a - b);
   }
-  /// Tells of classes that no point had before: the store may have too many points for the start file to know them all.
+  /// Reports classes that no point had before: the store may have too many points for the start file to know them all.
   private noteClasses({vertices}: Changes): void {
     if (this.classKind === null) return;
     const before = this.classes.size;
