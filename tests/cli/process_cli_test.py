@@ -561,7 +561,7 @@ class NameTest(ProcessTest):
         name = f'a{self.ESCAPE}\r\u009b2J\u202e.xyz'
         points = self.points_file(name)
         for args in (['info', points], ['info', points + 'x'], ['cluster', points, '-o', 'x.csv', '-v'],
-                     ['convert', points, '-o', self.path('b' + name)], ['points', points, '-o', 'x'],
+                     ['convert', points, '-o', self.path('b' + name)], ['points', points, '-o', self.path('x.xyz')],
                      ['info', points, '--no-such' + self.ESCAPE], ['info', points, '--memory', self.ESCAPE],
                      ['build', points, '-o', self.path('s' + self.ESCAPE), '--crs', self.ESCAPE],
                      [self.ESCAPE]):
