@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -52,6 +53,58 @@ TEST(TriangleMesh, TakesTheAttributesThatItHasColumnsFor) {
   EXPECT_EQ(mesh.levels, (std::vector<std::uint8_t>{3, 255, 0}));
   EXPECT_TRUE(mesh.normals.empty());
   EXPECT_TRUE(mesh.representatives.empty());
+}
+
+MeshUnits units_of(int epsg, const std::string& unit, const std::string& heights = {}) {
+  MeshUnits units;
+  units.crs.epsg = epsg;
+  units.crs.geographic = unit == "degree";
+  units.crs.horizontal_unit = unit;
+  units.height_unit = heights;
+  return units;
+}
+
+TEST(MeshCoordinates, AreMetresInGlbWhateverTheUnits) {
+  const auto frame_of = [](const MeshUnits& units, const stream::Box3& bounds) {
+    return mesh_coordinates("m.glb", {}, units, bounds).frame;
+  };
+  const stream::Box3 degrees{{8, 46, 0}, {9, 47, 4000}};
+  const auto feet_high = frame_of(units_of(4326, "degree", "foot"), degrees);
+  ASSERT_TRUE(feet_high);
+  EXPECT_TRUE(feet_high->local);
+  EXPECT_NEAR(feet_high->metres[0], 76713, 50);
+  EXPECT_NEAR(feet_high->metres[1], 111160, 20);
+  EXPECT_EQ(feet_high->metres[2], 0.3048);
+  EXPECT_EQ(feet_high->crs, "EPSG:4326");
+  // At the pole, where there is no east.
+  const auto pole = frame_of(units_of(4326, "degree"), {{-180, 90, 0}, {180, 90, 0}});
+  ASSERT_TRUE(pole);
+  EXPECT_GT(pole->metres[0], 0);
+  // These are no latitudes: a caller's own numbers.
+  EXPECT_FALSE(frame_of(units_of(4326, "degree"), {{400000, 5000000, 0}, {500000, 5100000, 9}}));
+  const auto feet = frame_of(units_of(0, "foot"), {{0, 0, 0}, {1000, 1000, 9}});
+  ASSERT_TRUE(feet);
+  EXPECT_FALSE(feet->local);
+  EXPECT_EQ(feet->metres, (stream::Point3{0.3048, 0.3048, 0.3048}));
+  EXPECT_FALSE(frame_of(units_of(0, ""), degrees));
+  EXPECT_FALSE(frame_of(units_of(0, "metre"), degrees));
+  EXPECT_FALSE(frame_of(units_of(4326, "degree"), {}));
+  EXPECT_FALSE(mesh_coordinates("m.ply", {}, units_of(4326, "degree"), degrees).frame);
+}
+
+TEST(MeshCoordinates, NotesNameTheRemedy) {
+  const auto note = [](const char* path, const MeshUnits& units, const stream::Box3& bounds) {
+    return mesh_coordinates(path, {}, units, bounds).note;
+  };
+  const stream::Box3 south{{170, -45, 0}, {171, -44, 4000}}, globe{{-180, -90, 0}, {180, 90, 1}};
+  EXPECT_NE(note("m.obj", units_of(4326, "degree"), south).find("`to_crs` EPSG:32759 for metres"),
+            std::string::npos);
+  EXPECT_NE(note("m.glb", units_of(4326, "degree"), globe).find("`to_crs` EPSG:n, is truer"),
+            std::string::npos);
+  EXPECT_EQ(note("m.ply", units_of(32632, "metre"), {{0, 5e6, 0}, {1e5, 5.1e6, 0}}), "");
+  EXPECT_EQ(note("m.ply", units_of(0, "foot", "foot"), south), "");
+  EXPECT_NE(note("m.ply", units_of(0, "foot", "metre"), south).find("x and y are feet and heights"),
+            std::string::npos);
 }
 
 }  // namespace

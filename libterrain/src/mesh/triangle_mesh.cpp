@@ -67,6 +67,7 @@ struct Coordinates {
     // Without a place it is that of the unit alone.
     const GroundMap unit = ground.map({}), there = ground.map(bounds);
     metres = {unit[0], unit[4], unit[8]};
+    width = bounds.max[0] - bounds.min[0];
     // Maps stretch lengths by a few percent where they are used.
     constexpr double kStretched = 0.1;
     const double east = there[0] / unit[0], north = there[4] / unit[4];
@@ -96,13 +97,15 @@ struct Coordinates {
     return degrees ? "degrees" : metres[0] == 1 ? "metres" : "feet";
   }
   [[nodiscard]] std::string projection() const {
-    const bool common = metres[1] > 1.05e5 && metres[1] < 1.2e5;  // not grads
+    // In degrees, not grads, and not so wide that it stretches lengths itself.
+    const bool common = metres[1] > 1.05e5 && metres[1] < 1.2e5 && width < 12;
     return degrees && common ? " " + projection_at(middle[0], middle[1]) : " EPSG:n";
   }
 
   stream::Crs crs;
   stream::Point3 metres{1, 1, 1};
   Point2 middle{};
+  double width = 0;
   bool local = false, degrees = false;
   double widest_error = 0;  ///< of lengths from west to east, as a share
 };
