@@ -207,6 +207,22 @@ void bind_mesh(py::module_& module) {
   });
   module.def("units",
              [](const OpenStore& open) { return to_python(terrain::MeshUnits(open.get())); });
+  // Of WGS 84.
+  module.def("lonlat_units", [] {
+    terrain::MeshUnits units;
+    units.crs.epsg = 4326;
+    units.crs.geographic = true;
+    units.crs.horizontal_unit = "degree";
+    return to_python(units);
+  });
+  // By the same rule as in files that have no unit but the metre.
+  module.def("metres_per_unit", [](const py::object& units, double x0, double y0, double z0,
+                                   double x1, double y1, double z1) {
+    const auto frame =
+        terrain::mesh_coordinates("mesh.glb", {}, units_from(units), {{x0, y0, z0}, {x1, y1, z1}})
+            .frame;
+    return frame ? frame->metres : stream::Point3{1, 1, 1};
+  });
   module.def("level_within", [](const OpenStore& open, std::uint64_t most) {
     return terrain::level_within(open.get(), most);
   });

@@ -9,7 +9,7 @@ from . import _core
 from ._arrays import as_array, as_numbers, as_rows, whole
 from ._matching import _threads
 from ._mesh import Mesh
-from ._pictures import triangles_svg
+from ._pictures import plane_png
 
 
 def ellipse(a, b, angle=0.0):
@@ -305,8 +305,8 @@ class Delaunay2(_Delaunay):
         J. Skala, 7.4."""
         return self._euclidean().adapted(self._regions(regions))
 
-    def _repr_svg_(self):
-        return triangles_svg(self.points, self.simplices)
+    def _repr_png_(self):
+        return plane_png(self.points, self.simplices)
 
 
 @dataclass(frozen=True)
@@ -393,5 +393,5 @@ class DynamicSurface(_PointMesh):
         used, corners = np.unique(self.simplices, return_inverse=True)
         return Mesh(self.points[used], corners.reshape(-1, 3).astype(np.uint32))
 
-    def _repr_svg_(self):
-        return self.mesh()._repr_svg_()
+    def _repr_png_(self):
+        return self.mesh()._repr_png_()

@@ -7,7 +7,8 @@ import os
 
 import numpy as np
 
-from ._pictures import lines_svg
+from ._mesh import metres_per_unit
+from ._pictures import lines_png
 from ._sources import crs_text
 
 
@@ -18,8 +19,13 @@ class FeatureCollection(dict):
     def __geo_interface__(self):
         return dict(self)
 
-    def _repr_svg_(self):
-        return lines_svg([line['geometry']['coordinates'] for line in self['features']])
+    _units = None  #: for pictures, as the core has them
+
+    def _repr_png_(self):
+        lines = [np.asarray(line['geometry']['coordinates'], np.float64)[:, :2] for line in self['features']]
+        ends = np.array([end for line in lines for end in (line.min(axis=0), line.max(axis=0))]).reshape(-1, 2)
+        metres = metres_per_unit(np.column_stack((ends, np.zeros(len(ends)))), self._units)[:2]
+        return lines_png([line * metres for line in lines])
 
     def __repr__(self):
         return f'<terrace.FeatureCollection of {len(self["features"])} features>'

@@ -8,11 +8,21 @@ import numpy as np
 from . import _core
 from ._arrays import as_numbered, as_rows
 from ._job import notes
-from ._pictures import light, triangles_svg
+from ._pictures import light, relief_png, triangles_svg
+
+
+def metres_per_unit(places, units):
+    """Metres in a unit of x, y and z in the middle of places, shape (n, 3); units: as the core has them, None if not known."""
+    known = places[np.isfinite(places).all(axis=1)]
+    if units is None or len(known) == 0:
+        return np.ones(3)
+    return np.array(_core.metres_per_unit(units, *known.min(axis=0), *known.max(axis=0)))
 
 
 class Mesh:
     """Triangles between vertices; unpacks as ``vertices, triangles = mesh``.
+
+    A notebook shows it from above as shaded relief, in metres on the ground where the units are known.
 
     vertices: float64, shape (n, 3), in the CRS that was asked for. triangles: uint32, shape (m, 3), numbers of
     vertices, counter-clockwise seen from above. levels: uint8, the highest level of each vertex, or None.
@@ -58,7 +68,8 @@ class Mesh:
         path = os.fspath(path)
         if path.endswith('.svg'):
             with open(path, 'w' if replace else 'x', encoding='ascii') as file:
-                file.write(self._svg(len(self.triangles)))
+                vertices = self._in_metres()
+                file.write(triangles_svg(vertices[:, :2], self.triangles, light(vertices, self.triangles)))
             return
         note = _core.write_mesh(os.fsencode(path), *self._parts(), bool(replace), self._units)
         if note:
@@ -106,11 +117,12 @@ class Mesh:
     def __repr__(self):
         return f'<terrace.{type(self).__name__}: {len(self.vertices)} vertices, {len(self.triangles)} triangles>'
 
-    def _svg(self, *most):
-        return triangles_svg(self.vertices[:, :2], self.triangles, light(self.vertices, self.triangles), *most)
+    def _in_metres(self):
+        vertices = np.asarray(self.vertices, np.float64)
+        return vertices * metres_per_unit(vertices, self._units)
 
-    def _repr_svg_(self):
-        return self._svg()
+    def _repr_png_(self):
+        return relief_png(self._in_metres(), self.triangles)
 
 
 class BoundedMesh(Mesh):

@@ -173,11 +173,11 @@ class Store:
         return (f'<terrace.Store {name!r}: {info["points"]} points, {levels} level{"s" if levels > 1 else ""}, {kind}'
                 f'{", closed" if self.closed else ""}>')
 
-    def _repr_svg_(self):
+    def _repr_png_(self):
         if self.closed:
             return None
         try:
-            return self.mesh(level=self.level_within(4000))._repr_svg_()
+            return self.mesh(level=self.level_within(100_000))._repr_png_()
         except _core.Error:
             return None
 
@@ -382,7 +382,9 @@ class Store:
                                    None if lonlat is None else bool(lonlat), job(progress, threads, memory))
         if own and lonlat is None:
             notes.info('contours are in the store\'s own x and y: nothing leads from its CRS to WGS 84')
-        return FeatureCollection(json.loads(text))
+        lines = FeatureCollection(json.loads(text))
+        lines._units = _core.units(self._core) if own else _core.lonlat_units()
+        return lines
 
     def mesh(self, level=None, region=None, *, focus=(), where=None, cluster=None, metric='euclidean', crs=None, max_points=None,
              smoothing=None, overlay=None, save_overlay=None, replace=False, progress=None, threads=None, memory=None):

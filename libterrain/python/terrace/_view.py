@@ -245,5 +245,5 @@ class Multiresolution:
         points, triangles = self._core.count()
         return f'<terrace.Multiresolution: {points} points, {triangles} triangles, {len(self.expanded)} clusters expanded>'
 
-    def _repr_svg_(self):
-        return self.mesh._repr_svg_()
+    def _repr_png_(self):
+        return self.mesh._repr_png_()

@@ -163,7 +163,6 @@ class Triangulations(unittest.TestCase):
         self.assertEqual((len(made), made.simplices.shape), (0, (0, 3)))
         self.assertEqual(terrace.Delaunay3().simplices.shape, (0, 4))
         self.assertEqual(made.find_simplex([[0, 0], [np.nan, 1]]).tolist(), [-1, -1])
-        self.assertIn('polygon', terrace.Delaunay2([[0, 0], [1, 0], [0, 1]])._repr_svg_())
 
     def test_threads_share_one(self):
         made = terrace.Delaunay2(np.random.default_rng(1).random((5000, 2)))

@@ -174,7 +174,7 @@ class Lines(StoreCase):
     def test_contours_lie_at_their_height(self):
         lines = self.raster.contours(20)
         self.assertEqual(lines.__geo_interface__['type'], 'FeatureCollection')
-        self.assertEqual(lines._repr_svg_().count('<polyline'), len(lines['features']))
+        self.assertLess(len(lines._repr_png_()), 400_000)
         self.assertGreater(len(lines['features']), 5)
         for feature in lines['features']:
             elev = feature['properties']['elev']

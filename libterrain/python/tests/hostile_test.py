@@ -91,7 +91,7 @@ def calls(luck, terrace, shared, folder):
         (lambda a: store.points(cluster=a), [lambda: (luck.randrange(3), luck.randrange(9))], []),
         (store.tiles, [lambda: os.path.join(folder, 'tiles'), lambda: (0, number())],
          ['max_error', 'quality', 'vertical', 'geoid', 'fill', 'flat_height', 'water', 'normals', 'gzip', 'name', 'resume', 'replace']),
-        (lambda: (repr(store), store._repr_svg_(), store.info, store.verify(), store.__geo_interface__), [], []),
+        (lambda: (repr(store), store._repr_png_(), store.info, store.verify(), store.__geo_interface__), [], []),
         (lambda: (repr(view), view.snapshot(), view.traffic), [], []),
         (lambda a: terrace.Mesh(*a), [lambda: (solid(), handles())], []),
         (lambda a: store.mesh(max_points=a).save(os.path.join(folder, 'm.glb'), True), [lambda: 40], []),

@@ -34,7 +34,7 @@ class Meshes(StoreCase):
             common = triangle_set(vertices, triangles) & triangle_set(vertices, same.simplices)
             self.assertGreater(len(common), 0.999 * len(triangles))
         self.assertEqual(len(mesh.levels), len(vertices))
-        self.assertIn('<polygon', mesh._repr_svg_())
+        self.assertLess(len(mesh._repr_png_()), 400_000)
         self.assertEqual(len(mesh.__geo_interface__['coordinates']), len(triangles))
 
     def test_levels_regions_focuses(self):

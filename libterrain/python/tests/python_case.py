@@ -3,8 +3,10 @@
 
 import os
 import shutil
+import struct
 import tempfile
 import unittest
+import zlib
 
 import numpy as np
 
@@ -34,6 +36,19 @@ def cloud(count=20000, seed=1):
     xy = random.random((count, 2)) * [1000, 800] + [300000, 5200000]
     z = 50 + 10 * np.sin(xy[:, 0] / 90) + (xy[:, 1] - 5200000) / 40
     return np.column_stack((xy, z)), (np.arange(count) % 7).astype(np.uint8)
+
+
+def pixels_of(png):
+    """The grey pixels of a PNG without interlacing or filters, shape (rows, columns)."""
+    columns, rows = struct.unpack('>II', png[16:24])
+    data, at = b'', 8
+    while at < len(png):
+        size, kind = struct.unpack('>I4s', png[at:at + 8])
+        data += png[at + 8:at + 8 + size] if kind == b'IDAT' else b''
+        at += size + 12
+    lines = np.frombuffer(zlib.decompress(data), np.uint8).reshape(rows, -1)
+    assert lines.shape[1] == columns + 1 and not lines[:, 0].any()
+    return lines[:, 1:].astype(int)
 
 
 class StoreCase(unittest.TestCase):
