@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Dynamic Delaunay triangulations of the plane and of space."""
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,41 +69,156 @@ class MeshChanges:
                 f'{len(self.removed_vertices)} and {len(self.removed_simplices)} went>')
 
 
+class _Numbers:
+    """The numbers of vertices for the caller, from 0, and the slots of the core, which counts in an order of its own.
+
+    A slot that is used again keeps its number. The first points that are inserted have their rows as numbers; of equal
+    ones the first is the vertex, and the others are copies, whose numbers no vertex has.
+    """
+
+    def __init__(self):
+        self._of_slot = np.empty(0, np.int32)  # -1: none
+        self._slots = np.empty(0, np.int32)  # by number, -1: a copy
+        self._copies = np.empty((0, 2), np.int32)  # the number of a copy, that of its vertex
+
+    def __len__(self):
+        return len(self._slots)
+
+    def take(self, slots):
+        """The numbers of slots that were just filled, in the order of the points."""
+        first_points = len(self._slots) == 0
+        most = int(slots.max(initial=-1)) + 1
+        if most > len(self._of_slot):
+            self._of_slot = np.append(self._of_slot, np.full(max(most, 2 * len(self._of_slot)) - len(self._of_slot), -1, np.int32))
+        if first_points:
+            distinct, rows = np.unique(slots, return_index=True)
+            self._slots = np.full(len(slots), -1, np.int32)
+            self._slots[rows] = distinct
+            self._of_slot[distinct] = rows
+            copies = np.flatnonzero(self._slots < 0)
+            self._copies = np.column_stack((copies, self._of_slot[slots[copies]])).astype(np.int32)
+        else:
+            distinct, rows = np.unique(slots[self._of_slot[slots] < 0], return_index=True)
+            distinct = distinct[np.argsort(rows)]
+            self._of_slot[distinct] = np.arange(len(self._slots), len(self._slots) + len(distinct))
+            self._slots = np.append(self._slots, distinct)
+        return self._of_slot[slots]
+
+    def take_all(self, first, count):
+        """Numbers consecutive slots from 0."""
+        self._slots = np.arange(first, first + count, dtype=np.int32)
+        self._of_slot = np.append(np.full(first, -1, np.int32), np.arange(count, dtype=np.int32))
+
+    def forget_copies(self, vertices):
+        """Of vertices that are gone."""
+        if len(self._copies):
+            self._copies = self._copies[~np.isin(self._copies[:, 1], vertices)]
+
+    def of(self, slots):
+        """Numbers of slots, of any shape; -1 for a slot of -1."""
+        filled = slots[slots >= 0]
+        if filled.size and (filled.max() >= len(self._of_slot) or self._of_slot[filled].min() < 0):
+            self.take(np.unique(filled))  # an insertion was interrupted before its numbers were taken
+        return np.where(slots < 0, np.int32(-1), self._of_slot[slots]) if filled.size else slots
+
+    def all_slots(self):
+        """By number; -1 for a copy."""
+        return self._slots
+
+    def slots_of(self, numbers):
+        """Raises: ValueError for a number that no vertex ever had."""
+        for number in numbers[(numbers >= len(self._slots)) | (numbers < 0)]:
+            raise ValueError(f'there is no vertex {number}')
+        slots = self._slots[numbers]
+        for number in numbers[slots < 0]:
+            raise ValueError(f'there is no vertex {number}: this point equals an earlier one, whose number is in `ids`')
+        return slots
+
+    def by_number(self, rows):
+        """Rows by slot in the order of numbers; copies have those of their vertices."""
+        result = np.full((len(self._slots), *rows.shape[1:]), np.nan)
+        used = (self._slots >= 0) & (self._slots < len(rows))
+        result[used] = rows[self._slots[used]]
+        result[self._copies[:, 0]] = result[self._copies[:, 1]]
+        return result
+
+    def by_slot(self, values):
+        """The reverse, for values of shape (n,). Raises: ValueError unless there is one for each number."""
+        if values.ndim != 1 or len(values) < len(self._slots):
+            raise ValueError(f'there are `values` of the shape {values.shape} for {len(self._slots)} numbers of vertices; '
+                             'by_vertex() puts them in order')
+        result = np.full(max(len(self._of_slot), 1), np.nan)  # the core has a slot that is not a vertex
+        used = self._slots >= 0
+        result[self._slots[used]] = values[:len(self._slots)][used]
+        return result
+
+
 class _PointMesh:
-    """Vertices that come and go, and simplices between them."""
+    """Vertices that come and go, and simplices between them.
+
+    Vertices have numbers. The points that are given to the constructor have their rows as numbers, as in SciPy: 0, 1, ..;
+    points that are inserted later have the numbers that follow, or some that are free again. ``ids``, insert() and
+    ``simplices`` give such numbers, remove() and all others take them, and ``points`` has a row for each.
+    """
 
     _width = 0
 
-    #: The vertex of each point that was given to the constructor.
-    ids = np.empty(0, np.int32)
+    def __init__(self):
+        #: The vertex of each point that was given to the constructor: its row, or that of the first equal one.
+        self.ids = np.empty(0, np.int32)
+        self._numbers = _Numbers()
+        self._lock = threading.RLock()  # the core and the numbers change together
 
     def insert(self, points):
         """Adds points: shape (n, 2) or (n, 3) of any finite numbers; together is faster than one by one.
 
         Returns: int32, shape (n,): the vertex of each point, the same one for equal points. Raises: ValueError for
         a coordinate that is not finite; then nothing has changed."""
-        return self._core.insert(as_rows(points, 'points', (self._width,)))
+        points = as_rows(points, 'points', (self._width,))
+        with self._lock:
+            return self._numbers.take(self._core.insert(points))
 
     def remove(self, vertices):
         """Removes vertices, all different. The triangulation is then that of the rest, as if they had never been.
         Raises: ValueError for one that is not there; then nothing has changed."""
-        self._core.remove(_handles(vertices))
+        vertices = _handles(vertices)
+        with self._lock:
+            self._of_vertices(vertices, self._core.remove)
+            self._numbers.forget_copies(vertices)
+
+    def _of_vertices(self, vertices, work):
+        """work(slots). Raises: ValueError, with the caller's number, for a vertex that is not there or is named twice."""
+        found, counts = np.unique(vertices, return_counts=True)
+        for number in found[counts > 1]:
+            raise ValueError(f'vertex {number} is named twice')
+        slots = self._numbers.slots_of(vertices)
+        try:
+            return work(slots)
+        except ValueError:
+            for number in vertices[~np.isin(slots, self._core.vertices())]:
+                raise ValueError(f'there is no vertex {number}') from None
+            raise
 
     @property
     def points(self):
-        """Coordinates by number of vertex, float64: rows of numbers that are free are NaN."""
-        return self._core.points()
+        """Coordinates by number of vertex, float64: first the points of the constructor. Rows of vertices that were
+        removed are NaN."""
+        with self._lock:
+            return self._numbers.by_number(self._core.points())
 
     @property
     def vertices(self):
         """The vertices there are, int32, ascending."""
-        return self._core.vertices()
+        with self._lock:
+            return np.sort(self._numbers.of(self._core.vertices()))
 
     @property
     def simplices(self):
         """Corners of the triangles or tetrahedra, int32: numbers of vertices, so ``points[simplices]`` are their
-        coordinates. Counter-clockwise; of tetrahedra a, b, c counter-clockwise seen from d."""
-        return self._core.simplices()
+        coordinates, as in SciPy: the rows of the points that were given to the constructor. Counter-clockwise; of
+        tetrahedra a, b, c counter-clockwise seen from d."""
+        with self._lock:
+            return self._numbers.of(self._core.simplices())
 
     def record(self):
         """From here on changes() tells what changes; what was recorded before is dropped."""
@@ -111,7 +227,9 @@ class _PointMesh:
     def changes(self):
         """The net MeshChanges since record() or the last call. Raises: ValueError unless record() was called before.
         O(what changed)."""
-        return MeshChanges(**self._core.take_changes())
+        with self._lock:
+            changes = self._core.take_changes()
+            return MeshChanges(**{name: rows if name == 'removed_points' else self._numbers.of(rows) for name, rows in changes.items()})
 
     def digest(self):
         """A hash of the set of simplices by coordinates: equal for equal sets, whatever their history."""
@@ -129,6 +247,7 @@ class _Delaunay(_PointMesh):
     _elliptical_kind = None
 
     def __init__(self, points=None, *, metric=None):
+        super().__init__()
         self._elliptical = metric is not None
         self._core = self._elliptical_kind(_map(metric, self._width)) if self._elliptical else self._kind()
         if points is not None:
@@ -138,20 +257,29 @@ class _Delaunay(_PointMesh):
     def vertex_neighbor_vertices(self):
         """The vertices joined to each by an edge, as SciPy's: (where those of each number of vertex begin, int64;
         vertices, int32). In the plane counter-clockwise."""
-        return self._core.adjacent()
+        with self._lock:
+            begins, joined = self._core.adjacent()
+            slots = self._numbers.all_slots()
+            known = (slots >= 0) & (slots < len(begins) - 1)
+            from_, counts = np.zeros(len(slots), np.int64), np.zeros(len(slots), np.int64)
+            from_[known], counts[known] = begins[slots[known]], np.diff(begins)[slots[known]]
+            ends = np.append(0, np.cumsum(counts))
+            return ends, self._numbers.of(joined[np.repeat(from_ - ends[:-1], counts) + np.arange(ends[-1])])
 
     @property
     def neighbors(self):
-        """For each simplex the row of the one opposite to each corner, -1 beyond the hull."""
+        """For each simplex the row in ``simplices`` of the one opposite to each corner, -1 beyond the hull."""
         return self._core.neighbours()
 
     def find_simplex(self, points):
-        """The row of a simplex that holds each point, -1 outside the hull."""
+        """The row in ``simplices`` of one that holds each point, -1 outside the hull."""
         return self._core.find_simplex(as_rows(points, 'points', (self._width,)))
 
     def nearest(self, points):
         """The nearest vertex of each point, exactly; -1 if there is none."""
-        return self._core.nearest(as_rows(points, 'points', (self._width,)))
+        points = as_rows(points, 'points', (self._width,))
+        with self._lock:
+            return self._numbers.of(self._core.nearest(points))
 
     def by_vertex(self, values):
         """Values of the points that were given at first, by number of vertex: float64, NaN for other vertices; of equal
@@ -159,9 +287,14 @@ class _Delaunay(_PointMesh):
         values = as_numbers(values, 'values')
         if values.shape != self.ids.shape:
             raise ValueError(f'there are values of the shape {values.shape} for {len(self.ids)} points')
-        result = np.full(len(self._core.points()), np.nan)
+        with self._lock:
+            result = np.full(len(self._numbers), np.nan)
         result[self.ids] = values
         return result
+
+    def _values(self, values):
+        """As the core wants them; hold the lock."""
+        return self._numbers.by_slot(as_numbers(values, 'values'))
 
     def _euclidean(self):
         if self._elliptical:
@@ -219,7 +352,9 @@ class Delaunay2(_Delaunay):
         if columns * rows > 2 ** 29:
             raise ValueError('a triangulation has at most 2^29 vertices')
         first = made._core.build_grid(x, y, float(step), columns, rows)
-        made.ids = np.arange(first, first + columns * rows, dtype=np.int32) if columns * rows else made.ids
+        if columns * rows:
+            made._numbers.take_all(first, columns * rows)
+            made.ids = np.arange(columns * rows, dtype=np.int32)
         return made
 
     def weights(self, places, method='linear'):
@@ -235,7 +370,10 @@ class Delaunay2(_Delaunay):
         >>> weights @ d.points[vertices], begins
         (array([0.25, 0.5 ]), array([0, 3, 3]))
         """
-        return _core.weights_at(self._euclidean(), as_rows(places, 'places', (2,)), method)
+        places = as_rows(places, 'places', (2,))
+        with self._lock:
+            weights, vertices, begins = _core.weights_at(self._euclidean(), places, method)
+            return weights, self._numbers.of(vertices), begins
 
     def vertical_distances(self, values, samples, method='linear', *, threads=None):
         """How far samples that are not in the triangulation lie above or below its surface.
@@ -248,8 +386,9 @@ class Delaunay2(_Delaunay):
         >>> d.vertical_distances(d.by_vertex([1, 2, 3]), [[0.25, 0.5, 3]])['bias']
         0.75
         """
-        return _core.vertical_distances(self._euclidean(), as_numbers(values, 'values'), as_rows(samples, 'samples', (3,)), method,
-                                        _threads(threads))
+        with self._lock:
+            return _core.vertical_distances(self._euclidean(), self._values(values), as_rows(samples, 'samples', (3,)), method,
+                                            _threads(threads))
 
     def heights(self, values, places, method='linear', *, threads=None):
         """Heights at places between vertices.
@@ -262,14 +401,16 @@ class Delaunay2(_Delaunay):
         >>> d.heights(d.by_vertex([1, 2, 3]), [[0.25, 0.5]])
         array([2.25])
         """
-        return _core.heights_at(self._euclidean(), as_numbers(values, 'values'), as_rows(places, 'places', (2,)), method,
-                                _threads(threads))
+        with self._lock:
+            return _core.heights_at(self._euclidean(), self._values(values), as_rows(places, 'places', (2,)), method,
+                                    _threads(threads))
 
     def gradients(self, values, places, method='linear', *, threads=None):
         """Height gained per unit of length to +x and to +y, shape (n, 2): 'linear' of the triangles, 'natural' of natural
         neighbours. NaN outside the hull. Otherwise as heights()."""
-        return _core.gradients_at(self._euclidean(), as_numbers(values, 'values'), as_rows(places, 'places', (2,)),
-                                  method, _threads(threads))
+        with self._lock:
+            return _core.gradients_at(self._euclidean(), self._values(values), as_rows(places, 'places', (2,)), method,
+                                      _threads(threads))
 
     def smooth(self, values, method='laplacian', *, vertices=None, iterations=10, strength=0.5, pass_band=0.1, edge_height=0.0):
         """Smoothed heights by number of vertex, float64.
@@ -278,8 +419,13 @@ class Delaunay2(_Delaunay):
         band between 0 and 1); 'bilateral', which keeps steps of at least ``edge_height``. vertices: those that may move, all
         by default; those on the hull and with a neighbour beyond stay. Raises: ValueError. Sources: G. Taubin, 1995;
         C. Tomasi, R. Manduchi, 1998."""
-        return _core.smooth(self._euclidean(), as_numbers(values, 'values'), None if vertices is None else _handles(vertices),
-                            method, whole(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height))
+        def smoothed(slots):
+            return self._numbers.by_number(_core.smooth(self._euclidean(), self._values(values), slots, method, iterations,
+                                                        float(strength), float(pass_band), float(edge_height)))
+
+        iterations = whole(iterations, 'iterations', bits=32)
+        with self._lock:
+            return smoothed(None) if vertices is None else self._of_vertices(_handles(vertices), smoothed)
 
     def quality(self, values, datum=0.0, *, bins=16):
         """Angles (degrees) and edges in the plane, areas, and the volumes between the surface and ``datum``.
@@ -287,12 +433,14 @@ class Delaunay2(_Delaunay):
         values: as of heights(). Returns: a dict: triangles, min_angle, mean_min_angle, max_aspect, mean_aspect, edges,
         min_edge, max_edge, mean_edge, edge_histogram (counts in ``bins`` equal intervals from min_edge to max_edge),
         area, surface_area, volume_above, volume_below."""
-        return _core.mesh_quality(self._euclidean(), as_numbers(values, 'values'), float(datum), whole(bins, 'bins', 1))
+        with self._lock:
+            return _core.mesh_quality(self._euclidean(), self._values(values), float(datum), whole(bins, 'bins', 1))
 
     def triangle_quality(self, values, datum=0.0):
         """The same of each triangle, in the order of simplices. Returns: a structured array: min_angle (degrees),
         aspect (1 for an equilateral triangle, otherwise larger), area, surface_area, volume_above, volume_below."""
-        made = _core.triangle_quality(self._euclidean(), as_numbers(values, 'values'), float(datum))
+        with self._lock:
+            made = _core.triangle_quality(self._euclidean(), self._values(values), float(datum))
         names = ('min_angle', 'aspect', 'area', 'surface_area', 'volume_above', 'volume_below')
         return made.view([(name, 'f8') for name in names]).reshape(-1)
 
@@ -303,10 +451,12 @@ class Delaunay2(_Delaunay):
         boxes overlap the first counts; outside all of them the metric is Euclidean. Triangles across regions stay as
         they are. Returns: int32, shape (m, 3), numbers of vertices, counter-clockwise. Raises: ValueError. Source:
         J. Skala, 7.4."""
-        return self._euclidean().adapted(self._regions(regions))
+        with self._lock:
+            return self._numbers.of(self._euclidean().adapted(self._regions(regions)))
 
     def _repr_png_(self):
-        return plane_png(self.points, self.simplices)
+        with self._lock:
+            return plane_png(self.points, self.simplices)
 
 
 @dataclass(frozen=True)
@@ -342,7 +492,9 @@ class Delaunay3(_Delaunay):
         """The tetrahedra after flips to suit a metric in each region; a box is six numbers, otherwise as
         Delaunay2.adapted(). Returns: (int32, shape (m, 4); the number of facets that are not Delaunay in their region's
         metric although no flip is possible)."""
-        return self._euclidean().adapted(self._regions(regions))
+        with self._lock:
+            tetrahedra, stuck = self._euclidean().adapted(self._regions(regions))
+            return self._numbers.of(tetrahedra), stuck
 
     def shape(self, rule='poles', *, criterion='gabriel', edge_factor=0.5, keep_vertices=True, lids=False, threads=None):
         """The shape from whose surface the points were scanned: which tetrahedra are inside, and their surface.
@@ -356,9 +508,11 @@ class Delaunay3(_Delaunay):
         >>> Delaunay3([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).shape('flood')
         <terrace.Shape: 1 tetrahedra, 4 triangles, volume 0.166667>
         """
-        tetrahedra, faces, *rest = _core.shape(self._core, rule, criterion, float(edge_factor), bool(keep_vertices), bool(lids),
-                                              _threads(threads))
-        return Shape(tetrahedra, Mesh(self.points, faces), *rest)
+        with self._lock:
+            tetrahedra, faces, *rest = _core.shape(self._core, rule, criterion, float(edge_factor), bool(keep_vertices), bool(lids),
+                                                  _threads(threads))
+            surface = Mesh(self.points, self._numbers.of(faces))
+            return Shape(self._numbers.of(tetrahedra), surface, *rest)
 
 
 class DynamicSurface(_PointMesh):
@@ -380,6 +534,7 @@ class DynamicSurface(_PointMesh):
     _width, _simplices = 3, 'triangles'
 
     def __init__(self, points=None):
+        super().__init__()
         self._core = _core.SharedSurface()
         if points is not None:
             self.ids = self.insert(points)
@@ -390,8 +545,10 @@ class DynamicSurface(_PointMesh):
 
     def mesh(self):
         """The surface as a Mesh of its own."""
-        used, corners = np.unique(self.simplices, return_inverse=True)
-        return Mesh(self.points[used], corners.reshape(-1, 3).astype(np.uint32))
+        with self._lock:
+            points, simplices = self.points, self.simplices
+        used, corners = np.unique(simplices, return_inverse=True)
+        return Mesh(points[used], corners.reshape(-1, 3).astype(np.uint32))
 
     def _repr_png_(self):
         return self.mesh()._repr_png_()

@@ -83,6 +83,68 @@ class Triangulations(unittest.TestCase):
         self.assertEqual(made.ids[0], made.ids[2])
         self.assertEqual(made.insert([[1, 0]])[0], made.ids[1])
 
+    def test_simplices_index_the_callers_points(self):
+        for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3), (terrace.DynamicSurface, 3)):
+            with self.subTest(kind=kind.__name__):
+                points = np.random.default_rng(21).random((500, width))
+                made = kind(points)
+                np.testing.assert_array_equal(made.points, points)
+                np.testing.assert_array_equal(made.ids, np.arange(500))
+                np.testing.assert_array_equal(made.vertices, np.arange(500))
+                self.assertEqual((made.simplices.min(), made.simplices.max()), (0, 499))
+                if kind is not terrace.DynamicSurface:
+                    theirs = Delaunay(points).simplices
+                    self.assertEqual({frozenset(row) for row in made.simplices.tolist()}, {frozenset(row) for row in theirs.tolist()})
+                # Later points follow; numbers that are free again come first.
+                more = made.insert(points[:40] + 2)
+                np.testing.assert_array_equal(more, np.arange(500, 540))
+                made.remove(more[::2])
+                made.remove([7])
+                self.assertTrue(np.isnan(made.points[[7, *more[::2]]]).all())
+                self.assertNotIn(7, made.simplices)
+                again = made.insert(points[:10] + 4)
+                self.assertLess(again.max(), 540)
+                np.testing.assert_array_equal(made.points[again], points[:10] + 4)
+                kept = np.setdiff1d(np.arange(500), [7, *again])
+                np.testing.assert_array_equal(made.points[kept], points[kept])
+                self.assertEqual(len(made), len(made.vertices))
+
+    def test_copies_have_the_number_of_the_first(self):
+        points = np.array([[0, 0], [1, 0], [0, 0], [0, 1], [1, 0], [1, 1]], float)
+        made = terrace.Delaunay2(points)
+        self.assertEqual(made.ids.tolist(), [0, 1, 0, 3, 1, 5])
+        np.testing.assert_array_equal(made.points, points)
+        self.assertEqual(set(made.simplices.ravel().tolist()), {0, 1, 3, 5})
+        self.assertEqual(made.vertices.tolist(), [0, 1, 3, 5])
+        with self.assertRaisesRegex(ValueError, 'no vertex 4'):
+            made.remove([4])
+        for wrong, text in (([9], 'no vertex 9'), ([-1], 'no such vertex'), ([3, 3], 'vertex 3 is named twice')):
+            with self.assertRaisesRegex(ValueError, text):
+                made.remove(wrong)
+        made.remove([1])
+        with self.assertRaisesRegex(ValueError, 'no vertex 1'):
+            made.remove([1])
+        self.assertTrue(np.isnan(made.points[[1, 4]]).all())
+        number = made.insert([[1, 0], [5, 5]])[0]
+        np.testing.assert_array_equal(made.points[number], (1, 0))
+        self.assertEqual(made.insert(points).tolist(), [0, number, 0, 3, number, 5])
+
+    def test_values_are_by_number(self):
+        points = np.random.default_rng(22).random((300, 2))
+        made = terrace.Delaunay2(points)
+        values = points @ (2, 3)
+        inside = points[:50] * 0.2 + 0.4
+        np.testing.assert_allclose(made.heights(values, inside), inside @ (2, 3), rtol=1e-12)
+        np.testing.assert_allclose(made.gradients(values, inside), np.broadcast_to((2, 3), (50, 2)), rtol=1e-9)
+        shares, vertices, begins = made.weights(inside)
+        np.testing.assert_allclose(np.add.reduceat(shares * values[vertices], begins[:-1]), inside @ (2, 3), rtol=1e-12)
+        np.testing.assert_array_equal(made.nearest(points), np.arange(300))
+        np.testing.assert_allclose(made.smooth(values, vertices=[5])[np.arange(300) != 5], values[np.arange(300) != 5])
+        with self.assertRaisesRegex(ValueError, 'values` of the shape'):
+            made.heights(values[:-1], inside)
+        self.assertEqual(terrace.Delaunay2.of_grid(4, 3).simplices.min(), 0)
+        np.testing.assert_array_equal(terrace.Delaunay2.of_grid(4, 3).points[5], (1, 1))
+
     def test_nearest(self):
         points = np.random.default_rng(9).random((1000, 2))
         asked = np.random.default_rng(10).random((300, 2)) * 2 - 0.5

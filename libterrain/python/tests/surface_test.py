@@ -229,7 +229,7 @@ class Interpolation(unittest.TestCase):
             self.assertLess(left, 0.6 * noise)
         step = mesh.by_vertex(np.where(self.xy[:, 0] < 0.5, 0.0, 10.0))
         np.testing.assert_array_equal(mesh.smooth(step, 'bilateral', edge_height=5), step)
-        some = mesh.vertices[:500]
+        some = mesh.vertices[np.hypot(*(self.xy[mesh.vertices] - 0.5).T) < 0.25]
         moved = mesh.vertices[(mesh.smooth(rough, vertices=some) != rough)[mesh.vertices]]
         self.assertTrue(set(moved) <= set(some))
         self.assertTrue(0 < len(moved) < len(some))
@@ -271,9 +271,7 @@ class Metrics(unittest.TestCase):
                                     (terrace.Delaunay3, terrace.ellipsoid([3, 1, 2]), 600)):
             points = random.random((count, len(metric)))
             made, mapped = kind(points, metric=metric), kind(points @ metric.T)
-            expected = np.empty_like(made.points)
-            expected[mapped.ids] = points  # handles of the two may differ
-            self.assertEqual(corner_sets(made.points, made.simplices), corner_sets(expected, mapped.simplices))
+            self.assertEqual(corner_sets(made.points, made.simplices), corner_sets(points, mapped.simplices))
             self.assertNotEqual(made.digest(), kind(points).digest())
             asked = random.random((200, len(metric)))
             closest = np.argmin((((asked[:, None] - points) @ metric.T) ** 2).sum(axis=2), axis=1)
