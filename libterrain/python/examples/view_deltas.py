@@ -4,7 +4,7 @@ import sys
 
 import terrace
 
-view = terrace.View(terrace.Store.open(sys.argv[1]))
+view = terrace.View(terrace.open(sys.argv[1]))
 triangles = {}
 for frame in range(120):
     delta = view.frame(position=(0, -20000 + 200 * frame, 4000), direction=(0, 1, -0.4), seconds=1 / 60)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Terrain, scans and point sets larger than memory, from numpy.
 
-``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters. From
-a ``Store`` come points, meshes, heights, contours, tiles and live views at any level of detail. Beside
-it stand the methods that it is made of: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
-``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``;
+``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters, which
+``open(path)`` or ``Store(path)`` opens again. A ``Store`` gives points, meshes, heights, contours, tiles and live
+views at any level of detail. The methods that it is made of work alone: ``Delaunay2`` and ``Delaunay3``,
+``bounded_mesh``, ``interpolate``, ``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``;
 and what it reads: ``read_points``, ``write_points``, ``Transformation``.
 
 Long calls release the interpreter's lock, use all cores unless ``threads`` says otherwise, and end soon
@@ -43,7 +43,9 @@ from ._tin import bounded_mesh, interpolate, simplify_line
 from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree, rotate_tree
 from ._view import MeshDelta, Multiresolution, View, ViewDelta
 
+open = Store.open
 __version__ = '0.1.0'
+# Not `open`: `from terrace import *` must leave Python's own alone.
 __all__ = [
     'Assignment', 'BoundedMesh', 'ClusterBlock', 'Clusters', 'Delaunay2', 'Delaunay3', 'DynamicSurface', 'Error',
     'FeatureCollection', 'HalvingMatching', 'KMeans', 'Matching', 'MatchingTree', 'Mesh', 'MeshChanges',

@@ -122,29 +122,34 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     if os.path.lexists(path) and not given.get('replace'):
         raise FileExistsError(errno.EEXIST, 'exists already; give another name or replace=True', path)
     _core.build(source, os.fsencode(path), given, job(progress, threads, memory))
-    return Store.open(path)
+    return Store(path)
 
 
 class Store:
-    """A store opened for reading. Any number of threads may use it at once; a fork of the process may too.
+    """A store opened for reading: ``Store('alps.store')``; ``terrace.open`` and ``Store.open`` are the same. Any number of
+    threads may use it at once; a fork of the process may too.
 
-    Close it, or use it as a context manager; a closed store raises ValueError.
+    Close it, or use it as a context manager; a closed store raises ValueError. Raises: FileNotFoundError; Error if the
+    store is damaged or of a newer version.
     """
 
-    def __init__(self, core):
-        self._core = core
-        self._info = core.info()
+    def __init__(self, path):
+        if isinstance(path, _core.OpenStore):  # a view of another store
+            self._core = path
+        else:
+            path = os.fspath(path)
+            try:
+                self._core = _core.OpenStore(os.fsencode(path))
+            except _core.Error as error:
+                if not os.path.lexists(path):
+                    raise FileNotFoundError(errno.ENOENT, 'there is no store here', path) from error
+                raise
+        self._info = self._core.info()
 
     @classmethod
     def open(cls, path):
-        """Opens the store in a folder. Raises: FileNotFoundError; Error if it is damaged or of a newer version."""
-        path = os.fspath(path)
-        try:
-            return cls(_core.OpenStore(os.fsencode(path)))
-        except _core.Error as error:
-            if not os.path.lexists(path):
-                raise FileNotFoundError(errno.ENOENT, 'there is no store here', path) from error
-            raise
+        """Opens the store in a folder, as ``Store(path)`` does."""
+        return cls(path)
 
     def close(self):
         """Work that other threads are at goes on to its end."""

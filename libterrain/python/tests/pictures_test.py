@@ -38,7 +38,7 @@ class Pictures(StoreCase):
         heights = 3000 * np.exp(-((metres[None, :] - 20_000) ** 2 + (metres[:, None] - 20_000) ** 2) / 1e8)
         lon, lat = 10 + metres / 55_800.0, 60 + metres / 111_412.0
         terrace.build(grid_mesh(heights, lon, lat).vertices, self.path('degrees'), crs='EPSG:4326')
-        with terrace.Store.open(self.path('degrees')) as store:
+        with terrace.open(self.path('degrees')) as store:
             made = store.mesh(level=0)
             degrees = pixels_of(made._repr_png_())
             elsewhere = pixels_of(store.mesh(level=0, crs='EPSG:32632')._repr_png_())

@@ -5,6 +5,7 @@ import errno
 import json
 import logging
 import os
+import pathlib
 import subprocess
 import tempfile
 import threading
@@ -50,6 +51,26 @@ class Stores(StoreCase):
         self.assertIn('EPSG:32632', repr(self.scan))
         self.assertLess(len(self.scan._repr_png_()), 400_000)
         self.assertEqual(self.scan.verify(), [])
+
+    def test_a_path_opens_a_store(self):
+        path = self.scan.info['path']
+        for opened in (terrace.Store(path), terrace.open(path), terrace.Store.open(path), terrace.Store(pathlib.Path(path))):
+            with opened as store:
+                self.assertEqual((len(store), store.bounds), (20000, self.scan.bounds))
+                self.assertGreater(len(store.where('classification == 2')) if 'classification' in store.points().dtype.names else 1, 0)
+        for wrong, kind in ((self.path('nothing'), FileNotFoundError), (self.folder, terrace.Error), (3, TypeError), (None, TypeError)):
+            for opener in (terrace.Store, terrace.open):
+                with self.assertRaises(kind):
+                    opener(wrong)
+        self.assertNotIn('open', terrace.__all__)  # `from terrace import *` would hide Python's own
+
+    def test_typos_in_options_are_refused(self):
+        for wrong in (lambda: terrace.build(self.points, self.path('typo'), replce=True), lambda: self.raster.tiles(self.path('typo'), max_eror=1),
+                      lambda: self.raster.heights([[0, 0]], level_=1), lambda: self.scan.mesh(smoothing={'methd': 'taubin'}),
+                      lambda: self.raster.raster(cel=1)):
+            with self.assertRaisesRegex(TypeError, 'replce|max_eror|level_|methd|cel'):
+                wrong()
+        self.assertFalse(os.path.exists(self.path('typo')))
 
     def test_regions_levels_and_conditions(self):
         box = (300100, 5200100, 300400, 5200300)

@@ -55,7 +55,7 @@ class Algorithm(QgsProcessingAlgorithm):
             raise QgsProcessingException(str(error)) from error
 
     def store(self, parameters, context):
-        return terrace.Store.open(self.parameterAsFile(parameters, 'STORE', context))
+        return terrace.open(self.parameterAsFile(parameters, 'STORE', context))
 
 
 def store_parameter():
