@@ -24,9 +24,9 @@ def run(name):
     """What the script prints, its names at the end, and how many cells end in an object with a picture."""
     with open(os.path.join(FOLDER, name), encoding='utf-8') as file:
         text = file.read()
-    names, printed, pictures = {}, io.StringIO(), 0
+    names, printed, pictures = {'__file__': os.path.join(FOLDER, name)}, io.StringIO(), 0
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(printed), \
-            contextlib.redirect_stderr(io.StringIO()), mock.patch.object(sys, 'argv', [name, ALPS]):
+            contextlib.redirect_stderr(io.StringIO()), mock.patch.object(sys, 'argv', [name]):
         before = os.getcwd()
         os.chdir(folder)
         try:
@@ -63,6 +63,14 @@ class Tutorials(unittest.TestCase):
     def test_all_are_here(self):
         scripts = {name for name in os.listdir(FOLDER) if name.endswith('.py')}
         self.assertEqual(scripts, {'terrain.py', 'lidar.py', 'clustering.py'})
+
+
+    def test_they_run_as_scripts_without_arguments(self):
+        for name in sorted(os.listdir(FOLDER)):
+            if name.endswith('.py'):
+                with self.subTest(name), tempfile.TemporaryDirectory() as folder:
+                    subprocess.run([sys.executable, os.path.join(FOLDER, name)], cwd=folder, check=True, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
 
 
 class Examples(StoreCase):

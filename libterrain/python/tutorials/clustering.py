@@ -23,12 +23,13 @@ exact = terrace.cluster(points[::20], 0.1, method='jain-vazirani')
 print(f'every 20th point: cost {exact.cost:.0f}, no solution below {exact.lower_bound:.0f}')
 
 # %% [markdown]
-# Linkage gives SciPy's rows, so SciPy's dendrograms draw them; k-means takes the representatives as its start.
+# Linkage has SciPy's methods and gives SciPy's rows, so SciPy's dendrograms draw them; k-means takes the representatives as
+# its start.
 
 # %%
-rows = terrace.linkage(points, 'complete')
-labels = terrace.flat_clusters(rows, count=12)
-print('complete linkage:', np.bincount(labels))
+for method in ('complete', 'average', 'ward'):
+    labels = terrace.flat_clusters(terrace.linkage(points, method), count=12)
+    print(f'{method} linkage:', np.bincount(labels))
 print('k-means:', terrace.kmeans(points, 12), 'from representatives:', terrace.kmeans(points, points[found.facilities]))
 
 # %% [markdown]
@@ -60,6 +61,7 @@ print(f'{made["points"]} points, clusters by level: {dict(sorted(clusters.items(
 
 # %%
 triangulation = terrace.Delaunay2(points)
+print('corners of the first triangle:', points[triangulation.simplices[0]])
 before = triangulation.digest()
 added = triangulation.insert(random.random((1000, 2)) * 100)
 print(triangulation)

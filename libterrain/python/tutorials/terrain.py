@@ -2,15 +2,18 @@
 # %% [markdown]
 # # Terrain: from a GeoTIFF to a mesh with a verified error
 #
-# One pass over the raster makes a *store*: every sample once, in a hierarchy of clusters.
+# One pass over the raster makes a *store*: every sample once, in a hierarchy of clusters. The raster is a piece of the Alps
+# from this repository; the name of any other will do. (A notebook has no `__file__`: start it in this folder.)
 
 # %%
-import sys
+from pathlib import Path
 import numpy as np
 import terrace
 
-store = terrace.build(sys.argv[1], 'alps.store', replace=True, progress=True)
+folder = Path(__file__).parent if '__file__' in globals() else Path.cwd()
+store = terrace.build(folder / '../../examples/alps.tif', 'alps.store', replace=True, progress=True)
 print(store, store.info['crs']['name'], f'{store.info["bytes"] / len(store):.2f} bytes per sample')
+# Later, or elsewhere: terrace.open('alps.store')
 
 # %% [markdown]
 # Which mesh keeps within 50 m of every sample? The bound is verified on each of them.
