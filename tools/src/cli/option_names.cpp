@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 42> kOptions{{
+constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"align", "--align"},
     {"band", "--band"},
     {"block_points", "--block"},
@@ -53,7 +53,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 42> kOptions
     {"water", "--water"},
     {"where", "--where"},
     {"zoom", "--zoom"},
-}};
+});
 
 }  // namespace
 
