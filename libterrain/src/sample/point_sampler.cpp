@@ -90,6 +90,7 @@ void sample_line(const stream::Store& store, const SamplerOptions& options, cons
   window.set_limit(too_long);
   window.load(flat(store.bounds()));
   const auto& points = window.triangulation();
+  if (points.vertex_count() == 0) return;
   for (std::size_t i = 0; i < places.size(); ++i) {
     store.check_stop();
     const Point2& place = places[i];

@@ -411,11 +411,12 @@ SurfacePoint PointSurface::natural(const Point2& place) {
 
 Point2 PointSurface::nearest(const Point2& place) {
   Point2 best{};
-  double bound = kFarAway;  ///< the square of its distance, or a little more
+  bool found = false;
+  double bound = kFarAway;  ///< the square of its distance, or a little more; it may overflow
   const auto offer = [&](const Point2& p) {
     const double square = square_of(p[0] - place[0], p[1] - place[1]);
     if (square > bound) return;
-    if (bound < kFarAway) {
+    if (found) {
       // Doubles tell most of them apart.
       const bool is_nearer = square * (1 + kDoubt) * (1 + kDoubt) < bound;
       if (!is_nearer) {
@@ -424,12 +425,13 @@ Point2 PointSurface::nearest(const Point2& place) {
       }
     }
     best = p;
+    found = true;
     bound = square * (1 + kDoubt);
   };
   for (std::uint32_t reach = 1;; reach *= 2) {
     cells_->visit_cells(cells_->near(place, reach), offer);
-    if (bound < kFarAway && cells_->is_near(disk(place, bound).bounds(), reach)) break;
-    if (bound < kFarAway || reach < kFarthest) continue;
+    if (found && cells_->is_near(disk(place, bound).bounds(), reach)) break;
+    if (found || reach < kFarthest) continue;
     for (const Point2& corner : hull_.corners()) offer(corner);
   }
   const CircleCover cover = disk(place, bound);
