@@ -83,10 +83,19 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   PointTable table;
   table.info = source->info();
   const std::size_t bytes_per_point = sizeof(stream::Point3) + table.info.payload_size();
+  const std::uint64_t fixed = kProgramMemory + reading;
+  const std::uint64_t most = (memory_bytes - std::min(memory_bytes, fixed)) / bytes_per_point;
+  // Rasters, PLY and meshes may have fewer.
+  if (!table.info.grid && table.info.points && *table.info.points <= most) {
+    table.positions.reserve(*table.info.points);
+    table.payload.reserve(*table.info.points * table.info.payload_size());
+  }
   for_each_block(*source, common, [&](stream::PointBlock& block) {
     stream::to_world(table.info, block);
     // A growing vector exists twice for a moment.
-    if (2 * bytes_per_point * (table.size() + block.size()) > memory_bytes - reading) {
+    const std::size_t count = table.size() + block.size();
+    const bool grows = count > table.positions.capacity();
+    if (count > (grows ? most / 2 : most)) {
       throw stream::Error({.file = file,
                            .where = {},
                            .cause = "has more points than " + readable_bytes(memory_bytes) +

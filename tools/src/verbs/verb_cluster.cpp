@@ -551,6 +551,7 @@ class ClusterCommand final : public Command {
            .cause = "has " + with_commas(table.size()) + " points",
            .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
     }
+    need_memory(table, common);
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
     if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
     std::vector<cluster::Point3> positions(table.size());
@@ -585,7 +586,7 @@ class ClusterCommand final : public Command {
     if (!labels_.empty()) write_labels(labels_, outcome.labels, replace_labels);
     if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
     if (!output_.empty()) {
-      write_clustered(output_, writing, table, outcome, request_.memory_bytes);
+      write_clustered(output_, writing, table, outcome, common.memory_or(0));
     }
     outputs.commit();
     Summary summary = summary_of(outcome, table.size(), watch);
@@ -595,6 +596,29 @@ class ClusterCommand final : public Command {
   }
 
  private:
+  /// Leaves request_.memory_bytes what is left after the table. Throws: stream::Error if the method
+  /// needs more.
+  void need_memory(const PointTable& table, const CommonOptions& common) {
+    // Peak bytes per point, measured; the methods on a matrix check theirs themselves.
+    const std::uint64_t each = request_.method == ClusterMethod::k_means  ? 120
+                               : request_.method == ClusterMethod::single ? 240
+                                                                          : 300;
+    const std::uint64_t held =
+        kProgramMemory + table.payload.size() + table.size() * sizeof(stream::Point3);
+    const std::uint64_t needed = held + table.size() * each;
+    const std::uint64_t memory = common.memory_or(0);
+    if (needed > memory) {
+      throw stream::Error({.file = input_,
+                           .where = {},
+                           .cause = "clustering its " + with_commas(table.size()) + " points by " +
+                                    method_ + " needs " + std::to_string((needed >> 20) + 1) +
+                                    " MiB, --memory is " + readable_bytes(memory),
+                           .remedy = "raise --memory, or build a store, which takes points of any "
+                                     "number"});
+    }
+    request_.memory_bytes = memory - held;
+  }
+
   void check_usage(const CommonOptions& common) {
     const auto method = choice<ClusterMethod>(method_, "--method",
                                               {{"facility", ClusterMethod::facility},
