@@ -233,8 +233,9 @@ class Store:
         region: a box of four or six numbers in the store's CRS, polygons (an object with ``__geo_interface__``, a
         GeoJSON dict or file) in the CRS that they name, or None. Polygons that name none are in longitude and latitude, as
         GeoJSON is, if the store's CRS is known and the numbers can be that; else in the store's. where: a condition on
-        attributes, x, y and z, such as 'classification == 2 && z < 100'. focus: pairs (region, level) with finer levels. cluster: in place of region and focus, a pair (L, N): the
-        points that cluster N of level L stands for. level: 0 unless given; with a cluster, its own. crs: that the coordinates
+        attributes, x, y and z, such as 'classification == 2 && z < 100'. focus: pairs (region, level) with finer levels.
+        cluster: in place of region and focus, a pair (L, N): the points that cluster N of level L stands for. level: 0
+        unless given; with a cluster, its own. crs: that the coordinates
         are wanted in.
 
         Returns: a structured array: x, y, z (float64), then the attributes with their types (float64 where they have
@@ -280,8 +281,8 @@ class Store:
         return self._core.count(box)
 
     def own_region(self, region, crs):
-        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon that names its CRS, with so many corners that
-        outlines are within a millionth of their length; without the heights of a box. Raises: Error where nothing leads
+        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon that names its CRS, with so many
+        corners that outlines are within a millionth of their length; without the heights of a box. Raises: Error where nothing leads
         from there."""
         text = crs_text(crs)
         if region is None or text is None:
@@ -348,7 +349,8 @@ class Store:
         """
         def make(name):
             _core.write_raster(self._core, os.fsencode(name), value, cell, b'' if align is None else os.fsencode(align),
-                               as_region(region), (crs_text(crs) or ''), method, whole(level, 'level', bits=32), max_edge, replace, job(progress, threads, memory))
+                               as_region(region), (crs_text(crs) or ''), method, whole(level, 'level', bits=32),
+                               max_edge, replace, job(progress, threads, memory))
             return read_raster(name)
 
         if path is not None:
