@@ -600,9 +600,9 @@ class ClusterCommand final : public Command {
   /// needs more.
   void need_memory(const PointTable& table, const CommonOptions& common) {
     // Peak bytes per point, measured; the methods on a matrix check theirs themselves.
-    const std::uint64_t each = request_.method == ClusterMethod::k_means  ? 120
-                               : request_.method == ClusterMethod::single ? 240
-                                                                          : 300;
+    const std::uint64_t each = request_.method == ClusterMethod::k_means   ? 120
+                               : request_.method == ClusterMethod::linkage ? 240
+                                                                           : 300;
     const std::uint64_t held =
         kProgramMemory + table.payload.size() + table.size() * sizeof(stream::Point3);
     const std::uint64_t needed = held + table.size() * each;
