@@ -92,7 +92,9 @@ class Remote {
 
 void expect_same(double a, double b, const std::string& where) {
   EXPECT_EQ(std::isnan(a), std::isnan(b)) << where << ": " << a << " for " << b;
-  if (!std::isnan(b)) EXPECT_NEAR(a, b, 1e-9 * (1 + std::abs(b))) << where;
+  if (!std::isnan(b)) {
+    EXPECT_NEAR(a, b, 1e-9 * (1 + std::abs(b))) << where;
+  }
 }
 
 constexpr stream::LinearMap kGround{30, 0, 0, 0, -30, 0, 0, 0, 1};
@@ -124,7 +126,9 @@ TEST(StoreProbes, HeightsOfRastersAreThoseOfTheSampler) {
     ASSERT_TRUE(later);
     ASSERT_EQ(found.has_value(), later->has_value());
     expect_same(found ? found->stored[2] : NAN, expected[i].height, std::to_string(i));
-    if (found) EXPECT_EQ((*later)->stored, found->stored);
+    if (found) {
+      EXPECT_EQ((*later)->stored, found->stored);
+    }
   }
   // The index and the clusters of each level.
   EXPECT_LE(rounds, 2 * static_cast<int>(store.levels().size()) + 1);
