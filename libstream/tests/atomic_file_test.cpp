@@ -196,11 +196,13 @@ TEST(AtomicFile, LooksAgainAtWhatItReplaces) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   std::ofstream(target) << "ours, old";
-  AtomicFile file(target, if_ours());
-  file.write("ours, new");
-  std::ofstream(target) << "a stranger's";
-  EXPECT_THROW(file.commit(), Error);
-  EXPECT_EQ(content(target), "a stranger's");
+  {
+    AtomicFile file(target, if_ours());
+    file.write("ours, new");
+    std::ofstream(target) << "a stranger's";
+    EXPECT_THROW(file.commit(), Error);
+    EXPECT_EQ(content(target), "a stranger's");
+  }
   AtomicFile again(target, if_ours());
   again.write("ours, new");
   fs::remove(target);

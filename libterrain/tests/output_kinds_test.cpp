@@ -31,10 +31,10 @@ TEST(OutputKinds, TheEndingChoosesTheFormat) {
 }
 
 TEST(OutputKinds, ANameOfAnotherFormatIsRefusedWithThePossibleOnes) {
-  expect_refused(outputs::kRasterFile, "x.png", {}, "end in .tif or .tiff");
-  expect_refused(outputs::kPictureFile, "x.jpg", {}, "end in .png");
-  expect_refused(outputs::kContourFile, "c.gpkg", {}, "end in .geojson or .json");
-  expect_refused(outputs::kMeshFile, "m.stl", {}, "end in .ply, .obj or .glb");
+  expect_refused(outputs::kRasterFile, "x.png", {}, "ends in .tif or .tiff");
+  expect_refused(outputs::kPictureFile, "x.jpg", {}, "ends in .png");
+  expect_refused(outputs::kContourFile, "c.gpkg", {}, "ends in .geojson or .json");
+  expect_refused(outputs::kMeshFile, "m.stl", {}, "ends in .ply, .obj or .glb");
   expect_refused(outputs::kMeshFile, "m", {}, "has no ending");
   expect_refused(outputs::kPointFile, "p.geojson", {}, ".copc.laz");
   expect_refused(outputs::kLabelFile, "l.png", {}, "cannot be written as .png");

@@ -523,5 +523,33 @@ TEST(Region, SaysWhatIsWrongWithRings) {
   }
 }
 
+/// Spikes from side to side, of which each row or each column crosses all.
+TEST(Region, SpikesAreAnsweredAlongBothAxes) {
+  constexpr std::size_t kSpikes = 20000;
+  constexpr double kWidth = 1000.0 / kSpikes;
+  std::vector<Point2> comb;
+  for (std::size_t i = 0; i < kSpikes; ++i) {
+    comb.push_back({static_cast<double>(i) * kWidth, 0});
+    comb.push_back({(static_cast<double>(i) + 0.5) * kWidth, 1000});
+  }
+  comb.push_back({1000, 0});
+  comb.push_back({1000, -1});
+  comb.push_back({0, -1});
+  std::vector<Point2> turned = comb;
+  for (Point2& p : turned) std::swap(p[0], p[1]);
+  const Region upright = Region::of_polygons({Polygon{comb}}, 0, 1),
+               lying = Region::of_polygons({Polygon{turned}}, 0, 1);
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> place(0, 1000);
+  for (int i = 0; i < 5000; ++i) {
+    const double x = place(random), y = place(random);
+    const double within = x / kWidth - std::floor(x / kWidth);
+    const double top = 1000 * (1 - std::abs(2 * within - 1));
+    if (std::abs(y - top) < 1e-3) continue;
+    EXPECT_EQ(upright.covers({x, y}), y < top) << x << ' ' << y;
+    EXPECT_EQ(lying.covers({y, x}), y < top) << x << ' ' << y;
+  }
+}
+
 }  // namespace
 }  // namespace terrace::terrain
