@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "io/file_size_signal.hpp"
-#include "io/placement.hpp"
+#include "io/output_placement.hpp"
 #include "io/temporary.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -52,7 +52,7 @@ struct AtomicFile::Impl {
   fs::path place;   ///< after following symbolic links
   fs::path temporary;
   Naming naming;
-  Placement placement;  ///< once complete
+  OutputPlacement placement;  ///< once complete
   int descriptor = -1;
   std::uint64_t flushed = 0;  // bytes in the file; the buffer continues there
   std::vector<std::byte> buffer;
@@ -128,7 +128,7 @@ struct AtomicFile::Impl {
   void complete() {
     flush();
     if (::fsync(descriptor) != 0) fail("cannot be synced", errno);
-    placement = Placement(target, place, temporary, naming);
+    placement = OutputPlacement(target, place, temporary, naming);
   }
 
   /// After put_together(): the temporary name is gone or that of what has been replaced. The
@@ -205,7 +205,7 @@ void AtomicFile::commit() {
     impl_->naming.group->files_.push_back(impl_);
     return;
   }
-  const std::array<Placement*, 1> alone{&impl_->placement};
+  const std::array<OutputPlacement*, 1> alone{&impl_->placement};
   put_together(alone);
   impl_->finish();
 }
@@ -216,7 +216,7 @@ OutputGroup::OutputGroup() = default;
 OutputGroup::~OutputGroup() = default;
 
 void OutputGroup::commit() {
-  std::vector<Placement*> outputs;
+  std::vector<OutputPlacement*> outputs;
   for (const auto& file : files_) outputs.push_back(&file->placement);
   put_together(outputs);
   for (const auto& file : files_) file->finish();

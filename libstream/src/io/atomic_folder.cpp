@@ -9,7 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "io/placement.hpp"
+#include "io/output_placement.hpp"
 #include "io/temporary.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
@@ -96,8 +96,8 @@ void AtomicFolder::commit() {
   }
   if (error) throw system_error(impl.target.string(), "cannot be listed", error.value());
   sync_folder(impl.folder);
-  Placement placement(impl.target, impl.target, impl.folder, impl.naming);
-  const std::array<Placement*, 1> alone{&placement};
+  OutputPlacement placement(impl.target, impl.target, impl.folder, impl.naming);
+  const std::array<OutputPlacement*, 1> alone{&placement};
   put_together(alone);
   impl.folder.clear();
   if (const fs::path old = placement.replaced(); !old.empty()) impl.remove(old);

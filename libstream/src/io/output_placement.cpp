@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/placement.hpp"
+#include "io/output_placement.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -36,20 +36,20 @@ bool is_folder(const fs::path& path) {
 
 }  // namespace
 
-Placement::Placement(fs::path shown, fs::path place, fs::path temporary, Naming naming)
+OutputPlacement::OutputPlacement(fs::path shown, fs::path place, fs::path temporary, Naming naming)
     : shown_(std::move(shown)),
       place_(std::move(place)),
       temporary_(std::move(temporary)),
       naming_(std::move(naming)) {}
 
-fs::path Placement::aside() const { return fs::path(temporary_).concat(kReplacedEnding); }
+fs::path OutputPlacement::aside() const { return fs::path(temporary_).concat(kReplacedEnding); }
 
-fs::path Placement::replaced() const {
+fs::path OutputPlacement::replaced() const {
   if (state_ == State::exchanged) return temporary_;
   return state_ == State::aside ? aside() : fs::path();
 }
 
-bool Placement::may_replace(const fs::path& old) const noexcept {
+bool OutputPlacement::may_replace(const fs::path& old) const noexcept {
   try {
     // A file replaces files, a folder replaces folders: after an exchange `temporary_` is the old
     // output, and the new one has the place.
@@ -62,11 +62,11 @@ bool Placement::may_replace(const fs::path& old) const noexcept {
   }
 }
 
-void Placement::fail(int error_number) const {
+void OutputPlacement::fail(int error_number) const {
   throw system_error(shown_.string(), "cannot be renamed into place", error_number);
 }
 
-void Placement::fail_because_it_exists() const {
+void OutputPlacement::fail_because_it_exists() const {
   throw Error({.file = shown_.string(),
                .where = {},
                .cause = "exists already",
@@ -74,7 +74,7 @@ void Placement::fail_because_it_exists() const {
                .error_number = EEXIST});
 }
 
-void Placement::fail_because_it_is_foreign() const {
+void OutputPlacement::fail_because_it_is_foreign() const {
   throw Error({.file = shown_.string(),
                .where = {},
                .cause = "exists and was not written by terrace, so it is not replaced",
@@ -83,7 +83,7 @@ void Placement::fail_because_it_is_foreign() const {
 }
 
 /// False if the name is free by now. Throws: Error.
-bool Placement::put_by_exchange() {
+bool OutputPlacement::put_by_exchange() {
   const int number = exchange(temporary_, place_);
   if (number == ENOENT) return false;
   if (number == EINVAL || number == ENOSYS) return put_by_steps();
@@ -96,7 +96,7 @@ bool Placement::put_by_exchange() {
 }
 
 /// For file systems that cannot exchange names.
-bool Placement::put_by_steps() {
+bool OutputPlacement::put_by_steps() {
   const fs::path old = aside();
   if (!is_folder(temporary_)) {
     // A file is replaced by one rename. A second name keeps the old one until all has gone well.
@@ -126,7 +126,7 @@ bool Placement::put_by_steps() {
   return true;
 }
 
-void Placement::put() {
+void OutputPlacement::put() {
   // The name may be taken or become free between two steps.
   for (int attempt = 0; attempt < 1000; ++attempt) {
     const int number = rename_exclusively(temporary_, place_);
@@ -148,7 +148,7 @@ void Placement::put() {
   fail(EBUSY);
 }
 
-void Placement::undo() noexcept {
+void OutputPlacement::undo() noexcept {
   switch (state_) {
     case State::alone:
       rename_exclusively(place_, temporary_);
@@ -167,7 +167,7 @@ void Placement::undo() noexcept {
   state_ = State::waiting;
 }
 
-void put_together(std::span<Placement* const> outputs) {
+void put_together(std::span<OutputPlacement* const> outputs) {
   std::size_t put = 0;
   try {
     std::set<fs::path> folders;

@@ -12,12 +12,12 @@ namespace terrace::stream {
 
 /// A complete and synced output, file or folder, under a temporary name in the folder of the name
 /// that it is to get.
-class Placement {
+class OutputPlacement {
  public:
-  Placement() = default;
+  OutputPlacement() = default;
   /// shown: the output's name in messages. `place` does not end in a link.
-  Placement(std::filesystem::path shown, std::filesystem::path place,
-            std::filesystem::path temporary, Naming naming);
+  OutputPlacement(std::filesystem::path shown, std::filesystem::path place,
+                  std::filesystem::path temporary, Naming naming);
 
   [[nodiscard]] const std::filesystem::path& place() const { return place_; }
   [[nodiscard]] const std::filesystem::path& shown() const { return shown_; }
@@ -55,7 +55,7 @@ class Placement {
 
 /// Gives all of them their names and syncs their folders. Throws: Error; then all names have what
 /// they had before.
-void put_together(std::span<Placement* const> outputs);
+void put_together(std::span<OutputPlacement* const> outputs);
 
 /// fsync of a folder that may be read; one that cannot be synced by its file system counts as
 /// synced. Throws: Error.
