@@ -22,6 +22,18 @@
 namespace terrace::terrain {
 namespace {
 
+/// What a file says that has nothing but WKT, or nothing but a code.
+stream::Crs crs_of_wkt(const std::string& wkt) {
+  stream::Crs crs;
+  crs.wkt = wkt;
+  return crs;
+}
+stream::Crs crs_of_code(int code) {
+  stream::Crs crs;
+  crs.epsg = code;
+  return crs;
+}
+
 TEST(CoordinateSystem, KnowsWhatTheCodesMeasureIn) {
   for (const char* code : {"EPSG:4326", "epsg:4258", "EPSG:4269", "EPSG:4979"}) {
     EXPECT_TRUE(CoordinateSystem::parse(code).is_geographic()) << code;
@@ -110,7 +122,7 @@ TEST(CoordinateSystem, WhatFilesAreGivenReadsBack) {
         "EPSG:32632", "EPSG:25832+7837", "EPSG:4326", "EPSG:4979", "EPSG:31468", "ESRI:102067"}) {
     SCOPED_TRACE(code);
     const CoordinateSystem known = CoordinateSystem::parse(code);
-    const auto read = CoordinateSystem::of({.wkt = known.crs_with_wkt1().wkt}, "file");
+    const auto read = CoordinateSystem::of(crs_of_wkt(known.crs_with_wkt1().wkt), "file");
     ASSERT_TRUE(read);
     EXPECT_TRUE(read->same_places(known));
     EXPECT_EQ(read->crs().epsg, known.crs().epsg);
@@ -143,10 +155,10 @@ TEST(CoordinateSystem, DescriptionsOfOneSystemAreTheSame) {
   }
   const std::vector<stream::Crs> same{keys({{1024, 1}, {3072, 25832}}),
                                       keys({{1024, 1}, {3072, 25832}, {3076, 9001}}),
-                                      {.wkt = utm.crs().wkt},
-                                      {.wkt = utm.crs_with_wkt1().wkt},
-                                      {.wkt = esri},
-                                      {.wkt = shifted},
+                                      crs_of_wkt(utm.crs().wkt),
+                                      crs_of_wkt(utm.crs_with_wkt1().wkt),
+                                      crs_of_wkt(esri),
+                                      crs_of_wkt(shifted),
                                       utm.crs()};
   for (const stream::Crs& a : same) {
     for (const stream::Crs& b : same) EXPECT_TRUE(same_crs(a, b)) << a.wkt << '\n' << b.wkt;
@@ -167,7 +179,7 @@ TEST(CoordinateSystem, AGeocentricSystemIsNamedButHasNoTerrain) {
   EXPECT_EQ(crs.vertical_unit, "metre");
   EXPECT_TRUE(crs.wkt.starts_with("GEODCRS[")) << crs.wkt;
   EXPECT_FALSE(CoordinateSystem::of(crs, "store"));
-  EXPECT_FALSE(CoordinateSystem::of({.epsg = 4978}, "file"));
+  EXPECT_FALSE(CoordinateSystem::of(crs_of_code(4978), "file"));
   EXPECT_THROW(CoordinateSystem::parse("EPSG:4978"), UsageError);
 }
 
@@ -324,7 +336,7 @@ TEST(CoordinateSystem, AFileMaySpellACrsAsItLikes) {
   std::ofstream(file) << "EPSG:32632";
   EXPECT_EQ(definition_of_text(file).epsg(), 32632);
   EXPECT_EQ(title(file).find("refused"), 0U);
-  EXPECT_EQ(local_crs_of({.wkt = file}), std::nullopt);
+  EXPECT_EQ(local_crs_of(crs_of_wkt(file)), std::nullopt);
 }
 
 TEST(CoordinateSystem, WktMayHaveParentheses) {
