@@ -57,6 +57,35 @@ StoredBox box_of(const LatticeWindow& window) {
            static_cast<double>(window.row + window.rows - 1)}};
 }
 
+/// Adds the part of the outline that decides about places in and around a box: the same wherever
+/// else the outline changes.
+void add_outline(const PointHull& hull, const StoredBox& box, Digest& digest) {
+  constexpr double kAround = 4.0;
+  std::vector<Point2> part(hull.corners().begin(), hull.corners().end());
+  for (unsigned side = 0; side < 4 && !hull.is_flat(); ++side) {
+    const std::size_t axis = side / 2, other = 1 - axis;
+    const bool upper = side % 2 == 1;
+    const double bound = upper ? box.max[axis] + kAround : box.min[axis] - kAround;
+    const auto keeps = [&](const Point2& p) { return upper ? p[axis] <= bound : p[axis] >= bound; };
+    std::vector<Point2> kept;
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      const Point2 &a = part[i], &b = part[(i + 1) % part.size()];
+      if (keeps(a)) kept.push_back(a);
+      if (keeps(a) == keeps(b)) continue;
+      Point2 cut{};
+      cut[axis] = bound;
+      cut[other] = a[other] + (bound - a[axis]) / (b[axis] - a[axis]) * (b[other] - a[other]);
+      kept.push_back(cut);
+    }
+    part = std::move(kept);
+  }
+  std::rotate(part.begin(), std::min_element(part.begin(), part.end()), part.end());
+  for (const Point2& corner : part) {
+    digest.add(corner[0]);
+    digest.add(corner[1]);
+  }
+}
+
 /// Adds the samples of a window, and the fill where it is used.
 void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& digest) {
   digest.add(raster.blocks.digest(window));
@@ -81,11 +110,7 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
     digest.add(raster.fill.digest(box_of(strip)));
     filled = true;
   }
-  if (!filled) return;
-  for (const Point2& corner : raster.hull.corners()) {
-    digest.add(corner[0]);
-    digest.add(corner[1]);
-  }
+  if (filled) add_outline(raster.hull, box_of(window), digest);
 }
 
 /// The lattice around places of it, two samples over its borders at most: what lies beyond is asked
