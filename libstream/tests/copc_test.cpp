@@ -224,7 +224,8 @@ TEST(CopcOctree, RegionsOfAWrongCubeAreRefused) {
   const TempFolder folder;
   const std::string path = (folder.path() / "cube.copc.laz").string();
   PointBlock points;
-  for (int i = 0; i < 1000; ++i) points.positions.push_back({i * 0.5, i % 7, i % 11});
+  for (int i = 0; i < 1000; ++i)
+    points.positions.push_back({i * 0.5, 1.0 * (i % 7), 1.0 * (i % 11)});
   const auto writer = open_point_writer(path, {});
   writer->append(points);
   writer->finish();

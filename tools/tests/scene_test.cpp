@@ -274,35 +274,6 @@ TEST_F(Scenes, ClustersExpandAndCollapseByHand) {
   EXPECT_EQ(scene->hash(), hash);
 }
 
-// Against rays from above at many places along the line.
-TEST_F(Scenes, AProfileIsTheSurfaceAlongALine) {
-  const auto scene = Scene::open(store(), kGround, 1'000'000);
-  for (int frame = 0; frame < 2000; ++frame) {
-    if (scene->frame(looking(0, 0, 1500, 4), 0.01, 0).settled) break;
-  }
-  scene->take_changes();
-  const stream::Point3 from{-310, -205, 0}, to{400, 330, 0};
-  auto line = scene->profile(from, to, {0, 0, 1});
-  std::sort(line.begin(), line.end());
-  ASSERT_GT(line.size(), 20u);
-  const double length = std::hypot(to[0] - from[0], to[1] - from[1]);
-  EXPECT_NEAR(line.front()[0], 0, 1e-9);
-  EXPECT_NEAR(line.back()[0], length, 1e-9);
-  std::size_t next = 0;
-  for (int i = 1; i < 500; ++i) {
-    const double at = length * i / 500;
-    while (line[next + 1][0] < at) ++next;
-    const auto &a = line[next], &b = line[next + 1];
-    const double height = a[1] + (at - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
-    const auto hit = scene->pick(
-        {from[0] + (to[0] - from[0]) * i / 500, from[1] + (to[1] - from[1]) * i / 500, 1e5},
-        {0, 0, -1}, 0.01);
-    ASSERT_TRUE(hit);
-    EXPECT_NEAR(height, hit->place[2], 1e-3);
-  }
-  EXPECT_TRUE(scene->profile(from, from, {0, 0, 1}).empty());
-}
-
 // The outline is made of closed lines between points that lie below the cluster.
 TEST_F(Scenes, AnOutlineGoesAroundACluster) {
   const auto scene = Scene::open(store(), kGround, 1'000'000);

@@ -10,6 +10,7 @@
 
 #include <terrace/stream/given_bytes.hpp>
 
+#include "base/vector.hpp"
 #include "sample/lattice_crossings.hpp"
 #include "surface/lattice_surface.hpp"
 
@@ -21,8 +22,6 @@ using stream::Point3;
 
 /// What a raster's places need is little.
 constexpr std::uint64_t kAll = UINT64_MAX;
-
-double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// Copies the attributes of a member, `bytes` of them.
 void copy_record(const stream::ClusterPoints& points, std::size_t member, std::size_t bytes,
