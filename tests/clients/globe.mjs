@@ -105,11 +105,16 @@ function compareSamples(set, places, heights, complain, facts) {
   const borders = new Map();
   places.forEach(({place, tiles, border}, i) => {
     if (border !== undefined) {
-      const first = borders.get(border) ?? borders.set(border, heights[i]).get(border);
-      const gap = Math.abs(first - heights[i]);
+      const rounding = Math.max(...tiles.map(tile => set.height(tile, ...place).rounding));
+      const here = {height: heights[i], rounding};
+      const first = borders.get(border) ?? borders.set(border, here).get(border);
+      const gap = Math.abs(first.height - here.height);
       facts.widest = Math.max(facts.widest, gap);
-      // A millimetre, and what a slope makes of the place beside the border.
-      if (!(gap <= 2e-3)) complain(`a gap of ${gap} m beside the border at ${place}`);
+      // Each tile rounds a height that both share. A millimetre more, and what a slope makes of the
+      // place next to the border.
+      if (!(gap <= 2e-3 + first.rounding + rounding)) {
+        complain(`a gap of ${gap} m beside the border at ${place}`);
+      }
     }
     // On a border any of the tiles may answer; interpolation has roundings of its own.
     const off = tiles.map(tile => {

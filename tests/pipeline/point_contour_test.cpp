@@ -105,13 +105,17 @@ std::vector<Corners> triangles_of(const stream::Store& store, unsigned level) {
 /// Each triangle by itself, higher ground on the left by the gradient. Equal ends are left out.
 std::multiset<Segment> segments_of(const std::vector<Corners>& triangles, double interval,
                                    const std::function<bool(const Corners&)>& wanted) {
+  // The intervals have at most one decimal, and so have the heights of their multiples.
+  const auto height = [&](std::int64_t level) {
+    return std::round(10 * interval * static_cast<double>(level)) / 10;
+  };
   std::multiset<Segment> segments;
   for (const Corners& t : triangles) {
     if (!wanted(t)) continue;
     const auto [lowest, highest] = std::minmax({t[0][2], t[1][2], t[2][2]});
     for (auto level = static_cast<std::int64_t>(std::floor(lowest / interval)) - 1;
-         static_cast<double>(level) * interval < highest; ++level) {
-      const double h = static_cast<double>(level) * interval;
+         height(level) < highest; ++level) {
+      const double h = height(level);
       std::vector<Point2> ends;
       Point2 up{};
       for (std::size_t i = 0; i < 3; ++i) {
