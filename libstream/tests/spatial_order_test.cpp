@@ -275,7 +275,7 @@ TEST(SpatialOrderTest, SmallBlocksAreHeldTogether) {
       std::uint64_t points = 0, room = 0;
       for (PointBlock block; source->next(block); block = {}) {
         points += block.size();
-        // Of the first window, which is held until it is judged.
+        // Only the first window counts, which is held until its order is judged.
         if (points <= 1u << 18) room += block.positions.capacity();
         EXPECT_LE(block.size(), kBlock);
         found.blocks.push_back(block);

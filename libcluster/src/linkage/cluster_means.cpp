@@ -4,7 +4,7 @@
 namespace terrace::cluster {
 namespace {
 
-/// Of squared distances, by Ward: 2 |a| |b| / (|a| + |b|). Symmetric to the last bit.
+/// The factor of a squared distance in Ward's method: 2 |a| |b| / (|a| + |b|). Exactly symmetric.
 double ward_factor(double a, double b) { return 2.0 * a * b / (a + b); }
 
 /// Subtracts the least coordinate of an axis if that is exact for all: the mean of places far from

@@ -34,7 +34,7 @@ std::vector<std::uint32_t> by_height(std::span<const Link> links) {
   return order;
 }
 
-/// Of each merge the greatest height in its subtree, itself included.
+/// Returns the greatest height in the subtree of each merge, its own included.
 std::vector<double> crests_of(const Dendrogram& dendrogram) {
   const std::size_t n = dendrogram.points;
   std::vector<double> crest;

@@ -124,7 +124,7 @@ void DistanceTriangle<T>::join(std::uint32_t low, std::uint32_t high, double bet
     if (!alive(k) || k == low || k == high) continue;
     T& to_high = k < high ? row(high)[k] : row(k)[high];
     T& to_low = k < low ? row(low)[k] : row(k)[low];
-    // Not negative, as the two that merge are no farther from each other than from others.
+    // Not negative: the two that merge are at most as far from each other as from others.
     to_high = static_cast<T>(combined(to_low, to_high, between, count_low, count_high, points(k)));
     if (k > low) to_low = std::numeric_limits<T>::infinity();
   }

@@ -207,7 +207,7 @@ class Chain final : public PointSource {
     }
   }
 
-  /// Of all files together: thousands of them may have many each.
+  /// The limit for all files together: there may be thousands, each with many comments.
   static constexpr std::size_t kMostComments = 1000;
 
   SourceOptions options_;

@@ -60,8 +60,8 @@ std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshH
 
 /// The local origin of a GLB file whose vertices lie in `bounds`.
 Point3 glb_origin(const Box3& bounds);
-/// What a GLB file stores for a coordinate, of units of so many metres. Not inline: GCC 12 drops
-/// the rounding where it makes vectors of it and the number is widened again at once.
+/// Returns what a GLB file stores for a coordinate whose unit is `metres` long. Not inline: where
+/// GCC 12 vectorises it and the result is widened again at once, it drops the rounding.
 float glb_coordinate(double coordinate, double origin, double metres);
 
 /// Holds a mesh writer's caller to its promises.

@@ -281,9 +281,9 @@ class Store:
         return self._core.count(box)
 
     def own_region(self, region, crs):
-        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon that names its CRS, with so many
-        corners that outlines are within a millionth of their length; without the heights of a box. Raises: Error where nothing leads
-        from there."""
+        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon that names its CRS, with enough
+        corners to keep outlines within a millionth of their length; without the heights of a box. Raises: Error if no operation
+        converts from there."""
         text = crs_text(crs)
         if region is None or text is None:
             raise ValueError('own_region() needs a region and its CRS')

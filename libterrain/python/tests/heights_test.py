@@ -140,7 +140,7 @@ class Rasters(StoreCase):
         with self.assertRaises(FileExistsError):
             self.scan.raster(cell=25, path=path)
         self.scan.raster(cell=25, path=path, replace=True)
-        # Of one cell size all fit each other, and others are told to.
+        # Rasters of one cell size align; `align` makes others do so.
         part = self.scan.raster(cell=25, region=(300110, 5200110, 300290, 5200190))
         np.testing.assert_array_equal(np.array(part.transform)[[2, 5]], (300100, 5200200))
         same = self.scan.raster(align=path)

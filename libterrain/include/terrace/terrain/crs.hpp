@@ -56,7 +56,7 @@ class CoordinateSystem {
 
   /// What a user writes: "EPSG:n", "EPSG:n+m" (horizontal and vertical), a code of another
   /// authority ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with one of these two
-  /// (.prj, .wkt). shift: for a datum that does not count as WGS 84; it goes before PROJ's
+  /// (.prj, .wkt). shift: for a datum that does not count as WGS 84; it overrides PROJ's
   /// operations. Throws: UsageError, naming the code or text and the remedy.
   static CoordinateSystem parse(const std::string& text,
                                 const std::optional<DatumShift>& shift = std::nullopt);
@@ -206,7 +206,8 @@ class RegionConversion {
   /// places are in that of the data. Throws: as above.
   [[nodiscard]] std::optional<Transformation> to_places(const PlacesCrs& given,
                                                         const stream::Box3& box) const;
-  /// Sets who is told what was assumed of a GeoJSON file's CRS, and which operation leads there.
+  /// Sets the function that receives notes: what was assumed about a GeoJSON file's CRS, and which
+  /// operation converts from it.
   void on_note(std::function<void(const std::string&)> note) { note_ = std::move(note); }
   /// What the user should know of it; empty: nothing.
   [[nodiscard]] std::string note() const { return to_regions_ ? to_regions_->note() : ""; }

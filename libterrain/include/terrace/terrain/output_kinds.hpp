@@ -47,7 +47,7 @@ namespace outputs {
 using namespace output_formats;
 using enum OutputKind::Names;
 inline constexpr OutputKind kPointFile{"a file of points", std::span(kPoints).first(7)};
-/// Of a store that may hold lines.
+/// For stores that may hold lines.
 inline constexpr OutputKind kPointOrLineFile{"a file of points", kPoints};
 inline constexpr OutputKind kMeshFile{"a mesh", kMesh};
 inline constexpr OutputKind kTetrahedraFile{"a file of tetrahedra", kTetrahedra, listed, false};

@@ -27,7 +27,7 @@ struct TilesRequest {
   std::optional<double> max_error{};
   tri::TinQuality quality = tri::TinQuality::kRemoval;
   HeightReference vertical = HeightReference::recorded;
-  std::string geoid{};  ///< file of a geoid grid of GeographicLib, goes before PROJ's
+  std::string geoid{};  ///< file of a geoid grid of GeographicLib, overrides PROJ's
   /// Globes have no holes: not `none`. `interpolate` fills voids within the convex outline of the
   /// data; beyond it the surface is at 0 m above the ellipsoid.
   Fill fill = Fill::interpolate;

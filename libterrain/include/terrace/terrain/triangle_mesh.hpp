@@ -46,7 +46,7 @@ void append_points(TriangleMesh& mesh, const stream::Schema& schema,
 /// The units of positions: made by default they are not known.
 struct MeshUnits {
   MeshUnits() = default;
-  /// Of what a store gives, after its places were converted.
+  /// The units of coordinates from a store after `places` has converted them.
   explicit MeshUnits(const stream::Store& store, const PlaceConversion& places = {});
 
   stream::Crs crs{};          ///< of x and y
