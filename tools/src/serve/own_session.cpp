@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "serve/own_session.hpp"
+
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -10,8 +12,6 @@
 #include <system_error>
 
 #include <unistd.h>
-
-#include "serve/own_session.hpp"
 
 namespace terrace::tools {
 namespace {

@@ -24,7 +24,6 @@
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
-#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/detail_points.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
