@@ -253,7 +253,8 @@ class ErrorTest(CommandTest):
         self.assert_one_line_error(
             terrace('synth', 'uniform', '--points', '9', '-o', self.path('folder.ply'), '--force'), 1)
         # --force would not help.
-        self.assertIn('- is standard output', terrace('synth', 'uniform', '--points', '9', '-o', '/dev/null').stderr)
+        os.mkfifo(self.path('pipe.xyz'))
+        self.assertIn('- is standard output', terrace('synth', 'uniform', '--points', '9', '-o', self.path('pipe.xyz')).stderr)
 
     def test_every_output_can_be_replaced_with_force(self):
         dem, hills = self.path('in.tif'), self.path('in.terrace')

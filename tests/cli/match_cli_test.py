@@ -194,11 +194,13 @@ class MatchTest(unittest.TestCase):
             self.assertFalse(os.path.exists(out))
 
     def test_too_little_memory_is_said_before_the_work(self):
-        self.points(20000)
+        self.points(60000)
         result = terrace('match', self.path('points.csv'), '-o', self.path('none.csv'),
-                         '--memory', '8M')
+                         '--memory', '40M')
         self.assertEqual(result.returncode, 1)
         self.assertIn('takes about', result.stderr)
+        self.assertIn('at least', terrace('match', self.path('points.csv'), '-o', self.path('none.csv'),
+                                          '--memory', '8M').stderr)
 
     def test_errors_are_one_line(self):
         self.points(10)

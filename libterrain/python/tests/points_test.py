@@ -108,7 +108,7 @@ class Points(StoreCase):
         for call, kind in ((lambda: terrace.read_points(self.path('none.laz')), OSError), (lambda: terrace.read_points([]), (ValueError, TypeError)),
                            (lambda: terrace.read_points(self.points, where='z >'), terrace.Error),
                            (lambda: terrace.read_points(self.points, block_points=0), ValueError), (lambda: terrace.read_points(self.points, none=1), TypeError),
-                           (lambda: terrace.write_points(self.path('a.what'), self.points), terrace.Error),
+                           (lambda: terrace.write_points(self.path('a.what'), self.points), ValueError),
                            (lambda: terrace.write_points(self.path('no/a.ply'), self.points), OSError),
                            (lambda: terrace.write_points(self.path('a.laz'), self.points, format='shp'), (ValueError, terrace.Error)),
                            (lambda: terrace.read_points(self.points, crs='EPSG:1'), ValueError), (lambda: terrace.read_points(np.zeros((0, 3))), ValueError)):

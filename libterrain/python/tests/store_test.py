@@ -691,7 +691,7 @@ class Lines(StoreCase):
         random = np.random.default_rng(21)
         given = [np.round(random.random((random.integers(2, 9), 3)).cumsum(axis=0) * 100, 2) for _ in range(60)]
         with open(self.path('lines.geojson'), 'w', encoding='ascii') as file:
-            json.dump({'type': 'FeatureCollection', 'features': [
+            json.dump({'type': 'FeatureCollection', 'crs': None, 'features': [
                 {'type': 'Feature', 'properties': {}, 'geometry': {'type': 'LineString', 'coordinates': line.tolist()}}
                 for line in given]}, file)
         store = terrace.build(self.path('lines.geojson'), self.path('lines'), entities='segments', block_points=60)

@@ -132,8 +132,13 @@ void refuse_empty_values(const CLI::App& app) {
 /// Least memory of a verb in MiB: the process itself and the smallest buffers. A verb that needs
 /// more for its input refuses the input itself.
 constexpr std::uint64_t kLeastMemory = 24;
-constexpr std::array<std::pair<std::string_view, std::uint64_t>, 4> kLeastMemoryOf{
-    {{"contour", 64}, {"raster", 64}, {"sample", 64}, {"profile", 48}}};
+constexpr std::array<std::pair<std::string_view, std::uint64_t>, 6> kLeastMemoryOf{
+    {{"cluster", 40},
+     {"contour", 64},
+     {"match", 40},
+     {"profile", 48},
+     {"raster", 64},
+     {"sample", 64}}};
 
 /// Refuses a --memory that is too small for any input.
 void check_memory(const Verb& verb, const CommonOptions& common) {
