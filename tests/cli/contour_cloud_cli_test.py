@@ -227,7 +227,7 @@ class CloudContourTest(CloudTestCase):
                 [(i, 2 * i, 10 * i) for i in range(50)],
                 [(i % 9, i // 9, 40) for i in range(50)])):
             store = self.build(f'few{number}', points, '--crs', 'EPSG:32632')
-            for interval in 1e-5, 10, 1e9:
+            for interval in 1e-4, 10, 1e9:
                 self.assertEqual(self.lines(store, '--interval', interval), [])
 
     def test_levels_without_number_are_told(self):

@@ -151,7 +151,7 @@ class SampleTest(QueryTest):
         for method in 'linear', 'natural':
             one = self.run_ok('sample', self.store, '--method', method, '--threads', 1, text=text)
             self.assertEqual(one, self.run_ok('sample', self.store, '--method', method, '--threads', 3,
-                                              '--memory', '2M', text=text))
+                                              '--memory', '64M', text=text))
             self.assertEqual(one.count('\n'), 30001)
 
     def test_places_are_written_in_another_reference_system(self):
@@ -265,7 +265,7 @@ class RasterTest(QueryTest):
             self.run_ok('raster', self.store, '--cell', 11, '--value', value, '--threads', 1, '--force',
                         '-o', one)
             self.run_ok('raster', self.store, '--cell', 11, '--value', value, '--threads', 3, '--force',
-                        '--memory', '30M', '-o', two)
+                        '--memory', '64M', '-o', two)
             self.assertTrue(filecmp.cmp(one, two, shallow=False))
 
     def test_regions_whose_rings_cross_are_refused(self):

@@ -259,7 +259,7 @@ class TileTest(TileTestCase):
             self.refuse(1, 'not empty', 'tile', store, '-o', self.path('full'), *vertical, *options)
         self.assertEqual(os.listdir(self.path('full')), ['letter.txt'])
         self.refuse(1, 'letter.txt', 'tile', store, '-o', self.path('full/letter.txt/x'), *vertical)
-        self.refuse(1, 'not a folder', 'tile', store, '-o', self.path('full/letter.txt'), *vertical)
+        self.refuse(2, 'which is a folder', 'tile', store, '-o', self.path('full/letter.txt'), *vertical)
         with open(self.path('full/layer.json'), 'w') as file:
             json.dump({'format': 'quantized-mesh-1.0', 'bounds': [0, 0, 1, 1],
                        'available': [[]]}, file)

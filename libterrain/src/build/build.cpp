@@ -375,15 +375,19 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
     in_order = ordered.get();
     points = std::move(ordered);
   }
-  // At once, but for a raster: not before it is known what a cell measures (see below).
+  const auto threads_for = [&](std::size_t payload_size) {
+    return threads_within_memory(request, context, memory_bytes, payload_size,
+                                 std::max(kSourceMemory, points->reading_bytes()), info);
+  };
+  // Before anything is read. What the store adds to a record is known later.
+  static_cast<void>(threads_for(info.payload_size()));
+  // Starts now, except for rasters, which need their cell size first (see below).
   points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
   const auto& [crs, ground] = located.get();
   BuildOutcome outcome;
-  const std::uint64_t source_bytes = std::max(kSourceMemory, points->reading_bytes());
   const stream::StoreSchema schema = schema_of(info, crs, request);
   const std::size_t payload_bytes = schema.payload_size();
-  const unsigned threads =
-      threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes, info);
+  const unsigned threads = threads_for(payload_bytes);
   if (info.grid) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.
     points->refine(cell_aspect(ground, info),

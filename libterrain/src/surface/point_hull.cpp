@@ -2,6 +2,7 @@
 #include "surface/point_hull.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <terrace/stream/store_query.hpp>
@@ -67,6 +68,21 @@ PointHull::Found PointHull::find(const Point2& place) const {
     if (!look_at(after == corners_.end() ? 0 : static_cast<std::size_t>(after - begin))) return {};
   }
   return found;
+}
+
+double PointHull::distance(const Point2& place) const {
+  if (!is_flat() && find(place).side != Side::kOutside) return 0.0;
+  double least = HUGE_VAL;  // squared
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const Point2 &a = corners_[i], &b = corners_[(i + 1) % corners_.size()];
+    const Point2 side{b[0] - a[0], b[1] - a[1]}, off{place[0] - a[0], place[1] - a[1]};
+    const double squared = side[0] * side[0] + side[1] * side[1];
+    const double along =
+        squared > 0.0 ? std::clamp((off[0] * side[0] + off[1] * side[1]) / squared, 0.0, 1.0) : 0.0;
+    const double dx = off[0] - along * side[0], dy = off[1] - along * side[1];
+    least = std::min(least, dx * dx + dy * dy);
+  }
+  return std::sqrt(least);
 }
 
 }  // namespace terrace::terrain

@@ -34,6 +34,8 @@ class PointHull {
   };
   /// Exact; O(log corners). Requires a finite place, and that the hull is not flat.
   [[nodiscard]] Found find(const Point2& place) const;
+  /// How far a place is outside, in the units of the points; 0 inside. O(corners) outside.
+  [[nodiscard]] double distance(const Point2& place) const;
 
  private:
   void set_corners(std::vector<Point2> corners);

@@ -76,9 +76,14 @@ class ConvertCommand : public Command {
     writing_within_memory(*writer, output_, memory, held);
     UndeclaredVoids voids(info);
     ProgressMeter meter(common.progress, "points");
-    std::vector<stream::PointBlock> blocks(common.threads);
+    // Each thread holds a block as it was read, and encoded; both have some room to grow.
+    const std::uint64_t of_thread = 5 * reading.block_points * (24 + info.payload_size());
+    const std::uint64_t taken = kProgramMemory + held + writer->writing_bytes();
+    const auto threads = static_cast<unsigned>(std::clamp<std::uint64_t>(
+        (memory - std::min(memory, taken)) / of_thread, 1, common.threads));
+    std::vector<stream::PointBlock> blocks(threads);
     each_in_order(
-        common.threads,
+        threads,
         [&](unsigned worker) -> std::optional<stream::PointBlock*> {
           check_interrupt();
           if (!source->next(blocks[worker])) return {};

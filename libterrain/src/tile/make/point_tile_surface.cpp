@@ -44,6 +44,7 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
       hull(store, 0),
       voids(std::make_shared<PointVoids>(store, 0)) {
   spacing = cloud_spacing(tiled, places);
+  rim = rim_of_outline();
   constexpr std::uint64_t kMost = std::uint64_t{1} << 31;
   if (tiled.points() >= std::min(whole_bytes / CloudSamples::kBytesPerPoint, kMost)) return;
   samples = std::make_unique<CloudSamples>(store, places, vertical, threads);
@@ -269,8 +270,7 @@ void PointTileSurface::heights(std::span<const double> longitude, std::span<cons
   for (std::size_t i = 0; i < places.size(); ++i) {
     // The line of 180 degrees has two numbers, and tiles on both sides of it.
     if (places[i][0] == 180.0) places[i][0] = -180.0;
-    // Points on one line have no hull to be beyond.
-    if (std::isnan(out[i]) && !cloud_.flat_fill && cloud_.hull.is_flat()) {
+    if (std::isnan(out[i]) && !cloud_.flat_fill && cloud_.hull.distance(stored[i]) <= cloud_.rim) {
       out[i] = cloud_.fill.height(stored[i][0], stored[i][1]);
     }
   }

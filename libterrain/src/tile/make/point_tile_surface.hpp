@@ -28,6 +28,7 @@ struct TiledCloud : TiledStore {
   /// Memory that a thread may use for the triangles of a part.
   std::uint64_t window_bytes = 0;
   PointHull hull;
+  double rim = 0;  ///< see rim_of_outline()
   /// All, if they fit into memory; else each thread reads those of a part at a time.
   std::unique_ptr<const CloudSamples> samples{};
   /// All triangles, for samples that crowd, if they fit as well.

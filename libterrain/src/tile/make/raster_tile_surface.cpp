@@ -150,12 +150,12 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = {longitude[i], latitude[i]};
   raster_.places.to_stored(places);
   const auto [last_column, last_row] = raster_.places.stored_bounds().max;
-  // Far places are moved to just beyond the outline. The rows and columns of the border are filled
-  // one sample farther than the raster goes: its cells reach half as far.
-  constexpr double kBeyond = 2.0;
+  // Places outside are moved to one sample from the lattice, where it is filled, and those beyond
+  // the rim of the outline to two.
   for (Point2& p : places) {
-    p = {std::clamp(p[0], -kBeyond, last_column + kBeyond),
-         std::clamp(p[1], -kBeyond, last_row + kBeyond)};
+    const double outside = std::max({-p[0], -p[1], p[0] - last_column, p[1] - last_row});
+    const double most = outside > raster_.rim ? 2.0 : 1.0;
+    p = {std::clamp(p[0], -most, last_column + most), std::clamp(p[1], -most, last_row + most)};
   }
   std::vector<std::uint32_t> order(places.size());
   std::iota(order.begin(), order.end(), 0U);

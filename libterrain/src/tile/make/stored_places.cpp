@@ -328,6 +328,8 @@ void StoredPlaces::to_geographic(std::span<Point2> places) const {
 }
 
 void StoredPlaces::to_stored(std::span<Point2> places) const {
+  // For places that have none in the store's CRS: beyond every outline and its rim.
+  constexpr double kFarAway = 1e9;
   for (Point2& p : places) {
     // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
     const double turned = wrapped_longitude(p[0]);
@@ -338,7 +340,7 @@ void StoredPlaces::to_stored(std::span<Point2> places) const {
     if (crs_.is_geographic() || goes_around_) p[0] = in_turn(p[0]);
     p = stored_place(placement_, p);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) {
-      p = {stored_.min[0] - 2.0, stored_.min[1] - 2.0};
+      p = {stored_.min[0] - kFarAway, stored_.min[1] - kFarAway};
     }
   }
 }

@@ -59,13 +59,14 @@ StoredBox box_of(const LatticeWindow& window) {
 
 /// Adds the part of the outline that decides about places in and around a box: the same wherever
 /// else the outline changes.
-void add_outline(const PointHull& hull, const StoredBox& box, Digest& digest) {
-  constexpr double kAround = 4.0;
+void add_outline(const PointHull& hull, const StoredBox& box, double rim, Digest& digest) {
+  digest.add(rim);
+  const double around = rim + 2.5;
   std::vector<Point2> part(hull.corners().begin(), hull.corners().end());
   for (unsigned side = 0; side < 4 && !hull.is_flat(); ++side) {
     const std::size_t axis = side / 2, other = 1 - axis;
     const bool upper = side % 2 == 1;
-    const double bound = upper ? box.max[axis] + kAround : box.min[axis] - kAround;
+    const double bound = upper ? box.max[axis] + around : box.min[axis] - around;
     const auto keeps = [&](const Point2& p) { return upper ? p[axis] <= bound : p[axis] >= bound; };
     std::vector<Point2> kept;
     for (std::size_t i = 0; i < part.size(); ++i) {
@@ -110,7 +111,8 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
     digest.add(raster.fill.digest(box_of(strip)));
     filled = true;
   }
-  if (filled) add_outline(raster.hull, box_of(window), digest);
+  if (!filled) return;
+  add_outline(raster.hull, box_of(window), raster.rim, digest);
 }
 
 /// The lattice around places of it, two samples over its borders at most: what lies beyond is asked
@@ -194,24 +196,17 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
   const CoordinateSystem& crs = places.crs();
   upright = crs.is_geographic() && crs.counts_as_wgs84() && world[1] == 0.0 && world[3] == 0.0;
   spacing = places.lattice_spacing();
+  rim = rim_of_outline();
 }
 
 bool TiledRaster::is_within_outline(double column, double row) const {
-  const Point2 place{column, row};
-  if (!hull.is_flat() && hull.find(place).side != PointHull::Side::kOutside) return true;
-  // To the diagonal neighbour and no farther.
-  constexpr double kReach = 1.5;
-  const std::span<const Point2> corners = hull.corners();
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Point2 &a = corners[i], &b = corners[(i + 1) % corners.size()];
-    const Point2 side{b[0] - a[0], b[1] - a[1]}, off{place[0] - a[0], place[1] - a[1]};
-    const double squared = side[0] * side[0] + side[1] * side[1];
-    const double along =
-        squared > 0.0 ? std::clamp((off[0] * side[0] + off[1] * side[1]) / squared, 0.0, 1.0) : 0.0;
-    const double dx = off[0] - along * side[0], dy = off[1] - along * side[1];
-    if (dx * dx + dy * dy <= kReach * kReach) return true;
+  const stream::StoreSchema& schema = store.schema();
+  // What is beyond the rim is asked two samples outside of the lattice.
+  if (column < -1 || row < -1 || column > static_cast<double>(schema.columns) ||
+      row > static_cast<double>(schema.rows)) {
+    return false;
   }
-  return false;
+  return hull.distance({column, row}) <= rim;
 }
 
 LatticeWindow TiledRaster::window_around(const GeographicBox& box) const {

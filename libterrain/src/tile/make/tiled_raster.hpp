@@ -21,6 +21,7 @@ struct TiledRaster : TiledStore {
   mutable HeightCache height_cache;  ///< 24 MiB per thread
   HeightBlocks::Range everywhere;    ///< of all samples
   PointHull hull;                    ///< of the samples with data, in columns and rows
+  double rim = 0;                    ///< see rim_of_outline()
   /// Columns run along meridians, rows along parallels, at equal distances.
   bool upright = false;
 

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tile/make/tiled_store.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "earth/ground.hpp"
+
+namespace terrace::terrain {
+
+double TiledStore::rim_of_outline() const {
+  const stream::StoreSchema& schema = store.schema();
+  const stream::Box3 box = world_box(schema, store.bounds());
+  const double fall = vertical.metres_per_unit() * std::max(std::abs(box.min[2] - height_beyond()),
+                                                            std::abs(box.max[2] - height_beyond()));
+  const GroundMap metres = Ground(schema).map(store.bounds());
+  const double unit = std::min(std::hypot(metres[0], metres[3]), std::hypot(metres[1], metres[4]));
+  const double share = unit > 0.0 ? 0.25 * fall / unit : 0.0;
+  return schema.grid ? std::max(1.5, share) : share;
+}
+
+}  // namespace terrace::terrain
