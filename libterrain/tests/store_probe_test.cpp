@@ -143,12 +143,13 @@ TEST(StoreProbes, ProfilesOfRastersAreThoseOfTheLibrary) {
   const auto world = [](const Point2& p) {
     return Point2{500000 + 30 * p[0], 5200000 - 30 * p[1]};
   };
-  for (const auto& [from, to] : std::vector<std::array<Point2, 2>>{
+  for (const auto& way : std::vector<std::array<Point2, 2>>{
            {{{10.3, 20.7}, {290.1, 250.9}}},
            {{{130.5, 10.2}, {130.5, 240.4}}},
            {{{250.25, 120.5}, {3.5, 120.5}}},
            {{{20.5, 200.25}, {20.75, 200.5}}},
        }) {
+    const Point2 &from = way[0], &to = way[1];
     std::vector<ProfilePoint> expected;
     profile(store, {.line = {world(from), world(to)}},
             [&](auto points) { expected.insert(expected.end(), points.begin(), points.end()); });
