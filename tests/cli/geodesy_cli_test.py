@@ -706,6 +706,30 @@ class GeodesyTest(unittest.TestCase):
         self.assertAlmostEqual(y, 5100000 / 0.9996, delta=1200)
         self.assertIn('geocentric', self.refused(2, 'points', store, '--to-crs', 'EPSG:4978', '-o', '-'))
 
+    def test_heights_keep_an_assumed_unit_in_another_crs(self):
+        """Heights without a unit are taken in that of the store's own x and y, or metres, wherever they go."""
+        rows = [100 + 3 * (i % 40) + (i // 40) % 7 for i in range(1600)]
+        for own, other, corner in ((32611, 2229, (380000, 3760000)), (2229, 32611, (6500000, 1800000))):
+            dem = self.path(f'unit{own}.tif')
+            write_tiff(dem, 40, 40, rows, corner=corner, cell=30.0, keys={1024: 1, 1025: 1, 3072: own})
+            store = self.build(dem)
+            slopes, heights = [], []
+            for to in ((), ('--to-crs', f'EPSG:{other}')):
+                raster, mesh = self.path('slope.tif'), self.path('slope.glb')
+                self.ok('raster', store, '--value', 'slope', *to, '-o', raster, '--force')
+                self.ok('convert', raster, '-o', self.path('slope.xyz'), '--force')
+                with open(self.path('slope.xyz'), encoding='ascii') as file:
+                    values = sorted(float(line.split()[2]) for line in file)
+                slopes.append(values[len(values) // 2])
+                self.ok('mesh', store, *to, '-o', mesh, '--force')
+                with open(mesh, 'rb') as file:
+                    data = file.read()
+                accessor = json.loads(data[20:20 + int.from_bytes(data[12:16], 'little')])['accessors'][0]
+                heights.append(accessor['max'][1] - accessor['min'][1])
+            self.assertAlmostEqual(slopes[0], slopes[1], delta=0.02 * slopes[0])
+            self.assertAlmostEqual(heights[0], heights[1], delta=0.01 * heights[0])
+            self.assertAlmostEqual(heights[0], 123 * (1 if own == 32611 else 1200 / 3937), delta=0.1)
+
     def test_a_point_that_has_no_place_there_is_named(self):
         cloud = self.cloud([(10, 10), (20, 20), (30, 90), (40, 40)])
         store = self.build(cloud, '--crs', 'EPSG:4326')

@@ -53,6 +53,8 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
   } catch (const nlohmann::json::parse_error& error) {
     const std::size_t byte = std::min(error.byte == 0 ? 0 : error.byte - 1, text.size());
     fail(place_of(text, byte), byte == text.size() ? "the JSON is cut off" : "is not JSON");
+  } catch (const nlohmann::json::out_of_range&) {
+    fail({}, "has a number that is too large");
   }
   return std::nullopt;
 }

@@ -112,11 +112,15 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
   std::string taken = "metres";
   if (const auto channel = metres_in_unit(own)) {
     metres_vertical_ = *channel;
+    height_unit_ = own;
   } else if (const auto vertical = metres_in_unit(crs.vertical_unit)) {
     metres_vertical_ = *vertical;
+    height_unit_ = crs.vertical_unit;
     taken = "the vertical unit of the CRS";
   } else if (kind_ != Kind::geographic && metres_horizontal_ < 1.0) {
     metres_vertical_ = metres_horizontal_;
+    height_unit_ =
+        crs.horizontal_unit.empty() ? unit_name(metres_horizontal_) : crs.horizontal_unit;
     taken = "that of x and y";
     if (!unknown) assume("the unit of heights is unknown and taken as " + taken);
   }

@@ -52,6 +52,8 @@ class Ground {
   [[nodiscard]] const std::string& unknown_height_unit() const { return unknown_height_unit_; }
   /// Metres in a unit of heights, times the weight of heights.
   [[nodiscard]] double metres_vertical() const { return metres_vertical_; }
+  /// The name of the unit of z that was found or assumed.
+  [[nodiscard]] const std::string& height_unit() const { return height_unit_; }
 
  private:
   enum class Kind : std::uint8_t { linear, geographic, web_mercator, projected };
@@ -64,6 +66,7 @@ class Ground {
   double degrees_ = 1.0;                    ///< of a unit of x, y
   double metres_horizontal_ = 1.0;          ///< of a unit of x, y
   double metres_vertical_ = 1.0;            ///< of a unit of z, weighed
+  std::string height_unit_ = "metre";
   std::string assumption_, unknown_height_unit_;
 };
 

@@ -114,7 +114,8 @@ std::string note_in_metres(const Coordinates& here) {
   const std::string name = here.name().empty() ? "" : " of " + here.name();
   const std::string back = "; asset.extras says how to get the coordinates" + name + " back";
   if (!here.local) {
-    return "in metres, as glTF asks, in place of " + here.horizontal_unit() + back;
+    return "in metres, as glTF asks, in place of " +
+           (here.metres[0] != 1 ? here.horizontal_unit() : "heights in another unit") + back;
   }
   std::string note = "in metres, as glTF asks, east and north of " +
                      readable_number(here.middle[0], 10) + ", " +
@@ -149,11 +150,8 @@ MeshUnits::MeshUnits(const stream::Store& store, const PlaceConversion& places)
     : crs(store.schema().crs), height_unit(store.schema().coordinates[2].unit) {
   const std::optional<stream::Crs> other = places.crs();
   if (!other) return;
-  // Heights stay as they are, in feet too if only x and y are said to be.
-  if (!metres_in_unit(height_unit)) height_unit = crs.vertical_unit;
-  if (!metres_in_unit(height_unit) && Ground(store.schema()).metres_vertical() != 1) {
-    height_unit = crs.horizontal_unit;
-  }
+  // Heights stay as they are, in whatever unit they have next to the store's own x and y.
+  height_unit = Ground(store.schema()).height_unit();
   const stream::Crs own = std::exchange(crs, *other);
   crs.vertical_epsg = own.vertical_epsg;
   crs.vertical_unit = own.vertical_unit;

@@ -39,8 +39,8 @@ stream::Placement placement_of(const RasterGrid& grid, const stream::StoreSchema
   placement.coordinates[2].scale = 1;
   placement.coordinates[2].offset = 0;
   placement.crs = crs;
-  // Heights keep their unit where x and y get another.
-  if (placement.crs.vertical_unit.empty()) placement.crs.vertical_unit = schema.crs.vertical_unit;
+  // Heights keep the unit that they have next to the store's own x and y.
+  placement.coordinates[2].unit = Ground(schema).height_unit();
   return placement;
 }
 
@@ -50,7 +50,9 @@ class RasterShader {
   /// value: any but the height. crs: of the grid.
   RasterShader(const RasterGrid& grid, const stream::StoreSchema& schema, const stream::Crs& crs,
                RasterValue value)
-      : value_(value), ground_(placement_of(grid, schema, crs)) {}
+      : value_(value),
+        ground_(placement_of(grid, schema, crs)),
+        assumption_(Ground(schema).assumption()) {}
 
   /// Metres per cell going east and north, and per unit of height, at a cell.
   struct Scale {
@@ -79,11 +81,12 @@ class RasterShader {
   }
 
   /// What had to be assumed of units; empty if nothing.
-  [[nodiscard]] const std::string& assumption() const { return ground_.assumption(); }
+  [[nodiscard]] const std::string& assumption() const { return assumption_; }
 
  private:
   RasterValue value_;
   Ground ground_;
+  std::string assumption_;  ///< about the store
 };
 
 constexpr std::int64_t kRunTile = 256;

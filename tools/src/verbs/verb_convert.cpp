@@ -104,6 +104,7 @@ class ConvertCommand : public Command {
            .remedy = "give another --where or --region"});
     }
     writer->finish();
+    if (writer->points() == 0) common.say(inputs_.front() + ": there is not one point in it");
     tell_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
     if (const std::string note = voids.note(); !note.empty()) common.say(note);

@@ -80,6 +80,8 @@ class SampleCommand final : public Command {
     if (given) {
       conversions.most_latitude = given->to().most_latitude();
       conversions.to_store = [given](std::span<Point2> here) { given->reverse(here); };
+    } else if (const auto own = CoordinateSystem::of(store.schema().crs, store.path().string())) {
+      conversions.most_latitude = own->most_latitude();
     }
     if (const auto written = crs_.written(store, common, given)) {
       conversions.writes_degrees = written->to().is_geographic();

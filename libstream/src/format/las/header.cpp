@@ -269,6 +269,13 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
                " bytes are left",
            "the file is cut off or its header is wrong");
     }
+    // EVLRs or packets of waveforms may follow the points.
+    const std::uint64_t others = evlrs > 0 ? evlr_offset : *size;
+    const bool waveforms = header.minor == 3 || (encoding & 2U) != 0;
+    if (!waveforms && others <= *size && others > header.points_offset) {
+      const std::uint64_t whole = (others - header.points_offset) / header.record_bytes;
+      header.uncounted = whole - std::min(whole, header.points);
+    }
   }
   read_vlrs(input, vlrs, header, comments);
   if (evlrs > 0 && is_seekable(file)) {

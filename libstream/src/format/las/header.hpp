@@ -45,6 +45,7 @@ struct LasHeader {
   bool adjusted_time = false;  ///< GPS time is not that of the week
   std::size_t record_bytes = 0;
   std::uint64_t points = 0, points_offset = 0;
+  std::uint64_t uncounted = 0;  ///< records that follow those of an uncompressed file, at least
   std::array<double, 3> scale{}, offset{};
   Box3 bounds;               ///< in the CRS, as stated; empty if not filled in or not finite
   std::vector<LasVlr> vlrs;  ///< those used here, including EVLRs that can be reached

@@ -45,6 +45,12 @@ class LasOpener {
     info.files = {file_};
     info.crs =
         options_.crs ? *options_.crs : las_crs(header_, stream_.input->name(), info.comments);
+    if (header_.uncounted > 0) {
+      info.note = stream_.input->name() + ": the header counts " + std::to_string(header_.points) +
+                  " points, and the bytes of " + std::to_string(header_.uncounted) +
+                  " more follow, which are left out; a writer may have been interrupted";
+      info.comments.push_back(info.note);
+    }
     state_bounds();
     open_records();
     return std::move(stream_);

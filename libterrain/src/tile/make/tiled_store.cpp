@@ -15,8 +15,14 @@ double TiledStore::rim_of_outline() const {
                                                             std::abs(box.max[2] - height_beyond()));
   const GroundMap metres = Ground(schema).map(store.bounds());
   const double unit = std::min(std::hypot(metres[0], metres[3]), std::hypot(metres[1], metres[4]));
-  const double share = unit > 0.0 ? 0.25 * fall / unit : 0.0;
-  return schema.grid ? std::max(1.5, share) : share;
+  const double share = unit > 0.0 ? fall / (8 * unit) : 0.0;
+  const double rim = schema.grid ? std::max(1.5, share) : share;
+  if (!(rim > 0.0) || !std::isfinite(rim)) return 0.0;
+  // A power of four, so that tiles are rarely made again when other heights change.
+  int exponent = 0;
+  const double mantissa = std::frexp(rim, &exponent);
+  if (mantissa == 0.5) --exponent;
+  return std::ldexp(1.0, exponent + (exponent % 2 != 0 ? 1 : 0));
 }
 
 }  // namespace terrace::terrain

@@ -27,9 +27,9 @@ struct TiledStore {
   std::optional<double> flat_fill{};
   /// The height in metres beyond the outline: no land is invented there.
   [[nodiscard]] double height_beyond() const { return flat_fill.value_or(0.0); }
-  /// How far heights go on beyond the outline, in stored units: a quarter of the height by which
-  /// the surface falls there, and at least one and a half cells of a raster. Tiles round places,
-  /// and no sample at the outline may come to be beyond it.
+  /// How far heights go on beyond the outline, in stored units: an eighth to a half of the height
+  /// by which the surface falls there, a power of four, and at least one and a half cells of a
+  /// raster. Tiles round places, and no sample at the outline may come to be beyond it.
   [[nodiscard]] double rim_of_outline() const;
   /// Water is where the surface has this height (in the store's unit); nullopt: where a raster has
   /// no data.
