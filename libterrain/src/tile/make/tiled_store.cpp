@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/portable_math.hpp"
 #include "earth/ground.hpp"
 
 namespace terrace::terrain {
@@ -14,7 +15,8 @@ double TiledStore::rim_of_outline() const {
   const double fall = vertical.metres_per_unit() * std::max(std::abs(box.min[2] - height_beyond()),
                                                             std::abs(box.max[2] - height_beyond()));
   const GroundMap metres = Ground(schema).map(store.bounds());
-  const double unit = std::min(std::hypot(metres[0], metres[3]), std::hypot(metres[1], metres[4]));
+  const double unit =
+      std::min(portable_hypot(metres[0], metres[3]), portable_hypot(metres[1], metres[4]));
   const double share = unit > 0.0 ? fall / (8 * unit) : 0.0;
   const double rim = schema.grid ? std::max(1.5, share) : share;
   if (!(rim > 0.0) || !std::isfinite(rim)) return 0.0;
