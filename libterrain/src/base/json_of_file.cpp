@@ -41,7 +41,7 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
     if (text.size() > most_bytes) {
       fail({}, "is larger than the " + readable_bytes(most_bytes) + " that such a file may have");
     }
-    // What is not text is recognised before all of it is read.
+    // Binary files are recognised before all of them is read.
     const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
     if (first != std::string::npos && text[first] != '{' && text[first] != '[') {
       fail({}, "is not JSON");

@@ -379,7 +379,7 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
     return threads_within_memory(request, context, memory_bytes, payload_size,
                                  std::max(kSourceMemory, points->reading_bytes()), info);
   };
-  // Before anything is read. What the store adds to a record is known later.
+  // Checks memory before reading begins; the bytes that the store adds are known later.
   static_cast<void>(threads_for(info.payload_size()));
   // Starts now, except for rasters, which need their cell size first (see below).
   points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());

@@ -75,7 +75,7 @@ struct Coordinates {
     // Nor does a map that is far from its centre keep right angles.
     const bool straight = std::abs(there[1]) <= kStretched * std::min(there[0], there[4]);
     degrees = !ground.same_everywhere() && !ground.projected() && north > 10000;  // metres
-    // Beyond the poles they are no latitudes.
+    // Numbers beyond the poles are not latitudes.
     const bool apart = degrees && std::max(-bounds.min[1], bounds.max[1]) * north > 1.02e7;
     if (!stretched || !straight || apart) return;
     local = true;

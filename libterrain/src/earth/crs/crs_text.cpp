@@ -18,7 +18,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Of the text of a definition.
+/// The most bytes that the text of a definition may have.
 constexpr std::size_t kMostCrsText = std::size_t{64} << 10;
 
 /// Codes that are not EPSG's but widespread.

@@ -57,7 +57,7 @@ class BoundedMesher {
   [[nodiscard]] virtual bool can_estimate() const = 0;
 
   [[nodiscard]] double metres_vertical() const;
-  /// Of the file's vertices, in its CRS.
+  /// The bounds of the file's vertices, in its CRS.
   [[nodiscard]] const stream::Box3& bounds() const { return bounds_; }
   [[nodiscard]] const MeshCoordinates& coordinates() const { return coordinates_; }
 

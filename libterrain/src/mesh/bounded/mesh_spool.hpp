@@ -28,7 +28,7 @@ class MeshSpool {
   void add_triangle(const stream::TriangleIndices& triangle);
   void add_triangles(std::span<const stream::TriangleIndices> triangles);
 
-  /// Writes the file. bounds, frame: what the writer is told, see stream::MeshHeader.
+  /// Writes the file. bounds, frame: see stream::MeshHeader.
   void write(const std::string& path, const stream::WriterOptions& options,
              const stream::Box3& bounds, const std::optional<stream::MeshFrame>& frame);
 

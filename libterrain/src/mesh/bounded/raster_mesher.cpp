@@ -280,7 +280,7 @@ std::int64_t RasterMesher::straight_cells() const {
         const double cells = 2.0 * half * portable_hypot(way[0], way[1]);
         const double off = portable_hypot(0.5 * (a[0] + b[0]) - m[0], 0.5 * (a[1] + b[1]) - m[1]);
         const double length = portable_hypot(b[0] - a[0], b[1] - a[1]);
-        // What has no place there is refused when it becomes a vertex.
+        // A sample without a position there is refused when it becomes a vertex.
         if (!std::isfinite(off) || !(length > 0.0)) continue;
         // In cells along this way, and as if it were no longer than along a row.
         bend = std::max(bend, off / (length / cells) / (way[0] * way[0] + way[1] * way[1]));
