@@ -27,8 +27,9 @@ struct OutputKind {
 
 namespace output_formats {
 inline constexpr OutputFormat kPoints[] = {
-    {"xyz", ".xyz .txt"}, {"csv", ".csv .txt"}, {"ply", ".ply"},       {"ply-ascii", ".ply"},
-    {"las", ".las"},      {"laz", ".laz"},      {"copc", ".copc.laz .laz"}, {"geojson", ".geojson"}};
+    {"xyz", ".xyz .txt"},       {"csv", ".csv .txt"},   {"ply", ".ply"},
+    {"ply-ascii", ".ply"},      {"las", ".las"},        {"laz", ".laz"},
+    {"copc", ".copc.laz .laz"}, {"geojson", ".geojson"}};
 inline constexpr OutputFormat kMesh[] = {
     {"ply", ".ply"}, {"ply-ascii", ".ply"}, {"obj", ".obj"}, {"glb", ".glb"}};
 inline constexpr OutputFormat kTetrahedra[] = {{"vtk", ".vtk"}};
