@@ -14,7 +14,7 @@ namespace {
 
 class JsonOfFile : public ::testing::Test {
  protected:
-  /// What is wrong with a file of this text, of at most 64 KiB.
+  /// Returns the error of a file with this text, of at most 64 KiB.
   std::string fault_of(const std::string& text) const {
     std::ofstream(path_, std::ios::binary) << text;
     try {

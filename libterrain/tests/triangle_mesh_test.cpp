@@ -80,7 +80,7 @@ TEST(MeshCoordinates, AreMetresInGlbWhateverTheUnits) {
   const auto pole = frame_of(units_of(4326, "degree"), {{-180, 90, 0}, {180, 90, 0}});
   ASSERT_TRUE(pole);
   EXPECT_GT(pole->metres[0], 0);
-  // These are no latitudes: a caller's own numbers.
+  // A caller's own numbers, which are not latitudes.
   EXPECT_FALSE(frame_of(units_of(4326, "degree"), {{400000, 5000000, 0}, {500000, 5100000, 9}}));
   const auto feet = frame_of(units_of(0, "foot"), {{0, 0, 0}, {1000, 1000, 9}});
   ASSERT_TRUE(feet);

@@ -212,7 +212,7 @@ TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
 TEST_F(MayReplace, ALinkIsWhatItLeadsTo) {
   const std::string link = scratch_.path() / "link";
   fs::create_symlink("output", link);
-  EXPECT_FALSE(may_replace(link, false).replace) << "nothing stands there yet";
+  EXPECT_FALSE(may_replace(link, false).replace) << "the target does not exist yet";
   write("a letter\n");
   EXPECT_THROW(may_replace(link, true), stream::Error);
   write("");

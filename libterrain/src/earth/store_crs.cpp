@@ -63,8 +63,8 @@ CoordinateSystem shifted(const CoordinateSystem& system, const std::optional<Dat
   return CoordinateSystem(definition);
 }
 
-/// The CRS that GeoJSON names. Never a file's name: whoever wrote the file does not choose which
-/// files are read.
+/// Returns the CRS that GeoJSON names. The name never leads to a file: the author of a GeoJSON file
+/// must not choose which other files are read.
 CoordinateSystem system_named_in(const PlacesCrs& given) {
   std::string name = given.name;
   // http://www.opengis.net/def/crs/EPSG/0/4326

@@ -111,7 +111,7 @@ struct CellRange {
 
   [[nodiscard]] std::uint32_t count() const { return count_of(last - first); }
 
-  /// Of a cell: a range that ends this close to a multiple ends at it.
+  /// The share of a cell within which a range ends at a multiple.
   static constexpr double kRounding = 1e-6;
   double first, last;  ///< multiples of the cell
 };

@@ -26,7 +26,7 @@ struct PlaceConversions {
   std::function<void(std::span<Point2>)> to_store;    ///< none: they are in the store's CRS
   std::function<void(std::span<Point2>)> to_written;  ///< none: lines keep their places
   bool writes_degrees = false;                        ///< of to_written
-  /// Of a given y that is a latitude. Beyond it the lines are wrong, not merely off the data.
+  /// The largest y where y is a latitude. A line with a larger one is an error, not off the data.
   double most_latitude = std::numeric_limits<double>::infinity();
 };
 

@@ -40,7 +40,7 @@ struct WindowTin {
   std::vector<tri::GridVertex> vertices;  ///< columns and rows count from the window's first
   std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS of the file
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  /// Of the mesh that a reader gets back; which samples it covers is told on the lattice.
+  /// Measured on the mesh that a reader gets back; coverage is determined on the lattice.
   tri::GridTinCheck check;
   /// Samples with data, before filling and inside the region; those on the first row and column
   /// count in the previous window.

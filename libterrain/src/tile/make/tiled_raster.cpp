@@ -201,7 +201,7 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
 
 bool TiledRaster::is_within_outline(double column, double row) const {
   const stream::StoreSchema& schema = store.schema();
-  // What is beyond the rim is asked two samples outside of the lattice.
+  // visit_places() moves places beyond the rim to two samples outside the lattice.
   if (column < -1 || row < -1 || column > static_cast<double>(schema.columns) ||
       row > static_cast<double>(schema.rows)) {
     return false;
