@@ -30,10 +30,10 @@ double distance(const Point3& a, const Point3& b) {
   return std::sqrt(dot(d, d));
 }
 
-/// Returns the faults of a tile's header. Sound: its heights are those of the lowest and the highest vertex,
-/// the sphere holds all vertices and is not wider than its centre asks for, the centre lies in the
-/// tile, the horizon occlusion point is not hidden while a vertex is seen, and not farther out than
-/// that takes. The tile has a vertex. O(n).
+/// Returns the faults of a tile's header. Sound: its heights are those of the lowest and the
+/// highest vertex, the sphere holds all vertices and is not wider than its centre asks for, the
+/// centre lies in the tile, the horizon occlusion point is not hidden while a vertex is seen, and
+/// not farther out than that takes. The tile has a vertex. O(n).
 std::vector<TileFault> check_tile_header(const TileAddress& address, const DecodedTile& tile) {
   std::vector<TileFault> faults;
   const auto fault = [&](std::uint64_t offset, std::string what) {
