@@ -165,7 +165,7 @@ TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
     SCOPED_TRACE("round " + std::to_string(round));
     BlockClusterer clusterer;
     BlockClustering clustering;
-    run_linear(clusterer, p.view(), Effort::standard, 1, clustering);
+    run_linear(clusterer, p.view(), {.effort = Effort::standard, .seed = 1}, clustering);
     BlockClustering trimmed = clustering;
     leave_out(p.view(), trimmed);
     EXPECT_EQ(trimmed.facilities, clustering.facilities);

@@ -31,7 +31,8 @@ TEST(Interchange, GainIsWhatOpeningSpares) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 40, 60);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    const MatrixRows costs(matrix);
+    const StopCheck never;
+    const MatrixRows costs(matrix, never);
     MatrixSearch search(costs, costs.opening());
     std::mt19937_64 random(seed);
     const auto first = static_cast<std::uint32_t>(random() % problem.facilities);

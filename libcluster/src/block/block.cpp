@@ -131,6 +131,7 @@ void BlockClusterer::run(std::span<const Point3> points, std::span<const double>
   const double mean_weight = mean_of(weights);
   const double facility_cost = options.facility_cost * scaling.diagonal;
   BlockState& state = impl_->state;
+  state.check_stop = &options.check_stop;
   state.facility_cost = static_cast<float>(std::min(facility_cost / mean_weight, 1e8));
   impl_->sorter.load(points, weights, mean_weight, scaling, state);
   impl_->engine(state, plan_of(options, points.size()));
@@ -142,7 +143,8 @@ void BlockClusterer::run(std::span<const Point3> points, std::span<const double>
   for (std::uint32_t j = 0; j < state.facility_count; ++j) {
     result.facilities.push_back(state.original[state.facility[j]]);
   }
-  const double connections = impl_->finish.run(points, weights, scaling, facility_cost, result);
+  const double connections =
+      impl_->finish.run(points, weights, scaling, facility_cost, options.check_stop, result);
   result.facility_cost = scaling.unscaled(facility_cost);
   result.connection_cost = scaling.unscaled(connections);
 }

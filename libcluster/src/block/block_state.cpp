@@ -127,6 +127,11 @@ void BlockState::place_segments() {
   pool_used = end;
 }
 
+void BlockState::look() {
+  vectors_since_check = 0;
+  if (*check_stop) (*check_stop)();
+}
+
 void BlockState::sort_facilities() {
   std::sort(static_cast<std::uint32_t*>(facility), facility + facility_count);
   for (std::uint32_t j = 0; j < facility_count; ++j) {

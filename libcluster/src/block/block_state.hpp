@@ -8,6 +8,7 @@
 
 #include "scaling.hpp"
 #include "terrace/cluster/point.hpp"
+#include "terrace/cluster/stop_check.hpp"
 
 namespace terrace::cluster {
 
@@ -82,6 +83,15 @@ struct BlockState {
   Column<float> scratch;
   Column<float> scratch_pool;
 
+  /// Of the options; never null.
+  const StopCheck* check_stop = nullptr;
+  std::uint32_t vectors_since_check = 0;
+  /// To be called once per so many vectors; throws what the check throws.
+  [[gnu::always_inline]] void tick(std::uint32_t vectors) {
+    vectors_since_check += vectors;
+    if (vectors_since_check >= kVectorsBetweenChecks) look();
+  }
+
   /// Makes room for `facilities` facilities.
   void reserve_facilities(std::uint32_t facilities);
   /// Makes room for `more` additional floats at the end of the pool; may move all segments.
@@ -97,6 +107,9 @@ struct BlockState {
   void sort_facilities();
 
  private:
+  static constexpr std::uint32_t kVectorsBetweenChecks = 1u << 16;
+  void look();
+
   Column<float> spare_[6];
 };
 

@@ -49,6 +49,7 @@ class Assigner {
     const std::uint32_t end = round_to_lanes(s_.facility_count);
     const V step = V::broadcast(1.0e-6f);
     for (std::uint32_t g = 0; g < s_.group_count; ++g) {
+      s_.tick(2 * end / kLanes);
       const V cx = V::broadcast(s_.group_x[g]);
       const V cy = V::broadcast(s_.group_y[g]);
       const V cz = V::broadcast(s_.group_z[g]);

@@ -56,6 +56,7 @@ class Engine {
   }
 
   void consider(std::uint32_t point) {
+    s_.tick(s_.facility_count / kLanes + 64);
     if (gain_.gain(s_.x[point], s_.y[point], s_.z[point]) > 0) gain_.open(point);
   }
 

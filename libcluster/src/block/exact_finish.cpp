@@ -33,13 +33,15 @@ ExactFinish::Costs ExactFinish::costs(std::span<const Point3> points,
 }
 
 double ExactFinish::run(std::span<const Point3> points, std::span<const double> weights,
-                        const Scaling& scaling, double facility_cost, BlockClustering& clustering) {
+                        const Scaling& scaling, double facility_cost, const StopCheck& check_stop,
+                        BlockClustering& clustering) {
   facilities_.clear();
   for (const std::uint32_t f : clustering.facilities) {
     facilities_.push_back(scaling.scaled(points[f]));
   }
   Costs present = costs(points, weights, scaling, clustering);
   while (present.greatest > facility_cost) {
+    if (check_stop) check_stop();
     // The new cluster comes behind the one that it splits, which keeps neighbours together.
     const std::uint32_t number = clustering.assignment[present.where] + 1;
     const Point3 place = scaling.scaled(points[present.where]);

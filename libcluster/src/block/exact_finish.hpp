@@ -16,9 +16,10 @@ namespace terrace::cluster {
 class ExactFinish {
  public:
   /// facility_cost: scaled. Changes facilities and assignment of `clustering` if necessary. Returns
-  /// the scaled connection cost.
+  /// the scaled connection cost. Throws what the check throws.
   double run(std::span<const Point3> points, std::span<const double> weights,
-             const Scaling& scaling, double facility_cost, BlockClustering& clustering);
+             const Scaling& scaling, double facility_cost, const StopCheck& check_stop,
+             BlockClustering& clustering);
 
  private:
   struct Costs {

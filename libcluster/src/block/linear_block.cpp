@@ -9,12 +9,9 @@
 
 namespace terrace::cluster {
 
-void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, Effort effort,
-                std::uint64_t seed, BlockClustering& result) {
+void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, BlockOptions options,
+                BlockClustering& result) {
   const SearchFrame frame = make_frame(problem);
-  BlockOptions options;
-  options.effort = effort;
-  options.seed = seed;
   // The clusterer measures the box of the mapped points, the problem the mapped box of the points.
   const Scaling scaling(frame.points);
   if (scaling.diagonal > 0.0) {

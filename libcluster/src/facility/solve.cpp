@@ -33,9 +33,9 @@ FacilitySolution solve_matrix(const FacilityMatrix& problem, const FacilityOptio
   if (options.start) refuse(report.strategy, "does not start from a solution");
   switch (report.strategy) {
     case FacilityStrategy::jain_vazirani:
-      return jain_vazirani(problem, report);
+      return jain_vazirani(problem, report, options.check_stop);
     case FacilityStrategy::greedy_stars:
-      return greedy_stars(problem, report);
+      return greedy_stars(problem, report, options.check_stop);
     case FacilityStrategy::lp_rounding:
       return lp_rounding(problem, report);
     default:
@@ -46,12 +46,12 @@ FacilitySolution solve_matrix(const FacilityMatrix& problem, const FacilityOptio
 template <class Problem>
 FacilitySolution solve_by_matrix(const Problem& problem, const FacilityOptions& options,
                                  FacilityReport& report) {
-  const CostMatrix matrix = cost_matrix(problem, options.memory_limit);
+  const CostMatrix matrix = cost_matrix(problem, options.memory_limit, options.check_stop);
   FacilitySolution solution = solve_matrix(matrix.view(), options, report);
   if (std::isfinite(problem.outlier_price)) {
     // In the matrix an outlier is a client whose connection costs the price.
     const double lower_bound = solution.lower_bound;
-    const auto engine = make_search(problem, FacilityStrategy::full_scan);
+    const auto engine = make_search(problem, FacilityStrategy::full_scan, 1, options.check_stop);
     engine->start(solution);
     solution = engine->solution();
     solution.lower_bound = lower_bound;
@@ -75,12 +75,14 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
 
   BlockClusterer clusterer;
   BlockClustering clustering;
-  run_linear(clusterer, problem, options.effort, options.seed, clustering);
+  run_linear(clusterer, problem,
+             {.effort = options.effort, .seed = options.seed, .check_stop = options.check_stop},
+             clustering);
   FacilitySolution solution;
   solution.facilities = std::move(clustering.facilities);
   solution.assignment = std::move(clustering.assignment);
   // Costs in double precision, clusters by ascending facility.
-  const auto engine = make_search(problem, FacilityStrategy::full_scan);
+  const auto engine = make_search(problem, FacilityStrategy::full_scan, 1, options.check_stop);
   engine->start(solution);
   if (report) {
     report->strategy = kFast;
@@ -100,7 +102,7 @@ FacilitySolution solve_any(const Problem& problem, const FacilityOptions& option
   if (needs_matrix(options.strategy)) {
     return solve_by_matrix(problem, options, report ? *report : own);
   }
-  const auto engine = make_search(problem, options.strategy, options.threads);
+  const auto engine = make_search(problem, options.strategy, options.threads, options.check_stop);
   return run_search(*engine, options, report);
 }
 

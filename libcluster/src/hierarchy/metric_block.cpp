@@ -73,7 +73,7 @@ void MetricBlockClusterer::run_once(const FacilityPoints& problem, const Facilit
   const bool automatic = options.strategy == FacilityStrategy::automatic;
   if (automatic && problem.channels.size() == 0 &&
       linear_map(problem.metric, bounds_of(problem.points))) {
-    run_linear(clusterer_, problem, options.effort, options.seed, result);
+    run_linear(clusterer_, problem, {.effort = options.effort, .seed = options.seed}, result);
     leave_out(problem, result);
     return;
   }

@@ -78,8 +78,11 @@ struct ScaledWeights {
 
 /// One run of Lloyd's iteration. Everything is in scaled units.
 struct Run {
-  Run(const KMeansTree& the_tree, ThreadTeam& team, std::vector<Point3> start)
-      : tree(the_tree), filter(the_tree, start.size(), team), centres(std::move(start)) {}
+  Run(const KMeansTree& the_tree, ThreadTeam& team, std::vector<Point3> start,
+      const StopCheck& check_stop)
+      : tree(the_tree),
+        filter(the_tree, start.size(), team, check_stop),
+        centres(std::move(start)) {}
 
   void iterate(const KMeansOptions& options, double diagonal) {
     const double still2 = options.tolerance * diagonal * options.tolerance * diagonal;
@@ -202,13 +205,14 @@ KMeansResult k_means(std::span<const Point3> points, std::span<const double> wei
   }
   const Scaling scaling(points);
   const ScaledWeights scaled_weights(weights);
-  const KMeansTree tree(points, scaled_weights.values, scaling);
+  const KMeansTree tree(points, scaled_weights.values, scaling, options.check_stop);
   ThreadTeam team(std::max(options.threads, 1u));
   std::mt19937_64 random(options.seed);
   KMeansResult best;
   double least = 0;
   for (std::size_t restart = 0; restart < options.restarts; ++restart) {
-    Run run(tree, team, k_means_seeds(tree, options.clusters, random));
+    Run run(tree, team, k_means_seeds(tree, options.clusters, random, options.check_stop),
+            options.check_stop);
     run.iterate(options, scaling.diagonal);
     if (restart > 0 && run.sse >= least) continue;
     least = run.sse;
@@ -223,7 +227,7 @@ KMeansResult k_means_from(std::span<const Point3> centres, std::span<const Point
   check_points(centres, "centre");
   const Scaling scaling(points);
   const ScaledWeights scaled_weights(weights);
-  const KMeansTree tree(points, scaled_weights.values, scaling);
+  const KMeansTree tree(points, scaled_weights.values, scaling, options.check_stop);
   ThreadTeam team(std::max(options.threads, 1u));
   std::vector<Point3> start;
   start.reserve(centres.size());
@@ -232,7 +236,7 @@ KMeansResult k_means_from(std::span<const Point3> centres, std::span<const Point
     for (double& v : p) v = std::clamp(v, -kFarthest, kFarthest);
     start.push_back(p);
   }
-  Run run(tree, team, std::move(start));
+  Run run(tree, team, std::move(start), options.check_stop);
   run.iterate(options, scaling.diagonal);
   return result_of(run, scaling, scaled_weights.exponent);
 }

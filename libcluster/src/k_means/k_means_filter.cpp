@@ -32,7 +32,8 @@ double distance2(double ax, double ay, double az, double bx, double by, double b
 
 }  // namespace
 
-KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team)
+KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team,
+                           const StopCheck& check_stop)
     : tree_(tree),
       clusters_(clusters),
       team_(team),
@@ -41,7 +42,7 @@ KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadT
       owner_(tree.block_count(), kMixed),
       sums_(clusters),
       chunk_sums_(clusters * tree.levels[chunk_level_].size()),
-      scratch_(team.threads()) {
+      scratch_(team.threads(), Scratch(check_stop)) {
   for (Scratch& scratch : scratch_) {
     const std::size_t size = (chunk_level_ + 2) * clusters;
     scratch.x.resize(size);
@@ -97,6 +98,7 @@ bool KMeansFilter::assign(std::span<const Point3> centres) {
 template <int D>
 void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates& from,
                          Scratch& scratch, std::span<Sum> sums) {
+  scratch.ticks(from.count);
   const KMeansTree::Node& node = tree_.levels[level][index];
   const double mx = 0.5 * (node.low[0] + node.high[0]);
   const double my = 0.5 * (node.low[1] + node.high[1]);
@@ -166,6 +168,7 @@ void KMeansFilter::own(std::size_t level, std::size_t index, std::uint32_t clust
 template <int D>
 void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates, Scratch& scratch,
                                 std::span<Sum> sums) {
+  scratch.ticks(KMeansTree::kBlock * candidates.count);
   const double* const x = &tree_.x[block * KMeansTree::kBlock];
   const double* const y = &tree_.y[block * KMeansTree::kBlock];
   const double* const z = &tree_.z[block * KMeansTree::kBlock];

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "k_means/k_means_tree.hpp"
+#include "stop_ticks.hpp"
 #include "thread_team.hpp"
 
 namespace terrace::cluster {
@@ -22,8 +23,9 @@ class KMeansFilter {
     double weight = 0;
   };
 
-  /// tree and team outlive this object.
-  KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team);
+  /// tree, team and check_stop outlive this object.
+  KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team,
+               const StopCheck& check_stop);
 
   /// One assignment. Returns whether a point has changed its cluster since the last one.
   bool assign(std::span<const Point3> centres);
@@ -45,6 +47,8 @@ class KMeansFilter {
     std::size_t count;
   };
   struct Scratch {
+    explicit Scratch(const StopCheck& check_stop) : ticks(check_stop) {}
+    StopTicks ticks;
     std::vector<double> x, y, z;  // room for k candidates on each level
     std::vector<std::uint32_t> number;
     std::vector<Sum> sums;  // of the current chunk

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "draws.hpp"
+#include "stop_ticks.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -24,8 +25,10 @@ double below_box(const Point3& p, const KMeansTree::Node& box) {
 
 class CentreSeeder {
  public:
-  explicit CentreSeeder(const KMeansTree& tree)
-      : tree_(tree), cost_(tree.x.size(), std::numeric_limits<double>::infinity()) {
+  CentreSeeder(const KMeansTree& tree, const StopCheck& check_stop)
+      : tree_(tree),
+        ticks_(check_stop),
+        cost_(tree.x.size(), std::numeric_limits<double>::infinity()) {
     for (const auto& level : tree.levels) {
       std::vector<State>& states = states_.emplace_back(level.size());
       // The first seed: by weight alone.
@@ -51,7 +54,7 @@ class CentreSeeder {
   }
 
   /// By how much a seed there would lower total().
-  [[nodiscard]] double gain(const Point3& seed) const { return gain(seed, states_.size() - 1, 0); }
+  [[nodiscard]] double gain(const Point3& seed) { return gain(seed, states_.size() - 1, 0); }
 
   void add(const Point3& seed) { add(seed, states_.size() - 1, 0); }
 
@@ -77,7 +80,8 @@ class CentreSeeder {
     return last;
   }
 
-  [[nodiscard]] double gain(const Point3& seed, std::size_t level, std::size_t node) const {
+  [[nodiscard]] double gain(const Point3& seed, std::size_t level, std::size_t node) {
+    ticks_(KMeansTree::kBlock);
     if (below_box(seed, tree_.levels[level][node]) >= states_[level][node].most) return 0.0;
     double sum = 0;
     if (level == 0) {
@@ -94,6 +98,7 @@ class CentreSeeder {
   }
 
   void add(const Point3& seed, std::size_t level, std::size_t node) {
+    ticks_(KMeansTree::kBlock);
     State& state = states_[level][node];
     if (below_box(seed, tree_.levels[level][node]) >= state.most) return;
     state = {0, 0};
@@ -115,6 +120,7 @@ class CentreSeeder {
   }
 
   const KMeansTree& tree_;
+  StopTicks ticks_;
   std::vector<double> cost_;  // by position: squared distance to the nearest seed
   std::vector<std::vector<State>> states_;
 };
@@ -122,8 +128,8 @@ class CentreSeeder {
 }  // namespace
 
 std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
-                                  std::mt19937_64& random) {
-  CentreSeeder seeder(tree);
+                                  std::mt19937_64& random, const StopCheck& check_stop) {
+  CentreSeeder seeder(tree, check_stop);
   std::vector<Point3> seeds{tree.point(seeder.draw(true, random))};
   seeder.add(seeds.front());
   // 0.7 is approximately the natural logarithm of two.

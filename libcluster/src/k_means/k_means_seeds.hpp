@@ -13,6 +13,7 @@ namespace terrace::cluster {
 /// times squared distance to the nearest seed so far, several times, and the draw that leaves the
 /// least sum of these is taken. Boxes that a new seed cannot improve are skipped.
 [[nodiscard]] std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
-                                                std::mt19937_64& random);
+                                                std::mt19937_64& random,
+                                                const StopCheck& check_stop);
 
 }  // namespace terrace::cluster

@@ -5,6 +5,8 @@
 #include <array>
 #include <utility>
 
+#include "stop_ticks.hpp"
+
 namespace terrace::cluster {
 namespace {
 
@@ -32,11 +34,12 @@ struct Keyed {
 };
 
 /// Stable, by the lowest `bits` of the keys.
-void radix_sort(std::vector<Keyed>& items, unsigned bits) {
+void radix_sort(std::vector<Keyed>& items, unsigned bits, const StopCheck& check_stop) {
   constexpr unsigned kKeyDigitBits = 10;
   constexpr std::size_t kKeyDigits = std::size_t{1} << kKeyDigitBits;
   std::vector<Keyed> other(items.size());
   for (unsigned shift = 0; shift < bits; shift += kKeyDigitBits) {
+    if (check_stop) check_stop();
     std::array<std::size_t, kKeyDigits> place{};
     for (const Keyed& item : items) ++place[(item.key >> shift) % kKeyDigits];
     std::size_t sum = 0;
@@ -67,7 +70,7 @@ KMeansTree::Node joined(std::span<const KMeansTree::Node> children) {
 }  // namespace
 
 KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> weights,
-                       const Scaling& scaling)
+                       const Scaling& scaling, const StopCheck& check_stop)
     : count(points.size()) {
   const bool flat = scaling.extent[2] == 0.0;
   std::vector<Keyed> order(count);
@@ -82,12 +85,14 @@ KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> w
              : spread_by_two(cell(0)) | spread_by_two(cell(1)) << 1 | spread_by_two(cell(2)) << 2;
     order[i] = {key, static_cast<std::uint32_t>(i)};
   }
-  radix_sort(order, (flat ? 2 : 3) * kAxisBits);
+  radix_sort(order, (flat ? 2 : 3) * kAxisBits, check_stop);
+  StopTicks ticks(check_stop);
 
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   for (std::vector<double>* column : {&x, &y, &z, &w}) column->resize(blocks * kBlock);
   original.resize(count);
   for (std::size_t place = 0; place < blocks * kBlock; ++place) {
+    ticks(8);
     const std::uint32_t i = order[std::min(place, count - 1)].index;
     const Point3 p = scaling.scaled(points[i]);
     x[place] = p[0];
@@ -101,6 +106,7 @@ KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> w
 
   std::vector<Node> level(blocks);
   for (std::size_t b = 0; b < blocks; ++b) {
+    ticks(4 * kBlock);
     std::array<Node, kBlock> single;
     for (std::size_t k = 0; k < kBlock; ++k) {
       const std::size_t place = b * kBlock + k;

@@ -8,6 +8,7 @@
 
 #include "scaling.hpp"
 #include "terrace/cluster/point.hpp"
+#include "terrace/cluster/stop_check.hpp"
 
 namespace terrace::cluster {
 
@@ -34,7 +35,7 @@ struct KMeansTree {
 
   /// weights: scaled to at most 1, or empty.
   KMeansTree(std::span<const Point3> points, std::span<const double> weights,
-             const Scaling& scaling);
+             const Scaling& scaling, const StopCheck& check_stop);
 
   [[nodiscard]] std::size_t block_count() const { return levels.front().size(); }
   /// Blocks [first, last) below a node.

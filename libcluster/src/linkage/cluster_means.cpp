@@ -25,11 +25,12 @@ void move_to_origin(std::vector<double>& axis) {
 
 }  // namespace
 
-ClusterMeans::ClusterMeans(const LinkagePoints& points, LinkageMethod method, SimdPath path)
-    : ClusterSlots(points.scaled().size()),
+ClusterMeans::ClusterMeans(const LinkagePoints& points, LinkageMethod method,
+                           const LinkageOptions& options)
+    : ClusterSlots(points.scaled().size(), options.check_stop),
       points_of_(points),
       method_(method),
-      kernels_(linkage_kernels<double>(path)),
+      kernels_(linkage_kernels<double>(options.path)),
       row_(points.scaled().size()) {
   for (unsigned a = 0; a < 3; ++a) {
     axis_[a].reserve(size());

@@ -16,7 +16,7 @@ namespace terrace::cluster {
 /// squares; centroid: the mean; median: the middle between the places of the two parts.
 class ClusterMeans : public ClusterSlots {
  public:
-  ClusterMeans(const LinkagePoints& points, LinkageMethod method, SimdPath path);
+  ClusterMeans(const LinkagePoints& points, LinkageMethod method, const LinkageOptions& options);
 
   [[nodiscard]] double distance(std::uint32_t a, std::uint32_t b) const;
   [[nodiscard]] NearCluster nearest(std::uint32_t x, std::uint32_t begin, std::uint32_t end,

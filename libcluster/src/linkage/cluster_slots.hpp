@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "stop_ticks.hpp"
 #include "terrace/cluster/dendrogram.hpp"
 
 /// Agglomeration by nearest clusters, over any distances of clusters. Private to linkage.
@@ -32,7 +33,9 @@ struct NearCluster {
 
 class ClusterSlots {
  public:
-  explicit ClusterSlots(std::size_t count) : points_(count, 1.0), name_(count) {
+  /// check_stop: outlives this object.
+  ClusterSlots(std::size_t count, const StopCheck& check_stop)
+      : points_(count, 1.0), name_(count), ticks_(check_stop) {
     std::iota(name_.begin(), name_.end(), 0u);
   }
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(name_.size()); }
@@ -42,6 +45,9 @@ class ClusterSlots {
   [[nodiscard]] const double* points() const { return points_.data(); }
   /// A point of the cluster.
   [[nodiscard]] std::uint32_t name(std::uint32_t slot) const { return name_[slot]; }
+
+  /// To be called once per so many distances; throws what the check throws.
+  void tick(std::size_t distances) { ticks_(distances); }
 
   void count_as_one(std::uint32_t low, std::uint32_t high) {
     points_[high] += points_[low];
@@ -59,6 +65,7 @@ class ClusterSlots {
  private:
   std::vector<double> points_;
   std::vector<std::uint32_t> name_;
+  StopTicks ticks_;
 };
 
 /// Merges two slots. Returns the link, at the given height.
@@ -107,6 +114,7 @@ std::vector<Link> chain_links(Clusters& clusters) {
       while (!clusters.alive(start)) ++start;
       push(start);
     }
+    clusters.tick(clusters.size());
     const std::uint32_t x = chain.back();
     NearCluster before;
     if (chain.size() > 1) {
@@ -153,6 +161,7 @@ std::vector<Link> nearest_pair_links(Clusters& clusters) {
   // merge concerns few, and the least pair is found first.
   std::vector<NearCluster> nearest(clusters.size());
   const auto find = [&](std::uint32_t x) {
+    clusters.tick(clusters.size());
     nearest[x] = clusters.nearest(x, 0, x, clusters.nearest(x, x + 1, clusters.size(), {}));
   };
   const auto comes_first = [&](std::uint32_t x, std::uint32_t a, std::uint32_t b) {

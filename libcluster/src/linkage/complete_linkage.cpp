@@ -9,6 +9,7 @@
 #include "linkage/complete_rounds.hpp"
 #include "linkage/linkage_points.hpp"
 #include "linkage/linkage_tree.hpp"
+#include "stop_ticks.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
@@ -23,11 +24,11 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   // In the order of a kD-tree most clusters that merge have nearby rows in the matrix.
   std::vector<std::uint32_t> all(points.size());
   std::iota(all.begin(), all.end(), 0u);
-  const LinkageTree tree(linkage_points.scaled(), all, options.threads);
+  const LinkageTree tree(linkage_points.scaled(), all, options.threads, options.check_stop);
   const double* const x = tree.axis(0);
   const double* const y = tree.axis(1);
   const double* const z = tree.axis(2);
-  CompleteRounds<T> rounds(matrix, kernels, options.threads);
+  CompleteRounds<T> rounds(matrix, kernels, options);
   std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
     const std::size_t after = std::min(matrix.width(), points.size() - 1 - i);
     kernels.distances(x + i + 1, y + i + 1, z + i + 1, after, x[i], y[i], z[i], row);
@@ -36,7 +37,7 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   for (Link& link : links) {
     link = {tree.number(link.i), tree.number(link.j), linkage_points.height(link.height)};
   }
-  return make_dendrogram(points.size(), links);
+  return make_dendrogram(points.size(), links, options.check_stop);
 }
 
 /// An order in which close things are close: recursive halving by which of two distant things is
@@ -90,8 +91,12 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
   // As for points: clusters that merge should have nearby rows in the matrix.
   std::vector<std::uint32_t> thing(count);
   std::iota(thing.begin(), thing.end(), 0u);
-  order_by_distance(thing, checked);
-  CompleteRounds<T> rounds(matrix, kernels, options.threads);
+  StopTicks ticks(options.check_stop);
+  order_by_distance(thing, [&](std::uint32_t i, std::uint32_t j) {
+    ticks(kTicksOfDistance);
+    return checked(i, j);
+  });
+  CompleteRounds<T> rounds(matrix, kernels, options);
   std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
     // The second copies are never read.
     const bool second_copy = count % 2 == 0 && i >= count / 2;
@@ -100,7 +105,7 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
     }
   });
   for (Link& link : links) link = {thing[link.i], thing[link.j], link.height};
-  return make_dendrogram(count, links);
+  return make_dendrogram(count, links, options.check_stop);
 }
 
 }  // namespace
@@ -126,13 +131,13 @@ Dendrogram complete_linkage(BandMatrix<T>&& distances, const LinkageOptions& opt
                                   " is in the matrix twice, with different values");
     }
   }
-  CompleteRounds<T> rounds(distances, linkage_kernels<T>(options.path), options.threads);
+  CompleteRounds<T> rounds(distances, linkage_kernels<T>(options.path), options);
   const std::vector<Link> links = rounds.run([&](std::size_t i, const T* row) {
     for (std::size_t k = 0; k < distances.width(); ++k) {
       check_distance(row[k], std::numeric_limits<T>::max(), i, band_partner(n, {i, k}));
     }
   });
-  return make_dendrogram(n, links);
+  return make_dendrogram(n, links, options.check_stop);
 }
 
 template Dendrogram complete_linkage(BandMatrix<float>&&, const LinkageOptions&);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "parallel.hpp"
+#include "stop_ticks.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -22,9 +23,10 @@ constexpr std::size_t kPrefetch = 8;
 
 template <class T>
 CompleteRounds<T>::CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels,
-                                  unsigned threads)
+                                  const LinkageOptions& options)
     : kernels_(kernels),
-      threads_(std::clamp(threads, 1u, 256u)),
+      threads_(std::clamp(options.threads, 1u, 256u)),
+      check_stop_(options.check_stop),
       clusters_(matrix.size()),
       columns_(threads_) {
   const auto n = static_cast<std::uint32_t>(matrix.size());
@@ -40,6 +42,7 @@ std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
   parallel_blocks(
       size(), kRowsPerBlock, threads(), [&](std::size_t begin, std::size_t end, unsigned thread) {
         for (std::size_t c = begin; c < end; ++c) {
+          check_stop();
           fill(c, clusters_[c].row);
           note_minima(static_cast<std::uint32_t>(c), clusters_[c], size(), columns_[thread]);
         }
@@ -51,6 +54,7 @@ std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
     list_parts();
     parallel_blocks(first_.size(), kRowsPerBlock, threads(),
                     [&](std::size_t begin, std::size_t end, unsigned thread) {
+                      check_stop();
                       for (std::size_t k = begin; k < end; ++k) {
                         bring_in(static_cast<std::uint32_t>(k), columns_[thread]);
                       }
@@ -217,6 +221,7 @@ void CompleteRounds<T>::shrink() {
   std::vector<Cluster> next(count);
   parallel_blocks(count, kRowsPerBlock, threads(),
                   [&](std::size_t begin, std::size_t end, unsigned thread) {
+                    check_stop();
                     for (std::size_t k = begin; k < end; ++k) {
                       const auto c = static_cast<std::uint32_t>(k);
                       next[k] = shrunk(c, columns_[thread]);
@@ -313,7 +318,9 @@ void CompleteRounds<T>::chain() {
   std::vector<bool> gone(m, false);
   std::vector<std::uint32_t> chain;
   std::uint32_t start = 0;
+  StopTicks ticks(check_stop_);
   for (std::uint32_t left = m; left > enough;) {
+    ticks(m);
     if (chain.empty()) {
       while (gone[start]) ++start;
       chain.push_back(start);

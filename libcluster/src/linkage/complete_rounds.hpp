@@ -8,6 +8,7 @@
 #include "linkage/linkage_kernels.hpp"
 #include "terrace/cluster/band_matrix.hpp"
 #include "terrace/cluster/dendrogram.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 /// Private to complete linkage.
 
@@ -26,7 +27,9 @@ class CompleteRounds {
   /// concurrently, in any order.
   using FillRow = std::function<void(std::size_t i, T* row)>;
 
-  CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels, unsigned threads);
+  /// options: outlive this object.
+  CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels,
+                 const LinkageOptions& options);
   /// All merges, by the first rows of the clusters. If a pair has two copies (even n), only the
   /// copy in the upper half of the matrix counts.
   std::vector<Link> run(const FillRow& fill);
@@ -73,6 +76,10 @@ class CompleteRounds {
   }
   [[nodiscard]] Pieces pieces(std::uint32_t c) const;
   [[nodiscard]] unsigned threads() const;
+  /// Throws what the check throws.
+  void check_stop() const {
+    if (check_stop_) check_stop_();
+  }
 
   // Nearest clusters, row by row.
   void begin_minima(std::size_t count);
@@ -96,6 +103,7 @@ class CompleteRounds {
 
   const LinkageKernels<T>& kernels_;
   const unsigned threads_;
+  const StopCheck& check_stop_;
   std::vector<Cluster> clusters_;
   std::vector<Columns> columns_;         ///< by thread
   std::vector<Nearest> ahead_, behind_;  ///< nearest in the own row, and in the own column

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "linkage/union_find.hpp"
+#include "stop_ticks.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -19,14 +20,15 @@ std::string text_of(const Link& link) {
 }
 
 /// Indices of the links by height, ties in their original order.
-std::vector<std::uint32_t> by_height(std::span<const Link> links) {
+std::vector<std::uint32_t> by_height(std::span<const Link> links, StopTicks& ticks) {
   struct Key {
     double height;
     std::uint32_t link;
   };
   std::vector<Key> keys(links.size());
   for (std::uint32_t r = 0; r < links.size(); ++r) keys[r] = {links[r].height, r};
-  std::sort(keys.begin(), keys.end(), [](const Key& x, const Key& y) {
+  std::sort(keys.begin(), keys.end(), [&](const Key& x, const Key& y) {
+    ticks();
     return x.height < y.height || (x.height == y.height && x.link < y.link);
   });
   std::vector<std::uint32_t> order(links.size());
@@ -75,7 +77,8 @@ std::vector<std::uint32_t> labels_below(const Dendrogram& dendrogram,
 
 /// The dendrogram of links that are taken in the given order.
 Dendrogram join(std::size_t points, std::span<const Link> links,
-                std::span<const std::uint32_t> order) {
+                std::span<const std::uint32_t> order, StopTicks& ticks) {
+  constexpr std::size_t kTicksOfJoin = 64;
   Dendrogram dendrogram{.points = points, .merges = {}};
   dendrogram.merges.reserve(links.size());
   UnionFind sets(points);
@@ -84,6 +87,7 @@ Dendrogram join(std::size_t points, std::span<const Link> links,
   std::iota(cluster.begin(), cluster.end(), 0u);
   auto next = static_cast<std::uint32_t>(points);
   for (const std::uint32_t r : order) {
+    ticks(kTicksOfJoin);
     const std::uint32_t x = sets.find(links[r].i);
     const std::uint32_t y = sets.find(links[r].j);
     if (!sets.unite(x, y)) {
@@ -121,16 +125,20 @@ void check_links(std::size_t points, std::span<const Link> links) {
 
 }  // namespace
 
-Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
+Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links,
+                           const StopCheck& check_stop) {
   check_links(points, links);
-  return join(points, links, by_height(links));
+  StopTicks ticks(check_stop);
+  return join(points, links, by_height(links, ticks), ticks);
 }
 
-Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> links) {
+Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> links,
+                                    const StopCheck& check_stop) {
   check_links(points, links);
   std::vector<std::uint32_t> order(links.size());
   std::iota(order.begin(), order.end(), 0u);
-  return join(points, links, order);
+  StopTicks ticks(check_stop);
+  return join(points, links, order, ticks);
 }
 
 std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double height) {

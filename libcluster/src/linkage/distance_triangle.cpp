@@ -23,17 +23,17 @@ bool works_on_squares(LinkageMethod method) {
 
 template <class T>
 DistanceTriangle<T>::DistanceTriangle(std::size_t count, LinkageMethod method,
-                                      std::uint64_t memory_limit)
-    : ClusterSlots(count), method_(method), squares_(works_on_squares(method)) {
+                                      const LinkageOptions& options)
+    : ClusterSlots(count, options.check_stop), method_(method), squares_(works_on_squares(method)) {
   // As a band, whose size is the same up to half a row.
-  (void)checked_band_bytes(count, sizeof(T), memory_limit);
+  (void)checked_band_bytes(count, sizeof(T), options.memory_limit);
   if (count > 1) entries_ = std::make_unique_for_overwrite<T[]>(count * (count - 1) / 2);
 }
 
 template <class T>
 DistanceTriangle<T>::DistanceTriangle(const LinkagePoints& points, LinkageMethod method,
                                       const LinkageOptions& options)
-    : DistanceTriangle(points.scaled().size(), method, options.memory_limit) {
+    : DistanceTriangle(points.scaled().size(), method, options) {
   const LinkageKernels<T>& kernels = linkage_kernels<T>(options.path);
   exponent_ = points.exponent();
   std::vector<double> axis[3];
@@ -42,7 +42,9 @@ DistanceTriangle<T>::DistanceTriangle(const LinkagePoints& points, LinkageMethod
   }
   parallel_blocks(size(), kRowsOfTriangle, options.threads,
                   [&](std::size_t begin, std::size_t end, unsigned) {
+                    StopTicks ticks(options.check_stop);
                     for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
+                      ticks(end);
                       T* const to = row(i);
                       kernels.distances(axis[0].data(), axis[1].data(), axis[2].data(), i,
                                         axis[0][i], axis[1][i], axis[2][i], to);
@@ -55,12 +57,14 @@ DistanceTriangle<T>::DistanceTriangle(const LinkagePoints& points, LinkageMethod
 template <class T>
 DistanceTriangle<T>::DistanceTriangle(std::size_t count, const PairDistance& distance,
                                       LinkageMethod method, const LinkageOptions& options)
-    : DistanceTriangle(count, method, options.memory_limit) {
+    : DistanceTriangle(count, method, options) {
   parallel_blocks(count, kRowsOfTriangle, options.threads,
                   [&](std::size_t begin, std::size_t end, unsigned) {
+                    StopTicks ticks(options.check_stop);
                     for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
                       T* const to = row(i);
                       for (std::size_t j = 0; j < i; ++j) {
+                        ticks(kTicksOfDistance);
                         const double value =
                             distance(static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(i));
                         check_distance(value, std::numeric_limits<T>::max(), j, i);
@@ -68,13 +72,19 @@ DistanceTriangle<T>::DistanceTriangle(std::size_t count, const PairDistance& dis
                       }
                     }
                   });
-  if (count < 2) return;
-  const std::span<T> all(entries_.get(), count * (count - 1) / 2);
-  const double largest = *std::max_element(all.begin(), all.end());
+  double largest = 0.0;
+  for (std::size_t i = 1; i < count; ++i) {
+    tick(i);
+    for (std::size_t j = 0; j < i; ++j) largest = std::max(largest, double{row(i)[j]});
+  }
   if (largest > 0.0) std::frexp(largest, &exponent_);
-  for (T& entry : all) {
-    entry = std::ldexp(entry, -exponent_);
-    if (squares_) entry *= entry;
+  for (std::size_t i = 1; i < count; ++i) {
+    tick(i);
+    for (std::size_t j = 0; j < i; ++j) {
+      T& entry = row(i)[j];
+      entry = std::ldexp(entry, -exponent_);
+      if (squares_) entry *= entry;
+    }
   }
 }
 
@@ -135,6 +145,7 @@ template <class T>
 void DistanceTriangle<T>::move(const std::vector<std::uint32_t>& kept) {
   T* to = entries_.get();
   for (std::size_t i = 1; i < kept.size(); ++i) {
+    tick(i);
     const T* const from = row(kept[i]);
     for (std::size_t j = 0; j < i; ++j) *to++ = from[kept[j]];
   }

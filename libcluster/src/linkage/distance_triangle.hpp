@@ -34,7 +34,7 @@ class DistanceTriangle : public ClusterSlots {
   [[nodiscard]] double height(double distance) const;
 
  private:
-  DistanceTriangle(std::size_t count, LinkageMethod method, std::uint64_t memory_limit);
+  DistanceTriangle(std::size_t count, LinkageMethod method, const LinkageOptions& options);
   /// The distances to the slots before.
   [[nodiscard]] T* row(std::size_t slot) { return entries_.get() + slot * (slot - 1) / 2; }
   [[nodiscard]] const T* row(std::size_t slot) const {

@@ -12,12 +12,12 @@ namespace terrace::cluster {
 namespace {
 
 template <class Clusters>
-Dendrogram agglomerate(Clusters&& clusters, LinkageMethod method) {
+Dendrogram agglomerate(Clusters&& clusters, LinkageMethod method, const StopCheck& check_stop) {
   const std::size_t points = clusters.size();
   if (method == LinkageMethod::centroid || method == LinkageMethod::median) {
-    return make_dendrogram_in_order(points, nearest_pair_links(clusters));
+    return make_dendrogram_in_order(points, nearest_pair_links(clusters), check_stop);
   }
-  return make_dendrogram(points, chain_links(clusters));
+  return make_dendrogram(points, chain_links(clusters), check_stop);
 }
 
 /// What clusters, their nearest ones, links and the dendrogram take for a point.
@@ -51,21 +51,25 @@ Dendrogram linkage(std::span<const Point3> points, LinkageMethod method,
   const LinkagePoints checked(points);
   if (method != LinkageMethod::average && method != LinkageMethod::weighted) {
     check_means(points.size(), options.memory_limit);
-    return agglomerate(ClusterMeans(checked, method, options.path), method);
+    return agglomerate(ClusterMeans(checked, method, options), method, options.check_stop);
   }
   if (options.entry == MatrixEntry::float32) {
-    return agglomerate(DistanceTriangle<float>(checked, method, options), method);
+    return agglomerate(DistanceTriangle<float>(checked, method, options), method,
+                       options.check_stop);
   }
-  return agglomerate(DistanceTriangle<double>(checked, method, options), method);
+  return agglomerate(DistanceTriangle<double>(checked, method, options), method,
+                     options.check_stop);
 }
 
 Dendrogram linkage(std::size_t count, const PairDistance& distance, LinkageMethod method,
                    const LinkageOptions& options) {
   if (method == LinkageMethod::complete) return complete_linkage(count, distance, options);
   if (options.entry == MatrixEntry::float32) {
-    return agglomerate(DistanceTriangle<float>(count, distance, method, options), method);
+    return agglomerate(DistanceTriangle<float>(count, distance, method, options), method,
+                       options.check_stop);
   }
-  return agglomerate(DistanceTriangle<double>(count, distance, method, options), method);
+  return agglomerate(DistanceTriangle<double>(count, distance, method, options), method,
+                     options.check_stop);
 }
 
 }  // namespace terrace::cluster

@@ -12,6 +12,9 @@
 
 namespace terrace::cluster {
 
+/// What a distance that the caller computes costs, see StopTicks.
+inline constexpr std::size_t kTicksOfDistance = 64;
+
 /// Copies of points, scaled by a power of two so that squares of distances do not overflow, nor
 /// underflow above 1e-150 of the largest coordinate. Scaling is exact: distances are those of the
 /// points to the last bit.

@@ -11,7 +11,7 @@ constexpr unsigned kSharedLevels = 6;  ///< their nodes are split one level afte
 }  // namespace
 
 LinkageTree::LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
-                         unsigned threads) {
+                         unsigned threads, const StopCheck& check_stop) {
   const std::size_t count = chosen.size();
   while (count > (kLeaf << depth_)) ++depth_;
   boxes_.resize(nodes());
@@ -24,12 +24,14 @@ LinkageTree::LinkageTree(std::span<const Point3> points, std::span<const std::ui
   for (unsigned level = 0; level < shared; ++level) {
     const std::size_t first = std::size_t{1} << level;
     parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
+      if (check_stop) check_stop();
       split(first + q, level, records);
     });
   }
   const std::size_t first = std::size_t{1} << shared;
   parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
-    split_all(first + q, shared, records);
+    StopTicks ticks(check_stop);
+    split_all(first + q, shared, records, ticks);
     const std::size_t end = ((q + 1) * count) >> shared;
     for (std::size_t i = (q * count) >> shared; i < end; ++i) {
       for (unsigned a = 0; a < 3; ++a) axes_[a][i] = records[i].p[a];
@@ -70,11 +72,14 @@ void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& r
   });
 }
 
-void LinkageTree::split_all(std::size_t node, unsigned level, std::vector<Record>& records) {
+void LinkageTree::split_all(std::size_t node, unsigned level, std::vector<Record>& records,
+                            StopTicks& ticks) {
+  constexpr std::size_t kTicksOfPoint = 8;
+  ticks(kTicksOfPoint * (size() >> level));
   split(node, level, records);
   if (level == depth_) return;
-  split_all(2 * node, level + 1, records);
-  split_all(2 * node + 1, level + 1, records);
+  split_all(2 * node, level + 1, records, ticks);
+  split_all(2 * node + 1, level + 1, records, ticks);
 }
 
 }  // namespace terrace::cluster

@@ -8,6 +8,7 @@
 #include "linkage/linkage_tree.hpp"
 #include "linkage/spanning_tree.hpp"
 #include "linkage/union_find.hpp"
+#include "stop_ticks.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
@@ -15,7 +16,10 @@ namespace {
 
 /// The first point at each position; the others at the position are linked to it, at height 0. The
 /// tree over the distinct points then has only geometric ties.
-std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vector<Link>& links) {
+std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vector<Link>& links,
+                                    const StopCheck& check_stop) {
+  constexpr std::size_t kTicksOfLookup = 64;
+  StopTicks ticks(check_stop);
   const auto hash = [](const Point3& p) {
     std::uint64_t h = 0;
     for (const double v : p) {
@@ -30,6 +34,7 @@ std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vect
   std::vector<std::uint32_t> first;
   first.reserve(points.size());
   for (std::uint32_t i = 0; i < points.size(); ++i) {
+    ticks(kTicksOfLookup);
     std::size_t slot = hash(points[i]) >> (64 - bits);
     while (table[slot] != kFree && points[table[slot]] != points[i]) {
       slot = (slot + 1) & (table.size() - 1);
@@ -51,10 +56,11 @@ std::vector<Link> spanning_tree(std::span<const Point3> points, const LinkageOpt
   std::vector<Link> links;
   if (points.size() < 2) return links;
   links.reserve(points.size() - 1);
-  const std::vector<std::uint32_t> first = distinct(linkage_points.scaled(), links);
+  const std::vector<std::uint32_t> first =
+      distinct(linkage_points.scaled(), links, options.check_stop);
   if (first.size() < 2) return links;
-  const LinkageTree tree(linkage_points.scaled(), first, options.threads);
-  const SpanningTree spanning(tree, options.threads);
+  const LinkageTree tree(linkage_points.scaled(), first, options.threads, options.check_stop);
+  const SpanningTree spanning(tree, options.threads, options.check_stop);
   for (const TreeEdge& edge : spanning.edges()) {
     links.push_back(
         {tree.number(edge.low), tree.number(edge.high), linkage_points.height(edge.square)});
@@ -63,7 +69,7 @@ std::vector<Link> spanning_tree(std::span<const Point3> points, const LinkageOpt
 }
 
 Dendrogram single_linkage(std::span<const Point3> points, const LinkageOptions& options) {
-  return make_dendrogram(points.size(), spanning_tree(points, options));
+  return make_dendrogram(points.size(), spanning_tree(points, options), options.check_stop);
 }
 
 Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointPair> candidates) {

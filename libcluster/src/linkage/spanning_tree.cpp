@@ -17,11 +17,11 @@ constexpr std::size_t kLeavesPerBlock = 256;
 
 }  // namespace
 
-SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads)
+SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads, const StopCheck& check_stop)
     : tree_(tree),
       threads_(threads),
       count_(static_cast<std::uint32_t>(tree.size())),
-      lists_(tree, threads),
+      lists_(tree, threads, check_stop),
       used_(count_, 0),
       bound_(count_, 0.0),
       component_(count_),
@@ -40,13 +40,17 @@ SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads)
   while (roots_.size() > 1) {
     for (const std::uint32_t root : roots_)
       shortest_[root] = {std::numeric_limits<double>::infinity(), kMixed, kMixed};
-    parallel_blocks(
-        count_, kPointsPerBlock, threads_,
-        [this](std::size_t begin, std::size_t end, unsigned) { take_from_lists(begin, end); });
+    parallel_blocks(count_, kPointsPerBlock, threads_,
+                    [&](std::size_t begin, std::size_t end, unsigned) {
+                      if (check_stop) check_stop();
+                      take_from_lists(begin, end);
+                    });
     label_nodes();
-    parallel_blocks(
-        tree_.leaves(), kLeavesPerBlock, threads_,
-        [this](std::size_t begin, std::size_t end, unsigned) { search_tree(begin, end); });
+    parallel_blocks(tree_.leaves(), kLeavesPerBlock, threads_,
+                    [&](std::size_t begin, std::size_t end, unsigned) {
+                      if (check_stop) check_stop();
+                      search_tree(begin, end);
+                    });
     merge();
   }
 }

@@ -25,7 +25,7 @@ namespace terrace::cluster {
 /// the component. The largest component, which would search longest, is found by the others.
 class SpanningTree {
  public:
-  SpanningTree(const LinkageTree& tree, unsigned threads);
+  SpanningTree(const LinkageTree& tree, unsigned threads, const StopCheck& check_stop);
   [[nodiscard]] const std::vector<TreeEdge>& edges() const { return edges_; }
 
  private:

@@ -9,6 +9,7 @@
 
 #include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/point.hpp"
+#include "terrace/cluster/stop_check.hpp"
 
 /// Facility location on one block of points: choose representatives (facilities) among the points
 /// and assign every point to one, at low total cost
@@ -26,6 +27,8 @@ struct BlockOptions {
   double facility_cost = 1.0;  ///< positive; multiplied by the diagonal of the bounding box
   Effort effort = Effort::standard;
   std::uint64_t seed = 1;  ///< only Effort::full tries random candidates
+  /// For large blocks. After it has thrown, the next block is clustered as if nothing had happened.
+  StopCheck check_stop = {};
 };
 
 /// Facilities in the order of their cluster numbers, which is that of a space-filling curve:

@@ -13,6 +13,7 @@
 #include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/metric.hpp"
 #include "terrace/cluster/point.hpp"
+#include "terrace/cluster/stop_check.hpp"
 
 /// Uncapacitated facility location: open facilities are paid for, each client is connected to one,
 /// and
@@ -206,6 +207,8 @@ struct FacilityOptions {
   std::uint64_t memory_limit = 0;
   /// Local search: progress in candidates.
   FacilityProgress progress = {};
+  /// Heard by every strategy except LP rounding.
+  StopCheck check_stop = {};
 };
 
 /// Statistics of a local search, for figures 7.12 to 7.14.
@@ -270,6 +273,7 @@ struct LowerBoundOptions {
   std::size_t steps = 1000;  ///< subgradient steps; 0: only their starting point
   unsigned threads = 1;      ///< 0: one per core. Does not change the result.
   FacilityProgress progress = {};
+  StopCheck check_stop = {};
 };
 
 /// A lower bound of the cost of every solution, so that a result can state its gap: a value of the

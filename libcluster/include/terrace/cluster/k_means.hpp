@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "terrace/cluster/point.hpp"
+#include "terrace/cluster/stop_check.hpp"
 
 /// k-means: k centres, not necessarily points of the input, at a low sum of squared distances
 ///     SSE = sum of weight(i) * |point i - its centre|^2.
@@ -29,6 +30,7 @@ struct KMeansOptions {
   /// bounding box. 0: when no assignment changes.
   double tolerance = 0.0;
   unsigned threads = 1;  ///< 0 counts as 1
+  StopCheck check_stop = {};
 };
 
 struct KMeansResult {

@@ -7,10 +7,11 @@
 
 namespace terrace::cluster {
 
-DualAscent::DualAscent(const ClientOrder& order, std::span<const double> opening)
+DualAscent::DualAscent(const ClientOrder& order, const MatrixRows& costs)
     : order_(&order),
+      costs_(&costs),
       duals_(order.clients()),
-      slack_(opening.begin(), opening.end()),
+      slack_(costs.opening().begin(), costs.opening().end()),
       reach_(order.clients(), 0),
       all_(order.clients()),
       tight_(order.facilities(), 0),
@@ -62,7 +63,10 @@ void DualAscent::lower_one(std::uint32_t client) {
 void DualAscent::raise(std::span<const std::uint32_t> clients) {
   for (bool raised = true; raised;) {
     raised = false;
-    for (const std::uint32_t i : clients) raised |= raise_one(i);
+    for (const std::uint32_t i : clients) {
+      costs_->check_stop();
+      raised |= raise_one(i);
+    }
   }
 }
 
@@ -103,6 +107,7 @@ bool DualAscent::adjust() {
   find_support();
   std::vector<std::uint32_t> freed;
   for (std::uint32_t i = 0; i < duals_.size(); ++i) {
+    costs_->check_stop();
     std::uint32_t two[2];
     if (payments(i, two) < 2) continue;
     // Clients for which one of the two is the only tight facility within reach can rise instead.

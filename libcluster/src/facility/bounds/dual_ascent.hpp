@@ -13,9 +13,10 @@ namespace terrace::cluster {
 class DualAscent {
  public:
   /// Begins with the least cost of each client. O(facilities * clients).
-  DualAscent(const ClientOrder& order, std::span<const double> opening);
+  DualAscent(const ClientOrder& order, const MatrixRows& costs);
 
-  /// Raises the duals of these clients in turn until none can be raised.
+  /// Raises the duals of these clients in turn until none can be raised. Throws, as adjust() does,
+  /// what the check of the costs throws.
   void raise(std::span<const std::uint32_t> clients);
   /// One round of dual adjustment. Returns whether the sum of the duals has grown.
   bool adjust();
@@ -35,6 +36,7 @@ class DualAscent {
   [[nodiscard]] std::uint32_t payments(std::uint32_t client, std::uint32_t (&two)[2]) const;
 
   const ClientOrder* order_;
+  const MatrixRows* costs_;
   std::vector<double> duals_;
   std::vector<double> slack_;         // opening cost minus payments, by facility
   std::vector<std::uint32_t> reach_;  // per client: number of facilities that cost at most its dual

@@ -27,7 +27,7 @@ void unscale(const MatrixRows& costs, std::vector<double>& duals) {
 std::vector<double> ascended(const MatrixRows& costs) {
   constexpr int kAdjustments = 20;
   const ClientOrder order(costs);
-  DualAscent ascent(order, costs.opening());
+  DualAscent ascent(order, costs);
   std::vector<std::uint32_t> all(costs.clients());
   std::iota(all.begin(), all.end(), 0u);
   ascent.raise(all);
@@ -39,7 +39,8 @@ std::vector<double> ascended(const MatrixRows& costs) {
 
 }  // namespace
 
-double dual_value(const FacilityMatrix& problem, std::span<const double> duals) {
+double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
+                  const StopCheck& check_stop) {
   check(problem);
   if (duals.size() != problem.clients) {
     throw std::invalid_argument("duals: " + std::to_string(duals.size()) + " for " +
@@ -49,7 +50,7 @@ double dual_value(const FacilityMatrix& problem, std::span<const double> duals) 
     if (std::isfinite(duals[i])) continue;
     throw std::invalid_argument("the dual of client " + std::to_string(i) + " is not finite");
   }
-  const MatrixRows costs(problem);
+  const MatrixRows costs(problem, check_stop);
   std::vector<double> scaled(duals.begin(), duals.end());
   for (double& v : scaled) v = costs.scaled(v);
   return finished(costs, scaled);
@@ -58,13 +59,13 @@ double dual_value(const FacilityMatrix& problem, std::span<const double> duals) 
 LowerBound lower_bound(const FacilityMatrix& problem, const FacilitySolution& start,
                        const LowerBoundOptions& options) {
   check(problem);
-  const MatrixRows costs(problem);
+  const MatrixRows costs(problem, options.check_stop);
   LowerBound bound;
   bound.duals = ascended(costs);
   if (options.steps > 0) {
     FacilityReport report;
     const FacilitySolution target =
-        start.facilities.empty() ? greedy_stars(problem, report) : start;
+        start.facilities.empty() ? greedy_stars(problem, report, options.check_stop) : start;
     double cost = 0.0;  // scaled, as the sum of large costs may be infinite
     for (const std::uint32_t j : target.facilities) {
       if (j >= problem.facilities) {

@@ -33,7 +33,8 @@ class RowDual final : public DualFunction {
 /// L(v), rounded down so that no solution costs less; 0 if it would be negative. O(facilities *
 /// clients). Throws: std::invalid_argument as check() does, if there is not one dual per client, or
 /// if one is not finite, naming it.
-[[nodiscard]] double dual_value(const FacilityMatrix& problem, std::span<const double> duals);
+[[nodiscard]] double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
+                                const StopCheck& check_stop = {});
 
 /// L of k-median: facilities cost nothing, and the k that are paid most are open,
 ///     L(v) = sum_i v_i - sum of the k greatest of sum_i max(0, v_i - c_ij).

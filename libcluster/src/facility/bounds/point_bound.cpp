@@ -34,14 +34,15 @@ class PointDual final : public DualFunction {
   /// Space and weights are in the order of the tree's leaves. `price`: what a client of weight 1
   /// pays at most, or infinite.
   PointDual(const BoxTree& tree, const Space& space, std::span<const double> weights,
-            double facility_cost, double price, unsigned threads)
+            double facility_cost, double price, const LowerBoundOptions& options)
       : tree_(&tree),
         space_(&space),
         distances_(space),
         weights_(weights),
         facility_cost_(facility_cost),
         price_(price),
-        threads_(threads),
+        threads_(options.threads),
+        check_stop_(&options.check_stop),
         payment_(weights.size()),
         paid_(weights.size()),
         root_(weights.size()),
@@ -67,6 +68,7 @@ class PointDual final : public DualFunction {
       std::size_t most_here = 0;
       const std::size_t end = std::min(leaves_.size(), (block + 1) * kBlock);
       for (std::size_t k = block * kBlock; k < end; ++k) {
+        if (*check_stop_) (*check_stop_)();
         most_here = std::max(most_here, visit(leaves_[k], work));
       }
       std::size_t seen = most.load();
@@ -207,6 +209,7 @@ class PointDual final : public DualFunction {
   std::span<const double> weights_;
   double facility_cost_, price_;
   unsigned threads_;
+  const StopCheck* check_stop_;
   std::vector<double> payment_;  // u
   std::vector<double> paid_;     // by facility
   std::vector<double> root_;     // sqrt(w)
@@ -307,13 +310,13 @@ double ascend_from(const Start& start, const Space& space, const SearchFrame& fr
   duals = start.payments(frame);
   if constexpr (Space::kHasBoxes) {
     PointDual<Space> function(*tree, space, frame.weights, frame.facility_cost, frame.outlier_price,
-                              options.threads);
+                              options);
     std::vector<double> variables = function.variables(duals);
     const double best = ascend(function, variables, start.cost, options);
     duals = function.duals(variables);
     return best;
   } else {
-    const PointRows<Space> rows(space, frame.weights, frame.outlier_price);
+    const PointRows<Space> rows(space, frame.weights, frame.outlier_price, options.check_stop);
     const std::vector<double> opening(duals.size(), frame.facility_cost);
     std::vector<double> ceiling;
     if (std::isfinite(frame.outlier_price)) {

@@ -22,6 +22,7 @@ ClientOrder::ClientOrder(const MatrixRows& costs) : facilities_(costs.facilities
   }
   std::vector<double> column(m);
   for (std::size_t i = 0; i < n; ++i) {
+    costs.check_stop();
     for (std::size_t j = 0; j < m; ++j) column[j] = costs.cost(j, i);
     std::uint32_t* const order = facility_.data() + i * m;
     std::iota(order, order + m, 0u);

@@ -21,8 +21,8 @@ void check_memory(std::uint64_t n, std::uint64_t limit, const char* what) {
 }
 
 template <class Space>
-CostMatrix fill(const Space& space, const SearchFrame& frame) {
-  const PointRows<Space> rows(space, frame.weights, frame.outlier_price);
+CostMatrix fill(const Space& space, const SearchFrame& frame, const StopCheck& check_stop) {
+  const PointRows<Space> rows(space, frame.weights, frame.outlier_price, check_stop);
   const std::size_t n = frame.weights.size();
   CostMatrix matrix;
   matrix.opening.assign(n, frame.true_facility_cost);
@@ -39,16 +39,18 @@ CostMatrix fill(const Space& space, const SearchFrame& frame) {
 
 }  // namespace
 
-CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit) {
+CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit,
+                       const StopCheck& check_stop) {
   check_memory(problem.points.size(), memory_limit, "points");
   SearchFrame frame = make_frame(problem);
   return with_space(problem, frame, problem.points,
-                    [&](const auto& space) { return fill(space, frame); });
+                    [&](const auto& space) { return fill(space, frame, check_stop); });
 }
 
-CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit) {
+CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit,
+                       const StopCheck& check_stop) {
   check_memory(problem.count, memory_limit, "entities");
-  return fill(space_of(problem), make_frame(problem));
+  return fill(space_of(problem), make_frame(problem), check_stop);
 }
 
 }  // namespace terrace::cluster

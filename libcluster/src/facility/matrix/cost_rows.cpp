@@ -8,8 +8,8 @@
 
 namespace terrace::cluster {
 
-MatrixRows::MatrixRows(const FacilityMatrix& matrix)
-    : CostRows(matrix.facilities, matrix.clients),
+MatrixRows::MatrixRows(const FacilityMatrix& matrix, const StopCheck& check_stop)
+    : CostRows(matrix.facilities, matrix.clients, check_stop),
       opening_(matrix.opening),
       connection_(matrix.connection) {
   double largest = 0.0;
@@ -28,11 +28,13 @@ MatrixRows::MatrixRows(const FacilityMatrix& matrix)
 }
 
 const double* MatrixRows::row(std::size_t facility, std::vector<double>& /*scratch*/) const {
+  check_stop();
   return connection_.data() + facility * clients();
 }
 
 void MatrixRows::gather(std::size_t facility, std::span<const std::uint32_t> which,
                         double* out) const {
+  check_stop();
   const double* const costs = connection_.data() + facility * clients();
   for (std::size_t k = 0; k < which.size(); ++k) out[k] = costs[which[k]];
 }

@@ -17,27 +17,34 @@ class CostRows {
   virtual ~CostRows() = default;
   [[nodiscard]] std::size_t facilities() const { return facilities_; }
   [[nodiscard]] std::size_t clients() const { return clients_; }
-  /// The costs of all clients from facility j; valid until `scratch` is used again.
+  /// Throws what the check throws. For loops over facilities or clients.
+  void check_stop() const {
+    if (*check_stop_) (*check_stop_)();
+  }
+  /// The costs of all clients from facility j; valid until `scratch` is used again. This and
+  /// gather() throw what the check throws.
   virtual const double* row(std::size_t facility, std::vector<double>& scratch) const = 0;
   /// The costs of some clients, the same values as in the row.
   virtual void gather(std::size_t facility, std::span<const std::uint32_t> clients,
                       double* out) const = 0;
 
  protected:
-  CostRows(std::size_t facilities, std::size_t clients)
-      : facilities_(facilities), clients_(clients) {}
+  /// check_stop: outlives this object.
+  CostRows(std::size_t facilities, std::size_t clients, const StopCheck& check_stop)
+      : facilities_(facilities), clients_(clients), check_stop_(&check_stop) {}
   CostRows(const CostRows&) = default;
   CostRows& operator=(const CostRows&) = default;
 
  private:
   std::size_t facilities_, clients_;
+  const StopCheck* check_stop_;
 };
 
 /// A matrix whose costs are at most 2^900; it is copied only if its costs must be scaled for that,
 /// or if they are all so small that they lack digits.
 class MatrixRows final : public CostRows {
  public:
-  explicit MatrixRows(const FacilityMatrix& matrix);
+  MatrixRows(const FacilityMatrix& matrix, const StopCheck& check_stop);
 
   const double* row(std::size_t facility, std::vector<double>& scratch) const override;
   void gather(std::size_t facility, std::span<const std::uint32_t> clients,

@@ -92,6 +92,7 @@ class Stars {
 
   // Over the waiting clients, nearest first; others are removed from the list.
   Star cheapest(std::uint32_t j) {
+    costs_->check_stop();
     std::uint32_t* const order = row_order(j);
     std::uint32_t kept = 0;
     for (std::uint32_t k = 0; k < left_[j]; ++k) {
@@ -152,8 +153,9 @@ double least_divisor(const MatrixRows& costs, const std::vector<double>& duals) 
 
 }  // namespace
 
-FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report) {
-  const MatrixRows costs(problem);
+FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report,
+                              const StopCheck& check_stop) {
+  const MatrixRows costs(problem, check_stop);
   Stars stars(costs);
   stars.run();
   FacilitySolution solution = solution_of(problem, stars.open());
@@ -162,7 +164,7 @@ FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& rep
   std::vector<double> feasible = report.duals;
   for (double& v : report.duals) v = costs.unscaled(v);
   for (double& v : feasible) v = costs.unscaled(v / report.divisor);
-  solution.lower_bound = dual_value(problem, feasible);
+  solution.lower_bound = dual_value(problem, feasible, check_stop);
   return solution;
 }
 

@@ -69,7 +69,7 @@ FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOption
     throw std::invalid_argument("the time limit is NaN: give seconds, or infinity");
   }
   const auto start = Clock::now();
-  const MatrixRows costs(problem);
+  const MatrixRows costs(problem, options.check_stop);
   std::vector<Found> found(length.restarts);
   parallel(length.restarts, options.threads, [&](std::size_t run) {
     found[run] =

@@ -30,6 +30,7 @@ class Growth {
       if (costs_->opening()[j] == 0.0) payments_.push({0.0, j});
     }
     for (std::size_t waiting = duals_.size(); waiting > 0;) {
+      costs_->check_stop();
       // At equal times facilities open first: clients that reach them then are connected at once.
       if (!payments_.empty() &&
           (reaches_.empty() || payments_.top().first <= reaches_.top().first)) {
@@ -49,6 +50,7 @@ class Growth {
     std::vector<char> used(duals_.size(), 0);  // has paid for a facility that stays
     std::vector<std::uint32_t> stay;
     for (const std::uint32_t j : opening_order_) {
+      costs_->check_stop();
       bool free = true;
       for (std::size_t i = 0; i < duals_.size() && free; ++i) {
         free = !(used[i] && duals_[i] > costs_->cost(j, i));
@@ -147,15 +149,16 @@ class Growth {
 
 }  // namespace
 
-FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report) {
-  const MatrixRows costs(problem);
+FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report,
+                               const StopCheck& check_stop) {
+  const MatrixRows costs(problem, check_stop);
   const ClientOrder order(costs);
   Growth growth(costs, order);
   growth.run();
   FacilitySolution solution = solution_of(problem, growth.independent());
   report.duals = growth.duals();
   for (double& v : report.duals) v = costs.unscaled(v);
-  solution.lower_bound = dual_value(problem, report.duals);
+  solution.lower_bound = dual_value(problem, report.duals, check_stop);
   return solution;
 }
 

@@ -73,7 +73,7 @@ FacilitySolution k_median(const FacilityMatrix& problem, std::size_t k,
                           const KMedianOptions& options) {
   check(problem);
   check_count(k, problem.facilities, options);
-  const MatrixRows costs(problem);
+  const MatrixRows costs(problem, options.check_stop);
   FacilitySolution solution;
   solution.facilities = find_medians(costs, k, options);
   const Connections connections = connect(costs, solution.facilities);
@@ -92,7 +92,7 @@ FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
   SearchFrame frame = make_frame(problem);
   const double rounding = rounding_of_frame(problem, frame);
   return with_space(problem, frame, problem.points, [&](const auto& space) {
-    const PointRows costs(space, frame.weights, frame.outlier_price);
+    const PointRows costs(space, frame.weights, frame.outlier_price, options.check_stop);
     FacilitySolution solution;
     solution.facilities = find_medians(costs, k, options);
     Connections connections = connect(costs, solution.facilities);

@@ -12,8 +12,10 @@ namespace terrace::cluster {
 [[nodiscard]] FacilitySolution interchange(const FacilityMatrix& problem,
                                            const FacilityOptions& options);
 /// Throw: std::invalid_argument if the memory cannot be allocated.
-[[nodiscard]] FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report);
-[[nodiscard]] FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report);
+[[nodiscard]] FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report,
+                                             const StopCheck& check_stop);
+[[nodiscard]] FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report,
+                                            const StopCheck& check_stop);
 /// Throws: std::runtime_error if the library was built without GLPK or GLPK fails.
 [[nodiscard]] FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& report);
 
@@ -30,7 +32,9 @@ struct CostMatrix {
 /// its outlier price pays that price to whichever facility it is connected to. O(n^2) distances.
 /// Throws: std::invalid_argument if the 8 n^2 bytes exceed `memory_limit` (0: no limit), naming
 /// them, or if a cost overflows a double, like check() of a matrix; std::bad_alloc.
-[[nodiscard]] CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit);
-[[nodiscard]] CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit);
+[[nodiscard]] CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit,
+                                     const StopCheck& check_stop = {});
+[[nodiscard]] CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit,
+                                     const StopCheck& check_stop = {});
 
 }  // namespace terrace::cluster

@@ -51,32 +51,35 @@ std::size_t ceil_log(std::size_t value, std::size_t base) {
 
 template <class Space>
 std::unique_ptr<SearchEngine> make(SearchFrame& frame, Space space, FacilityStrategy strategy,
-                                   unsigned threads, const std::string& what) {
+                                   unsigned threads, const StopCheck& check_stop,
+                                   const std::string& what) {
   check_strategy(strategy, Space::kHasBoxes, space.has_triangles(), what);
   if (strategy == FacilityStrategy::automatic) {
     strategy = space.has_triangles() ? FacilityStrategy::facilities
                : Space::kHasBoxes    ? FacilityStrategy::kd_tree
                                      : FacilityStrategy::full_scan;
   }
-  return std::make_unique<SpaceSearch<Space>>(frame, std::move(space), strategy, threads);
+  return std::make_unique<SpaceSearch<Space>>(frame, std::move(space), strategy, threads,
+                                              check_stop);
 }
 
 }  // namespace
 
 std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, FacilityStrategy strategy,
-                                          unsigned threads) {
+                                          unsigned threads, const StopCheck& check_stop) {
   SearchFrame frame = make_frame(problem);
   const std::string what = "the metric \"" + name_of(problem.metric) + "\"";
   return with_space(problem, frame, problem.points,
                     [&](auto space) -> std::unique_ptr<SearchEngine> {
-                      return make(frame, std::move(space), strategy, threads, what);
+                      return make(frame, std::move(space), strategy, threads, check_stop, what);
                     });
 }
 
 std::unique_ptr<SearchEngine> make_search(const FacilityEntities& problem,
-                                          FacilityStrategy strategy, unsigned threads) {
+                                          FacilityStrategy strategy, unsigned threads,
+                                          const StopCheck& check_stop) {
   SearchFrame frame = make_frame(problem);
-  return make(frame, space_of(problem), strategy, threads, "distances by a function");
+  return make(frame, space_of(problem), strategy, threads, check_stop, "distances by a function");
 }
 
 std::size_t candidate_count(Effort effort, std::size_t points) {

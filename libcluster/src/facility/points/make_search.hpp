@@ -14,10 +14,10 @@ namespace terrace::cluster {
 /// Throws: std::invalid_argument if the problem does not admit the strategy.
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(
     const FacilityPoints& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
-    unsigned threads = 1);
+    unsigned threads = 1, const StopCheck& check_stop = {});
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(
     const FacilityEntities& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
-    unsigned threads = 1);
+    unsigned threads = 1, const StopCheck& check_stop = {});
 
 /// The number of candidates of a search over this many points; at least one, unless there are no
 /// points.

@@ -23,14 +23,16 @@ namespace terrace::cluster {
 template <class Space>
 class PointRows final : public CostRows {
  public:
-  PointRows(const Space& space, std::span<const double> weights, double price)
-      : CostRows(weights.size(), weights.size()),
+  PointRows(const Space& space, std::span<const double> weights, double price,
+            const StopCheck& check_stop)
+      : CostRows(weights.size(), weights.size(), check_stop),
         space_(&space),
         distances_(space),
         weights_(weights),
         price_(price) {}
 
   const double* row(std::size_t facility, std::vector<double>& scratch) const override {
+    check_stop();
     const auto count = static_cast<std::uint32_t>(clients());
     scratch.resize(count);
     distances_.from(static_cast<std::uint32_t>(facility)).fill(count, scratch.data());
@@ -41,6 +43,7 @@ class PointRows final : public CostRows {
   }
   void gather(std::size_t facility, std::span<const std::uint32_t> which,
               double* out) const override {
+    check_stop();
     const auto from = space_->from(static_cast<std::uint32_t>(facility));
     for (std::size_t k = 0; k < which.size(); ++k) {
       out[k] = weights_[which[k]] * std::min(from(which[k]), price_);

@@ -21,10 +21,12 @@ namespace {
 
 }  // namespace
 
-SearchEngine::SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads)
+SearchEngine::SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
+                           StopCheck check_stop)
     : strategy_(strategy),
       state_(frame),
       team_(threads_for(std::numeric_limits<std::size_t>::max(), threads)),
+      check_stop_(std::move(check_stop)),
       verdicts_(1) {}
 
 void SearchEngine::replace(std::vector<std::uint32_t> facility, std::vector<double> distance) {
@@ -92,6 +94,7 @@ bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std:
       if (!progress(done, candidates)) return false;
       next_report = done + step;
     }
+    if (check_stop_) check_stop_();
     const std::size_t now = std::min(batch, candidates - done);
     if (verdicts_.size() < now) verdicts_.resize(now);
     for (std::size_t k = 0; k < now; ++k) {
@@ -100,7 +103,10 @@ bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std:
     if (now == 1) {
       judge(verdicts_[0].candidate, true, verdicts_[0]);
     } else {
-      team_.run(now, [this](std::size_t k) { judge(verdicts_[k].candidate, false, verdicts_[k]); });
+      team_.run(now, [this](std::size_t k) {
+        if (check_stop_) check_stop_();
+        judge(verdicts_[k].candidate, false, verdicts_[k]);
+      });
     }
     std::size_t positive = 0;
     const Verdict* best = nullptr;

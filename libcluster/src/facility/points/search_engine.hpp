@@ -19,8 +19,10 @@ namespace terrace::cluster {
 /// to rounding.
 class SearchEngine {
  public:
-  /// strategy: that of a local search, not automatic. threads: 0: one per core.
-  SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads);
+  /// strategy: that of a local search, not automatic. threads: 0: one per core. check_stop: its
+  /// exceptions are thrown by all that takes O(clients) or more.
+  SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
+               StopCheck check_stop);
   virtual ~SearchEngine() = default;
 
   /// Meyerson's initial solution (4.2.3): in random order, each client opens a facility with
@@ -66,6 +68,7 @@ class SearchEngine {
   const FacilityStrategy strategy_;
   SearchState state_;
   ThreadTeam team_;
+  const StopCheck check_stop_;
 
  private:
   SearchStatistics statistics_;

@@ -15,6 +15,7 @@
 #include "facility/points/box_tree.hpp"
 #include "facility/points/search_engine.hpp"
 #include "facility/points/search_space.hpp"
+#include "stop_ticks.hpp"
 
 namespace terrace::cluster {
 
@@ -23,8 +24,9 @@ template <class Space>
 class SpaceSearch final : public SearchEngine {
  public:
   /// strategy: one that the space admits, not automatic.
-  SpaceSearch(SearchFrame& frame, Space space, FacilityStrategy strategy, unsigned threads)
-      : SearchEngine(frame, strategy, threads), space_(std::move(space)) {
+  SpaceSearch(SearchFrame& frame, Space space, FacilityStrategy strategy, unsigned threads,
+              const StopCheck& check_stop)
+      : SearchEngine(frame, strategy, threads, check_stop), space_(std::move(space)) {
     if constexpr (Space::kHasBoxes) {
       if (strategy == FacilityStrategy::quadtree) tree_.emplace(BoxTree::Kind::quadtree, points());
       if (strategy == FacilityStrategy::octree) tree_.emplace(BoxTree::Kind::octree, points());
@@ -54,7 +56,9 @@ class SpaceSearch final : public SearchEngine {
     }
     std::vector<std::uint32_t> facility(count), open;
     std::vector<double> distances(count);
+    StopTicks ticks(check_stop_);
     for (const std::uint32_t i : order) {
+      ticks(8 + 2 * open.size());
       std::uint32_t nearest = kOutlier;
       double least = std::numeric_limits<double>::infinity();
       for (const std::uint32_t j : open) {
@@ -107,7 +111,9 @@ class SpaceSearch final : public SearchEngine {
   // Finds open facilities that are nearer than `distances`. A facility remains its own client, at
   // 0.
   void find_nearest(std::vector<std::uint32_t>& facility, std::vector<double>& distances) const {
+    StopTicks ticks(check_stop_);
     for (const std::uint32_t j : state_.open()) {
+      ticks(2 * state_.size());
       const From from = space_.from(j);
       for (std::uint32_t i = 0; i < state_.size(); ++i) {
         const double d = from(i);
