@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "parallel.hpp"
+#include "stop_ticks.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -68,16 +69,19 @@ struct Trial {
 
 class Matcher {
  public:
-  Matcher(std::uint32_t count, const Row& row) : count_(count), row_(row) {}
+  Matcher(std::uint32_t count, const Row& row, const StopCheck& check_stop)
+      : count_(count), row_(row), check_stop_(check_stop) {}
 
   /// The least total distance between the halves.
   Trial match(const Halves& halves) {
     const std::size_t rows = halves.first.size(), columns = halves.second.size();
     costs_.resize(rows * columns);
+    StopTicks ticks(check_stop_);
     for (std::size_t r = 0; r < rows; ++r) {
+      ticks(2 * columns);
       row_(halves.first[r], halves.second, costs_.data() + r * columns);
     }
-    const auto assignment = assign(std::span<const double>(costs_), rows, columns);
+    const auto assignment = assign(std::span<const double>(costs_), rows, columns, check_stop_);
     Trial trial{std::vector<std::uint32_t>(count_, kNobody), 0.0};
     std::vector<double> distance(count_, 0.0);
     for (std::size_t r = 0; r < rows; ++r) {
@@ -94,6 +98,7 @@ class Matcher {
  private:
   std::uint32_t count_;
   const Row& row_;
+  const StopCheck& check_stop_;
   std::vector<double> costs_;
 };
 
@@ -129,7 +134,7 @@ class Search {
 
 void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& options,
                  unsigned threads, Search& search) {
-  std::vector<Matcher> matchers(threads, Matcher(count, row));
+  std::vector<Matcher> matchers(threads, Matcher(count, row, options.check_stop));
   std::vector<Trial> trials(threads);
   while (search.goes_on()) {
     // A round of one iteration per thread; results are evaluated in iteration order.
@@ -144,7 +149,7 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
 }
 
 void monotone(std::uint32_t count, const Row& row, const HalvingOptions& options, Search& search) {
-  Matcher matcher(count, row);
+  Matcher matcher(count, row, options.check_stop);
   while (search.goes_on()) {
     std::mt19937_64 random(seed_of_iteration(options.seed, search.result.iterations));
     search.take(matcher.match(search.result.mate.empty() ? random_halves(count, random)

@@ -69,7 +69,9 @@ class Windows {
     result_.cost = cost_;
     // Rounding alone can lift the bound above the cost.
     result_.dual_bound =
-        result_.optimal ? cost_ : std::min(cost_, discs_.bound(points_, metric_, threads_));
+        result_.optimal
+            ? cost_
+            : std::min(cost_, discs_.bound(points_, metric_, threads_, options_.check_stop));
     const auto alone = std::find(result_.mate.begin(), result_.mate.end(), kNobody);
     if (alone != result_.mate.end()) {
       result_.left_over = static_cast<std::uint32_t>(alone - result_.mate.begin());
@@ -119,7 +121,7 @@ class Windows {
     units.reserve(chosen.size());
     for (const std::uint32_t i : chosen) units.push_back({points_[i], i});
     Parts parts;
-    windows::cut<D>(units, options_.window, true, 0, 0, parts.ends);
+    windows::cut<D>(units, options_.window, true, 0, 0, parts.ends, options_.check_stop);
     parts.points.reserve(units.size());
     for (const auto& unit : units) parts.points.push_back(unit.name);
     sort_within(parts);
@@ -135,7 +137,8 @@ class Windows {
     for (std::size_t g = 0; g < groups.count(); ++g) {
       units.clear();
       for (const std::uint32_t i : groups.group(g)) units.push_back({points_[i], i});
-      windows::cut<D>(units, 4 * options_.window, true, 0, groups.begin[g], parts.ends);
+      windows::cut<D>(units, 4 * options_.window, true, 0, groups.begin[g], parts.ends,
+                      options_.check_stop);
       for (const auto& unit : units) parts.points.push_back(unit.name);
     }
     sort_within(parts);
@@ -156,7 +159,7 @@ class Windows {
       units.push_back(unit);
     }
     Parts parts;
-    windows::cut<D>(units, options_.window / 2, false, round, 0, parts.ends);
+    windows::cut<D>(units, options_.window / 2, false, round, 0, parts.ends, options_.check_stop);
     parts.points.reserve(points_.size());
     std::size_t done = 0;
     for (std::size_t& end : parts.ends) {
@@ -214,6 +217,7 @@ class Windows {
     std::vector<Point> points(members.size());
     for (std::size_t m = 0; m < members.size(); ++m) points[m] = points_[members[m]];
     PointMatchingOptions options;
+    options.check_stop = options_.check_stop;
     if (metric_.distance) {
       options.metric = metric_;
       options.metric.distance = [&](std::uint32_t i, std::uint32_t j) {
@@ -265,6 +269,7 @@ LargeMatching match(std::span<const std::array<double, D>> points,
   if (options.labels.empty() && points.size() <= std::max<std::size_t>(options.exact_limit, 3)) {
     PointMatchingOptions exact;
     exact.metric = options.metric;
+    exact.check_stop = options.check_stop;
     PointMatching matching = match_points(points, exact);
     result.mate = std::move(matching.mate);
     result.cost = matching.cost;

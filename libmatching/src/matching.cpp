@@ -42,8 +42,9 @@ void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
 
 template <class AnyEdge>
 Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exponent,
-               const std::vector<Edge>& doubled) {
-  Solver solver(static_cast<std::uint32_t>(vertex_count), doubled);
+               const std::vector<Edge>& doubled, const StopCheck& check_stop) {
+  Solver solver(static_cast<std::uint32_t>(vertex_count), doubled, blossom::kNone,
+                StopTicks(check_stop));
   const std::uint32_t alone = solver.solve();
   if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
@@ -170,8 +171,8 @@ double Matching::dual_bound() const {
   return std::ldexp(high * 0x1p32 + static_cast<double>(low), -1 - exponent);
 }
 
-Matching min_weight_perfect_matching(std::size_t vertex_count,
-                                     std::span<const WeightedEdge> edges) {
+Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const WeightedEdge> edges,
+                                     const StopCheck& check_stop) {
   check_ends(vertex_count, edges);
   double largest = 0.0;
   for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -187,14 +188,15 @@ Matching min_weight_perfect_matching(std::size_t vertex_count,
     doubled.reserve(edges.size());
     for (const WeightedEdge& e : edges) doubled.push_back({e.i, e.j, 2 * rounded(e, exponent)});
     try {
-      return solve(vertex_count, edges, exponent, doubled);
+      return solve(vertex_count, edges, exponent, doubled, check_stop);
     } catch (const std::overflow_error&) {
       if (bits <= 34) throw;
     }
   }
 }
 
-Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges) {
+Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges,
+                                     const StopCheck& check_stop) {
   check_ends(vertex_count, edges);
   std::vector<Edge> doubled;
   doubled.reserve(edges.size());
@@ -207,7 +209,7 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const I
     }
     doubled.push_back({e.i, e.j, 2 * e.weight});
   }
-  return solve(vertex_count, edges, 0, doubled);
+  return solve(vertex_count, edges, 0, doubled, check_stop);
 }
 
 std::string matching_error(const Matching& matching, std::span<const WeightedEdge> edges) {

@@ -15,25 +15,27 @@ namespace {
 
 template <class Cost>
 BasicAssignment<LabelOf<Cost>> assign_matrix(std::span<const Cost> costs, std::size_t rows,
-                                             std::size_t columns) {
+                                             std::size_t columns, const StopCheck& check_stop) {
   check_matrix(costs, rows, columns);
   const auto row = [&](std::size_t i) { return costs.data() + i * columns; };
-  return DenseSolver<Cost, decltype(row)>(rows, columns, row).solve();
+  return DenseSolver<Cost, decltype(row)>(rows, columns, row, check_stop).solve();
 }
 
 }  // namespace
 
-Assignment assign(std::span<const double> costs, std::size_t rows, std::size_t columns) {
-  return assign_matrix(costs, rows, columns);
+Assignment assign(std::span<const double> costs, std::size_t rows, std::size_t columns,
+                  const StopCheck& check_stop) {
+  return assign_matrix(costs, rows, columns, check_stop);
 }
 
-Assignment assign(std::span<const float> costs, std::size_t rows, std::size_t columns) {
-  return assign_matrix(costs, rows, columns);
+Assignment assign(std::span<const float> costs, std::size_t rows, std::size_t columns,
+                  const StopCheck& check_stop) {
+  return assign_matrix(costs, rows, columns, check_stop);
 }
 
-IntegerAssignment assign(std::span<const std::int32_t> costs, std::size_t rows,
-                         std::size_t columns) {
-  return assign_matrix(costs, rows, columns);
+IntegerAssignment assign(std::span<const std::int32_t> costs, std::size_t rows, std::size_t columns,
+                         const StopCheck& check_stop) {
+  return assign_matrix(costs, rows, columns, check_stop);
 }
 
 Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fill_row) {
@@ -48,7 +50,7 @@ Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fil
     }
     return static_cast<const double*>(buffer.data());
   };
-  return DenseSolver<double, decltype(row)>(rows, columns, row).solve();
+  return DenseSolver<double, decltype(row)>(rows, columns, row, {}).solve();
 }
 
 }  // namespace terrace::matching

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "assignment/scan_kernels.hpp"
+#include "stop_ticks.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -23,10 +24,12 @@ class DenseSolver {
  public:
   using Number = LabelOf<Cost>;
 
-  DenseSolver(std::size_t rows, std::size_t columns, Rows& source)
+  /// check_stop: outlives this object.
+  DenseSolver(std::size_t rows, std::size_t columns, Rows& source, const StopCheck& check_stop)
       : rows_(rows),
         columns_(columns),
         source_(source),
+        ticks_(check_stop),
         kernels_(scan_kernels<Cost>()),
         row_of_(columns, kUnassigned),
         distance_(columns),
@@ -81,6 +84,7 @@ class DenseSolver {
     for (std::size_t i = 0; i < count; ++i) {
       std::uint32_t row = static_cast<std::uint32_t>(i);
       while (row != kUnassigned) {
+        ticks_(columns_);
         const Cost* costs = source_(row);
         Number least, second;
         kernels_.least_two(costs, result_.column_dual.data(), columns_, &least, &second);
@@ -145,6 +149,7 @@ class DenseSolver {
       leave_at = -result_.row_dual[start];
     }
     for (;;) {
+      ticks_(columns_);
       const Number base = reached - result_.row_dual[row];
       const Number least = kernels_.relax(source_(row), labels.data(), columns_, base, row,
                                           distance_.data(), previous_.data(), block_least_.data());
@@ -193,6 +198,7 @@ class DenseSolver {
 
   std::size_t rows_, columns_;
   Rows& source_;
+  StopTicks ticks_;
   const ScanKernels<Cost>& kernels_;
   bool retiring_ = false;
   BasicAssignment<Number> result_;

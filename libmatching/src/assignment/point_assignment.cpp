@@ -111,10 +111,11 @@ class NearCandidates {
 
 /// For rows.size() <= columns.size(); does not compute the cost.
 template <std::size_t D>
-Assignment assign_wide(const Points<D>& rows, const Points<D>& columns) {
+Assignment assign_wide(const Points<D>& rows, const Points<D>& columns,
+                       const StopCheck& check_stop) {
   ColumnTree<D> tree(columns);
   NearCandidates<D> source(rows, tree, columns.size());
-  SparseSolver<NearCandidates<D>> solver(rows.size(), columns.size(), source);
+  SparseSolver<NearCandidates<D>> solver(rows.size(), columns.size(), source, check_stop);
   // Every column is within reach of every row, so a path always exists.
   solver.solve();
   Assignment result = solver.result();
@@ -128,13 +129,14 @@ Assignment assign_wide(const Points<D>& rows, const Points<D>& columns) {
 
 template <std::size_t D>
 Assignment assign_sets(std::span<const std::array<double, D>> rows,
-                       std::span<const std::array<double, D>> columns) {
+                       std::span<const std::array<double, D>> columns,
+                       const StopCheck& check_stop) {
   const Scaled<D> scaled(rows, columns);
   Assignment result;
   if (rows.size() <= columns.size()) {
-    result = assign_wide<D>(scaled.rows, scaled.columns);
+    result = assign_wide<D>(scaled.rows, scaled.columns, check_stop);
   } else {
-    Assignment turned = assign_wide<D>(scaled.columns, scaled.rows);
+    Assignment turned = assign_wide<D>(scaled.columns, scaled.rows, check_stop);
     result.column.assign(rows.size(), kUnassigned);
     for (std::size_t j = 0; j < columns.size(); ++j)
       result.column[turned.column[j]] = static_cast<std::uint32_t>(j);
@@ -165,12 +167,14 @@ double check_sets(const Assignment& assignment, std::span<const std::array<doubl
 
 }  // namespace
 
-Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns) {
-  return assign_sets<2>(rows, columns);
+Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns,
+                         const StopCheck& check_stop) {
+  return assign_sets<2>(rows, columns, check_stop);
 }
 
-Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns) {
-  return assign_sets<3>(rows, columns);
+Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns,
+                         const StopCheck& check_stop) {
+  return assign_sets<3>(rows, columns, check_stop);
 }
 
 double check_points(const Assignment& assignment, std::span<const Point2> rows,

@@ -127,8 +127,8 @@ bool chosen_cost(const EdgeLists& lists, std::size_t row, std::uint32_t column, 
   return found;
 }
 
-Assignment solve_wide(EdgeLists& lists, const char* side) {
-  SparseSolver<EdgeLists> solver(lists.rows(), lists.columns, lists);
+Assignment solve_wide(EdgeLists& lists, const char* side, const StopCheck& check_stop) {
+  SparseSolver<EdgeLists> solver(lists.rows(), lists.columns, lists, check_stop);
   if (!solver.solve()) {
     const std::vector<std::uint32_t> tree = solver.tree_rows();
     const bool row = side[0] == 'r';
@@ -143,13 +143,13 @@ Assignment solve_wide(EdgeLists& lists, const char* side) {
   return solver.result();
 }
 
-Assignment solve(EdgeLists lists) {
+Assignment solve(EdgeLists lists, const StopCheck& check_stop) {
   Assignment result;
   if (lists.rows() <= lists.columns) {
-    result = solve_wide(lists, "row");
+    result = solve_wide(lists, "row", check_stop);
   } else {
     EdgeLists wide = transposed(lists);
-    Assignment turned = solve_wide(wide, "column");
+    Assignment turned = solve_wide(wide, "column", check_stop);
     result.column.assign(lists.rows(), kUnassigned);
     for (std::size_t j = 0; j < lists.columns; ++j)
       result.column[turned.column[j]] = static_cast<std::uint32_t>(j);
@@ -183,10 +183,13 @@ double check_lists(const Assignment& assignment, const EdgeLists& lists) {
 
 }  // namespace
 
-Assignment assign_sparse(const SparseCosts& costs) { return solve(lists_of(costs)); }
+Assignment assign_sparse(const SparseCosts& costs, const StopCheck& check_stop) {
+  return solve(lists_of(costs), check_stop);
+}
 
-Assignment assign_sparse(std::span<const CostEdge> edges, std::size_t rows, std::size_t columns) {
-  return solve(lists_of(edges, rows, columns));
+Assignment assign_sparse(std::span<const CostEdge> edges, std::size_t rows, std::size_t columns,
+                         const StopCheck& check_stop) {
+  return solve(lists_of(edges, rows, columns), check_stop);
 }
 
 double check(const Assignment& assignment, const SparseCosts& costs) {

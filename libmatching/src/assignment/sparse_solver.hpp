@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "assignment/bidding.hpp"
+#include "stop_ticks.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -34,9 +35,11 @@ struct Candidate {
 template <class Source>
 class SparseSolver {
  public:
-  SparseSolver(std::size_t rows, std::size_t columns, Source& source)
+  /// check_stop: outlives this object.
+  SparseSolver(std::size_t rows, std::size_t columns, Source& source, const StopCheck& check_stop)
       : rows_(rows),
         source_(source),
+        ticks_(check_stop),
         row_of_(columns, kUnassigned),
         previous_(columns),
         distance_(columns, kInfinity),
@@ -92,6 +95,7 @@ class SparseSolver {
 
   Offer<double> offer(std::uint32_t row) {
     for (;;) {
+      ticks_(source_.candidates(row).size());
       Offer<double> found{kUnassigned, kInfinity, source_.threshold(row)};
       for (const Candidate& c : source_.candidates(row)) {
         const double reduced = c.cost - result_.column_dual[c.column];
@@ -119,6 +123,7 @@ class SparseSolver {
     for (std::size_t i = 0; i < rows_; ++i) {
       auto row = static_cast<std::uint32_t>(i);
       while (row != kUnassigned) {
+        ticks_(source_.candidates(row).size());
         double least = kInfinity, second = source_.threshold(row), cost = 0;
         std::uint32_t column = kUnassigned;
         for (const Candidate& c : source_.candidates(row)) {
@@ -178,6 +183,7 @@ class SparseSolver {
   /// Relaxes the row's candidates from `first` on; absent ones matter if they are below `limit`.
   void relax(std::uint32_t row, std::size_t first, double limit) {
     const double base = row_distance_[row] - result_.row_dual[row];
+    ticks_(source_.candidates(row).size());
     for (const Candidate& c : source_.candidates(row).subspan(first)) {
       const double through = (base + c.cost) - result_.column_dual[c.column];
       if (!(through < bound_) || !(through < distance_[c.column])) continue;
@@ -248,6 +254,7 @@ class SparseSolver {
 
   std::size_t rows_;
   Source& source_;
+  StopTicks ticks_;
   Assignment result_;
   std::vector<std::uint32_t> row_of_, previous_;
   std::vector<double> distance_, row_distance_;

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "stop_ticks.hpp"
+
 namespace terrace::matching::blossom {
 
 /// The order of points by recursive halving along the longer side of their bounding box, down to
@@ -19,13 +21,15 @@ namespace terrace::matching::blossom {
 inline constexpr std::uint32_t kLeaf = 8;
 
 template <std::size_t D>
-std::vector<std::uint32_t> halving_order(std::span<const std::array<double, D>> points) {
+std::vector<std::uint32_t> halving_order(std::span<const std::array<double, D>> points,
+                                         StopTicks ticks = {}) {
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, points.size()}};
   while (!open.empty()) {
     const auto [begin, end] = open.back();
     open.pop_back();
+    ticks(8 * (end - begin));
     if (end - begin <= kLeaf) {
       std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin),
                 order.begin() + static_cast<std::ptrdiff_t>(end));

@@ -52,7 +52,8 @@ class Pricing {
   using Point = std::array<double, D>;
 
   /// points: in halving order, as the solver's vertices 0 .. points.size() - 1.
-  Pricing(std::span<const Point> points, const PairCost& cost) : points_(points), cost_(cost) {}
+  Pricing(std::span<const Point> points, const PairCost& cost, StopTicks ticks = {})
+      : points_(points), cost_(cost), ticks_(ticks) {}
 
   /// Some of the violated pairs: the worst few of each part, more for large parts.
   std::vector<Edge> violated(const Solver& solver) {
@@ -60,6 +61,7 @@ class Pricing {
     found_.clear();
     heads_.assign(1, {kNone, 0});
     while (!heads_.empty()) {
+      ticks_();
       const Head head = heads_.back();
       heads_.pop_back();
       follow(head, solver);
@@ -170,6 +172,7 @@ class Pricing {
     const auto count = static_cast<std::uint32_t>(members_.size());
     if (count <= 4 * kLeaf) {
       for (std::uint32_t i = 0; i < count; ++i) {
+        ticks_(count);
         for (std::uint32_t j = 0; j < count; ++j) {
           if (faces(i, j)) test(members_[i], members_[j], worst);
         }
@@ -206,6 +209,7 @@ class Pricing {
       const Member& a = members_[i];
       open.assign(1, 0);
       while (!open.empty()) {
+        ticks_(kLeaf);
         const std::uint32_t x = open.back();
         open.pop_back();
         const auto& node = nodes[x];
@@ -231,6 +235,7 @@ class Pricing {
 
   std::span<const Point> points_;
   const PairCost& cost_;
+  StopTicks ticks_;
   Nest nest_;
   std::vector<Head> heads_;
   std::vector<Member> members_;

@@ -24,7 +24,9 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
   left_out_ = false;
   label_plus(root);
   scan_queue();
+  constexpr std::size_t kTicksOfEvent = 64;
   while (!heap_.empty()) {
+    ticks_(kTicksOfEvent);
     const Event event = heap_.front();
     std::pop_heap(heap_.begin(), heap_.end(), later);
     heap_.pop_back();
@@ -105,6 +107,7 @@ void Solver::scan_queue() {
 }
 
 void Solver::scan(std::uint32_t vertex) {
+  ticks_(4 * (arc_begin_[vertex + std::size_t{1}] - arc_begin_[vertex]));
   const Vertex& u = vertices_[vertex];
   for (std::size_t k = arc_begin_[vertex]; k < arc_begin_[vertex + std::size_t{1}]; ++k) {
     const Arc& arc = arcs_[k];

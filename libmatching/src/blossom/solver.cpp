@@ -8,8 +8,14 @@
 
 namespace terrace::matching::blossom {
 
-Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late)
-    : n_(n), late_(late), edges_(std::move(edges)), vertices_(n), sets_(n), nodes_(n) {
+Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late, StopTicks ticks)
+    : n_(n),
+      late_(late),
+      ticks_(ticks),
+      edges_(std::move(edges)),
+      vertices_(n),
+      sets_(n),
+      nodes_(n) {
   for (std::uint32_t v = 0; v < n; ++v) {
     vertices_[v].set = v;
     vertices_[v].key = std::numeric_limits<std::int64_t>::max();
@@ -83,6 +89,7 @@ std::uint32_t Solver::solve() {
     const bool unlimited = exposed <= 2 || limit > kLimit / 16;
     const std::uint32_t before = exposed;
     for (std::uint32_t v = 0; v < n_; ++v) {
+      ticks_();
       // The base of an exposed blossom is its root, so that each pass searches from it once.
       if (!is_exposed(v) || nodes_[top(v)].base != v) continue;
       const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "stop_ticks.hpp"
+
 namespace terrace::matching::blossom {
 
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
@@ -34,11 +36,13 @@ class Solver {
   /// Takes n vertices and edges (ends below n, i != j, |cost| below kLimit / 4). Vertex `late`, if
   /// given, may have edges to all others: it is matched last, so that its many edges are not
   /// scanned repeatedly.
-  Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone);
+  Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone,
+         StopTicks ticks = {});
 
   /// Computes a perfect matching of least weight.
   /// Returns kNone, or an exposed vertex that cannot be matched (then witness() proves it).
-  /// Throws std::overflow_error if a potential exceeds kLimit.
+  /// Throws std::overflow_error if a potential exceeds kLimit, and what the check of `ticks`
+  /// throws; the solver can then only be destroyed.
   std::uint32_t solve();
 
   /// Adds edges; where they violate the duals these are repaired, which may expose vertices.
@@ -139,6 +143,7 @@ class Solver {
   };
 
   std::uint32_t n_, late_;
+  StopTicks ticks_;
   std::vector<Edge> edges_;
   std::vector<std::size_t> arc_begin_;
   std::vector<Arc> arcs_;

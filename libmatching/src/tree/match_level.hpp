@@ -15,9 +15,10 @@ namespace terrace::matching::tree {
 /// one left over. The result must not depend on the number of threads.
 template <std::size_t D>
 std::vector<std::uint32_t> match_level(std::span<const std::array<double, D>> points,
-                                       unsigned threads) {
+                                       unsigned threads, const StopCheck& check_stop) {
   LargeMatchingOptions options;
   options.threads = threads;
+  options.check_stop = check_stop;
   return std::move(match_large(points, options).mate);
 }
 

@@ -197,6 +197,7 @@ class Builder {
       const std::vector<std::uint32_t> mate = match(nodes, threads);
       std::size_t kept = 0;
       const std::uint32_t first = row;
+      if (options_.check_stop) options_.check_stop();
       for (std::uint32_t i = 0; i < nodes.size(); ++i) {
         if (mate[i] == kNobody) {
           nodes[kept++] = nodes[i];
@@ -214,7 +215,7 @@ class Builder {
     std::vector<Point> positions(nodes.size());
     for (std::size_t i = 0; i < nodes.size(); ++i) positions[i] = nodes[i].position;
     if (!options_.matcher) {
-      return tree::match_level<D>(std::span<const Point>(positions), threads);
+      return tree::match_level<D>(std::span<const Point>(positions), threads, options_.check_stop);
     }
     std::vector<std::uint32_t> mate = options_.matcher(positions);
     if (mate.size() != nodes.size()) {

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "stop_ticks.hpp"
+
 namespace terrace::matching::windows {
 
 /// An item that windows do not divide: a point, or a pair at its midpoint.
@@ -28,11 +30,13 @@ struct Unit {
 /// Cost: O(n log(n / most)).
 template <std::size_t D>
 void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t seed,
-         std::size_t first, std::vector<std::size_t>& ends) {
+         std::size_t first, std::vector<std::size_t>& ends, const StopCheck& check_stop) {
+  StopTicks ticks(check_stop);
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, units.size()}};
   while (!open.empty()) {
     const auto [begin, end] = open.back();
     open.pop_back();
+    ticks(8 * (end - begin));
     if (end - begin <= most) {
       if (end != begin) ends.push_back(first + end);
       continue;

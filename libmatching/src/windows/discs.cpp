@@ -98,12 +98,13 @@ class Excess {
   using Point = std::array<double, D>;
 
   Excess(std::span<const Point> points, const PointMetric& metric,
-         std::span<const std::uint32_t> window, unsigned threads)
+         std::span<const std::uint32_t> window, unsigned threads, const StopCheck& check_stop)
       : points_(points),
         metric_(metric),
         window_(window),
         threads_(threads),
-        order_(blossom::halving_order(points)),
+        check_stop_(check_stop),
+        order_(blossom::halving_order(points, StopTicks(check_stop))),
         tree_(sorted(points, order_)),
         owner_(tree_.nodes().size()),
         largest_(tree_.nodes().size()) {
@@ -192,11 +193,13 @@ class Excess {
 
   template <class Work>
   void for_each_chunk(const Work& work) const {
-    constexpr std::size_t kChunk = 4096;
+    constexpr std::size_t kChunk = 4096, kTicksOfSearch = 1024;
     const std::size_t n = points_.size();
     for_each_index((n + kChunk - 1) / kChunk, threads_, [&](std::size_t chunk) {
       std::vector<std::uint32_t> open;
+      StopTicks ticks(check_stop_);
       for (std::size_t k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k) {
+        ticks(kTicksOfSearch);
         work(static_cast<std::uint32_t>(k), open);
       }
     });
@@ -206,6 +209,7 @@ class Excess {
   const PointMetric& metric_;
   std::span<const std::uint32_t> window_;
   unsigned threads_;
+  const StopCheck& check_stop_;
   std::vector<std::uint32_t> order_;
   BoxTree<D> tree_;
   std::vector<std::uint32_t> owner_;  // for each box: the window, if all its points are in one
@@ -216,8 +220,8 @@ class Excess {
 
 template <std::size_t D>
 double Discs::bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
-                    unsigned threads) {
-  Excess<D> excess(points, metric, window_, threads);
+                    unsigned threads, const StopCheck& check_stop) {
+  Excess<D> excess(points, metric, window_, threads, check_stop);
   // First shrink those that reach far beyond their window, as if the radii of all others were at
   // most the distance to their nearest neighbour: otherwise one wide moat would lower a thousand
   // small discs. Then shrink both of each pair, by half each.
@@ -231,7 +235,9 @@ double Discs::bound(std::span<const std::array<double, D>> points, const PointMe
   return sum - *std::max_element(radius_.begin(), radius_.end());
 }
 
-template double Discs::bound(std::span<const Point2>, const PointMetric&, unsigned);
-template double Discs::bound(std::span<const Point3>, const PointMetric&, unsigned);
+template double Discs::bound(std::span<const Point2>, const PointMetric&, unsigned,
+                             const StopCheck&);
+template double Discs::bound(std::span<const Point3>, const PointMetric&, unsigned,
+                             const StopCheck&);
 
 }  // namespace terrace::matching::windows

@@ -34,7 +34,7 @@ class Discs {
   /// Cost: O(n log n) if radii are of the order of the distances between neighbours.
   template <std::size_t D>
   double bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
-               unsigned threads);
+               unsigned threads, const StopCheck& check_stop);
 
  private:
   struct Moat {

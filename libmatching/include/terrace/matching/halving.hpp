@@ -10,6 +10,7 @@
 
 #include "terrace/matching/matching.hpp"
 #include "terrace/matching/point.hpp"
+#include "terrace/matching/stop_check.hpp"
 
 /// Euclidean matching by halving: the points are repeatedly divided into two halves, which are
 /// matched at the least total distance (an assignment). Source: J. Skála, Algorithms for
@@ -43,6 +44,7 @@ struct HalvingOptions {
   /// Called by the caller's thread after each iteration (or a few) with the iterations done, their
   /// total, and the least cost so far. False ends the search.
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
+  StopCheck check_stop = {};
 };
 
 struct HalvingMatching {

@@ -30,6 +30,7 @@ struct LargeMatchingOptions {
   /// all rounds are needed, and the cost once there is a matching (0 before). False ends the rounds
   /// and keeps the current matching; before there is one it has no effect.
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
+  StopCheck check_stop = {};
 };
 
 struct LargeMatching {

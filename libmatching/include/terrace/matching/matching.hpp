@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "terrace/matching/stop_check.hpp"
+
 namespace terrace::matching {
 
 /// Stands for "no vertex" and "no blossom".
@@ -68,8 +70,10 @@ struct Matching {
 /// changes follow V. Kolmogorov, "Blossom V: a new implementation of a minimum cost perfect
 /// matching algorithm", 2009, but one tree at a time, each stopped at a limit that grows from pass
 /// to pass.
-Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const WeightedEdge> edges);
-Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges);
+Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const WeightedEdge> edges,
+                                     const StopCheck& check_stop = {});
+Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges,
+                                     const StopCheck& check_stop = {});
 
 /// Checks the proof that comes with a matching. Returns an empty string, or a description of the
 /// fault.

@@ -27,8 +27,10 @@ namespace terrace::matching {
 /// for the complete graph: O(n^3) time and 16 bytes per pair.
 /// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
 /// dense problems).
-Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns);
-Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns);
+Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns,
+                         const StopCheck& check_stop = {});
+Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns,
+                         const StopCheck& check_stop = {});
 
 /// As check() of assignment.hpp, on all pairs.
 ///

@@ -10,6 +10,7 @@
 
 #include "terrace/matching/matching.hpp"
 #include "terrace/matching/point.hpp"
+#include "terrace/matching/stop_check.hpp"
 
 namespace terrace::matching {
 
@@ -29,6 +30,7 @@ struct PointMatchingOptions {
   /// Additional candidate edges, for instance from a Delaunay triangulation.
   std::span<const std::pair<std::uint32_t, std::uint32_t>> candidates{};
   PointMetric metric{};  ///< Euclidean where `distance` is empty
+  StopCheck check_stop = {};
 };
 
 /// The optimal matching of points and its proof.
