@@ -143,6 +143,11 @@ void Delaunay2<Coord, Metric>::reserve(std::size_t vertices) {
 }
 
 template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::set_check_stop(StopCheck check_stop) {
+  impl_->mesh.ticks = StopTicks(std::move(check_stop));
+}
+
+template <class Coord, class Metric>
 const Metric& Delaunay2<Coord, Metric>::metric() const {
   return impl_->metric;
 }

@@ -89,6 +89,11 @@ void Delaunay3<Coord, Metric>::reserve(std::size_t vertices) {
 }
 
 template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::set_check_stop(StopCheck check_stop) {
+  impl_->mesh.ticks = StopTicks(std::move(check_stop));
+}
+
+template <class Coord, class Metric>
 const Metric& Delaunay3<Coord, Metric>::metric() const {
   return impl_->metric;
 }

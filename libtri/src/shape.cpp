@@ -50,13 +50,15 @@ template <class Triangulation>
 BasicShape3<Triangulation>& BasicShape3<Triangulation>::operator=(BasicShape3&&) noexcept = default;
 
 template <class Triangulation>
-void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, unsigned threads) {
+void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, unsigned threads,
+                                         const StopCheck& check_stop) {
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   shape::State& state = impl_->state;
   if (impl_->options.rule == ShapeRule::kPoles) {
     [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
-    return shape::restore_by_poles(mesh, state, threads);
+    return shape::restore_by_poles(mesh, state, threads, check_stop);
   }
+  state.ticks = StopTicks(check_stop);
   const bool keep_vertices = impl_->options.keep_vertices;
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
     if (impl_->options.rule == ShapeRule::kFlood) {
@@ -66,6 +68,7 @@ void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, uns
       shape::peel_as_published(mesh, state, criterion, keep_vertices);
     }
   });
+  state.ticks = {};
 }
 
 template <class Triangulation>

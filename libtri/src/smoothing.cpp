@@ -9,6 +9,7 @@
 #include "delaunay2/access.hpp"
 #include "interpolation/check_heights.hpp"
 #include "interpolation/place.hpp"
+#include "stop_ticks.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -89,7 +90,7 @@ bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
 }
 
 template <class Mesh>
-Rows make_rows(const Mesh& mesh, std::span<const VertexId> region) {
+Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, StopTicks& ticks) {
   Rows rows;
   for (const VertexId v : region) rows.vertex.push_back(slot(v));
   std::sort(rows.vertex.begin(), rows.vertex.end());
@@ -102,6 +103,7 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region) {
   std::vector<double> weights;
   rows.begin.push_back(0);
   for (const std::uint32_t v : rows.vertex) {
+    ticks(256);
     bool inside = !mesh.flat;
     at.clear();
     const std::size_t first = rows.neighbour.size();
@@ -138,8 +140,9 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region) {
 /// neighbour that is higher by d.
 template <class Count>
 void take_step(const Rows& rows, double step, std::vector<double>& height,
-               std::vector<double>& next, Count count) {
+               std::vector<double>& next, Count count, StopTicks& ticks) {
   for (std::size_t i = 0; i < rows.moving; ++i) {
+    ticks(4 * (rows.begin[i + 1] - rows.begin[i]));
     double sum = 0;
     double weights = 0;
     for (std::size_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k) {
@@ -161,7 +164,8 @@ std::vector<HeightChange> smooth(const Delaunay2<Coord>& triangulation, const He
                                  const SmoothingOptions& options) {
   check(options);
   check_heights(triangulation, heights);
-  const Rows rows = make_rows(Delaunay2Access::mesh(triangulation), region);
+  StopTicks ticks(options.check_stop);
+  const Rows rows = make_rows(Delaunay2Access::mesh(triangulation), region, ticks);
   std::vector<double> height;
   for (const std::uint32_t v : rows.vertex) {
     height.push_back(heights(VertexId{v}));
@@ -178,11 +182,11 @@ std::vector<HeightChange> smooth(const Delaunay2<Coord>& triangulation, const He
   };
   for (unsigned i = 0; i < options.iterations; ++i) {
     if (options.method == Smoothing::kBilateral) {
-      take_step(rows, options.strength, height, next, similar);
+      take_step(rows, options.strength, height, next, similar, ticks);
     } else {
-      take_step(rows, options.strength, height, next, all);
+      take_step(rows, options.strength, height, next, all, ticks);
       if (options.method == Smoothing::kTaubin)
-        take_step(rows, back_step(options), height, next, all);
+        take_step(rows, back_step(options), height, next, all, ticks);
     }
   }
   std::vector<HeightChange> changes;

@@ -48,6 +48,7 @@ constexpr std::uint32_t kAlias = kFreeVertexBit;
 
 template <class Kernel>
 void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
+  mesh.ticks(kTicksOfWalk);
   const auto& p = mesh.point[vertex];
   const WalkEnd end = walk(mesh, p, mesh.incident[mesh.last_vertex]);
   if (!end.outside) {
@@ -67,6 +68,7 @@ void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   std::vector<std::uint32_t>& line = mesh.line;
   for (std::uint32_t v = begin; v < end; ++v) line.push_back(v);
   std::sort(line.begin(), line.end(), [&](std::uint32_t a, std::uint32_t b) {
+    mesh.ticks(4);
     return lexicographically_less(mesh.point[a], mesh.point[b]) ||
            (mesh.point[a] == mesh.point[b] && a < b);
   });
@@ -85,12 +87,14 @@ void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
 /// The first vertex not on one line with the ones before, or kNone; `second`: the first that
 /// differs from vertex begin.
 template <class Kernel>
-std::uint32_t first_off_line(const Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
+std::uint32_t first_off_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
                              std::uint32_t& second) {
   second = begin + 1;
   while (second < end && mesh.point[second] == mesh.point[begin]) ++second;
-  for (std::uint32_t v = second + 1; v < end; ++v)
+  for (std::uint32_t v = second + 1; v < end; ++v) {
+    mesh.ticks(kTicksOfWalk);
     if (Kernel::orientation(mesh.point[begin], mesh.point[second], mesh.point[v]) != 0) return v;
+  }
   return kNone;
 }
 

@@ -83,10 +83,13 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
   mesh.link(make_side(previous, 1), make_side(first, 2));
   incident[vertex] = previous;
   mesh.prefetch_free_triangle();
+  constexpr std::size_t kTicksOfTriangle = 32;
+  mesh.ticks(kTicksOfTriangle * removed);
 }
 
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint) {
+  mesh.ticks(kTicksOfWalk);
   if (mesh.flat) return insert_flat(mesh, p);
   const std::uint32_t from = hint == kNone ? mesh.last_vertex : hint;
   const WalkEnd end = walk(mesh, p, mesh.incident[from]);

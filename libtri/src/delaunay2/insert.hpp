@@ -10,6 +10,9 @@
 
 namespace terrace::tri::planar {
 
+/// What the way to a point costs, see StopTicks.
+inline constexpr std::size_t kTicksOfWalk = 256;
+
 /// Joins a vertex, which has its slot and point but no triangle, to a triangulation with triangles.
 /// `conflict`: a triangle in conflict with it, as found by walk() if no corner equals the point.
 ///

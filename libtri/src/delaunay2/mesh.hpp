@@ -11,6 +11,7 @@
 #include "../free_slots.hpp"
 #include "../journal.hpp"
 #include "../pool.hpp"
+#include "../stop_ticks.hpp"
 
 /// The data of a triangulation and the operations that all algorithms share. No geometry here.
 
@@ -153,6 +154,7 @@ struct Mesh {
   FreeSlots free_triangles;
 
   Journal<Point, 3> journal;
+  StopTicks ticks;  ///< of building and inserting
 
   // Scratch memory, kept between calls.
   std::vector<Side> sides;
@@ -185,6 +187,7 @@ struct Mesh {
     }
     Mesh empty;
     empty.journal = std::move(journal);
+    empty.ticks = std::move(ticks);
     *this = std::move(empty);
   }
 

@@ -49,6 +49,7 @@ void wait_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   std::vector<std::uint32_t>& waiting = mesh.waiting;
   for (std::uint32_t v = begin; v < end; ++v) waiting.push_back(v);
   std::sort(waiting.begin(), waiting.end(), [&](std::uint32_t a, std::uint32_t b) {
+    mesh.ticks(4);
     const auto& p = mesh.vertex[a].point;
     const auto& q = mesh.vertex[b].point;
     return lexicographically_less(p, q) || (same_point(p, q) && a < b);
@@ -123,7 +124,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   const std::uint32_t end = mesh.vertex.size();
   mesh.basis.clear();
   std::uint32_t apex = begin;
-  while (apex < end && extend_basis(mesh, mesh.basis, apex)) ++apex;
+  for (; apex < end && extend_basis(mesh, mesh.basis, apex); ++apex) mesh.ticks(kTicksOfInsertion);
   if (apex == end) {
     wait_all(mesh, begin, end);
   } else {

@@ -17,6 +17,7 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
 
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint) {
+  mesh.ticks(kTicksOfInsertion);
   if (mesh.flat) return insert_flat(mesh, p);
   const std::uint32_t from = hint == kNone ? mesh.last_vertex : hint;
   const WalkEnd end = walk(mesh, p, mesh.vertex[from].incident);

@@ -8,6 +8,9 @@
 
 namespace terrace::tri::spatial {
 
+/// What one insertion costs, see StopTicks.
+inline constexpr std::size_t kTicksOfInsertion = 2048;
+
 /// Joins a vertex, which has its slot and point but no tetrahedron, to a triangulation with
 /// tetrahedra. `conflict`: a tetrahedron in conflict with it, as found by walk() if no corner
 /// equals the point. See cavity_insert.hpp.

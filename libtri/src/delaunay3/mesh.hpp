@@ -10,6 +10,7 @@
 
 #include "../journal.hpp"
 #include "../pool.hpp"
+#include "../stop_ticks.hpp"
 #include "delaunay3/wrap/scan.hpp"
 #include "facet_table.hpp"
 
@@ -185,6 +186,7 @@ struct Mesh {
   std::uint32_t finite_count = 0;  ///< finite tetrahedra
 
   Journal<Point, 4> journal;
+  StopTicks ticks;  ///< of building and inserting
 
   // Scratch memory, kept between calls.
   Cavity cavity;
@@ -211,6 +213,7 @@ struct Mesh {
     }
     Mesh empty;
     empty.journal = std::move(journal);
+    empty.ticks = std::move(ticks);
     *this = std::move(empty);
   }
 

@@ -152,13 +152,18 @@ template <class Kernel>
 class alignas(128) Worker {
  public:
   Worker(Mesh<Kernel>& mesh, const Curve& curve, const Part& its_part)
-      : part(its_part), mesh_(mesh), curve_(curve), insertion_(mesh, cavity_, part) {}
+      : part(its_part),
+        mesh_(mesh),
+        curve_(curve),
+        insertion_(mesh, cavity_, part),
+        ticks_(mesh.ticks) {}
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
   void run(std::span<const std::uint32_t> going) {
     try {
       for (; tried < going.size(); ++tried) {
+        ticks_(kTicksOfInsertion);
         if (insert(going[tried])) continue;
         if (out_of_room_) return;
         put_off.push_back(going[tried]);
@@ -199,6 +204,7 @@ class alignas(128) Worker {
   Cavity cavity_;
   CavityInsertion<Kernel, Part> insertion_;
   bool out_of_room_ = false;
+  StopTicks ticks_;
 };
 
 template <class Kernel>
@@ -235,7 +241,7 @@ class Round {
       first.run(lists[0]);
       if (other.joinable()) {
         other.join();
-      } else {
+      } else if (!first.failure) {
         second.run(lists[1]);
       }
       for (const auto* worker : {&first, &second}) {
@@ -312,6 +318,7 @@ class Round {
 
 template <class Kernel>
 void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint) {
+  mesh.ticks(kTicksOfInsertion);
   const auto& p = mesh.vertex[vertex].point;
   const WalkEnd end = walk(mesh, p, mesh.vertex[hint].incident);
   if (!end.outside) {

@@ -23,12 +23,15 @@ class Flips {
  public:
   template <class Triangulation>
   Flips(const Triangulation& triangulation, const MetricField2& field,
-        const TriangleFilter& takes_part)
-      : point_(triangulation.vertex_slots()), region_(triangulation.vertex_slots(), kNoRegion) {
+        const TriangleFilter& takes_part, const StopCheck& check_stop)
+      : ticks_(check_stop),
+        point_(triangulation.vertex_slots()),
+        region_(triangulation.vertex_slots(), kNoRegion) {
     if (!takes_part) mesh_.triangle.reserve(triangulation.triangle_count());
     // The dense number of each participating triangle.
     std::vector<std::uint32_t> number(triangulation.triangle_slots(), kNone);
     for (const TriangleId id : triangulation.all_triangles()) {
+      ticks_(64);
       const auto corners = triangulation.vertices(id);
       for (const VertexId v : corners) {
         const auto p = triangulation.point(v);
@@ -39,6 +42,7 @@ class Flips {
       mesh_.triangle.push_back({{slot(corners[0]), slot(corners[1]), slot(corners[2])}, {}});
     }
     for (const TriangleId id : triangulation.all_triangles()) {
+      ticks_(64);
       if (number[slot(id)] == kNone) continue;
       Triangle& t = mesh_.triangle[number[slot(id)]];
       const auto beyond = triangulation.neighbours(id);
@@ -68,6 +72,7 @@ class Flips {
       const QuadraticForm form(maps_[region]);
       const EllipticalKernel::Scope scope(form);
       for (const std::uint32_t t : members[region]) {
+        ticks_(256);
         for (std::uint32_t i = 0; i < 3; ++i) pending_.push_back(make_side(t, i));
         // Two of the neighbour's corners are this triangle's.
         mesh_.settle<EllipticalKernel>(
@@ -75,7 +80,7 @@ class Flips {
             [&](Side, Side mate) {
               return region_[mesh_.triangle[triangle_of(mate)].corner[index_of(mate)]] == region;
             },
-            [](std::uint32_t, std::uint32_t) {});
+            [this](std::uint32_t, std::uint32_t) { ticks_(256); });
       }
     }
   }
@@ -99,6 +104,7 @@ class Flips {
   void find_regions(const MetricField2& field, const LinearMap2& given) {
     std::map<LinearMap2, std::uint32_t> known;
     for (const Triangle& t : mesh_.triangle) {
+      ticks_(256);
       for (const std::uint32_t v : t.corner) {
         if (region_[v] != kNoRegion) continue;
         const LinearMap2 map = field(point_[v]);
@@ -124,6 +130,7 @@ class Flips {
     return region_[t.corner[1]] == region && region_[t.corner[2]] == region ? region : kNoRegion;
   }
 
+  StopTicks ticks_;
   std::vector<Point> point_;           // by vertex slot
   std::vector<std::uint32_t> region_;  // by vertex slot: index in maps_
   FlipMesh mesh_;
@@ -138,8 +145,9 @@ class Flips {
 template <class Triangulation>
 std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& triangulation,
                                                       const MetricField2& field,
-                                                      const TriangleFilter& takes_part) {
-  Flips flips(triangulation, field, takes_part);
+                                                      const TriangleFilter& takes_part,
+                                                      const StopCheck& check_stop) {
+  Flips flips(triangulation, field, takes_part, check_stop);
   flips.run();
   return flips.result();
 }
@@ -163,16 +171,19 @@ std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& trian
 
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<std::int32_t>&,
                                                                const MetricField2&,
-                                                               const TriangleFilter&);
+                                                               const TriangleFilter&,
+                                                               const StopCheck&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<std::int32_t>&,
                                                                const MetricField2&, const Box3&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
                                                                const MetricField2&,
-                                                               const TriangleFilter&);
+                                                               const TriangleFilter&,
+                                                               const StopCheck&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
                                                                const MetricField2&, const Box3&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(
-    const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const TriangleFilter&);
+    const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const TriangleFilter&,
+    const StopCheck&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(
     const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const Box3&);
 

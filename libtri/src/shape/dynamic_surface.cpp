@@ -66,6 +66,7 @@ struct DynamicSurface<Coord>::Impl {
   Pool<std::uint32_t> at_vertex;  ///< how many have it as a corner, by vertex slot
   std::size_t count = 0;
   Journal<Point, 3> journal;
+  StopCheck check_stop;
   // Scratch memory.
   struct Facet {
     Corners3 corners;
@@ -89,7 +90,7 @@ struct DynamicSurface<Coord>::Impl {
       examined = shape::update_nearby(mesh(), state, changes, exposed);
       return;
     }
-    shape::restore_by_poles(mesh(), state, threads);
+    shape::restore_by_poles(mesh(), state, threads, check_stop);
     examined.resize(mesh().tetrahedron.size());
     for (std::uint32_t t = 0; t < examined.size(); ++t) examined[t] = t;
   }
@@ -321,6 +322,11 @@ std::size_t DynamicSurface<Coord>::removal_work(std::span<const VertexId> vertic
   for (const VertexId v : vertices)
     if (slot(v) < degree.size()) inside += degree[slot(v)];
   return vertices.size() + (inside - std::min(inside, kUsual * vertices.size())) / 2;
+}
+template <class Coord>
+void DynamicSurface<Coord>::set_check_stop(StopCheck check_stop) {
+  impl_->tetrahedra.set_check_stop(check_stop);
+  impl_->check_stop = std::move(check_stop);
 }
 template <class Coord>
 void DynamicSurface<Coord>::reserve(std::size_t vertices) {

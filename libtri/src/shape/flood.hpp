@@ -22,6 +22,7 @@ namespace terrace::tri::shape {
 template <class Criterion, class Mesh>
 void spread(const Mesh& mesh, State& state, const Criterion& criterion) {
   for (std::size_t at = 0; at < state.queue.size(); ++at) {
+    state.ticks(256);
     const spatial::Tetrahedron& from = mesh.tetrahedron[state.queue[at]];
     for (const spatial::Side side : from.mate) {
       const std::uint32_t t = spatial::tetrahedron_of(side);
@@ -52,6 +53,7 @@ void flood(const Mesh& mesh, State& state, const Criterion& criterion) {
   keep_all(mesh, state);
   state.queue.clear();
   for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {
+    state.ticks(16);
     const spatial::Tetrahedron& ghost = mesh.tetrahedron[t];
     if (ghost.corner[0] == spatial::kFreeCorner) continue;
     const std::uint32_t g = spatial::ghost_index(ghost.corner);

@@ -209,17 +209,21 @@ class SignedSets {
 
 class Forest {
  public:
-  Forest(const Spheres& spheres, unsigned threads, const Part& part)
+  Forest(const Spheres& spheres, unsigned threads, const Part& part, const StopCheck& check_stop)
       : spheres_(spheres),
+        check_stop_(check_stop),
+        ticks_(check_stop),
         threads_(threads),
         part_(part),
         beyond_(static_cast<std::uint32_t>(spheres.tetrahedra().size())) {}
 
   std::vector<std::uint8_t> labels() {
     poles_ = PoleFinder(spheres_, part_).find();
+    ticks_.look();
     measure_facets();
     SignedSets sets(beyond_ + 1);
     join_tetrahedra(sets);
+    ticks_.look();
     list_statements(sets);
     std::vector<std::uint32_t> first_roots;
     for (std::uint32_t x = 0; x <= beyond_; ++x)
@@ -255,6 +259,7 @@ class Forest {
     const auto scratch = [] { return std::vector<spatial::Side>(); };
     for_blocks(count, kForestBlock, threads_, scratch,
                [&](std::size_t begin, std::size_t end, std::vector<spatial::Side>& sides) {
+                 if (check_stop_) check_stop_();
                  // First the facets alone, so that the branch is not mixed with the arithmetic.
                  sides.resize(4 * (end - begin));
                  std::size_t facets = 0;
@@ -333,6 +338,7 @@ class Forest {
     };
     has_room_for_more(count + count / 2);
     for (std::uint32_t t = 0; t < count; ++t) {
+      ticks_(16);
       if (!spheres_.finite(t)) continue;
       has_room_for_more(4);
       const std::uint32_t one = sets.root(2 * t);
@@ -367,6 +373,7 @@ class Forest {
   void join_best(SignedSets& sets, std::vector<std::uint32_t>& roots) {
     for (const std::uint32_t root : roots) best_[root] = kNoBest;
     for (std::uint32_t i = 0; i < list_.size(); ++i) {
+      ticks_(4);
       const Statement& s = list_[i];
       const std::uint64_t best = std::uint64_t{s.key >> 1} << 32 | i;
       for (std::uint64_t* held : {&best_[s.one], &best_[s.other >> 1]}) {
@@ -420,6 +427,8 @@ class Forest {
   static constexpr std::uint64_t kNoBest = ~std::uint64_t{0};
 
   const Spheres& spheres_;
+  const StopCheck& check_stop_;
+  StopTicks ticks_;
   unsigned threads_;
   const Part& part_;
   std::uint32_t beyond_;
@@ -433,9 +442,9 @@ class Forest {
 
 }  // namespace
 
-std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
-                                        const Part& part) {
-  return Forest(spheres, threads, part).labels();
+std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads, const Part& part,
+                                        const StopCheck& check_stop) {
+  return Forest(spheres, threads, part, check_stop).labels();
 }
 
 }  // namespace terrace::tri::shape

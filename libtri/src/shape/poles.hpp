@@ -38,7 +38,7 @@ struct Part {
 ///
 /// O(n log n); memory 60 bytes per tetrahedron, freed at the end, besides the spheres.
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
-                                        const Part& part = {});
+                                        const Part& part = {}, const StopCheck& check_stop = {});
 
 /// How many tetrahedra outside and inside every vertex has, by slot. Ghosts are outside.
 using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
@@ -55,19 +55,22 @@ using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
 ///
 /// In a part only tetrahedra between whole vertices are flipped.
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-                              const Part& part = {});
+                              const Part& part = {}, const StopCheck& check_stop = {});
 
 /// The state of the poles rule from scratch. Vertices that are not on the surface are lost.
 /// Requires a scope of the metric.
 template <class Mesh>
-void restore_by_poles(const Mesh& mesh, State& state, unsigned threads) {
+void restore_by_poles(const Mesh& mesh, State& state, unsigned threads,
+                      const StopCheck& check_stop) {
+  StopTicks ticks(check_stop);
   std::vector<Place> places = places_of(mesh);
+  ticks.look();
   const Renumbered ordered = in_order_of_vertices(
       std::span(mesh.tetrahedron.data(), mesh.tetrahedron.size()), places, threads);
-  const Spheres spheres(span_of(ordered.tetrahedra), std::move(places), threads);
-  const std::vector<std::uint8_t> forest = signed_forest(spheres, threads);
+  const Spheres spheres(span_of(ordered.tetrahedra), std::move(places), threads, check_stop);
+  const std::vector<std::uint8_t> forest = signed_forest(spheres, threads, {}, check_stop);
   std::vector<std::uint8_t> inside = forest;
-  const LabelCounts counts = smooth_and_sculpt(spheres, inside);
+  const LabelCounts counts = smooth_and_sculpt(spheres, inside, {}, check_stop);
   state.of.assign(mesh.tetrahedron.size(), kAbsent);
   state.forest.assign(mesh.tetrahedron.size(), 0);
   state.kept_count = 0;

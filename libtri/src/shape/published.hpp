@@ -39,11 +39,14 @@ void peel_as_published(const Mesh& mesh, State& state, const Criterion& criterio
     if (std::any_of(mate.begin(), mate.end(), open)) add(round, t);
   }
   while (!round.empty()) {
-    std::sort(round.begin(), round.end(),
-              [](const Candidate& a, const Candidate& b) { return a.key < b.key; });
+    std::sort(round.begin(), round.end(), [&](const Candidate& a, const Candidate& b) {
+      state.ticks(8);
+      return a.key < b.key;
+    });
     next.clear();
     std::uint32_t before = spatial::kNone;
     for (const Candidate& candidate : round) {
+      state.ticks(128);
       const std::uint32_t t = candidate.tetrahedron;
       if (t == before || state.of[t] != kKept) continue;
       before = t;

@@ -96,6 +96,7 @@ void rescue(const Mesh& mesh, State& state) {
   };
   for (;;) {
     while (!next.empty()) {
+      state.ticks(256);
       const std::uint32_t t = next.top().tetrahedron;
       next.pop();
       if (has_lost(t)) take(t);

@@ -54,16 +54,18 @@ template <class Triangulation>
 RestoredSurface shape_faces(std::span<const typename Triangulation::Point> points,
                             const RestoreOptions& options,
                             Triangulation triangulation = Triangulation()) {
+  triangulation.set_check_stop(options.check_stop);
   const std::vector<VertexId> vertices =
       triangulation.build(points, options.threads == 0 ? 2 : options.threads);
   std::vector<std::uint32_t> point_of(triangulation.vertex_slots());
   for (std::size_t i = vertices.size(); i-- > 0;)
     point_of[slot(vertices[i])] = static_cast<std::uint32_t>(i);
   BasicShape3<Triangulation> shape(options.shape);
-  shape.restore(triangulation, options.threads);
+  shape.restore(triangulation, options.threads, options.check_stop);
   ShapeSurface surface = options.shape.rule == ShapeRule::kPoles
                              ? shape.surface_without_lids(triangulation)
                              : shape.surface(triangulation);
+  if (options.check_stop) options.check_stop();
   RestoredSurface result;
   result.parts = shape.parts(triangulation, surface);
   result.surface.faces = std::move(surface.surface.faces);

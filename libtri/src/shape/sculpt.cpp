@@ -86,7 +86,7 @@ double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
   return terms[0] + terms[1] + terms[2] + terms[3];
 }
 
-void smooth(const Spheres& spheres, Labels& labels) {
+void smooth(const Spheres& spheres, Labels& labels, StopTicks& ticks) {
   struct Candidate {
     double gain;
     Ranks corners;
@@ -102,8 +102,12 @@ void smooth(const Spheres& spheres, Labels& labels) {
     const double gain = gain_of(spheres, labels, t);
     if (gain > kLeastGain) next.push({gain, spheres.ranks_of(t), t});
   };
-  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) consider(t);
+  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+    ticks(32);
+    consider(t);
+  }
   while (!next.empty()) {
+    ticks(256);
     const Candidate candidate = next.top();
     next.pop();
     const std::uint32_t t = candidate.tetrahedron;
@@ -117,7 +121,7 @@ void smooth(const Spheres& spheres, Labels& labels) {
   }
 }
 
-void sculpt(const Spheres& spheres, Labels& labels) {
+void sculpt(const Spheres& spheres, Labels& labels, StopTicks& ticks) {
   struct Candidate {
     double defect;
     std::uint32_t vertex_rank;
@@ -145,11 +149,13 @@ void sculpt(const Spheres& spheres, Labels& labels) {
   const std::vector<std::uint8_t> buried = labels.all_buried();
   if (buried.empty()) return;
   for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+    ticks(8);
     if (!spheres.finite(t)) continue;
     for (const std::uint32_t i : {0u, 1u, 2u, 3u})
       if (buried[tetrahedra[t].corner[i]] != 0) consider(spatial::make_side(t, i));
   }
   while (!next.empty()) {
+    ticks(256);
     const spatial::Side side = next.top().side;
     next.pop();
     const std::uint32_t t = spatial::tetrahedron_of(side);
@@ -164,10 +170,11 @@ void sculpt(const Spheres& spheres, Labels& labels) {
 }  // namespace
 
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-                              const Part& part) {
+                              const Part& part, const StopCheck& check_stop) {
+  StopTicks ticks(check_stop);
   Labels labels(spheres, inside, part.whole);
-  smooth(spheres, labels);
-  sculpt(spheres, labels);
+  smooth(spheres, labels, ticks);
+  sculpt(spheres, labels, ticks);
   return labels.take_counts();
 }
 

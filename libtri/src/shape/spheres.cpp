@@ -56,13 +56,14 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
 }
 
 Spheres::Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
-                 unsigned threads)
+                 unsigned threads, const StopCheck& check_stop)
     : tetrahedra_(tetrahedra), places_(std::move(places)) {
   sphere_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
   finite_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
   for_blocks(
       tetrahedra.size(), kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
+        if (check_stop) check_stop();
         for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
           finite_[t] = spatial::is_finite(tetrahedra[t].corner);
           if (finite(t)) sphere_[t] = sphere_of(tetrahedra[t]);

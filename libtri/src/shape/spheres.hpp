@@ -179,7 +179,7 @@ class Spheres {
   /// The tetrahedra must be turned. O(tetrahedra). The result is the same for any number of
   /// threads.
   Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
-          unsigned threads);
+          unsigned threads, const StopCheck& check_stop = {});
 
   [[nodiscard]] std::span<const spatial::Tetrahedron> tetrahedra() const { return tetrahedra_; }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }

@@ -31,6 +31,7 @@ struct State {
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
   std::size_t kept_count = 0;          ///< in state kKept
   std::vector<std::uint8_t> forest;    ///< poles rule: labels of its first step, by slot
+  StopTicks ticks;                     ///< of the rules that peel
   // Scratch memory, kept between calls.
   std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
   std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides

@@ -11,6 +11,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "terrace/tri/stop_check.hpp"
+
 /// Dynamic Delaunay triangulation of the plane: exact, canonical, compact.
 ///
 /// The triangulation is a function of the point set alone. Ties of cocircular points are broken by
@@ -199,6 +201,9 @@ class Delaunay2 {
   void restart();
   /// Reserves room for this many vertices without moving memory.
   void reserve(std::size_t vertices);
+  /// Sets what build() and insert() call at intervals. After it has thrown, the object can only be
+  /// cleared or destroyed.
+  void set_check_stop(StopCheck check_stop);
 
   // ---- Reading --------------------------------------------------------------------------------
 

@@ -110,6 +110,9 @@ class Delaunay3 {
   void clear();
   /// Reserves room for this many vertices, spread in space, without moving memory.
   void reserve(std::size_t vertices);
+  /// Sets what build() and insert() call at intervals, by their threads. After it has thrown, the
+  /// object can only be cleared or destroyed.
+  void set_check_stop(StopCheck check_stop);
 
   // ---- Reading --------------------------------------------------------------------------------
 

@@ -66,6 +66,9 @@ class DynamicSurface {
   /// the other side of a body. As of the last follow(). O(vertices).
   [[nodiscard]] std::size_t removal_work(std::span<const VertexId> vertices) const;
   void reserve(std::size_t vertices);
+  /// Sets what building, inserting and restoring call at intervals. After it has thrown, the object
+  /// can only be destroyed.
+  void set_check_stop(StopCheck check_stop);
 
   /// Brings the surface up to date. About 16 us per point that came or went; from scratch if most
   /// tetrahedra are new.

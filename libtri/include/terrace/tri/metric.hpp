@@ -177,7 +177,7 @@ using TriangleFilter = std::function<bool(TriangleId)>;
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field,
-    const TriangleFilter& takes_part = {});
+    const TriangleFilter& takes_part = {}, const StopCheck& check_stop = {});
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field, const Box3& window);

@@ -158,7 +158,9 @@ class BasicShape3 {
   /// rule uses more than one (0: one per core). Poles: O(n log n). Flood: O(n) facet tests, about
   /// twice as many as removed tetrahedra, and O(m log m) for m tetrahedra at vertices that the
   /// flood has lost.
-  void restore(const Triangulation& triangulation, unsigned threads = 1);
+  /// After check_stop has thrown, the shape can only be restored or destroyed.
+  void restore(const Triangulation& triangulation, unsigned threads = 1,
+               const StopCheck& check_stop = {});
 
   /// Updates the shape after changes of the triangulation that this object was restored from (or
   /// from its initial, empty state): the same result as restore(), at a cost that depends on the
@@ -238,6 +240,7 @@ struct RestoreOptions {
   std::optional<EllipticalMetric3> metric;
   /// 0: one per core. The result is the same for any number.
   unsigned threads = 1;
+  StopCheck check_stop = {};
 };
 
 struct RestoredSurface {

@@ -36,6 +36,7 @@ struct SmoothingOptions {
   /// kBilateral: neighbours with at least this difference do not count, > 0, in the unit of
   /// heights.
   double edge_height = 0;
+  StopCheck check_stop = {};
 };
 
 struct HeightChange {
