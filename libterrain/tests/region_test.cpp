@@ -13,8 +13,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/tri/predicates.hpp>
 
-#include "base/orientation.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
@@ -137,9 +137,9 @@ TEST(Orientation, IsExactNearALine) {
                        cy = ay + 7 * dy;
     const Wide exact = Wide{bx - ax} * (cy - ay) - Wide{by - ay} * (cx - ax);
     const auto d = [](std::int64_t v) { return static_cast<double>(v); };
-    EXPECT_EQ(orientation({d(ax), d(ay)}, {d(bx), d(by)}, {d(cx), d(cy)}), exact > 0   ? 1
-                                                                           : exact < 0 ? -1
-                                                                                       : 0);
+    EXPECT_EQ(tri::orientation({d(ax), d(ay)}, {d(bx), d(by)}, {d(cx), d(cy)}), exact > 0   ? 1
+                                                                                : exact < 0 ? -1
+                                                                                            : 0);
   }
 }
 
@@ -383,9 +383,9 @@ bool even_odd(const std::vector<Point2>& ring, const Point2& p) {
     const auto between = [&](std::size_t k) {
       return std::min(a[k], b[k]) <= p[k] && p[k] <= std::max(a[k], b[k]);
     };
-    if (between(0) && between(1) && orientation(a, b, p) == 0) return true;
+    if (between(0) && between(1) && tri::orientation(a, b, p) == 0) return true;
     if ((a[1] <= p[1]) == (b[1] <= p[1])) continue;
-    if ((orientation(a, b, p) > 0) == (a[1] <= p[1])) inside = !inside;
+    if ((tri::orientation(a, b, p) > 0) == (a[1] <= p[1])) inside = !inside;
   }
   return inside;
 }

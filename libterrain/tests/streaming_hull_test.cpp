@@ -8,8 +8,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include "base/orientation.hpp"
+#include <terrace/tri/predicates.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -35,7 +34,7 @@ std::vector<Point2> places(std::uint64_t seed, std::size_t count) {
 /// Whether a to b has all places on its left or on it.
 bool supports(const Point2& a, const Point2& b, const std::vector<Point2>& all) {
   return std::all_of(all.begin(), all.end(),
-                     [&](const Point2& p) { return orientation(a, b, p) >= 0; });
+                     [&](const Point2& p) { return tri::orientation(a, b, p) >= 0; });
 }
 
 TEST(ConvexHull, IsTheCornersInOrder) {
@@ -47,14 +46,14 @@ TEST(ConvexHull, IsTheCornersInOrder) {
       EXPECT_NE(std::find(all.begin(), all.end(), corner), all.end());
     }
     if (hull.size() < 3) {
-      for (const Point2& p : all) EXPECT_EQ(orientation(hull.front(), hull.back(), p), 0);
+      for (const Point2& p : all) EXPECT_EQ(tri::orientation(hull.front(), hull.back(), p), 0);
       continue;
     }
     EXPECT_EQ(hull.front(), *std::min_element(all.begin(), all.end()));
     for (std::size_t i = 0; i < hull.size(); ++i) {
       const Point2 &a = hull[i], &b = hull[(i + 1) % hull.size()], &c = hull[(i + 2) % hull.size()];
       EXPECT_TRUE(supports(a, b, all));
-      EXPECT_EQ(orientation(a, b, c), 1);
+      EXPECT_EQ(tri::orientation(a, b, c), 1);
     }
     // With what lies on the sides: every place of the border, each once.
     const std::vector<Point2> border = convex_hull(all, true);
@@ -65,7 +64,7 @@ TEST(ConvexHull, IsTheCornersInOrder) {
     for (const Point2& p : all) {
       bool on_side = false;
       for (std::size_t i = 0; i < hull.size(); ++i) {
-        on_side = on_side || orientation(hull[i], hull[(i + 1) % hull.size()], p) == 0;
+        on_side = on_side || tri::orientation(hull[i], hull[(i + 1) % hull.size()], p) == 0;
       }
       EXPECT_EQ(on_side, std::find(border.begin(), border.end(), p) != border.end());
     }
@@ -97,7 +96,7 @@ TEST(ConvexHull, IsCrossedByLinesOutsideOrOnItsBorder) {
     if (hull.size() < 3) continue;
     const auto outside = [&](const Point2& p) {
       for (std::size_t i = 0; i < hull.size(); ++i) {
-        if (orientation(hull[i], hull[(i + 1) % hull.size()], p) <= 0) return true;
+        if (tri::orientation(hull[i], hull[(i + 1) % hull.size()], p) <= 0) return true;
       }
       return false;
     };

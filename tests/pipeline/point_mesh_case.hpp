@@ -18,9 +18,9 @@
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
+#include <terrace/tri/predicates.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "base/orientation.hpp"
 #include "base/streaming_hull.hpp"
 #include "random.hpp"
 #include "terrace/stream/mesh_reader.hpp"
@@ -103,7 +103,7 @@ inline tri::TinErrors check_surface(const Cloud& cloud, const terrain::TriangleM
   const Point2 origin = places.front();
   double area = 0;
   for (const auto& t : mesh.triangles) {
-    EXPECT_GT(terrain::orientation(place(t[0]), place(t[1]), place(t[2])), 0);
+    EXPECT_GT(tri::orientation(place(t[0]), place(t[1]), place(t[2])), 0);
     for (std::size_t k = 0; k < 3; ++k) {
       used.insert(t[k]);
       const auto [edge, fresh] = edges.emplace(t[k], t[(k + 1) % 3]);

@@ -6,10 +6,10 @@
 #include <limits>
 
 #include <nlohmann/json.hpp>
+#include <terrace/tri/predicates.hpp>
 
 #include "base/geojson_crs.hpp"
 #include "base/json_of_file.hpp"
-#include "base/orientation.hpp"
 #include "base/region_shape.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
@@ -239,12 +239,12 @@ bool Region::touches(const std::array<stream::Point3, 3>& triangle) const {
   for (std::size_t i = 0; i < 3; ++i) flat[i] = {triangle[i][0], triangle[i][1]};
   if (shape_) return shape_->touches(flat);
   // Convex shapes whose bounds meet are apart only if a side of the triangle parts them.
-  const int turn = orientation(flat[0], flat[1], flat[2]);
+  const int turn = tri::orientation(flat[0], flat[1], flat[2]);
   for (std::size_t i = 0; i < 3; ++i) {
     int least = 1, most = -1;
     for (unsigned corner = 0; corner < 4; ++corner) {
       const Point2 p{(corner & 1 ? box_.max : box_.min)[0], (corner & 2 ? box_.max : box_.min)[1]};
-      const int side = orientation(flat[i], flat[(i + 1) % 3], p);
+      const int side = tri::orientation(flat[i], flat[(i + 1) % 3], p);
       least = std::min(least, side);
       most = std::max(most, side);
     }

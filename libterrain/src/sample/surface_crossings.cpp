@@ -6,7 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/orientation.hpp"
+#include <terrace/tri/predicates.hpp>
+
 #include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {
@@ -99,7 +100,7 @@ void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begi
     if (!window_.is_certain(triangle)) continue;
     const auto corner = window_.corners_with_heights(triangle);
     std::array<int, 3> side{};
-    for (std::size_t i = 0; i < 3; ++i) side[i] = orientation(from, to, corner[i].place);
+    for (std::size_t i = 0; i < 3; ++i) side[i] = tri::orientation(from, to, corner[i].place);
     if (side[0] == side[1] && side[1] == side[2]) continue;
     for (std::size_t i = 0; i < 3; ++i) {
       std::size_t p = i, q = (i + 1) % 3;

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/tri/predicates.hpp>
 
-#include "base/orientation.hpp"
 #include "base/stopwatch.hpp"
 #include "base/streaming_hull.hpp"
 #include "base/units.hpp"
@@ -63,7 +63,7 @@ class OuterSides {
           p[1] > std::max(side.from[1], side.to[1])) {
         continue;
       }
-      if (orientation(side.from, side.to, p) == 0) return &side;
+      if (tri::orientation(side.from, side.to, p) == 0) return &side;
     }
     return nullptr;
   }
