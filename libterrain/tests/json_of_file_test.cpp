@@ -2,6 +2,7 @@
 #include "base/json_of_file.hpp"
 
 #include <fstream>
+#include <stop_token>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -39,6 +40,14 @@ TEST_F(JsonOfFile, ReadsJson) {
 TEST_F(JsonOfFile, NamesThePlaceOfAFault) {
   EXPECT_EQ(fault_of("{\"a\": 1,\n  \"b\": }"), "line 2, column 8: is not JSON");
   EXPECT_EQ(fault_of("{\"a\": [1, 2"), "line 1, column 12: the JSON is cut off");
+}
+
+TEST_F(JsonOfFile, EndsAtAStop) {
+  std::ofstream(path_, std::ios::binary) << "[" << std::string(1000000, ' ') << "]";
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(static_cast<void>(json_of_file(path_, std::uint64_t{1} << 30, "", stop.get_token())),
+               stream::Stopped);
 }
 
 TEST_F(JsonOfFile, OtherFormatsAreNotReadToTheirEnd) {

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <random>
+#include <stop_token>
 #include <thread>
 #include <vector>
 
@@ -498,8 +499,8 @@ TEST(Region, SaysWhatIsWrongWithRings) {
            {{{square}, {square, {{1, 1}, {3, 3}, {3, 1}, {1, 3}}}},
             "polygon 2, hole 1",
             "Self-intersection at 2, 2"},
-           {{{{{0, 0}, {NAN, 4}, {4, 0}}}}, "polygon 1, outer ring", "Invalid Coordinate"},
-           {{{{{0, 0}, {1, kAnyHeight}, {4, 0}}}}, "polygon 1, outer ring", "Invalid Coordinate"},
+           {{{{{0, 0}, {NAN, 4}, {4, 0}}}}, "polygon 1, outer ring", "not finite"},
+           {{{{{0, 0}, {1, kAnyHeight}, {4, 0}}}}, "polygon 1, outer ring", "not finite"},
            {{{hole, square}}, "polygon 1", "do not fit together"},
            {{{square, hole, {{2, 2}, {7, 2}, {7, 7}}}}, "polygon 1", "do not fit together"},
            {{{square, {{20, 1}, {25, 1}, {25, 5}}}}, "polygon 1", "Hole lies outside shell at 2"},
@@ -521,6 +522,70 @@ TEST(Region, SaysWhatIsWrongWithRings) {
   } catch (const stream::Error& error) {
     EXPECT_EQ(error.parts().file, file.path());
   }
+}
+
+TEST(Region, TakesRingsThatTouchInPlacesOnly) {
+  const std::vector<Point2> square{{0, 0}, {8, 0}, {8, 8}, {0, 8}};
+  // Holes that touch the shell, in a corner and along a side, and each other.
+  const std::vector<Point2> left{{0, 4}, {2, 3}, {4, 4}, {2, 5}}, right{{4, 4}, {6, 3}, {6, 5}};
+  const std::vector<Point2> corner{{0, 0}, {2, 1}, {1, 2}};
+  EXPECT_NO_THROW(Region::of_polygons({{square, left, right, corner}}, 0, 1));
+  const auto refused = [](const Polygon& polygon) -> std::string {
+    try {
+      Region::of_polygons({polygon}, 0, 1);
+    } catch (const stream::Error& error) {
+      return error.parts().cause;
+    }
+    return "taken";
+  };
+  // A hole from side to side, and a circle of holes, cut the inside in two.
+  EXPECT_NE(refused({square, {{0, 4}, {4, 3}, {8, 4}, {4, 5}}}).find("disconnected at 8, 4"),
+            std::string::npos);
+  EXPECT_NE(refused({square, left, {{4, 4}, {8, 4}, {6, 5}}}).find("disconnected"),
+            std::string::npos);
+  // A hole that leaves through a corner of another ring.
+  EXPECT_NE(refused({square, {{4, 4}, {10, 3}, {8, 5}}}).find("Self-intersection"),
+            std::string::npos);
+  EXPECT_NE(refused({square, left, {{1, 4}, {2, 3.75}, {3, 4}}}).find("Nested holes at 1, 4"),
+            std::string::npos);
+  // Two rings with one side in common, and a hole that is the shell again.
+  EXPECT_NE(refused({square, {{0, 2}, {2, 3}, {0, 4}}}).find("Self-intersection"),
+            std::string::npos);
+  EXPECT_NE(refused({square, square}).find("Self-intersection"), std::string::npos);
+  // A ring that touches itself.
+  EXPECT_NE(refused({{{0, 0}, {4, 2}, {8, 0}, {8, 4}, {4, 2}, {0, 4}}})
+                .find("Ring Self-intersection at 4, 2"),
+            std::string::npos);
+}
+
+/// Shapes of which all pairs of edges would be compared where boxes alone exclude pairs.
+TEST(Region, ChecksStarsCombsAndSpiralsInNearlyLinearTime) {
+  constexpr int kCorners = 200'000 / kShare;
+  constexpr double kTurn = 6.283185307179586;
+  std::vector<Point2> star, spiral;
+  for (int i = 0; i < kCorners; ++i) {
+    const double angle = kTurn * i / kCorners, reach = i % 2 == 0 ? 1.0 : 1e-6;
+    star.push_back({reach * std::cos(angle), reach * std::sin(angle)});
+  }
+  constexpr int kTurns = 200;
+  for (int i = 0; i < kCorners; ++i) {
+    const bool out = 2 * i < kCorners;
+    const double along = (out ? i : kCorners - 1 - i) * 2.0 / kCorners;
+    const double angle = kTurn * kTurns * along;
+    const double reach = 1 + kTurns * along + (out ? 0.5 : 0.0);
+    spiral.push_back({reach * std::cos(angle), reach * std::sin(angle)});
+  }
+  for (const std::vector<Point2>& ring : {star, spiral}) {
+    const Region region = Region::of_polygons({{ring}}, 0, 1);
+    EXPECT_FALSE(region.covers({1e5, 0}));
+  }
+  // One edge too far.
+  std::vector<Point2> crossed = star;
+  crossed[static_cast<std::size_t>(kCorners / 2)] = {0.5, -1.0};
+  EXPECT_THROW(Region::of_polygons({{crossed}}, 0, 1), stream::Error);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(Region::of_polygons({{star}}, 0, 1, {}, stop.get_token()), stream::Stopped);
 }
 
 /// Spikes from side to side, of which each row or each column crosses all.

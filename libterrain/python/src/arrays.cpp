@@ -3,9 +3,12 @@
 
 #include <limits>
 #include <optional>
+#include <stop_token>
 #include <utility>
 
 #include <pybind11/stl.h>
+
+#include "call.hpp"
 
 namespace terrace::python {
 namespace {
@@ -140,7 +143,9 @@ std::optional<terrain::Region> region_of(const py::object& given) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const auto name = geojson["name"].cast<std::string>();
   const terrain::Region region =
-      terrain::Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name);
+      released([&](const std::stop_token& stop) -> std::optional<terrain::Region> {
+        return terrain::Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name, stop);
+      }).value();
   const auto crs = geojson["crs"].cast<std::optional<std::string>>();
   if (!crs) return region;
   return region.in_crs(terrain::PlacesCrs{.name = *crs, .file = name});

@@ -2,8 +2,11 @@
 #include "base/json_of_file.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -13,6 +16,37 @@
 
 namespace terrace::terrain {
 namespace {
+
+/// A text that is read as long as no stop is requested.
+class HeardText {
+ public:
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  HeardText(const char* at, const std::stop_token& stop) : at_(at), stop_(&stop) {}
+  reference operator*() const { return *at_; }
+  HeardText& operator++() {
+    constexpr std::uintptr_t kBetweenChecks = 0x10000;
+    if (reinterpret_cast<std::uintptr_t>(++at_) % kBetweenChecks == 0 && stop_->stop_requested()) {
+      throw stream::Stopped();
+    }
+    return *this;
+  }
+  HeardText operator++(int) {
+    HeardText before = *this;
+    ++*this;
+    return before;
+  }
+  bool operator==(const HeardText& other) const { return at_ == other.at_; }
+  bool operator!=(const HeardText& other) const { return at_ != other.at_; }
+
+ private:
+  const char* at_;
+  const std::stop_token* stop_;
+};
 
 std::string place_of(std::string_view text, std::size_t byte) {
   const std::string_view before = text.substr(0, byte);
@@ -24,7 +58,7 @@ std::string place_of(std::string_view text, std::size_t byte) {
 }  // namespace
 
 std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
-                                           const std::string& remedy) {
+                                           const std::string& remedy, const std::stop_token& stop) {
   // A stream of the standard library throws at the first byte of a folder.
   std::error_code ignored;
   if (std::filesystem::is_directory(name, ignored)) return std::nullopt;
@@ -36,6 +70,7 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
   std::string text;
   std::vector<char> piece(std::size_t{1} << 16);
   while (file) {
+    if (stop.stop_requested()) throw stream::Stopped();
     file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
     text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
     if (text.size() > most_bytes) {
@@ -49,7 +84,8 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
   }
   if (file.bad()) return std::nullopt;
   try {
-    return nlohmann::json::parse(text);
+    return nlohmann::json::parse(HeardText(text.data(), stop),
+                                 HeardText(text.data() + text.size(), stop));
   } catch (const nlohmann::json::parse_error& error) {
     const std::size_t byte = std::min(error.byte == 0 ? 0 : error.byte - 1, text.size());
     fail(place_of(text, byte), byte == text.size() ? "the JSON is cut off" : "is not JSON");

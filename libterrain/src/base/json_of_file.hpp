@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <stop_token>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -14,9 +15,10 @@ inline constexpr std::uint64_t kMostGeoJsonBytes = std::uint64_t{128} << 20;
 
 /// The JSON in a file; nothing if the file cannot be opened or is a folder. Memory: some ten times
 /// the file. Throws: stream::Error, with this remedy, if it is larger than most_bytes or not JSON,
-/// which names the place.
+/// which names the place; stream::Stopped.
 std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
-                                           const std::string& remedy);
+                                           const std::string& remedy,
+                                           const std::stop_token& stop = {});
 
 /// A remedy for files that should be GeoJSON.
 std::string convert_to_geojson(const std::string& name);

@@ -93,14 +93,14 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   }
 }
 
-Region read_geojson(const std::string& name) {
-  const auto json = json_of_file(name, kMostGeoJsonBytes, convert_to_geojson(name));
+Region read_geojson(const std::string& name, const std::stop_token& stop) {
+  const auto json = json_of_file(name, kMostGeoJsonBytes, convert_to_geojson(name), stop);
   if (!json) fail(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
   collect_polygons(*json, name, 0, polygons);
   if (polygons.empty()) fail(name, "holds no polygon");
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name)
+  return Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name, stop)
       .in_crs(crs_of_geojson(*json, name));
 }
 
@@ -136,7 +136,7 @@ std::string geojson_crs_member(const stream::Crs& crs) {
   return R"("crs":{"type":"name","properties":{"name":)" + nlohmann::json(name).dump() + "}},";
 }
 
-Region Region::parse(const std::string& text) {
+Region Region::parse(const std::string& text, const std::stop_token& stop) {
   Region region;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (looks_like_numbers(text)) {
@@ -157,7 +157,7 @@ Region Region::parse(const std::string& text) {
     }
     return region;
   }
-  return read_geojson(text);
+  return read_geojson(text, stop);
 }
 
 Region Region::of_box(const stream::Box3& box) {
@@ -179,8 +179,8 @@ Region Region::with_extent(const stream::Box3& extent) const {
 }
 
 Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high,
-                           const std::string& file) {
-  return of_shape(std::make_shared<RegionShape>(std::move(polygons), file), low, high);
+                           const std::string& file, const std::stop_token& stop) {
+  return of_shape(std::make_shared<RegionShape>(std::move(polygons), file, stop), low, high);
 }
 
 Region Region::of_shape(std::shared_ptr<const RegionShape> shape, double low, double high) {

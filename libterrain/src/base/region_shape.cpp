@@ -10,7 +10,7 @@
 
 #include <geos_c.h>
 
-#include "base/units.hpp"
+#include "base/polygon_check.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
@@ -93,25 +93,8 @@ class Geos {
   std::string said_;
 };
 
-/// What is wrong with a polygon, and where; nullopt if it is valid.
-std::optional<std::string> fault_of(const Geos& geos, const GEOSGeometry* polygon) {
-  char* reason = nullptr;
-  GEOSGeometry* place = nullptr;
-  const char answer = GEOSisValidDetail_r(geos.context(), polygon, 0, &reason, &place);
-  const Geos::Owned<char> owned_reason(reason, {geos.context()});
-  const Geos::Geometry owned_place(place, {geos.context()});
-  if (geos.told(answer)) return std::nullopt;
-  std::string text = reason != nullptr ? reason : "not valid";
-  double x = 0, y = 0;
-  if (place != nullptr && GEOSGeomGetX_r(geos.context(), place, &x) == 1 &&
-      GEOSGeomGetY_r(geos.context(), place, &y) == 1) {
-    text += " at " + number_text(x) + ", " + number_text(y);
-  }
-  return text;
-}
-
-void require_valid(const Geos& geos, const std::vector<Polygon>& polygons,
-                   const std::string& file) {
+void require_valid(const std::vector<Polygon>& polygons, const std::string& file,
+                   const std::stop_token& stop) {
   std::string where;
   const auto refuse = [&](const std::string& cause) {
     throw stream::Error({.file = file,
@@ -131,12 +114,15 @@ void require_valid(const Geos& geos, const std::vector<Polygon>& polygons,
     for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
       at_ring(ring);
       if (polygons[i][ring].size() < 3) refuse("a ring has fewer than three corners");
+      for (const Point2& p : polygons[i][ring]) {
+        if (!std::isfinite(p[0]) || !std::isfinite(p[1])) refuse("a coordinate is not finite");
+      }
     }
-    const std::optional<std::string> fault = fault_of(geos, geos.polygon(polygons[i]).get());
+    const std::optional<std::string> fault = fault_of(polygons[i], stop);
     if (!fault) continue;
     for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
       at_ring(ring);
-      const auto own = fault_of(geos, geos.polygon(std::span(polygons[i][ring])).get());
+      const auto own = fault_of({polygons[i][ring]}, stop);
       if (own) refuse("the ring is not valid: " + *own);
     }
     where = polygon;
@@ -231,17 +217,19 @@ bool crosses_rows(const std::vector<Polygon>& polygons) {
 }
 
 const std::vector<Polygon>& found_valid(const std::vector<Polygon>& polygons,
-                                        const std::string& file) {
-  require_valid(Geos(), polygons, file);
+                                        const std::string& file, const std::stop_token& stop) {
+  require_valid(polygons, file, stop);
   return polygons;
 }
 
 }  // namespace
 
-RegionShape::RegionShape(std::vector<Polygon> polygons, const std::string& file)
+RegionShape::RegionShape(std::vector<Polygon> polygons, const std::string& file,
+                         const std::stop_token& stop)
     : polygons_(std::move(polygons)),
       swapped_(crosses_rows(polygons_)),
-      grid_(found_valid(polygons_, file), [this](const Point2& place) {
+      grid_(found_valid(polygons_, file, stop), [&](const Point2& place) {
+        if (stop.stop_requested()) throw stream::Stopped();
         return ask([&](const Prepared& shape) { return shape.any_meets(shape.point(place)); });
       }) {}
 
@@ -341,9 +329,9 @@ void add_parts(const Geos& geos, const GEOSGeometry* shape, std::vector<Polygon>
 }  // namespace
 
 std::vector<Polygon> valid_polygons(const Polygon& polygon) {
+  if (!fault_of(polygon)) return {polygon};
   const Geos geos;
   const Geos::Geometry given = geos.polygon(polygon);
-  if (!fault_of(geos, given.get())) return {polygon};
   std::vector<Polygon> result;
   add_parts(geos, geos.own(GEOSMakeValid_r(geos.context(), given.get())).get(), result);
   return result;

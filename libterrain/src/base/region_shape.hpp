@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -19,8 +20,10 @@ namespace terrace::terrain {
 class RegionShape {
  public:
   /// Throws: stream::Error that names `file`, the polygon, the ring and the place if there is no
-  /// polygon or one is not valid by OGC Simple Features. Polygons may overlap each other.
-  RegionShape(std::vector<Polygon> polygons, const std::string& file);
+  /// polygon or one is not valid by OGC Simple Features; stream::Stopped. Polygons may overlap each
+  /// other.
+  RegionShape(std::vector<Polygon> polygons, const std::string& file,
+              const std::stop_token& stop = {});
   RegionShape(const RegionShape&) = delete;
   RegionShape& operator=(const RegionShape&) = delete;
   ~RegionShape();

@@ -9,6 +9,7 @@
 #include "base/geojson_crs.hpp"
 #include "base/json_of_file.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -125,7 +126,7 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
   } else if (!focuses.empty()) {
     detail.level = store.top();
   }
-  if (!region.empty()) detail.region = conversion(Region::parse(region));
+  if (!region.empty()) detail.region = conversion(Region::parse(region, stop_token()));
   for (const std::string& text : focuses) {
     Focus focus = parse_focus(text);
     detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
@@ -160,7 +161,7 @@ Focus parse_focus(const std::string& text) {
   if (colon == std::string::npos) {
     throw UsageError("the focus '" + text + "' names no level; write BOX:L");
   }
-  return {.region = Region::parse(text.substr(0, colon)),
+  return {.region = Region::parse(text.substr(0, colon), stop_token()),
           .level = parse_level(text.substr(colon + 1))};
 }
 
@@ -182,7 +183,7 @@ Line parse_line(const std::string& text) {
     for (std::size_t i = 0; i < v.size(); i += 2) line.places.push_back({v[i], v[i + 1]});
     return line;
   }
-  const auto json = json_of_file(text, kMostGeoJsonBytes, convert_to_geojson(text));
+  const auto json = json_of_file(text, kMostGeoJsonBytes, convert_to_geojson(text), stop_token());
   if (!json) throw bad("is neither a list of places nor a readable file");
   std::vector<std::vector<Point2>> lines;
   try {

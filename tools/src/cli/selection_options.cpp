@@ -9,6 +9,7 @@
 #include <terrace/stream/input.hpp>
 
 #include "cli/cli.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -95,7 +96,7 @@ stream::Selection SelectionOptions::selection(std::span<const std::string> input
                                               const CommonOptions& common) const {
   stream::Selection selection{.where = where_, .resolution = resolution_.value_or(0)};
   if (!region_.empty()) {
-    terrain::Region region = terrain::Region::parse(region_);
+    terrain::Region region = terrain::Region::parse(region_, stop_token());
     if (!region_crs_.empty() || terrain::RegionConversion::may_turn(region)) {
       terrain::RegionConversion converted = conversion(inputs, reading, shift, region);
       converted.on_note([&common](const std::string& line) { common.say(line); });

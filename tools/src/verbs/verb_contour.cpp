@@ -47,7 +47,8 @@ class ContourCommand final : public Command {
     const stream::Store store = surface_.open(sampler);
     request.level = sampler.level;
     request.max_edge = sampler.max_edge;
-    if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
+    if (!region_.empty())
+      request.region = crs_.regions(store, common)(Region::parse(region_, stop_token()));
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     const ContourOutcome outcome = write_contours(
         store, request, [&](std::string_view text) { output.write(text); }, common.context());

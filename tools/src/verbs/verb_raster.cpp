@@ -7,6 +7,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "cli/store_options.hpp"
@@ -52,7 +53,8 @@ class RasterCommand final : public Command {
     request.cell = cell_;
     request.align = align_;
     const stream::Store store = surface_.open(request.sampler);
-    if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
+    if (!region_.empty())
+      request.region = crs_.regions(store, common)(Region::parse(region_, stop_token()));
     request.to = crs_.to(store, common);
     request.output = output_;
     request.replace = may_replace(output_, common.force);

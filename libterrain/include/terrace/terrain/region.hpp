@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,8 @@ class Region {
   /// (Polygon, MultiPolygon, GeometryCollection, Feature or FeatureCollection of these), of which
   /// crs() tells the CRS: RegionConversion leads from there to the data.
   /// Throws: UsageError for numbers that are not a box, stream::Error for a file that is not a
-  /// region or has an invalid polygon, as of_polygons().
-  static Region parse(const std::string& text);
+  /// region or has an invalid polygon, as of_polygons(); stream::Stopped.
+  static Region parse(const std::string& text, const std::stop_token& stop = {});
 
   static Region of_box(const stream::Box3& box);
   /// The same region with another extent().
@@ -58,9 +59,9 @@ class Region {
   /// The union of polygons, each with heights from `low` to `high`. file: named in errors.
   /// Throws: stream::Error without polygons, or for an invalid one (a ring that crosses or
   /// touches itself along a line, has fewer than three corners, no area or a coordinate that is not
-  /// finite; a hole outside; holes that cross), naming polygon, ring and place.
+  /// finite; a hole outside; holes that cross), naming polygon, ring and place; stream::Stopped.
   static Region of_polygons(std::vector<Polygon> polygons, double low, double high,
-                            const std::string& file = {});
+                            const std::string& file = {}, const std::stop_token& stop = {});
 
   /// In which CRS the places are; nullopt: in that of the data.
   [[nodiscard]] const std::optional<PlacesCrs>& crs() const { return crs_; }
