@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every job of libterrain ends when its context says so, and leaves nothing; others go on.
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -9,6 +10,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <terrace/stream/error.hpp>
@@ -20,6 +22,7 @@
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/contours.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/profile.hpp"
 #include "terrace/terrain/raster.hpp"
@@ -118,6 +121,20 @@ TEST_F(Stop, EndsEveryJobAndLeavesTheOthers) {
     EXPECT_NO_THROW(job({.stop = other.get_token()}));
     for (const char* ending : {".ply", ".tif", ".tiles"}) fs::remove_all(path + ending);
   }
+}
+
+TEST_F(Stop, EndsSmoothingThatWouldNotEndByItself) {
+  std::stop_source stop;
+  terrain::DetailMeshOptions options;
+  options.heights.smoothing =
+      tri::SmoothingOptions{.method = tri::Smoothing::kBilateral, .iterations = 1'000'000'000};
+  // After the store has been read, unless the machine is slow.
+  const std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    stop.request_stop();
+  });
+  EXPECT_THROW(static_cast<void>(detail_mesh(*store_, {}, options, {.stop = stop.get_token()})),
+               stream::Stopped);
 }
 
 TEST_F(Stop, ComesInTheMiddleOfAJob) {

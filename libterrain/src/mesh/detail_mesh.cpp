@@ -222,7 +222,7 @@ template <class Model>
 TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placement,
                            const std::optional<Region>& region, const std::vector<double>& heights,
                            const std::optional<tri::MetricField2>& field,
-                           const CollapsedClusters* collapsed) {
+                           const CollapsedClusters* collapsed, const stream::Store& store) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
@@ -263,7 +263,10 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
       return true;
     }
   };
+  constexpr std::size_t kBetweenChecks = 4096;
+  std::size_t added = 0;
   const auto add = [&](std::array<tri::VertexId, 3> corners) {
+    if (++added % kBetweenChecks == 0) store.check_stop();
     if (mirrored) std::swap(corners[1], corners[2]);
     if (region &&
         !region->touches({position(corners[0]), position(corners[1]), position(corners[2])})) {
@@ -272,7 +275,10 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
     mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
   };
   if (field) {
-    for (const auto& corners : tri::metric_triangles(triangulation, *field, has_data)) add(corners);
+    for (const auto& corners :
+         tri::metric_triangles(triangulation, *field, has_data, [&] { store.check_stop(); })) {
+      add(corners);
+    }
   } else {
     for (const tri::TriangleId t : triangulation.all_triangles()) {
       if (has_data(t)) add(triangulation.vertices(t));
@@ -294,10 +300,12 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
   const auto finish = [&](const auto& model) {
     std::vector<double> heights;
     if (options.heights.any()) {
-      heights = changed_heights(model, placement, detail.region, options.heights);
+      HeightOptions changes = options.heights;
+      if (changes.smoothing) changes.smoothing->check_stop = [&] { store.check_stop(); };
+      heights = changed_heights(model, placement, detail.region, changes);
     }
     return mesh_of_model(model, placement, detail.region, heights, field,
-                         collapsed ? &*collapsed : nullptr);
+                         collapsed ? &*collapsed : nullptr, store);
   };
   if (store.condition() != nullptr) return finish(MatchingPoints<Coord>(store, detail));
   StoreSource whole(store);

@@ -34,7 +34,9 @@ class MatchingPoints {
             points.push_back({{tri::cluster_id(level, stream::ordinal_of(id)), i}, p[2]});
           }
         });
+    triangulation_.set_check_stop([&] { view.check_stop(); });
     const std::vector<tri::VertexId> vertices = triangulation_.build(places);
+    triangulation_.set_check_stop({});
     vertices_.resize(triangulation_.vertex_slots());
     // The first of several points at one place stands for them, so it comes last.
     for (std::size_t i = points.size(); i-- > 0;) vertices_[tri::slot(vertices[i])] = points[i];

@@ -73,7 +73,10 @@ std::vector<tri::HeightChange> smoothed(const Model& model, const stream::Placem
                                         tri::SmoothingOptions options) {
   const auto& triangulation = model.triangulation();
   std::vector<tri::VertexId> inside;
+  constexpr std::size_t kBetweenChecks = 4096;
+  std::size_t looked_at = 0;
   for (const tri::VertexId v : triangulation.all_vertices()) {
+    if (++looked_at % kBetweenChecks == 0 && options.check_stop) options.check_stop();
     const auto p = triangulation.point(v);
     if (!region ||
         region->contains(world_point(

@@ -128,9 +128,10 @@ void set_parts(const tri::ShapeParts& parts, ScanSurface& out) {
 template <class Triangulation>
 void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::RestoreOptions& options,
                      TriangleMesh points, Triangulation triangulation, ScanSurface& out) {
+  triangulation.set_check_stop(options.check_stop);
   const std::vector<tri::VertexId> vertices = triangulation.build(ground, 2);
   tri::BasicShape3<Triangulation> shape(options.shape);
-  shape.restore(triangulation, options.threads);
+  shape.restore(triangulation, options.threads, options.check_stop);
   const tri::ShapeSurface surface = shape.surface(triangulation);
   out.measures = tri::measure(surface.surface);
   set_parts(shape.parts(triangulation, surface), out);
@@ -172,6 +173,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   ScanSurface out;
   tri::RestoreOptions restore = options.restore;
   restore.threads = context.threads;
+  restore.check_stop = [&] { context.check_stop(); };
   if (options.tetrahedra) {
     if (restore.metric) {
       keep_tetrahedra(ground, restore, std::move(points),
@@ -182,8 +184,10 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     if (out.tetrahedra.empty()) out.spanned = dimensions_of(ground);
     return out;
   }
-  tri::RestoredSurface surface =
-      options.method ? options.method->restore(ground) : tri::restore_surface(ground, restore);
+  tri::RestoredSurface surface = options.method
+                                     ? options.method->restore(ground, restore.check_stop)
+                                     : tri::restore_surface(ground, restore);
+  context.check_stop();
   out.measures = tri::measure(surface.surface);
   if (!options.method) {
     set_parts(surface.parts, out);

@@ -141,6 +141,7 @@ void PointWindow::insert_taken() {
   std::vector<tri::VertexId> built;
   const bool is_first = triangulation_.vertex_count() == 0;
   if (is_first) {
+    triangulation_.set_check_stop([this] { store_.check_stop(); });
     built = triangulation_.build(places_);
     if (keeps_taken()) {
       places_.clear();

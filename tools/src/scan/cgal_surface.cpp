@@ -52,11 +52,13 @@ Sides checked_box(std::span<const tri::Point3> points) {
 
 }  // namespace
 
-tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points) {
+tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points,
+                                             const tri::StopCheck& check_stop) {
   if (points.empty()) return {};
   checked_box(points);
   // CGAL requires distinct points that span space.
   tri::Delaunay3<double> triangulation;
+  triangulation.set_check_stop(check_stop);
   const std::vector<tri::VertexId> vertices = triangulation.build(points);
   if (triangulation.tetrahedron_count() == 0) return {};
   std::vector<bool> met(triangulation.vertex_slots());
@@ -71,7 +73,7 @@ tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points
   triangulation.clear();
 
   tri::RestoredSurface result;
-  result.surface.faces = advancing_front(different);
+  result.surface.faces = advancing_front(different, check_stop);
   // The order and the first corners that CGAL gives depend on addresses in memory.
   for (auto& face : result.surface.faces) {
     std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());

@@ -14,8 +14,10 @@ namespace terrace::tools {
 /// turned so that their volume is positive. CGAL 5.5 breaks ties of equal radii by addresses in
 /// memory, so single faces can differ from run to run. No faces where all points are in one plane.
 ///
-/// Throws std::invalid_argument as alpha_wrap_surface(). About 2 s per 100,000 points.
-tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points);
+/// Throws std::invalid_argument as alpha_wrap_surface(), and what check_stop throws; it is not
+/// heard while CGAL triangulates. About 2 s per 100,000 points.
+tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points,
+                                             const tri::StopCheck& check_stop = {});
 
 /// CGAL's alpha wrap (C. Portaneri et al., doi:10.1145/3528223.3530152): watertight, manifold, free
 /// of intersections, and strictly around all points at a distance of alpha / 30. Its corners are

@@ -37,10 +37,11 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
     shape.keep_vertices = false;
     if (value) shape.edge_factor = *value;
   } else if (name == "alpha-wrap") {
-    options.method = {[alpha = value.value_or(0.0)](std::span<const tri::Point3> points) {
-                        return tri::RestoredSurface{alpha_wrap_surface(points, alpha), {}};
-                      },
-                      kCgalBytesPerPoint};
+    options.method = {
+        [alpha = value.value_or(0.0)](std::span<const tri::Point3> points, const tri::StopCheck&) {
+          return tri::RestoredSurface{alpha_wrap_surface(points, alpha), {}};
+        },
+        kCgalBytesPerPoint};
   } else if (name == "advancing-front" && !value) {
     options.method = {advancing_front_surface, kCgalBytesPerPoint};
   } else {

@@ -22,13 +22,15 @@ namespace terrace::terrain {
 /// A caller's own way from points, in metres, to a surface.
 struct SurfaceMethod {
   /// Corners that are input points are named in RestoredSurface::input; a surface without any has
-  /// new points as its corners.
-  std::function<tri::RestoredSurface(std::span<const tri::Point3>)> restore;
+  /// new points as its corners. Calls check_stop at intervals and lets its exceptions pass.
+  std::function<tri::RestoredSurface(std::span<const tri::Point3>,
+                                     const tri::StopCheck& check_stop)>
+      restore;
   std::uint64_t bytes_per_point = 0;  ///< peak memory
 };
 
 struct ScanSurfaceOptions {
-  tri::RestoreOptions restore{};          ///< its threads are the context's
+  tri::RestoreOptions restore{};          ///< threads and check_stop are the context's
   std::optional<SurfaceMethod> method{};  ///< in place of tri::restore_surface()
   bool tetrahedra = false;  ///< the tetrahedra inside the surface, not triangles; without `method`
 };
