@@ -5,6 +5,7 @@
 
 #include <terrace/cluster/dendrogram.hpp>
 
+#include "cli/interrupt.hpp"
 #include "picture/color.hpp"
 #include "picture/draw.hpp"
 
@@ -87,6 +88,7 @@ void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
   std::vector<double> middle(tree.merges.size());
   const auto points = static_cast<std::uint32_t>(tree.points);
   for (std::size_t r = 0; r < tree.merges.size(); ++r) {
+    check_interrupt();
     const Merge& merge = tree.merges[r];
     const Rgb colour = group[r] < 0 ? Rgb{60, 60, 65} : category_colour(group[r]);
     const auto place = [&](std::uint32_t node) {

@@ -6,6 +6,7 @@
 
 #include "base/parallel.hpp"
 #include "base/portable_math.hpp"
+#include "cli/interrupt.hpp"
 #include "picture/draw.hpp"
 #include "tables/matching_result.hpp"
 
@@ -133,6 +134,7 @@ void draw_lines(const std::vector<stream::Point3>& positions,
     fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
     for (const LineSet::Line& line : lines) {
+      check_interrupt();
       for (std::size_t i = line.begin; i + 1 < line.end; ++i) {
         Colour colour = kDot;
         for (std::size_t c = 0; c < 3 && !colours.empty(); ++c) {
@@ -168,6 +170,7 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
     fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
     for (const std::uint32_t i : order) {
+      check_interrupt();
       const MatchingLine& line = lines[i];
       const double radius = width_of_level(line.level, thin);
       const Colour colour = level_colour(line.level, picture.result.top);
@@ -177,6 +180,7 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
       }
     }
     for (std::size_t i = 0; i < points; ++i) {
+      check_interrupt();
       if (reached[i] && crowded) continue;
       brush.dot(places[i], dot, kDot);
       if (!reached[i] && !lines.empty()) brush.dot(places[i], 0.55 * dot, kPaper);

@@ -13,6 +13,7 @@
 #include "base/point_spacing.hpp"
 #include "base/portable_math.hpp"
 #include "base/vector.hpp"
+#include "cli/interrupt.hpp"
 #include "picture/draw.hpp"
 
 namespace terrace::tools {
@@ -35,6 +36,7 @@ float jump(float radius, const Camera& camera) {
 double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   double area = 1;
   for (std::uint32_t cell = 2; cell <= 256; cell *= 2) {
+    check_interrupt();
     const std::size_t columns = canvas.width() / cell + 1;
     std::vector<std::uint8_t> taken(columns * (canvas.height() / cell + 1), 0);
     std::size_t count = 0, points = 0;
@@ -58,6 +60,7 @@ double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
 std::vector<Splat> projected(const std::vector<stream::Point3>& positions, const Camera& camera) {
   std::vector<Splat> splats(positions.size());
   for (std::size_t i = 0; i < splats.size(); ++i) {
+    check_interrupt();
     const auto [x, y, depth] = camera.project(positions[i]);
     splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0};
   }
@@ -95,6 +98,7 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
     const double per_distance = coarse > 0 ? apart : scattered;
     positions.clear();
     for (const std::uint32_t i : group) positions.push_back(cloud.positions[i]);
+    check_interrupt();
     const std::vector<float> distances = neighbour_distances(positions, kRank, options.threads);
     std::vector<float> sorted = distances;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -141,6 +145,7 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
   };
   for_bands(height, threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t y = first; y < last; ++y) {
+      check_interrupt();
       float* const row = rows.data() + y * row_size;
       for (std::uint32_t x = 0; x < width; ++x) row[x] = canvas.depth(x, y);
       for (std::uint32_t x = 0; x < width; ++x)
@@ -148,10 +153,12 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
     }
   });
   for_bands(width, threads, [&](std::uint32_t first, std::uint32_t last) {
-    for (std::uint32_t x = first; x < last; ++x)
+    for (std::uint32_t x = first; x < last; ++x) {
+      check_interrupt();
       for (std::uint32_t y = 0; y < height; ++y)
         canvas.depth(x, y) =
             smooth(columns.data() + x * column_size, height, y, radii[std::size_t{y} * width + x]);
+    }
   });
 }
 
@@ -170,6 +177,7 @@ void light_by_depth(const Camera& camera, const Light& light, const Radii& radii
                     Canvas& canvas) {
   for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t y = first; y < last; ++y) {
+      check_interrupt();
       for (std::uint32_t x = 0; x < canvas.width(); ++x) {
         const float here = canvas.depth(x, y);
         if (!std::isfinite(here)) continue;
@@ -235,6 +243,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
   Radii radii(std::size_t{canvas.width()} * canvas.height(), 0.0F);
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::size_t i = 0; i < splats.size(); ++i) {
+      check_interrupt();
       const Splat& s = splats[i];
       const float radius = s.radius;
       const float y0 = std::max(std::ceil(s.y - radius - 0.5F), static_cast<float>(first));

@@ -4,6 +4,7 @@
 
 #include "base/parallel.hpp"
 #include "base/vector.hpp"
+#include "cli/interrupt.hpp"
 #include "picture/draw.hpp"
 
 namespace terrace::tools {
@@ -94,6 +95,7 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
   const std::vector<std::array<float, 3>> normals =
       options.wire ? std::vector<std::array<float, 3>>() : vertex_normals(mesh);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
+    check_interrupt();
     const auto [x, y, depth] = camera.project(mesh.positions[i]);
     vertices[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 1.0F};
     if (!normals.empty()) {
@@ -103,6 +105,7 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
 
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first_row, std::uint32_t last_row) {
     for (const auto& t : mesh.triangles) {
+      check_interrupt();
       const float y0 = vertices[t[0]].y, y1 = vertices[t[1]].y, y2 = vertices[t[2]].y;
       if (std::max({y0, y1, y2}) < static_cast<float>(first_row) ||
           std::min({y0, y1, y2}) > static_cast<float>(last_row)) {

@@ -122,6 +122,7 @@ double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
     progress(static_cast<double>(done) / static_cast<double>(total));
     return true;
   };
+  options.check_stop = check_interrupt;
   return cluster::lower_bound(problem, solution, options).lower_bound;
 }
 
@@ -148,6 +149,7 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
     progress(static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
     return true;
   };
+  options.check_stop = check_interrupt;
   // The production path, unless an option asks for what it cannot do.
   constexpr std::size_t kFastPoints = std::size_t{1} << 24;
   if (request.strategy == FacilityStrategy::automatic && request.iterations.empty() &&
@@ -166,9 +168,9 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
 ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPoints& problem,
                                  const ClusterProgress& progress) {
   // Besides the matrix, the growth keeps the clients sorted by facility: half as much again.
-  FacilitySolution solution = cluster::solve(
-      problem,
-      {.strategy = FacilityStrategy::greedy_stars, .memory_limit = request.memory_bytes / 3 * 2});
+  FacilitySolution solution = cluster::solve(problem, {.strategy = FacilityStrategy::greedy_stars,
+                                                       .memory_limit = request.memory_bytes / 3 * 2,
+                                                       .check_stop = check_interrupt});
   solution.lower_bound =
       std::max(solution.lower_bound, bound_of(request, problem, solution, progress));
   return outcome_of(std::move(solution));
@@ -189,7 +191,8 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
                                                         {.clusters = request.k,
                                                          .seed = request.seed,
                                                          .restarts = request.restarts,
-                                                         .threads = request.threads});
+                                                         .threads = request.threads,
+                                                         .check_stop = check_interrupt});
   ClusterOutcome outcome;
   outcome.connection_cost = result.sse;
   outcome.labels = result.assignment;
@@ -222,7 +225,8 @@ ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const Facility
                                    {.restarts = static_cast<std::uint32_t>(request.restarts),
                                     .bound_steps = steps,
                                     .seed = request.seed,
-                                    .threads = request.threads}));
+                                    .threads = request.threads,
+                                    .check_stop = check_interrupt}));
   outcome.opening_cost.reset();
   return outcome;
 }
@@ -236,6 +240,7 @@ cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints&
   options.entry =
       request.single_precision ? cluster::MatrixEntry::float32 : cluster::MatrixEntry::float64;
   options.memory_limit = request.memory_bytes;
+  options.check_stop = check_interrupt;
   if (points) return cluster::linkage(*points, request.linkage, options);
   switch (request.linkage) {
     case cluster::LinkageMethod::complete:

@@ -101,6 +101,7 @@ matching::HalvingOptions halving_options(const MatchRequest& request) {
   options.seed = request.seed;
   options.threads = request.threads;
   options.memory_limit = request.memory_bytes;
+  options.check_stop = check_interrupt;
   return options;
 }
 
@@ -150,6 +151,7 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
   options.labels = labels;
   options.threads = request.threads;
   options.progress = progress;
+  options.check_stop = check_interrupt;
   matching::LargeMatching matching = matching::match_large(points, options);
   outcome.mate = std::move(matching.mate);
   outcome.cost = matching.cost;
@@ -177,7 +179,9 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
     };
   } else if (request.method == MatchMethod::exact) {
     options.matcher = [](std::span<const Point3> nodes) {
-      return std::move(matching::match_points(nodes).mate);
+      matching::PointMatchingOptions matching;
+      matching.check_stop = check_interrupt;
+      return std::move(matching::match_points(nodes, matching).mate);
     };
   }
   // The tree, and the level being matched.
@@ -185,6 +189,7 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
   check_memory(labels.empty() ? tree_bytes + kExactBytes * points.size() : tree_bytes, request,
                points.size(), "raise it, or name clusters with --labels");
   options.progress = [&](std::size_t done, std::size_t total) { return progress(done, total, 0); };
+  options.check_stop = check_interrupt;
   return {matching::make_matching_tree(points, options), labels.empty() ? 0 : distinct(labels)};
 }
 
@@ -307,6 +312,7 @@ class MatchCommand final : public Command {
   std::string rows_of(const MatchOutcome& outcome, std::size_t& pairs) const {
     std::string text = std::string(kPairsHead) + '\n';
     for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
+      check_interrupt();
       const std::uint32_t b = outcome.mate[a];
       // A point without a partner has a number above all.
       if (b <= a || b >= outcome.mate.size()) continue;
@@ -343,6 +349,7 @@ class MatchCommand final : public Command {
     const bool boxed = !boxes.empty();
     std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
     for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
+      check_interrupt();
       text += std::to_string(row.a) + ',' + std::to_string(row.b) + ',' +
               number_text(row.distance) + ',' + std::to_string(row.size) + ',' +
               std::to_string(row.level);

@@ -75,6 +75,7 @@ void put_on_ground(PictureInput& input, const stream::Placement& placement, cons
                               0.5 * (box.min[2] + box.max[2])};
   input.heights.reserve(input.mesh.positions.size());
   for (stream::Point3& p : input.mesh.positions) {
+    check_interrupt();
     input.heights.push_back(world_point(placement, p)[2]);
     p = apply(map, {p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]});
   }
@@ -366,8 +367,11 @@ class RenderCommand : public Command {
     }
     const bool terrain = input.terrain || is_height_field(mesh);
     std::vector<Rgb> colours;
+    check_interrupt();
     if (input.lines.empty() || !color_.empty()) colours = colours_of(mesh, input.heights, terrain);
+    check_interrupt();
     const double factor = exaggerate(mesh, terrain, view);
+    check_interrupt();
 
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
     Camera camera(view);
@@ -508,6 +512,7 @@ class RenderCommand : public Command {
     const unsigned top =
         by == "level" ? *std::max_element(mesh.levels.begin(), mesh.levels.end()) : 0;
     for (std::size_t i = 0; i < colours.size(); ++i) {
+      check_interrupt();
       if (by == "height") colours[i] = tint.colour(heights[i]);
       if (by == "slope") colours[i] = slope_colour(slope_degrees(normals[i]));
       if (by == "level") colours[i] = store_level_colour(mesh.levels[i], top);
