@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include <terrace/stream/error.hpp>
 #include <terrace/terrain/context.hpp>
 
 #include "core.hpp"
@@ -40,6 +41,13 @@ auto released(Work&& work) {
     run_apart([&] { result = call(); }, stop);
     return result;
   }
+}
+
+/// What ends the work of a library that takes a check, once `stop` is requested.
+inline std::function<void()> stop_check(const std::stop_token& stop) {
+  return [stop] {
+    if (stop.stop_requested()) throw stream::Stopped();
+  };
 }
 
 /// A number of threads, 0 for one per core.

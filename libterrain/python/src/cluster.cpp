@@ -63,12 +63,13 @@ py::array linkage(const Array<double>& given, const std::string& method,
                   const std::optional<Array<std::uint32_t>>& edges, const py::dict& how) {
   const std::vector<cluster::Point3> points = points3_of(given);
   const cluster::LinkageMethod kind = linkage_named(method);
-  const cluster::LinkageOptions options = linkage_options(how);
+  cluster::LinkageOptions options = linkage_options(how);
   bool gpu = false;
   take_option(how, "gpu", gpu);
   std::span<const cluster::PointPair> pairs;
   if (edges) pairs = rows_of<2>(*edges, "edges");
-  return to_array(released([&] {
+  return to_array(released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
     const std::span<const cluster::Point3> all(points);
     if (edges) return rows_of_merges(cluster::single_linkage(all, pairs));
     if (gpu) {
@@ -88,13 +89,13 @@ py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& le
     throw py::value_error("there are " + std::to_string(heights.size()) + " lengths of " +
                           std::to_string(pairs.size()) + " edges");
   }
-  return to_array(released([&] {
+  return to_array(released([&](const std::stop_token& stop) {
     std::vector<cluster::Link> links;
     links.reserve(pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       links.push_back({pairs[i][0], pairs[i][1], heights[i]});
     }
-    return rows_of_merges(cluster::make_dendrogram(links.size() + 1, links));
+    return rows_of_merges(cluster::make_dendrogram(links.size() + 1, links, stop_check(stop)));
   }));
 }
 
@@ -110,9 +111,11 @@ py::array linkage_of_distances(std::size_t count, const Array<double>& given,
   const auto of_pair = [&](std::uint32_t i, std::uint32_t j) {
     return distances[i * (2 * count - i - 1) / 2 + (j - i - 1)];
   };
-  const cluster::LinkageOptions options = linkage_options(how);
-  return to_array(
-      released([&] { return rows_of_merges(cluster::linkage(count, of_pair, kind, options)); }));
+  cluster::LinkageOptions options = linkage_options(how);
+  return to_array(released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
+    return rows_of_merges(cluster::linkage(count, of_pair, kind, options));
+  }));
 }
 
 /// (ends of each edge, lengths)
@@ -120,8 +123,10 @@ py::tuple spanning_tree(const Array<double>& given, unsigned threads) {
   const std::vector<cluster::Point3> points = points3_of(given);
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<double> lengths;
-  released([&] {
-    for (const cluster::Link& link : cluster::spanning_tree(points, {.threads = all_or(threads)})) {
+  released([&](const std::stop_token& stop) {
+    const cluster::LinkageOptions options{.threads = all_or(threads),
+                                          .check_stop = stop_check(stop)};
+    for (const cluster::Link& link : cluster::spanning_tree(points, options)) {
       edges.push_back({link.i, link.j});
       lengths.push_back(link.height);
     }
@@ -164,13 +169,14 @@ py::tuple k_means(const Array<double>& given, const py::object& start, std::size
     throw py::value_error("there are " + std::to_string(weighing.size()) + " weights of " +
                           std::to_string(points.size()) + " points");
   }
-  const cluster::KMeansOptions options{.clusters = clusters,
-                                       .seed = seed,
-                                       .restarts = restarts,
-                                       .max_iterations = max_iterations,
-                                       .tolerance = tolerance,
-                                       .threads = all_or(threads)};
-  cluster::KMeansResult made = released([&] {
+  cluster::KMeansOptions options{.clusters = clusters,
+                                 .seed = seed,
+                                 .restarts = restarts,
+                                 .max_iterations = max_iterations,
+                                 .tolerance = tolerance,
+                                 .threads = all_or(threads)};
+  cluster::KMeansResult made = released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
     return centres.empty() ? cluster::k_means(points, weighing, options)
                            : cluster::k_means_from(centres, points, weighing, options);
   });
@@ -193,18 +199,25 @@ struct Search {
     return arrays_of_solution(released([&](const std::stop_token& stop) {
       const auto goes_on = [&](auto...) { return !stop.stop_requested(); };
       if constexpr (!std::is_same_v<Problem, cluster::FacilityEntities>) {
-        if (count) return k_median(problem, *count, median);
+        if (count) {
+          cluster::KMedianOptions search = median;
+          search.check_stop = stop_check(stop);
+          return k_median(problem, *count, search);
+        }
       } else if (count) {
         throw std::invalid_argument("entities have no k-median: give the matrix of distances");
       }
       cluster::FacilityOptions search = options;
       search.progress = goes_on;
+      search.check_stop = stop_check(stop);
       if (start) search.start = &*start;
       cluster::FacilitySolution made = cluster::solve(problem, search);
       // A search for a better lower bound than the method's own.
       if (bound_steps > 0) {
-        const cluster::LowerBoundOptions bounding{
-            .steps = bound_steps, .threads = options.threads, .progress = goes_on};
+        const cluster::LowerBoundOptions bounding{.steps = bound_steps,
+                                                  .threads = options.threads,
+                                                  .progress = goes_on,
+                                                  .check_stop = search.check_stop};
         const double bound = cluster::lower_bound(problem, made, bounding).lower_bound;
         made.lower_bound = std::max(made.lower_bound, bound);
       }

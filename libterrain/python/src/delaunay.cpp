@@ -70,8 +70,10 @@ std::vector<std::array<std::int32_t, N>> numbers_of_corners(
 /// Triangles adapted to a metric for each region.
 py::array adapted2(SharedDelaunay2& shared, const MetricRegions<2>& regions) {
   const tri::MetricField2 field = field_of<2>(regions);
-  return to_array(shared.read(
-      0, [&](const auto& mesh) { return numbers_of_corners(metric_triangles(mesh, field)); }));
+  return to_array(shared.read(0, [&](const auto& mesh, const std::stop_token& stop) {
+    return numbers_of_corners(
+        metric_triangles(mesh, field, tri::TriangleFilter(), stop_check(stop)));
+  }));
 }
 
 /// (tetrahedra, facets where no flip is possible)

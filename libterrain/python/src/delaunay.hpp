@@ -130,20 +130,25 @@ class SharedDelaunay {
     return locked(items + size_, [&] { return work(mesh_); });
   }
 
-  /// work(mesh), which only reads it and takes about as long as a pass over it and so many items.
+  /// work(mesh) or work(mesh, stop token), which only reads it and takes about as long as a pass
+  /// over it and so many items.
   template <class Work>
   auto read(std::size_t items, Work&& work) {
-    return locked(items + size_, [&] { return work(std::as_const(mesh_)); });
+    if constexpr (std::is_invocable_v<Work, const Mesh&, const std::stop_token&>) {
+      return locked(items + size_,
+                    [&](const std::stop_token& stop) { return work(std::as_const(mesh_), stop); });
+    } else {
+      return locked(items + size_, [&] { return work(std::as_const(mesh_)); });
+    }
   }
 
   py::array_t<std::int32_t> insert(const Array<double>& given) {
     const auto points = rows_of<N>(given, "points");
-    return to_array(locked(points.size(), [&] {
+    return to_array(locked(points.size(), [&](const std::stop_token& stop) {
       std::vector<std::int32_t> handles(points.size());
       if (mesh_.vertex_count() == 0) {
-        const std::vector<tri::VertexId> made = mesh_.build(points);
+        const std::vector<tri::VertexId> made = build(points, stop);
         for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i]);
-        Kind::settle(mesh_);
         return handles;
       }
       std::vector<typename Mesh::Insertion> made(points.size());
@@ -330,19 +335,44 @@ class SharedDelaunay {
     return row;
   }
 
-  /// For much work signals are looked for.
+  /// Builds an empty mesh, which stays empty if it is stopped or fails.
+  std::vector<tri::VertexId> build(std::span<const Point> points, const std::stop_token& stop) {
+    mesh_.set_check_stop(stop_check(stop));
+    try {
+      std::vector<tri::VertexId> made = mesh_.build(points);
+      Kind::settle(mesh_);
+      mesh_.set_check_stop({});
+      return made;
+    } catch (...) {
+      if constexpr (requires { mesh_.clear(); }) {
+        mesh_.clear();
+      } else {
+        mesh_ = Mesh();
+      }
+      mesh_.set_check_stop({});
+      throw;
+    }
+  }
+
+  /// work() or work(stop token). For much work signals are looked for.
   template <class Work>
   auto locked(std::size_t items, Work&& work) {
     constexpr std::size_t kMuch = 10000;
-    const auto alone = [&] {
+    const auto alone = [&](const std::stop_token& stop) {
       const std::lock_guard lock(mutex_);
-      auto result = work();
+      auto result = [&] {
+        if constexpr (std::is_invocable_v<Work, const std::stop_token&>) {
+          return work(stop);
+        } else {
+          return work();
+        }
+      }();
       size_ = mesh_.vertex_count();
       return result;
     };
     if (items > kMuch) return released(alone);
     const py::gil_scoped_release open;
-    return alone();
+    return alone({});
   }
 
   /// The row of each simplex in simplices(), by slot.

@@ -29,7 +29,9 @@ py::tuple assign(const py::array_t<T, py::array::c_style>& costs) {
   const auto rows = static_cast<std::size_t>(costs.shape(0));
   const auto columns = static_cast<std::size_t>(costs.shape(1));
   const std::span<const T> all(costs.data(), rows * columns);
-  return arrays_of_assignment(released([&] { return matching::assign(all, rows, columns); }));
+  return arrays_of_assignment(released([&](const std::stop_token& stop) {
+    return matching::assign(all, rows, columns, stop_check(stop));
+  }));
 }
 
 /// row_of(number): the costs of that row. The matrix is never stored.
@@ -54,7 +56,9 @@ py::tuple assign_rows(std::size_t rows, std::size_t columns, const py::function&
 template <std::size_t N>
 py::tuple assign_places(const Array<double>& a, const Array<double>& b) {
   const auto rows = rows_of<N>(a, "a"), columns = rows_of<N>(b, "b");
-  return arrays_of_assignment(released([&] { return matching::assign_points(rows, columns); }));
+  return arrays_of_assignment(released([&](const std::stop_token& stop) {
+    return matching::assign_points(rows, columns, stop_check(stop));
+  }));
 }
 
 /// (mate of each point or -1, cost, bound, optimal)
@@ -71,7 +75,7 @@ py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
   options.rounds = rounds;
   options.threads = all_or(threads);
   matching::LargeMatching made = released([&](const std::stop_token& stop) {
-    options.progress = [&](auto...) { return !stop.stop_requested(); };
+    options.check_stop = stop_check(stop);
     return match_large(points, options);
   });
   return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, made.dual_bound,
@@ -101,6 +105,7 @@ py::tuple match_by_halving(const Array<double>& given, bool distances, const std
   const double* const matrix = given.data();
   std::vector<std::array<double, 2>> steps;
   matching::HalvingMatching made = released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
     options.progress = [&](auto...) { return !stop.stop_requested(); };
     matching::HalvingMatching result =
         distances
@@ -126,7 +131,9 @@ py::tuple assign_sparse(const Array<std::uint64_t>& begin, const Array<std::uint
                                     .begin = starts,
                                     .column = numbers_of(column, "columns"),
                                     .cost = numbers_of(cost, "costs")};
-  return arrays_of_assignment(released([&] { return matching::assign_sparse(costs); }));
+  return arrays_of_assignment(released([&](const std::stop_token& stop) {
+    return matching::assign_sparse(costs, stop_check(stop));
+  }));
 }
 
 /// As match(), of a graph.
@@ -139,13 +146,14 @@ py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
                           std::to_string(pairs.size()) + " edges");
   }
   double bound = 0;
-  const matching::Matching made = released([&] {
+  const matching::Matching made = released([&](const std::stop_token& stop) {
     std::vector<matching::WeightedEdge> edges;
     edges.reserve(pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       edges.push_back({pairs[i][0], pairs[i][1], costs[i]});
     }
-    matching::Matching result = matching::min_weight_perfect_matching(vertices, edges);
+    matching::Matching result =
+        matching::min_weight_perfect_matching(vertices, edges, stop_check(stop));
     bound = result.dual_bound();
     return result;
   });

@@ -31,9 +31,9 @@ py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule,
   std::vector<std::array<std::int32_t, 3>> faces;
   tri::ShapeParts parts;
   bool open = false;
-  const double volume = shared.read(0, [&](const auto& mesh) {
+  const double volume = shared.read(0, [&](const auto& mesh, const std::stop_token& stop) {
     tri::Shape3<double, Metric> made(options);
-    made.restore(mesh, threads);
+    made.restore(mesh, threads, stop_check(stop));
     for (const tri::TetrahedronId t : made.kept_tetrahedra()) {
       auto& row = kept.emplace_back();
       const auto corners = mesh.vertices(t);

@@ -51,6 +51,7 @@ py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
   std::vector<std::uint32_t> levels;
   auto made = released([&](const std::stop_token& stop) {
     options.progress = [&](auto...) { return !stop.stop_requested(); };
+    options.check_stop = stop_check(stop);
     auto tree = make_matching_tree(points, options);
     rows.reserve(tree.rows.size());
     levels.reserve(tree.rows.size());

@@ -89,6 +89,28 @@ class Jobs(StoreCase):
         self.assertEqual(told.split(), ['interrupted'] * 12)
         self.assertFalse(os.path.exists(self.path('interrupted-tiles.laz')))
 
+    def test_ctrl_c_ends_work_in_memory_that_would_take_minutes(self):
+        code = textwrap.dedent('''
+            import os, signal, threading, numpy as np, terrace
+            random = np.random.default_rng(1)
+            plane, space = random.random((6_000_000, 2)), random.random((3_000_000, 3))
+            for call in (lambda: terrace.Delaunay2(plane), lambda: terrace.Delaunay3(space), lambda: terrace.DynamicSurface(space),
+                         lambda: terrace.linkage(space[:60_000], 'ward'), lambda: terrace.linkage(space[:20_000], 'average'),
+                         lambda: terrace.linkage(space[:20_000], 'complete'), lambda: terrace.kmeans(space, 100_000),
+                         lambda: terrace.cluster(space[:4000], method='greedy-stars'), lambda: terrace.cluster(space[:40_000], count=1000),
+                         lambda: terrace.matching(space[:400_000]), lambda: terrace.assignment(space[:200_000], space[200_000:400_000])):
+                timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+                timer.start()
+                try:
+                    call()
+                    print('went on')
+                except KeyboardInterrupt:
+                    print('interrupted')
+        ''')
+        with subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True) as child:
+            told, _ = child.communicate(timeout=600)
+        self.assertEqual(told.split(), ['interrupted'] * 11)
+
     def test_other_threads_go_on(self):
         turns, stop = [0], threading.Event()
 
