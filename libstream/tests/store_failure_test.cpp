@@ -167,11 +167,11 @@ TEST(StoreWriting, ExistingOutputsAreRefused) {
 
   fs::create_directory(folder.path() / "other");
   write_bytes(folder.path() / "other" / "precious", "1");
-  EXPECT_TRUE(
-      contains(error_of([&] { write_small(folder.path() / "other", 7, true); }), "not a store"));
+  EXPECT_TRUE(contains(error_of([&] { write_small(folder.path() / "other", 7, true); }),
+                       "not written by terrace"));
   write_bytes(folder.path() / "file", "1");
-  EXPECT_TRUE(
-      contains(error_of([&] { write_small(folder.path() / "file", 7, true); }), "not a store"));
+  EXPECT_TRUE(contains(error_of([&] { write_small(folder.path() / "file", 7, true); }),
+                       "not written by terrace"));
   EXPECT_EQ(bytes_of(folder.path() / "other" / "precious"), "1");
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"file", "other", "s"}));
 }
@@ -262,6 +262,33 @@ TEST(StoreWriting, LinksAreFollowed) {
   EXPECT_NE(files_of(folder.path() / "elsewhere" / "s"), before);
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"elsewhere", "link"}));
   EXPECT_EQ(names_in(folder.path() / "elsewhere"), (std::vector<std::string>{"s"}));
+}
+
+/// Overlays belong to the store. Anything else stays, and the message names the first of it.
+TEST(StoreWriting, AStrangersFileInAStoreIsKept) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 1);
+  write_bytes(path / "smooth.overlay", "terrace overlay\nand more");
+  write_small(path, 2, /*replace=*/true);
+  const auto before = files_of(path);
+  for (const std::string name : {"notes.txt", "level-9.0.index", ".hidden"}) {
+    write_bytes(path / name, "terrace");
+    write_bytes(path / "zeal", "terrace");
+    EXPECT_TRUE(
+        contains(error_of([&] { write_small(path, 3, true); }), "contains " + name + ", which"));
+    fs::remove(path / name);
+    fs::remove(path / "zeal");
+    EXPECT_EQ(files_of(path), before);
+  }
+  fs::create_symlink("manifest.json", path / "link");
+  EXPECT_TRUE(contains(error_of([&] { write_small(path, 3, true); }), "contains link, which"));
+  fs::remove(path / "link");
+  fs::create_directory(path / "photos");
+  EXPECT_TRUE(contains(error_of([&] { write_small(path, 3, true); }), "contains photos, which"));
+  fs::remove(path / "photos");
+  write_small(path, 3, /*replace=*/true);
+  EXPECT_NE(files_of(path), before);
 }
 
 /// The files left by a writer that dies between the two renames of a replacement.

@@ -201,7 +201,7 @@ class StoreCrashTest(CrashCase):
                 file.write(text)
             result = terrace(*self.build('--force'), cwd=self.folder)
             self.assertEqual(result.returncode, 1, text)
-            self.assertIn('is not a store', result.stderr)
+            self.assertIn('was not written by terrace', result.stderr)
             self.assertEqual(os.listdir(self.path('s')), ['manifest.json'])
 
 
@@ -474,6 +474,28 @@ class StrangerTest(CrashCase):
         self.assertIn('was not written by terrace', error)
         self.assertEqual(sorted(os.listdir(self.folder)), ['old', 's'])
         self.assertEqual(everything(self.path('s')), {'photos/1': b'precious'})
+
+    def test_a_store_with_a_strangers_file_stays(self):
+        command = ('build', self.input('b.tif'), '-o', 's', '--block', '100', '--threads', '1')
+        self.assertEqual(terrace(*command, cwd=self.folder).returncode, 0)
+        before = everything(self.folder)
+
+        def change():
+            for name in ('s/notes.txt', 's/letter.txt'):
+                with open(self.path(name), 'w', encoding='ascii') as file:
+                    file.write('precious')
+
+        before.update({'s/notes.txt': b'precious', 's/letter.txt': b'precious'})
+        # It comes while the run lasts, or is there from the beginning.
+        for code, error in (self.run_while((*command, '--force'), change),
+                            (lambda run: (run.returncode, run.stderr))(terrace(*command, '--force', cwd=self.folder))):
+            self.assertEqual(code, 1, error)
+            self.assertIn('contains letter.txt, which terrace did not write', error)
+            self.assertIn('move that file away', error)
+            self.assertEqual(everything(self.folder), before)
+        for name in ('s/notes.txt', 's/letter.txt'):
+            os.remove(self.path(name))
+        self.assertEqual(terrace(*command, '--force', cwd=self.folder).returncode, 0)
 
     def test_tiles_are_not_removed_from_a_folder_that_is_another_one(self):
         command = ('tile', self.input('tiles.terrace'), '-o', 't', '--vertical', 'ellipsoidal', '--threads', '1',

@@ -229,6 +229,25 @@ class TileTest(TileTestCase):
         self.assertFalse(os.path.exists(self.path('again/9')))
         TileSet(self.path('again')).check()
 
+    def test_force_leaves_what_strangers_put_into_the_folder(self):
+        store, folder = self.stores['degrees'], self.path('shared')
+        self.tile(store, 'shared')
+        zoom = max(int(name) for name in os.listdir(folder) if name.isdigit())
+        stranger = f'{zoom}/0/0.terrain'
+        for name in ('index.html', '0/notes.txt', stranger):
+            path = os.path.join(folder, name)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, 'w') as file:
+                file.write('precious')
+        for option in ('--force', '--resume'):
+            self.refuse(1, f'contains {stranger}, which terrace did not write', 'tile', store, '-o', folder, '--vertical',
+                        'ellipsoidal', option)
+        os.remove(os.path.join(folder, stranger))
+        self.tile(store, 'shared', '--max-error', 30, '--zoom', '0-3', '--force')
+        for name in ('index.html', '0/notes.txt'):
+            with open(os.path.join(folder, name)) as file:
+                self.assertEqual(file.read(), 'precious')
+
     def test_what_cannot_be_tiled_is_refused(self):
         store, out = self.stores['degrees'], self.path('none')
         tile = ('tile', store, '-o', out)

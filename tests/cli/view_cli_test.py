@@ -532,9 +532,27 @@ class PublishTest(Stores):
             file.write('{"text": "terrace-stores"}')
         done = terrace('publish', self.store, '-o', other, '--force')
         self.assertEqual(done.returncode, 1)
-        self.assertIn('was not published by terrace', done.stderr)
+        self.assertIn('was not written by terrace', done.stderr)
         self.assertEqual(os.listdir(other), ['stores.json'])
         self.assertEqual(terrace('publish', self.store, '-o', self.path('no', 'parent')).returncode, 1)
+
+    def test_a_published_folder_with_a_strangers_file_is_kept(self):
+        site = self.path('shared')
+        self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 0)
+        self.assertEqual(terrace('publish', self.store, self.store, '-o', site, '-q', '--force').returncode, 0)
+        for name in ('robots.txt', 'stores/notes.txt', 'stores/alps/notes.txt', 'stores/alps-3.start', 'own/index.html'):
+            path = os.path.join(site, name)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, 'w') as file:
+                file.write('precious')
+            done = terrace('publish', self.store, '-o', site, '--force')
+            with self.subTest(name):
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(f"contains {name.replace('own/index.html', 'own')}, which terrace did not write", done.stderr)
+                self.assertEqual(self.read(path), b'precious')
+            os.remove(path)
+        os.rmdir(os.path.join(site, 'own'))
+        self.assertEqual(terrace('publish', self.store, '-o', site, '-q', '--force').returncode, 0)
 
     def test_a_store_inside_the_folder_it_would_replace(self):
         site = self.path('own')

@@ -36,6 +36,39 @@ bool is_folder(const fs::path& path) {
 
 }  // namespace
 
+Ownership ownership_of_entries(
+    const fs::path& folder, const std::function<Ownership(const fs::directory_entry&)>& of_entry) {
+  std::string first;
+  Ownership result(true);
+  std::error_code error;
+  fs::directory_iterator entry(folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!result.ours && first < name) continue;
+    const Ownership found = of_entry(*entry);
+    if (found.ours) continue;
+    first = name;
+    result = Ownership::except(found.stranger.empty() ? name : name + "/" + found.stranger);
+  }
+  return error ? Ownership(false) : result;
+}
+
+Error not_replaced(std::string file, const Ownership& found) {
+  if (found.stranger.empty()) {
+    return Error({.file = std::move(file),
+                  .where = {},
+                  .cause = "exists and was not written by terrace, so it is not replaced",
+                  .remedy = "move it away or choose another name",
+                  .error_number = EEXIST});
+  }
+  return Error({.file = std::move(file),
+                .where = {},
+                .cause = "contains " + found.stranger +
+                         ", which terrace did not write, so it is not replaced",
+                .remedy = "move that file away or choose another name",
+                .error_number = EEXIST});
+}
+
 OutputPlacement::OutputPlacement(fs::path shown, fs::path place, fs::path temporary, Naming naming)
     : shown_(std::move(shown)),
       place_(std::move(place)),
@@ -49,14 +82,15 @@ fs::path OutputPlacement::replaced() const {
   return state_ == State::aside ? aside() : fs::path();
 }
 
-bool OutputPlacement::may_replace(const fs::path& old) const noexcept {
+Ownership OutputPlacement::ownership_of(const fs::path& old) const noexcept {
   try {
     // A file replaces files, a folder replaces folders: after an exchange `temporary_` is the old
     // output, and the new one has the place.
     const fs::path& ours = old == temporary_ ? place_ : temporary_;
     const bool same_kind =
         is_folder(ours) ? is_folder(old) : fs::is_regular_file(fs::symlink_status(old));
-    return same_kind && (!naming_.is_ours || naming_.is_ours(old));
+    if (!same_kind || !naming_.is_ours) return same_kind;
+    return naming_.is_ours(old);
   } catch (...) {
     return false;  // what cannot be looked at is not ours
   }
@@ -74,14 +108,6 @@ void OutputPlacement::fail_because_it_exists() const {
                .error_number = EEXIST});
 }
 
-void OutputPlacement::fail_because_it_is_foreign() const {
-  throw Error({.file = shown_.string(),
-               .where = {},
-               .cause = "exists and was not written by terrace, so it is not replaced",
-               .remedy = "move it away or choose another name",
-               .error_number = EEXIST});
-}
-
 /// False if the name is free by now. Throws: Error.
 bool OutputPlacement::put_by_exchange() {
   const int number = exchange(temporary_, place_);
@@ -90,9 +116,10 @@ bool OutputPlacement::put_by_exchange() {
   if (number != 0) fail(number);
   state_ = State::exchanged;
   // Something else may have taken the name since it was looked at.
-  if (may_replace(temporary_)) return true;
+  const Ownership found = ownership_of(temporary_);
+  if (found.ours) return true;
   undo();
-  fail_because_it_is_foreign();
+  throw not_replaced(shown_.string(), found);
 }
 
 /// For file systems that cannot exchange names.
@@ -101,11 +128,11 @@ bool OutputPlacement::put_by_steps() {
   if (!is_folder(temporary_)) {
     // A file is replaced by one rename. A second name keeps the old one until all has gone well.
     const bool kept = ::link(place_.c_str(), old.c_str()) == 0;
-    const bool ours = may_replace(kept ? old : place_);
-    if (!ours || ::rename(temporary_.c_str(), place_.c_str()) != 0) {
+    const Ownership found = ownership_of(kept ? old : place_);
+    if (!found.ours || ::rename(temporary_.c_str(), place_.c_str()) != 0) {
       const int why = errno;
       if (kept) ::unlink(old.c_str());
-      if (!ours) fail_because_it_is_foreign();
+      if (!found.ours) throw not_replaced(shown_.string(), found);
       fail(why);
     }
     state_ = kept ? State::aside : State::gone;
@@ -115,11 +142,11 @@ bool OutputPlacement::put_by_steps() {
     if (errno == ENOENT) return false;
     fail(errno);
   }
-  const bool ours = may_replace(old);
-  const int number = ours ? rename_exclusively(temporary_, place_) : 0;
-  if (!ours || number != 0) {
+  const Ownership found = ownership_of(old);
+  const int number = found.ours ? rename_exclusively(temporary_, place_) : 0;
+  if (!found.ours || number != 0) {
     rename_exclusively(old, place_);
-    if (!ours) fail_because_it_is_foreign();
+    if (!found.ours) throw not_replaced(shown_.string(), found);
     fail(number);
   }
   state_ = State::aside;
@@ -138,10 +165,11 @@ void OutputPlacement::put() {
       fail(number);
     }
     if (!naming_.replace) fail_because_it_exists();
-    if (!may_replace(place_)) {
+    const Ownership found = ownership_of(place_);
+    if (!found.ours) {
       std::error_code ignored;
-      if (fs::exists(fs::symlink_status(place_, ignored))) fail_because_it_is_foreign();
-      continue;
+      if (!fs::exists(fs::symlink_status(place_, ignored))) continue;
+      throw not_replaced(shown_.string(), found);
     }
     if (put_by_exchange()) return;
   }

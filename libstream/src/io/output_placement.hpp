@@ -41,12 +41,11 @@ class OutputPlacement {
   };
 
   [[nodiscard]] std::filesystem::path aside() const;
-  [[nodiscard]] bool may_replace(const std::filesystem::path& old) const noexcept;
+  [[nodiscard]] Ownership ownership_of(const std::filesystem::path& old) const noexcept;
   bool put_by_exchange();
   bool put_by_steps();
   [[noreturn]] void fail(int error_number) const;
   [[noreturn]] void fail_because_it_exists() const;
-  [[noreturn]] void fail_because_it_is_foreign() const;
 
   std::filesystem::path shown_, place_, temporary_;
   Naming naming_;

@@ -293,15 +293,4 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
   }
 }
 
-bool looks_like_store(const std::filesystem::path& folder) {
-  std::error_code error;
-  const auto path = folder / kManifestName;
-  if (!std::filesystem::is_regular_file(path, error)) return false;
-  try {
-    return JsonValue::parse(read_manifest(*open_file(path))).at("format").string() == kFormatName;
-  } catch (const std::runtime_error&) {
-    return false;
-  }
-}
-
 }  // namespace terrace::stream::store

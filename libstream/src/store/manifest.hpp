@@ -71,7 +71,4 @@ Manifest parse_manifest(const std::string& text, const std::string& file);
 /// in the format's order.
 bool is_as_written(const std::string& text, const Manifest& manifest);
 
-/// Whether `folder` has a manifest whose format is that of a store of any version.
-bool looks_like_store(const std::filesystem::path& folder);
-
 }  // namespace terrace::stream::store

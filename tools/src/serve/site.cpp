@@ -25,7 +25,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kManifest = "manifest.json";
-constexpr const char* kStartEnding = ".start";
 /// How long a look at all files, and a failed attempt to serve them, counts.
 constexpr std::chrono::milliseconds kLook{100};
 /// To serve stores whose files change meanwhile, at the start.
@@ -264,8 +263,11 @@ Site make_site(std::span<const stream::Store> stores) {
     add_text(site, "stores/" + name + kStartEnding, start_file(store));
     list.push_back({{"name", name}, {"points", store.points()}, {"checksum", checksum}});
   }
-  add_text(site, "stores.json",
-           Json{{"format", "terrace-stores"}, {"version", 1}, {"stores", list}}.dump(1) + "\n");
+  Json viewer = Json::array();
+  for (const ViewerFile& file : viewer_files()) viewer.push_back(file.name);
+  const Json stores_json = {
+      {"format", "terrace-stores"}, {"version", 1}, {"stores", list}, {"viewer", viewer}};
+  add_text(site, "stores.json", stores_json.dump(1) + "\n");
   return site;
 }
 

@@ -68,6 +68,9 @@ class LiveSite {
   Site site_;
 };
 
+/// The start file of a store has the store's name and this.
+inline constexpr const char* kStartEnding = ".start";
+
 /// The name of each store in a site.
 std::vector<std::string> site_names(std::span<const stream::Store> stores);
 

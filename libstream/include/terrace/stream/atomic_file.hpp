@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "terrace/stream/error.hpp"
+
 /// Outputs that appear under their names complete and synced, or not at all.
 ///
 /// An output is written and synced under a temporary name, then renamed, then its folder is synced.
@@ -25,18 +27,42 @@ namespace terrace::stream {
 
 class OutputGroup;
 
+/// Whether terrace wrote what has an output's name.
+struct Ownership {
+  Ownership(bool all) : ours(all) {}
+  /// Of a folder that terrace wrote, with a file that it did not write: its path in the folder.
+  static Ownership except(std::string file) {
+    Ownership found(false);
+    found.stranger = std::move(file);
+    return found;
+  }
+
+  bool ours;
+  std::string stranger{};
+};
+
+/// Of a folder that is ours if all its entries are, of which `of_entry` is asked. The stranger is
+/// the first by name. False for a folder that cannot be listed.
+Ownership ownership_of_entries(
+    const std::filesystem::path& folder,
+    const std::function<Ownership(const std::filesystem::directory_entry&)>& of_entry);
+
+/// For an output whose name is taken by what terrace did not write, or not all of it. Requires
+/// !found.ours.
+Error not_replaced(std::string file, const Ownership& found);
+
 /// How an output takes its name. Converts from bool: whether it may replace what has the name.
 struct Naming {
   Naming() = default;
   template <std::same_as<bool> Bool>  // not from pointers, and so not from functions
   Naming(Bool replace_any) : replace(replace_any) {}
-  Naming(std::function<bool(const std::filesystem::path&)> may_go)
+  Naming(std::function<Ownership(const std::filesystem::path&)> may_go)
       : replace(true), is_ours(std::move(may_go)) {}
 
   bool replace = false;
   /// Only what this accepts is replaced; empty: anything. Asked at the moment of replacement, of
   /// the very file or folder that has the name then, which may have a temporary name meanwhile.
-  std::function<bool(const std::filesystem::path&)> is_ours{};
+  std::function<Ownership(const std::filesystem::path&)> is_ours{};
   /// Files only: the file gets its name by commit() of the group, which must outlive the writer.
   OutputGroup* group = nullptr;
 };

@@ -30,6 +30,8 @@
 
 namespace terrace::stream {
 
+struct Ownership;  // atomic_file.hpp
+
 /// Identifies a cluster for the lifetime of the store: level in the upper 8 bits, ordinal in the
 /// lower 56.
 enum class ClusterId : std::uint64_t {};
@@ -183,6 +185,9 @@ class Store {
   /// Whether there is a store. One that a writer moved aside in order to replace it gets its name
   /// back, if the writer died then. open() calls this.
   static bool exists(const std::filesystem::path& path);
+  /// Whether a folder is a store, of any version, and has no files besides those that its manifest
+  /// lists, and overlays. Reads the manifest and the names in the folder.
+  static Ownership ownership_of(const std::filesystem::path& folder);
 
   /// The same store for cancellable work: once `stop` is requested, every read throws Stopped, so
   /// loops that read need no check of their own.

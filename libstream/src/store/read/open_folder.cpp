@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
+#include <fstream>
+#include <set>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include "io/temporary.hpp"
+#include "store/json.hpp"
 #include "store/manifest.hpp"
+#include "store/overlay_page.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
@@ -13,6 +18,55 @@
 /// A store in its folder, where a writer that died may have left it under another name.
 
 namespace terrace::stream {
+
+using namespace store;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The manifest and the files that it lists; empty if the folder is not a store. Manifests of any
+/// version are read, damaged ones as far as possible.
+std::set<std::string> files_of_store(const fs::path& folder) {
+  std::error_code error;
+  const fs::path path = folder / kManifestName;
+  if (!fs::is_regular_file(path, error)) return {};
+  std::set<std::string> names;
+  try {
+    const JsonValue manifest = JsonValue::parse(read_manifest(*open_file(path)));
+    if (manifest.at("format").string() != kFormatName) return {};
+    names.insert(kManifestName);
+    for (const JsonValue& level : manifest.at("levels").items()) {
+      for (const JsonValue& segment : level.at("segments").items()) {
+        for (const char* part : {"data", "index"}) {
+          names.insert(segment.at(part).at("file").string());
+        }
+      }
+    }
+  } catch (const std::runtime_error&) {
+  }
+  return names;
+}
+
+bool is_overlay(const fs::path& path) {
+  constexpr std::string_view kMark(kOverlayMark);
+  std::string begin(kMark.size(), '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin == kMark;
+}
+
+}  // namespace
+
+Ownership Store::ownership_of(const fs::path& folder) {
+  const std::set<std::string> ours = files_of_store(folder);
+  if (ours.empty()) return false;
+  return ownership_of_entries(folder, [&](const fs::directory_entry& entry) {
+    std::error_code gone;
+    return fs::is_regular_file(entry.symlink_status(gone)) &&
+           (ours.contains(entry.path().filename().string()) || is_overlay(entry.path()));
+  });
+}
 
 Store Store::open(const std::filesystem::path& path) {
   if (!exists(path)) {

@@ -44,7 +44,7 @@ namespace {
 
 Naming naming_of(bool replace) {
   if (!replace) return {};
-  return {looks_like_store};
+  return {Store::ownership_of};
 }
 
 }  // namespace
@@ -143,11 +143,8 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
                    .cause = "exists already",
                    .remedy = "choose another name or remove it"});
     }
-    if (!looks_like_store(path)) {
-      throw Error({.file = path.string(),
-                   .where = {},
-                   .cause = "exists and is not a store, so it is not replaced",
-                   .remedy = "choose another name or remove it"});
+    if (const Ownership found = Store::ownership_of(path); !found.ours) {
+      throw not_replaced(path.string(), found);
     }
   }
   if (schema.attributes.size() > kMostAttributes) {

@@ -241,6 +241,7 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
   const std::string fingerprint = fingerprint_of(store, options);
   if (request.resume && !request.replace) refuse_another(layer_path, fingerprint);
   TileSetWriter writer(surfaces, options, context, layer_path);
+  writer.check_strangers();
   writer.write_zooms();
   folder.check_same();
   writer.finish();

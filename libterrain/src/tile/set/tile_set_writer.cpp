@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/gzip.hpp>
 
@@ -63,6 +64,32 @@ std::optional<std::size_t> number_of(const TileAddress& tile,
 
 }  // namespace
 
+bool TileSetWriter::is_stranger(const TileAddress& tile) const {
+  if (!finished_) return false;
+  if (const FinishedTile* record = journal_.find(tile); record && record->bytes > 0) return false;
+  const auto& available = finished_->available;
+  return tile.zoom >= available.size() ||
+         std::ranges::none_of(available[tile.zoom], [&](const TileRange& range) {
+           return range.x0 <= tile.x && tile.x <= range.x1 && range.y0 <= tile.y &&
+                  tile.y <= range.y1;
+         });
+}
+
+void TileSetWriter::check_strangers() const {
+  if (!finished_) return;
+  std::string first;
+  std::error_code error;
+  fs::recursive_directory_iterator at(options_.folder, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    const std::string name = at->path().lexically_relative(options_.folder).generic_string();
+    const auto tile = parse_tile_path(name);
+    if (tile && is_stranger(*tile) && (first.empty() || name < first)) first = name;
+  }
+  if (error) throw stream::system_error(options_.folder, "cannot be listed", error.value());
+  if (first.empty()) return;
+  throw stream::not_replaced(options_.folder, stream::Ownership::except(first));
+}
+
 void TileSetWriter::begin_change() {
   std::call_once(changed_, [this] {
     std::error_code error;
@@ -113,6 +140,7 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, Zoom& 
   std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
   if (options_.request.gzip) bytes = stream::gzip(bytes);
   if (before.empty()) before = read_tile_file(path);
+  if (!before.empty() && !repeats_ && is_stranger(tile)) throw stream::not_replaced(path, false);
   const Written written{
       true, bytes == before, {bytes.size(), checksum_of(bytes), digest, made.max_error}};
   if (!written.kept) {
@@ -237,6 +265,7 @@ void TileSetWriter::write_zooms() {
       if ((*zoom)->too_far) take_larger_steps(**zoom);
       again = again || (*zoom)->open;
     }
+    repeats_ = again;
   }
   for (auto zoom = zooms_.rbegin(); zoom != zooms_.rend(); ++zoom) conclude(**zoom);
 }
@@ -285,6 +314,7 @@ void TileSetWriter::remove_others() {
     const auto tile = parse_tile_path(name);
     if (!tile) continue;
     if (tile->zoom >= present.size() || !number_of(*tile, present[tile->zoom])) {
+      if (is_stranger(*tile)) throw stream::not_replaced(path.string(), false);
       gone.push_back(path);
     }
   }

@@ -2,15 +2,18 @@
 #pragma once
 
 #include <atomic>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "terrace/terrain/context.hpp"
 #include "terrace/terrain/tiles.hpp"
+#include "tile/format/tile_layer.hpp"
 #include "tile/make/tile_mesher.hpp"
 #include "tile/set/tile_journal.hpp"
 
@@ -42,9 +45,13 @@ class TileSetWriter {
         context_(context),
         layer_path_(layer_path),
         journal_(options.folder) {
+    if (std::filesystem::exists(layer_path)) finished_ = read_layer(layer_path);
     present.resize(options.last_zoom + 1);
   }
 
+  /// Throws: stream::Error if a finished set has a tile that terrace did not write. Reads the names
+  /// in the folder.
+  void check_strangers() const;
   void write_zooms();
   /// After all zooms: removes tiles of an earlier set that this one does not have, and temporary
   /// files of killed runs; completes the journal.
@@ -91,14 +98,19 @@ class TileSetWriter {
   void conclude(const Zoom& zoom);
   void remove_others();
   void begin_change();
+  /// Whether another program has put a tile into a finished set: neither the journal nor layer.json
+  /// lists it. Of an unfinished set, whose last tiles may not be listed yet, any tile is ours.
+  [[nodiscard]] bool is_stranger(const TileAddress& tile) const;
 
   const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
   const TileSetOptions& options_;
   const Context& context_;
   const std::string& layer_path_;
+  std::optional<TileLayer> finished_;  ///< the set that was there before
   TileJournal journal_;
   std::vector<TileJournal::Record> records_;
   std::vector<std::unique_ptr<Zoom>> zooms_;  ///< from the first one asked for on
+  bool repeats_ = false;                      ///< tiles of this run are written again
   std::once_flag changed_;
 };
 
