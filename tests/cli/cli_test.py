@@ -371,6 +371,38 @@ class ErrorTest(CommandTest):
                 result = terrace(*args, cwd=self.folder, preexec_fn=small_files)
                 self.assert_one_line_error(result, 1)
                 self.assertEqual(os.listdir(self.folder), [])
+                self.assertIn(f'terrace: {args[-1]}: ', result.stderr)
+
+    def test_full_disks_name_the_output_and_never_a_temporary_file(self):
+        def small_files():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
+        dem, cloud, hills, scan = (self.path(name) for name in ('d.tif', 'c.ply', 'd.terrace', 'c.terrace'))
+        self.run_ok('synth', 'dem', '--size', '200x200', '--crs', 'EPSG:32632', '-o', dem)
+        self.run_ok('synth', 'surface', '--points', '20000', '-o', cloud)
+        self.run_ok('build', dem, '-o', hills)
+        self.run_ok('build', cloud, '-o', scan)
+        inputs = sorted(os.listdir(self.folder))
+        west, south, _ = self.json_of('info', hills)['bounds']['min']
+        for name, *args in (['o.st', 'build', dem], ['o.st', 'build', cloud, '--order', 'spatial'],
+                            ['o.site', 'publish', hills], ['o.site', 'publish', scan, '--repack'],
+                            ['o.copc.laz', 'convert', cloud], ['o.laz', 'convert', cloud], ['o.csv', 'convert', cloud],
+                            ['o.ply', 'mesh', hills, '--max-error', 1], ['o.glb', 'mesh', hills], ['o.obj', 'mesh', hills],
+                            ['o.tif', 'raster', hills], ['o.geojson', 'contour', hills, '--interval', 1],
+                            ['o.png', 'render', hills], ['o.ply', 'surface', scan], ['o.vtk', 'surface', scan, '--tetrahedra'],
+                            ['o.csv', 'cluster', cloud], ['o.csv', 'match', cloud, '--method', 'monotone'],
+                            ['o.csv', 'profile', hills, '--line', f'{west},{south},{west + 3000},{south + 3000}', '--step', 1]):
+            with self.subTest(name=name, args=args):
+                result = terrace(*args, '-q', '-o', name, cwd=self.folder, preexec_fn=small_files)
+                self.assert_one_line_error(result, 1)
+                self.assertRegex(result.stderr, f'^terrace: (./)?{name}: .*File too large; raise the file size limit')
+                self.assertNotIn('.tmp-', result.stderr)
+                self.assertEqual(sorted(os.listdir(self.folder)), inputs)
+        result = terrace('tile', hills, '-q', '-o', 'o.t', '--vertical', 'ellipsoidal', cwd=self.folder, preexec_fn=small_files)
+        self.assert_one_line_error(result, 1)
+        self.assertRegex(result.stderr, r'^terrace: o\.t(/\d+/\d+/\d+\.terrain)?: .*File too large')
+        result = terrace('mesh', hills, '-q', '--max-error', 1, '-o', '-', cwd=self.folder, preexec_fn=small_files)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('terrace: standard output: ', result.stderr)
 
     def test_a_closed_pipe_ends_quietly(self):
         command = subprocess.Popen(

@@ -27,28 +27,11 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 1u << 20;
 
-std::string remedy_for(int error_number) {
-  switch (error_number) {
-    case ENOSPC:
-    case EDQUOT:
-      return "free space or choose another disk";
-    case EFBIG:
-      return "raise the file size limit (ulimit -f) or choose another file system";
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return "choose a writable folder";
-    case ENOENT:
-      return "create the folder first";
-    default:
-      return {};
-  }
-}
-
 }  // namespace
 
 struct AtomicFile::Impl {
   fs::path target;  ///< as given
+  fs::path shown;   ///< in messages
   fs::path place;   ///< after following symbolic links
   fs::path temporary;
   Naming naming;
@@ -64,7 +47,7 @@ struct AtomicFile::Impl {
   }
 
   [[noreturn]] void fail(const std::string& action, int error_number) const {
-    throw system_error(target.string(), action, error_number, remedy_for(error_number));
+    throw system_error(shown.string(), action, error_number, remedy_for(error_number));
   }
 
   void check_target() const {
@@ -128,7 +111,7 @@ struct AtomicFile::Impl {
   void complete() {
     flush();
     if (::fsync(descriptor) != 0) fail("cannot be synced", errno);
-    placement = OutputPlacement(target, place, temporary, naming);
+    placement = OutputPlacement(shown, place, temporary, naming);
   }
 
   /// After put_together(): the temporary name is gone or that of what has been replaced. The
@@ -142,6 +125,7 @@ struct AtomicFile::Impl {
 
 AtomicFile::AtomicFile(const fs::path& target, Naming naming) : impl_(std::make_shared<Impl>()) {
   impl_->target = target;
+  impl_->shown = naming.shown.empty() ? target : naming.shown;
   impl_->naming = std::move(naming);
   if (!target.has_filename()) {
     throw Error({.file = target.string(),

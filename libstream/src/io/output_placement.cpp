@@ -195,6 +195,24 @@ void OutputPlacement::undo() noexcept {
   state_ = State::waiting;
 }
 
+std::string remedy_for(int error_number) {
+  switch (error_number) {
+    case ENOSPC:
+    case EDQUOT:
+      return "free space or choose another disk";
+    case EFBIG:
+      return "raise the file size limit (ulimit -f) or choose another file system";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "choose a writable folder";
+    case ENOENT:
+      return "create the folder first";
+    default:
+      return {};
+  }
+}
+
 void put_together(std::span<OutputPlacement* const> outputs) {
   std::size_t put = 0;
   try {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "terrace/stream/atomic_file.hpp"
 
@@ -55,6 +56,9 @@ class OutputPlacement {
 /// Gives all of them their names and syncs their folders. Throws: Error; then all names have what
 /// they had before.
 void put_together(std::span<OutputPlacement* const> outputs);
+
+/// What to do about the failure of a system call that makes or writes a file.
+std::string remedy_for(int error_number);
 
 /// fsync of a folder that may be read; one that cannot be synced by its file system counts as
 /// synced. Throws: Error.

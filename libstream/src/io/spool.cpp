@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "io/file_size_signal.hpp"
+#include "io/output_placement.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -50,7 +51,10 @@ void Spool::write(std::uint64_t offset, std::span<const std::byte> bytes) {
     const ssize_t put = ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done,
                                  static_cast<off_t>(offset + done));
     if (put < 0 && errno == EINTR) continue;
-    if (put < 0) throw system_error(name_, "cannot write a temporary file", errno, remedy_);
+    if (put < 0) {
+      throw system_error(name_, "cannot write a temporary file", errno,
+                         errno == EFBIG ? remedy_for(EFBIG) : remedy_);
+    }
     done += static_cast<std::size_t>(put);
   }
   const std::uint64_t end = offset + bytes.size();

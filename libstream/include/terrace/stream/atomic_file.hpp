@@ -65,6 +65,8 @@ struct Naming {
   std::function<Ownership(const std::filesystem::path&)> is_ours{};
   /// Files only: the file gets its name by commit() of the group, which must outlive the writer.
   OutputGroup* group = nullptr;
+  /// Files only: the name in messages if that is not the target's, as for a part of an output.
+  std::filesystem::path shown{};
 };
 
 /// A file that appears under its name complete and synced, or not at all.

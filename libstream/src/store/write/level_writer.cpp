@@ -46,10 +46,11 @@ void add(const Counts& counts, Counts& to) {
 
 }  // namespace
 
-LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout, ThreadTeam& team)
+LevelWriter::LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
+                         Layout layout, ThreadTeam& team)
     : layout_(std::move(layout)),
-      data_(folder / file_name(layout_.level, "clusters")),
-      index_(folder / file_name(layout_.level, "index")),
+      data_(folder / file_name(layout_.level, "clusters"), shown),
+      index_(folder / file_name(layout_.level, "index"), shown),
       team_(team),
       encoders_(1) {}
 

@@ -49,7 +49,9 @@ struct PreparedBlock {
 /// of them came encoded.
 class LevelWriter {
  public:
-  LevelWriter(const std::filesystem::path& folder, Layout layout, ThreadTeam& team);
+  /// shown: the store in messages.
+  LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
+              Layout layout, ThreadTeam& team);
 
   /// What blocks are to be encoded with just now; null while there are no tables.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }

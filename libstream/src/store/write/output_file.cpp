@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "io/file_size_signal.hpp"
+#include "io/output_placement.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
@@ -17,9 +18,7 @@ constexpr std::size_t kBufferSize = 1u << 18;
 
 Error failed(const std::filesystem::path& path, const char* action) {
   const int number = errno;
-  const bool full = number == ENOSPC || number == EFBIG || number == EDQUOT;
-  return system_error(path.string(), action, number,
-                      full ? "free some space or write elsewhere" : "");
+  return system_error(path.string(), action, number, remedy_for(number));
 }
 
 }  // namespace
@@ -36,9 +35,10 @@ Descriptor::~Descriptor() {
   if (fd_ >= 0) ::close(fd_);
 }
 
-OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
+OutputFile::OutputFile(std::filesystem::path path, std::filesystem::path shown)
+    : path_(std::move(path)), shown_(std::move(shown)) {
   fd_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (!fd_.open()) throw failed(path_, "cannot create");
+  if (!fd_.open()) throw failed(shown_, "cannot be created");
   buffer_.reserve(kBufferSize);
 }
 
@@ -56,7 +56,7 @@ void OutputFile::flush() {
   while (left > 0) {
     const ssize_t written = ::write(fd_.get(), next, left);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw failed(path_, "cannot write");
+    if (written < 0) throw failed(shown_, "cannot be written");
     next += written;
     left -= static_cast<std::size_t>(written);
   }
@@ -73,8 +73,8 @@ void OutputFile::flush() {
 void OutputFile::finish() {
   flush();
   const FileSizeSignalBlock no_signal;
-  if (::fsync(fd_.get()) != 0) throw failed(path_, "cannot sync");
-  if (::close(fd_.release()) != 0) throw failed(path_, "cannot close");
+  if (::fsync(fd_.get()) != 0) throw failed(shown_, "cannot be synced");
+  if (::close(fd_.release()) != 0) throw failed(shown_, "cannot be closed");
 }
 
 }  // namespace terrace::stream::store

@@ -33,7 +33,8 @@ class Descriptor {
 /// thrown as an Error, including one that appears only at fsync or close.
 class OutputFile {
  public:
-  explicit OutputFile(std::filesystem::path path);
+  /// shown: the output in messages, which do not name its temporary files.
+  OutputFile(std::filesystem::path path, std::filesystem::path shown);
 
   void write(ByteView bytes);
   /// Writes the buffer, syncs and closes.
@@ -45,7 +46,7 @@ class OutputFile {
  private:
   void flush();
 
-  std::filesystem::path path_;
+  std::filesystem::path path_, shown_;
   Descriptor fd_;
   Bytes buffer_;
   std::uint64_t size_ = 0, flushed_ = 0;

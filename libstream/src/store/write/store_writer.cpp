@@ -113,7 +113,8 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   const unsigned level = encoded->level;
   while (levels.size() <= level) {
     levels.push_back(std::make_unique<LevelWriter>(
-        staging.folder(), Layout(schema, static_cast<unsigned>(levels.size()), kVersion), team));
+        staging.folder(), staging.target(),
+        Layout(schema, static_cast<unsigned>(levels.size()), kVersion), team));
   }
   if (level == 0) {
     points += encoded->points;
@@ -179,7 +180,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
   if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
-    throw Error({.file = w.staging.folder().string(),
+    throw Error({.file = w.staging.target().string(),
                  .where = {},
                  .cause = "its coordinates are not finite in the CRS: scale or offset of the input "
                           "are too large",
@@ -216,8 +217,8 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   w.schema = std::move(manifest.schema);
   // What was written must be readable: this also finds counts that the caller got wrong.
   const auto path = w.staging.folder() / kManifestName;
-  static_cast<void>(parse_manifest(text, path.string()));
-  OutputFile file(path);
+  static_cast<void>(parse_manifest(text, w.staging.target().string()));
+  OutputFile file(path, w.staging.target());
   file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   file.finish();
   if (publish) w.staging.commit();

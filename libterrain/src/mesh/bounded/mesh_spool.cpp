@@ -40,10 +40,17 @@ void read_back(stream::AtomicFile& file, std::uint64_t count, const std::stop_to
   }
 }
 
+stream::Naming spool_naming(const std::string& path) {
+  stream::Naming naming(true);
+  if (path == "-") naming.shown = "standard output";
+  return naming;
+}
+
 }  // namespace
 
 MeshSpool::MeshSpool(const std::string& path)
-    : vertex_file_(spool_name(path), true), triangle_file_(spool_name(path), true) {}
+    : vertex_file_(spool_name(path), spool_naming(path)),
+      triangle_file_(spool_name(path), spool_naming(path)) {}
 
 void MeshSpool::add_vertex(const stream::Point3& position) {
   add_vertices(std::span(&position, 1));

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
@@ -95,7 +96,7 @@ std::uint64_t checksum_of(std::span<const std::byte> bytes) {
   return sum;
 }
 
-TileJournal::TileJournal(const std::string& folder) : path_(folder + "/" + kName) {
+TileJournal::TileJournal(const std::string& folder) : folder_(folder), path_(folder + "/" + kName) {
   Lines read = read_lines(path_);
   if (read.good_bytes > 0) {
     // What a crash left behind the last whole line goes.
@@ -103,7 +104,9 @@ TileJournal::TileJournal(const std::string& folder) : path_(folder + "/" + kName
     if (fs::file_size(path_, error) != read.good_bytes) {
       fs::resize_file(path_, read.good_bytes, error);
     }
-    if (error) throw stream::system_error(path_, "cannot be written", error.value());
+    if (error)
+      throw stream::system_error(folder_, "the list of finished tiles cannot be written",
+                                 error.value());
     earlier_ = std::move(read.records);
     tidy_ = read.tidy;
     file_.open(path_, std::ios::binary | std::ios::app);
@@ -112,7 +115,8 @@ TileJournal::TileJournal(const std::string& folder) : path_(folder + "/" + kName
     file_ << head_line() << '\n';
   }
   file_.flush();
-  if (!file_) throw stream::system_error(path_, "cannot be written", errno);
+  if (!file_)
+    throw stream::system_error(folder_, "the list of finished tiles cannot be written", errno);
 }
 
 const FinishedTile* TileJournal::find(const TileAddress& tile) const {
@@ -127,7 +131,8 @@ void TileJournal::add(const TileAddress& tile, const FinishedTile& finished) {
     file_.flush();
     if (!file_) failure_ = errno;
   }
-  if (!file_) throw stream::system_error(path_, "cannot be written", failure_);
+  if (!file_)
+    throw stream::system_error(folder_, "the list of finished tiles cannot be written", failure_);
   tidy_ = false;
 }
 
@@ -135,7 +140,9 @@ void TileJournal::finish(std::vector<Record> records) {
   file_.close();
   std::sort(records.begin(), records.end(), by_address);
   if (tidy_ && records == earlier_) return;
-  stream::AtomicFile file(path_, true);
+  stream::Naming naming(true);
+  naming.shown = folder_;
+  stream::AtomicFile file(path_, std::move(naming));
   file.write(head_line() + "\n");
   for (const auto& [tile, finished] : records) file.write(line_of(tile, finished));
   file.commit();

@@ -49,7 +49,7 @@ class TileJournal {
   void finish(std::vector<Record> records);
 
  private:
-  std::string path_;
+  std::string folder_, path_;
   std::vector<Record> earlier_;  ///< sorted by address
   bool tidy_ = true;             ///< the file holds these, in this order
   std::ofstream file_;
