@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -11,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include "temp_folder.hpp"
@@ -257,6 +259,67 @@ TEST(OutputGroup, ThatIsNotCommittedLeavesNothing) {
     EXPECT_EQ(entries(folder.path()), 1);
   }
   EXPECT_EQ(entries(folder.path()), 0);
+}
+
+TEST(AtomicFolder, KeepsAFolderOfOursWithAStrangersFile) {
+  const TempFolder scratch;
+  const fs::path target = scratch.path() / "out";
+  const Naming naming([](const fs::path& there) {
+    return ownership_of_entries(there, [](const fs::directory_entry& entry) {
+      return entry.path().filename() == "mark" ? Ownership(true) : Ownership(false);
+    });
+  });
+  const auto write = [&](const std::string& text) {
+    AtomicFolder folder(target, "mark", naming);
+    std::ofstream(folder.folder() / "mark") << text;
+    folder.commit();
+  };
+  write("old");
+  write("new");
+  EXPECT_EQ(content(target / "mark"), "new");
+  for (const char* name : {"notes.txt", "letter.txt"}) std::ofstream(target / name) << "mine";
+  try {
+    write("newer");
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("contains letter.txt, which terrace did not write"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(content(target / "mark"), "new");
+  EXPECT_EQ(content(target / "notes.txt"), "mine");
+  EXPECT_EQ(entries(scratch.path()), 1);
+}
+
+TEST(AtomicFile, KnowsWhetherItsOutputHasBeenChanged) {
+  const TempFolder folder;
+  const fs::path target = folder.path() / "out.txt";
+  const auto write = [&] {
+    AtomicFile file(target, true);
+    file.write("1 2 3\n");
+    file.commit();
+  };
+  EXPECT_FALSE(is_unchanged_output(target));
+  write();
+  if (::getxattr(target.c_str(), "user.terrace", nullptr, 0) < 0) {
+    GTEST_SKIP() << "the file system has no extended attributes";
+  }
+  EXPECT_TRUE(is_unchanged_output(target));
+  fs::rename(target, folder.path() / "moved");
+  EXPECT_TRUE(is_unchanged_output(folder.path() / "moved"));
+  fs::rename(folder.path() / "moved", target);
+  std::ofstream(target, std::ios::app) << "more\n";
+  EXPECT_FALSE(is_unchanged_output(target));
+  write();
+  EXPECT_TRUE(is_unchanged_output(target));
+  // The same bytes again, an hour ago.
+  std::ofstream(target) << "1 2 3\n";
+  fs::last_write_time(target, fs::last_write_time(target) - std::chrono::hours(1));
+  EXPECT_FALSE(is_unchanged_output(target));
+  fs::remove(target);
+  std::ofstream(target) << "1 2 3\n";
+  EXPECT_FALSE(is_unchanged_output(target));
+  EXPECT_FALSE(is_unchanged_output(folder.path()));
 }
 
 TEST(AtomicFolder, AppearsWholeAndReplacesOnlyWhatIsOurs) {

@@ -326,6 +326,15 @@ class ErrorTest(CommandTest):
                 self.assertEqual(self.bytes_of(out), new)
                 if os.path.isdir(out):
                     continue
+                if not self.is_marked(out):
+                    # Text without a mark, as another program may write it.
+                    os.remove(out)
+                    with open(out, 'wb') as file:
+                        file.write(old)
+                    result = terrace(*command(1), option, out, '--force')
+                    self.assert_one_line_error(result, 1)
+                    self.assertIn('not written by terrace', result.stderr)
+                    self.assertEqual(self.bytes_of(out), old)
                 with open(out, 'w') as file:
                     file.write('A terrace, written by terrace and by hand.\n')
                 letter = self.bytes_of(out)
@@ -333,6 +342,11 @@ class ErrorTest(CommandTest):
                 self.assert_one_line_error(result, 1)
                 self.assertIn('not written by terrace', result.stderr)
                 self.assertEqual(self.bytes_of(out), letter)
+
+    @staticmethod
+    def is_marked(path):
+        """Whether the format has a place for a mark."""
+        return not path.endswith(('.csv', '.txt', '.xyz'))
 
     @staticmethod
     def bytes_of(path):

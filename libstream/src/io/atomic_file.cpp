@@ -14,6 +14,7 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include "io/file_size_signal.hpp"
@@ -26,6 +27,14 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kBufferBytes = 1u << 20;
+
+constexpr const char* kNoteName = "user.terrace";
+
+/// Differs after every change of a file.
+std::string note_of(const struct stat& status) {
+  return "written, " + std::to_string(status.st_size) + " bytes, " +
+         std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec);
+}
 
 }  // namespace
 
@@ -111,6 +120,12 @@ struct AtomicFile::Impl {
   void complete() {
     flush();
     if (::fsync(descriptor) != 0) fail("cannot be synced", errno);
+    // Now that its time is final. Without the attribute the file is still whole.
+    struct stat status {};
+    if (::fstat(descriptor, &status) == 0) {
+      const std::string note = note_of(status);
+      static_cast<void>(::fsetxattr(descriptor, kNoteName, note.data(), note.size(), 0));
+    }
     placement = OutputPlacement(shown, place, temporary, naming);
   }
 
@@ -205,6 +220,15 @@ void OutputGroup::commit() {
   put_together(outputs);
   for (const auto& file : files_) file->finish();
   files_.clear();
+}
+
+bool is_unchanged_output(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return false;
+  std::array<char, 100> note{};
+  const ssize_t size = ::getxattr(path.c_str(), kNoteName, note.data(), note.size());
+  return size > 0 &&
+         std::string_view(note.data(), static_cast<std::size_t>(size)) == note_of(status);
 }
 
 void remove_abandoned(const fs::path& target) { sweep_temporaries(follow_links(target)); }

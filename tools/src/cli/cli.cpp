@@ -197,7 +197,8 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
   app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
       ->group(group);
   app.add_flag("--force", common.force,
-               "Replace an existing output if its format's own mark says that terrace wrote it")
+               "Replace an existing output that terrace wrote: its format's own mark says so, text "
+               "is unchanged since then, and a folder has no files of others")
       ->group(group);
   app.add_option_function<std::string>(
          "--progress",

@@ -20,12 +20,11 @@ inline constexpr std::string_view kBoxTreeHead =
     "a,b,distance,size,level,minx,miny,minz,maxx,maxy,maxz";
 inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 
-/// True if the regular file at `path` is empty or terrace wrote it, which its format says at the
-/// place that the format has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB,
-/// GeoJSON, LAS), the tag Software (TIFF, PNG), the first bytes (overlays), the names of the
-/// columns (CSV). Tables of numbers without such names, and points as CSV, have no place for a
-/// mark: they count as ours if every number and separator in them stands exactly as terrace writes
-/// it.
+/// True if the regular file at `path` is empty or terrace wrote it. Its format says so at the place
+/// that the format has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB,
+/// GeoJSON, LAS), the tag Software (TIFF, PNG), the first bytes (overlays). Text has no such place
+/// (points as CSV and XYZ, tables, labels), and any program may write the very same: it counts as
+/// ours as long as nothing has changed it (stream::is_unchanged_output).
 bool written_by_terrace(const std::string& path);
 
 /// A CRS for the header of points, found when it is asked for: with WKT 1, which LAS wants. A CRS

@@ -162,6 +162,11 @@ class AtomicFolder {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Whether a writer of this library made the regular file at `path` and nothing has changed it
+/// since. Commit() notes size and time of the file in its extended attribute "user.terrace"; a file
+/// that has lost it (most copies do) and one on a file system without such attributes do not count.
+[[nodiscard]] bool is_unchanged_output(const std::filesystem::path& path);
+
 /// Removes temporary files left by killed writers of `target`, as the next AtomicFile for it would.
 void remove_abandoned(const std::filesystem::path& target);
 
