@@ -51,7 +51,7 @@ class Where::Parser {
   void parse() {
     constexpr std::size_t kMostCharacters = 4096;
     if (text_.size() > kMostCharacters) {
-      fail("is longer than " + std::to_string(kMostCharacters) + " characters");
+      fail("is longer than " + counted(kMostCharacters, "character"));
     }
     expression(0);
     if (at_ < text_.size()) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/units.hpp"
 
+#include <cmath>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -59,6 +60,11 @@ TEST(Readable, IsShort) {
   EXPECT_EQ(counted(0, "tile"), "0 tiles");
   EXPECT_EQ(counted(1, "tile"), "1 tile");
   EXPECT_EQ(counted(1234, "level"), "1,234 levels");
+  EXPECT_EQ(counted(1, "vertex") + " of " + counted(2, "vertex"), "1 vertex of 2 vertices");
+  EXPECT_EQ(counted(4, "tetrahedron"), "4 tetrahedra");
+  EXPECT_EQ(counted(2, "entry"), "2 entries");
+  EXPECT_EQ(counted(1, "sample", "lies", "lie") + " here", "1 sample lies here");
+  EXPECT_EQ(counted(0, "sample", "lies", "lie"), "0 samples lie");
   EXPECT_EQ(readable_bytes(12), "12 bytes");
   EXPECT_EQ(readable_bytes(256u << 20), "256 MiB");
   EXPECT_EQ(readable_bytes((std::uint64_t{3} << 30) + (std::uint64_t{1} << 28)), "3.25 GiB");
@@ -83,6 +89,17 @@ TEST(Readable, IsShort) {
   EXPECT_EQ(readable_seconds(0.84), "0.8 s");
   EXPECT_EQ(readable_seconds(245), "4:05");
   EXPECT_EQ(readable_seconds(3723), "1:02:03");
+}
+
+TEST(PlainNumber, HasNoExponentWhereItNeedsNone) {
+  EXPECT_EQ(plain_number(5e5), "500000");
+  EXPECT_EQ(plain_number(-1.5e-5), "-0.000015");
+  EXPECT_EQ(plain_number(0.1), "0.1");
+  EXPECT_EQ(plain_number(0), "0");
+  EXPECT_EQ(plain_number(123456789.125), "123456789.125");
+  EXPECT_EQ(plain_number(1e300), "1e+300");
+  EXPECT_EQ(plain_number(-3e38), "-3e+38");
+  EXPECT_EQ(plain_number(NAN), "nan");
 }
 
 TEST(NumberText, ReadsBackAsTheSameDouble) {

@@ -11,6 +11,7 @@
 
 #include "format/missing.hpp"
 #include "format/selection.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "with_type.hpp"
 
@@ -26,9 +27,8 @@ class ColumnSource final : public PointSource {
   ColumnSource(MemoryPoints points, const SourceOptions& options)
       : points_(std::move(points)), block_points_(std::max<std::size_t>(options.block_points, 1)) {
     if (points_.attributes.size() != points_.info.attributes.size()) {
-      throw std::invalid_argument("there are " + std::to_string(points_.attributes.size()) +
-                                  " columns of " + std::to_string(points_.info.attributes.size()) +
-                                  " attributes");
+      throw std::invalid_argument("there are " + counted(points_.attributes.size(), "column") +
+                                  " of " + counted(points_.info.attributes.size(), "attribute"));
     }
     points_.info.points = points_.count;
     if (options.crs) points_.info.crs = *options.crs;

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -106,8 +107,8 @@ void GivenBytes::add_file(const std::string& name, std::uint64_t size) {
   if (added) {
     at->second.size = size;
   } else if (at->second.size != size) {
-    throw impossible(name, "was said to have " + std::to_string(at->second.size) +
-                               " bytes and now has " + std::to_string(size));
+    throw impossible(name, "was said to have " + counted(at->second.size, "byte") +
+                               " and now has " + std::to_string(size));
   }
 }
 

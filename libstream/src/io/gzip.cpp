@@ -7,6 +7,7 @@
 
 #include <libdeflate.h>
 
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -56,8 +57,8 @@ std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t mo
   if (!is_gzip(bytes) || bytes.size() < kLeast) refuse(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
   if (size > most) {
-    refuse(name, "states " + std::to_string(size) + " bytes, more than the " +
-                     std::to_string(most) + " that it may hold");
+    refuse(name, "states " + counted(size, "byte") + ", more than the " + std::to_string(most) +
+                     " that it may hold");
   }
   const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
       libdeflate_alloc_decompressor());

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -52,7 +53,7 @@ bool LineReader::next(std::string_view& line) {
   if (length > kMaxLine) {
     throw Error({.file = input_->name(),
                  .where = "line " + std::to_string(number_ + 1),
-                 .cause = "longer than " + std::to_string(kMaxLine) + " bytes",
+                 .cause = "longer than " + counted(kMaxLine, "byte"),
                  .remedy = "this is not a text of points, or its line ends are missing"});
   }
   pending_ = length + line_end;

@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "terrace/stream/unit_words.hpp"
+
 namespace terrace::stream {
 
 /// A blank inside a line.
@@ -27,6 +29,11 @@ std::string_view trim(std::string_view line);
 std::vector<std::string_view> split_fields(std::string_view line, char separator);
 /// `field` without the single or double quotes around it.
 std::string_view unquoted(std::string_view field);
+/// "1 point", "12345 points" for an error message.
+template <class Number>
+std::string counted(Number number, std::string_view noun) {
+  return std::to_string(number) + ' ' + noun_for(number == 1, noun);
+}
 /// `text` prepared for an error message: in quotes, cut to 40 characters, without unprintable ones.
 std::string in_quotes(std::string_view text);
 

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "io/text.hpp"
 #include "store/overlay_page.hpp"
 #include "terrace/stream/atomic_file.hpp"
 
@@ -74,7 +75,7 @@ OverlayWriter::OverlayWriter(const std::filesystem::path& path, const Store& sto
                              const std::string& channel, Naming replace) {
   if (channel.size() > kMostOverlayNameBytes) {
     throw std::invalid_argument("the channel of an overlay has a name of " +
-                                std::to_string(channel.size()) + " bytes, at most 65535 fit");
+                                counted(channel.size(), "byte") + ", at most 65535 fit");
   }
   impl_ = std::make_unique<Impl>(
       Impl{.file = AtomicFile(path, std::move(replace)), .store = store, .channel = channel});
@@ -96,7 +97,7 @@ void OverlayWriter::add(ClusterId cluster, std::uint32_t index, double value) {
   if (!std::isfinite(value)) impl.refuse(cluster, index, "is not a finite number");
   impl.look_up(cluster, index);
   if (index >= impl.members) {
-    impl.refuse(cluster, index, "the cluster has " + std::to_string(impl.members) + " points");
+    impl.refuse(cluster, index, "the cluster has " + counted(impl.members, "point"));
   }
   if (id != impl.last_cluster && impl.page.values.size() >= kOverlayPageValues) impl.write_page();
   impl.page.add(cluster, {index, value});

@@ -146,8 +146,8 @@ Region Region::parse(const std::string& text, const std::stop_token& stop) {
     } else if (v.size() == 6) {
       region.box_ = {.min = {v[0], v[1], v[2]}, .max = {v[3], v[4], v[5]}};
     } else {
-      throw UsageError("the box '" + text + "' has " + std::to_string(v.size()) +
-                       " numbers; write minx,miny,maxx,maxy or minx,miny,minz,maxx,maxy,maxz");
+      throw UsageError("the box '" + text + "' has " + counted(v.size(), "number") +
+                       "; write minx,miny,maxx,maxy or minx,miny,minz,maxx,maxy,maxz");
     }
     if (region.box_.empty()) {
       throw UsageError("the box '" + text + "' has a minimum above its maximum" +

@@ -47,9 +47,8 @@ void need_all_points(const stream::Store& store, unsigned level, std::uint64_t p
   if (points == expected) return;
   throw stream::Error({.file = store.path().string(),
                        .where = "level " + std::to_string(level),
-                       .cause = "the clusters have " + std::to_string(points) +
-                                " points and not the " + std::to_string(expected) +
-                                " that the manifest tells",
+                       .cause = "the clusters have " + counted(points, "point") + " and not the " +
+                                std::to_string(expected) + " that the manifest tells",
                        .remedy = "restore the files or build the store anew"});
 }
 

@@ -6,6 +6,9 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/unit_words.hpp>
+
+#include "base/units.hpp"
 
 namespace terrace::terrain {
 
@@ -66,7 +69,8 @@ std::size_t CornerReader::operator()(std::span<const std::byte> record,
     if (!(vertices >= 2 && vertices <= static_cast<double>(count))) {
       throw stream::Error({.file = file_,
                            .where = {},
-                           .cause = "an entity of " + std::to_string(vertices) + " vertices",
+                           .cause = "an entity of " + plain_number(vertices) + ' ' +
+                                    stream::noun_for(vertices == 1, "vertex"),
                            .remedy = "the store is damaged; build it again"});
     }
     count = static_cast<std::size_t>(vertices);

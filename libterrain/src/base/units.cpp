@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include <terrace/stream/unit_words.hpp>
+
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -127,7 +129,12 @@ std::string with_commas(std::uint64_t value) {
 }
 
 std::string counted(std::uint64_t number, std::string_view noun) {
-  return with_commas(number) + ' ' + std::string(noun) + (number == 1 ? "" : "s");
+  return with_commas(number) + ' ' + stream::noun_for(number == 1, noun);
+}
+
+std::string counted(std::uint64_t number, std::string_view noun, std::string_view verb_of_one,
+                    std::string_view verb_of_more) {
+  return counted(number, noun) + ' ' + std::string(number == 1 ? verb_of_one : verb_of_more);
 }
 
 std::string readable_bytes(std::uint64_t bytes) {
@@ -197,6 +204,15 @@ std::string number_text(double value) {
   std::array<char, 40> text{};
   const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc{} ? std::string(text.data(), end) : std::string("nan");
+}
+
+std::string plain_number(double value) {
+  const double size = std::fabs(value);
+  if (!(size >= 1e-9 && size < 1e15)) return number_text(value);
+  std::array<char, 64> text{};
+  const auto [end, error] =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
+  return error == std::errc{} ? std::string(text.data(), end) : number_text(value);
 }
 
 }  // namespace terrace::terrain

@@ -41,8 +41,11 @@ std::vector<double> parse_numbers(std::string_view text, std::string_view what);
 
 /// "12,345,678".
 std::string with_commas(std::uint64_t value);
-/// "1 level", "12,345 tiles": a number and what is counted, with an s unless there is one.
+/// "1 level", "12,345 tiles", "2 vertices": a number and what is counted.
 std::string counted(std::uint64_t number, std::string_view noun);
+/// "1 sample lies", "2 samples lie".
+std::string counted(std::uint64_t number, std::string_view noun, std::string_view verb_of_one,
+                    std::string_view verb_of_more);
 /// "3.2 GiB", "640 MiB", "12 bytes".
 std::string readable_bytes(std::uint64_t bytes);
 /// "12.3 M/s", "45 k/s": a rate for people.
@@ -51,6 +54,8 @@ std::string readable_rate(double per_second);
 std::string readable_seconds(double seconds);
 /// The shortest text that reads back as the same double: "0.1", "1e+20", "nan".
 std::string number_text(double value);
+/// The same for people: without an exponent from 1e-9 up to 1e15, as in "500000".
+std::string plain_number(double value);
 /// A number for people, of so many digits, but never without those before the point: "2.99",
 /// "1,834", "0.00012", "4345.68" (of 6), "nan". Of 10 digits, as coordinates have, no commas.
 std::string readable_number(double value, int digits = 3);

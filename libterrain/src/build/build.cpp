@@ -189,9 +189,9 @@ void check_cells(const stream::SourceInfo& info) {
       {.file = info.files.empty() ? std::string() : info.files.front(),
        .where = {},
        .cause = std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
-                " cannot be told apart: steps of " + number_text(std::hypot(m[0], m[3])) + " x " +
-                number_text(std::hypot(m[1], m[4])) + " from " + number_text(m[2]) + ", " +
-                number_text(m[5]),
+                " cannot be told apart: steps of " + plain_number(std::hypot(m[0], m[3])) + " x " +
+                plain_number(std::hypot(m[1], m[4])) + " from " + plain_number(m[2]) + ", " +
+                plain_number(m[5]),
        .remedy =
            info.grid ? "correct the size of its cells" : "correct the scale of its coordinates"});
 }
@@ -454,12 +454,13 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
   outcome.level_points = result.level_points;
   outcome.level_clusters = result.level_clusters;
   if (so_far.empty_values > 0) {
-    context.say(std::to_string(so_far.empty_values) +
-                " attributes have no value in their file; they are NaN");
+    context.say(counted(so_far.empty_values, "attribute", "has no value in its file; it is NaN",
+                        "have no value in their file; they are NaN"));
   }
   if (so_far.withheld > 0) {
-    context.say(std::to_string(so_far.withheld) +
-                " points are marked as withheld in their file; they are kept, with the mark");
+    context.say(counted(so_far.withheld, "point",
+                        "is marked as withheld in its file; it is kept, with the mark",
+                        "are marked as withheld in their file; they are kept, with the mark"));
   }
   tell_spooled(info, context);
   if (!info.note.empty()) context.say(info.note);

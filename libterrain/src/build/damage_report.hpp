@@ -32,7 +32,7 @@ class DamageReport {
     return [this](const stream::Error& damage, std::uint64_t points) {
       const stream::Error::Parts& parts = damage.parts();
       std::string line = parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
-                         parts.cause + " (" + with_commas(points) + " points left out)";
+                         parts.cause + " (" + counted(points, "point") + " left out)";
       const std::lock_guard lock(mutex_);
       // One of several files is opened twice: to check that they agree, and to read it.
       if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
@@ -45,7 +45,7 @@ class DamageReport {
     const std::lock_guard lock(mutex_);
     for (const std::string& line : lines_) context.say(line);
     if (parts_ > lines_.size()) {
-      context.say("and " + with_commas(parts_ - lines_.size()) + " more damaged parts");
+      context.say("and " + counted(parts_ - lines_.size(), "more damaged part"));
     }
   }
 

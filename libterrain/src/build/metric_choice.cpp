@@ -51,7 +51,7 @@ stream::Box3 box_of(const nlohmann::json& json, const Place& place) {
   } else if (v.size() == 6) {
     box = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
   } else {
-    place.fail("\"box\" has " + std::to_string(v.size()) + " numbers, not 4 or 6");
+    place.fail("\"box\" has " + counted(v.size(), "number") + ", not 4 or 6");
   }
   if (box.empty()) place.fail("\"box\" is empty: a minimum exceeds its maximum");
   return box;
@@ -91,7 +91,7 @@ MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
   if (!json.contains("semi_axes")) place.fail("has no \"semi_axes\"");
   const std::vector<double> lengths = numbers(json["semi_axes"], "semi_axes", place);
   if (lengths.size() != 2 && lengths.size() != 3) {
-    place.fail("\"semi_axes\" has " + std::to_string(lengths.size()) + " numbers, not 2 or 3");
+    place.fail("\"semi_axes\" has " + counted(lengths.size(), "number") + ", not 2 or 3");
   }
   std::optional<stream::Box3> box;
   if (json.contains("box")) box = box_of(json["box"], place);

@@ -38,7 +38,7 @@ class UndeclaredVoids {
   /// Empty if there are none.
   [[nodiscard]] std::string note() const {
     if (count_ == 0) return {};
-    const std::string value = number_text(value_);
+    const std::string value = plain_number(value_);
     const std::string file = info_.files.size() == 1 ? info_.files.front() : "FILE";
     std::string remedy;
     if (!info_.grid) {
@@ -49,9 +49,10 @@ class UndeclaredVoids {
     } else {
       remedy = "declare the value: gdal_edit.py -a_nodata " + value + " " + file;
     }
-    return (info_.files.size() == 1 ? file + ": " : std::string()) + with_commas(count_) +
-           (info_.grid ? " cells" : " points") + " have heights beyond 1e30, such as " + value +
-           ", and are kept; if these mean no data, " + remedy;
+    return (info_.files.size() == 1 ? file + ": " : std::string()) +
+           counted(count_, info_.grid ? "cell" : "point", "has a height", "have heights") +
+           " beyond 1e30, such as " + value + (count_ == 1 ? ", and is" : ", and are") +
+           " kept; if these mean no data, " + remedy;
   }
 
  private:

@@ -118,7 +118,7 @@ void ContourText::append(std::string& text, const ContourLine& line,
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
     throw stream::Error({.file = file_,
                          .where = {},
-                         .cause = number_text(at[0]) + ',' + number_text(at[1]) +
+                         .cause = plain_number(at[0]) + ',' + plain_number(at[1]) +
                                   " has no longitude and latitude in " +
                                   geography_->system().title(),
                          .remedy = "build the store with the right `crs`, or leave the "

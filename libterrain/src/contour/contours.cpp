@@ -38,7 +38,7 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
   const auto level = [&](double raw) { return (raw * z.scale + z.offset) / request.interval; };
   const stream::Box3& bounds = store.bounds();
   if (std::max(std::abs(level(bounds.min[2])), std::abs(level(bounds.max[2]))) > kMostLevels) {
-    throw failure(store, "heights have too many levels of " + number_text(request.interval),
+    throw failure(store, "heights have too many levels of " + plain_number(request.interval),
                   "give a larger `interval`");
   }
   double low = bounds.min[2], high = bounds.max[2];
@@ -54,8 +54,8 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
   if (levels <= kMostLevelsDrawn) return;
   throw failure(store,
                 "between the lowest and the highest point there are " +
-                    with_commas(static_cast<std::uint64_t>(levels)) + " levels of " +
-                    number_text(request.interval) + ", more than " +
+                    counted(static_cast<std::uint64_t>(levels), "level") + " of " +
+                    plain_number(request.interval) + ", more than " +
                     with_commas(static_cast<std::uint64_t>(kMostLevelsDrawn)),
                 "give a larger `interval`");
 }
@@ -109,8 +109,8 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
                       throw failure(
                           store,
                           "contour lines that are not at their ends have more than " +
-                              with_commas(memory / 3 / kContourBytesPerPoint) +
-                              " points, too many for `memory_bytes`",
+                              counted(memory / 3 / kContourBytesPerPoint, "point") +
+                              ", too many for `memory_bytes`",
                           "raise `memory_bytes` or `interval`, or take a smaller `region`");
                     },
                 .stop = context.stop},

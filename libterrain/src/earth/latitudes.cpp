@@ -45,8 +45,8 @@ void LatitudeCheck::operator()(std::span<const stream::Point3> stored) const {
     const double x = m[0] * p[0] + m[1] * p[1] + m[2];
     throw stream::Error(
         {.file = file_,
-         .where = "point " + number_text(x) + ' ' + number_text(y),
-         .cause = "the latitude " + number_text(y * degrees_) + " is beyond a pole",
+         .where = "point " + plain_number(x) + ' ' + plain_number(y),
+         .cause = "the latitude " + plain_number(y * degrees_) + " is beyond a pole",
          .remedy = "x is the longitude and y the latitude: exchange them if they are the wrong way "
                    "round, or name the right `crs`"});
   }

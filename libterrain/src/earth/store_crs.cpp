@@ -231,7 +231,7 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
       stream::Point3& p = points[first + i];
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {
         throw stream::Error({.file = {},
-                             .where = "point " + number_text(p[0]) + " " + number_text(p[1]),
+                             .where = "point " + plain_number(p[0]) + " " + plain_number(p[1]),
                              .cause = "has no place in " + change_->to().title(),
                              .remedy = "take another `to_crs` or a smaller `region`"});
       }

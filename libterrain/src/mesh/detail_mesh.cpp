@@ -22,6 +22,7 @@
 
 #include "base/store_checks.hpp"
 #include "base/stored_entities.hpp"
+#include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "mesh/matching_points.hpp"
 #include "mesh/mesh_heights.hpp"
@@ -130,7 +131,7 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
   if (needed <= memory_bytes && points <= kMostVertices) return;
   throw stream::Error({.file = store.path().string(),
                        .where = {},
-                       .cause = "a mesh of " + std::to_string(points) + " points needs " +
+                       .cause = "a mesh of " + counted(points, "point") + " needs " +
                                 std::to_string((needed >> 20) + 1) +
                                 "M of memory, `memory_bytes` allows " +
                                 std::to_string(memory_bytes >> 20) + "M",

@@ -33,7 +33,7 @@ void check_surface_memory(const stream::Store& store, const Detail& detail,
   if (needed <= memory_bytes) return;
   throw stream::Error({.file = store.path().string(),
                        .where = {},
-                       .cause = "a surface of " + with_commas(points) + " points needs " +
+                       .cause = "a surface of " + counted(points, "point") + " needs " +
                                 readable_bytes(needed) + ", `memory_bytes` allows " +
                                 readable_bytes(memory_bytes),
                        .remedy = "take a coarser `level` or a smaller `region`"});

@@ -13,6 +13,7 @@
 
 #include "base/available_memory.hpp"
 #include "base/parallel.hpp"
+#include "base/units.hpp"
 #include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
 #include "surface/point_hull.hpp"
@@ -277,8 +278,8 @@ class PointSampler final : public HeightSampler {
         2 * std::max(memory_ + (std::uint64_t{1} << 20), static_cast<std::uint64_t>(bytes));
     throw stream::Error({.file = store_.path().string(),
                          .where = {},
-                         .cause = "more than " + std::to_string(room_) +
-                                  " points lie close together, too many for `memory_bytes`",
+                         .cause = "more than " + counted(room_, "point") +
+                                  " lie close together, too many for `memory_bytes`",
                          .remedy = "give " + std::to_string((needed >> 20) + 1) +
                                    "M of memory or more, or a coarser `level`"});
   }

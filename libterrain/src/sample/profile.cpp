@@ -85,7 +85,7 @@ class ProfileRun {
     if (!(rows > kMostRows)) return;
     throw UsageError(std::string(request_.step ? "`step` is too small" : "the line is too long") +
                      ": the profile would have more than " +
-                     with_commas(static_cast<std::uint64_t>(kMostRows)) + " rows");
+                     counted(static_cast<std::uint64_t>(kMostRows), "row"));
   }
 
   /// Every so many metres of the leg.

@@ -99,7 +99,7 @@ double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned
 std::uint32_t count_of(double cells) {
   if (!(cells <= kMostGridCells)) {
     throw UsageError("`cell` is too small: a side of the raster would have " +
-                     number_text(std::ceil(cells)) + " cells");
+                     plain_number(std::ceil(cells)) + " cells");
   }
   return static_cast<std::uint32_t>(std::max(1.0, cells));
 }

@@ -86,7 +86,7 @@ class Answers {
               throw stream::Error(
                   {.file = file_.name(),
                    .where = "line " + std::to_string(batch.first_line + i),
-                   .cause = "the latitude " + number_text(places_[i][1]) + " is beyond a pole",
+                   .cause = "the latitude " + plain_number(places_[i][1]) + " is beyond a pole",
                    .remedy = "places are longitude, latitude: name the columns lon and lat, or "
                              "exchange them"});
             }

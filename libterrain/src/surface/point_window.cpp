@@ -10,6 +10,8 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/units.hpp"
+
 namespace terrace::terrain {
 namespace {
 
@@ -62,8 +64,8 @@ void PointWindow::check_memory(std::size_t more) const {
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
   throw NoRoom({.file = store_.path().string(),
                 .where = {},
-                .cause = "a window of at least " + std::to_string(around + inserted) +
-                         " points needs " + std::to_string((needed >> 20) + 1) + "M of memory, " +
+                .cause = "a window of at least " + counted(around + inserted, "point") + " needs " +
+                         std::to_string((needed >> 20) + 1) + "M of memory, " +
                          std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
                 .remedy = "give more `memory_bytes`, fewer `threads`, or a coarser `level`"});
 }

@@ -338,10 +338,10 @@ double number_of_option(const std::string& name, const std::string& text,
                         const NumberRange& range) {
   const double value = parse_number(text, name);
   if (value < range.least || (range.above_least && value == range.least) || value > range.most) {
-    std::string wanted = range.above_least        ? "above " + number_text(range.least)
-                         : std::isinf(range.most) ? "at least " + number_text(range.least)
-                                                  : "from " + number_text(range.least) + " to " +
-                                                        number_text(range.most);
+    std::string wanted = range.above_least        ? "above " + plain_number(range.least)
+                         : std::isinf(range.most) ? "at least " + plain_number(range.least)
+                                                  : "from " + plain_number(range.least) + " to " +
+                                                        plain_number(range.most);
     throw UsageError(name + " must be " + wanted + ", not " + text);
   }
   return value;
@@ -364,7 +364,7 @@ CLI::Option* add_any_number(CLI::App& app, const std::string& name, Value& value
 
 CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
                         const std::string& description, const NumberRange& range) {
-  return add_any_number(app, name, value, description, range)->default_str(number_text(value));
+  return add_any_number(app, name, value, description, range)->default_str(plain_number(value));
 }
 
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,

@@ -177,8 +177,8 @@ Line parse_line(const std::string& text) {
       text.find_first_not_of("0123456789+-.,eE ") == std::string::npos) {
     const std::vector<double> v = parse_numbers(text, "--line");
     if (v.size() < 4 || v.size() % 2 != 0) {
-      throw UsageError("--line has " + std::to_string(v.size()) +
-                       " numbers; write x1,y1,x2,y2 and more pairs if wanted");
+      throw UsageError("--line has " + counted(v.size(), "number") +
+                       "; write x1,y1,x2,y2 and more pairs if wanted");
     }
     for (std::size_t i = 0; i < v.size(); i += 2) line.places.push_back({v[i], v[i + 1]});
     return line;
@@ -192,7 +192,7 @@ Line parse_line(const std::string& text) {
   } catch (const nlohmann::json::exception& error) {
     throw bad(std::string("is not GeoJSON (") + error.what() + ")");
   }
-  if (lines.size() != 1) throw bad("holds " + std::to_string(lines.size()) + " lines");
+  if (lines.size() != 1) throw bad("holds " + counted(lines.size(), "line"));
   if (lines.front().size() < 2) throw bad("the line has fewer than two places");
   line.places = std::move(lines.front());
   return line;

@@ -46,7 +46,7 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     if (labels.size() > points) {
       throw stream::Error({.file = path,
                            .where = where,
-                           .cause = "has more lines than the " + with_commas(points) + " points",
+                           .cause = "has more lines than the " + counted(points, "point"),
                            .remedy = "give the labels of these points, in the order of the input"});
     }
   }
@@ -57,11 +57,11 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
                          .remedy = "check the disk"});
   }
   if (labels.size() < points) {
-    throw stream::Error({.file = path,
-                         .where = {},
-                         .cause = "has " + with_commas(labels.size()) + " labels for " +
-                                  with_commas(points) + " points",
-                         .remedy = "give the labels of these points, in the order of the input"});
+    throw stream::Error(
+        {.file = path,
+         .where = {},
+         .cause = "has " + counted(labels.size(), "label") + " for " + counted(points, "point"),
+         .remedy = "give the labels of these points, in the order of the input"});
   }
   return labels;
 }

@@ -43,7 +43,7 @@ class Checker {
         return "names node " + std::to_string(node) + " before the row that makes it";
       }
       return "names " + std::string(tree_ ? "node " : "point ") + std::to_string(node) +
-             ", but there are " + with_commas(points_) + " points";
+             ", but there are " + counted(points_, "point");
     }
     if (row.a == row.b) return "joins " + std::to_string(row.a) + " with itself";
     for (const std::uint32_t node : {row.a, row.b}) {
@@ -51,13 +51,13 @@ class Checker {
         return "joins " + std::to_string(node) + ", which an earlier row has joined";
     }
     if (!(row.distance >= 0 && std::isfinite(row.distance))) {
-      return "has the distance " + number_text(row.distance);
+      return "has the distance " + plain_number(row.distance);
     }
     taken_[row.a] = taken_[row.b] = true;
     if (!tree_) return {};
     const Node &a = nodes_[row.a], &b = nodes_[row.b];
     if (row.size != a.size + b.size) {
-      return "says that its node has " + std::to_string(row.size) + " points below; it has " +
+      return "says that its node has " + counted(row.size, "point") + " below; it has " +
              std::to_string(a.size + b.size);
     }
     if (row.level <= std::max(a.level, b.level)) {
@@ -105,7 +105,7 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
       fail(rows->where(), "is not a row " + std::string(result.tree ? kTreeHead : kPairsHead));
     }
     if (result.lines.size() == most) {
-      fail(rows->where(), "is one row too many for " + with_commas(points) + " points");
+      fail(rows->where(), "is one row too many for " + counted(points, "point"));
     }
     const std::string fault = checker.fault(row, result.lines.size());
     if (!fault.empty()) fail(rows->where(), fault);
@@ -113,8 +113,8 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
     result.top = std::max(result.top, row.level);
   }
   if (result.tree && result.lines.size() < most) {
-    fail("", "has " + with_commas(result.lines.size()) + " rows; a tree of " + with_commas(points) +
-                 " points has " + with_commas(most));
+    fail("", "has " + counted(result.lines.size(), "row") + "; a tree of " +
+                 counted(points, "point") + " has " + with_commas(most));
   }
   return result;
 }

@@ -108,8 +108,8 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   });
   table.nodata = source->progress().nodata;
   if (table.nodata > 0 && !table.info.grid) {
-    common.context().say(with_commas(table.nodata) +
-                         " points without a coordinate are left out: "
+    common.context().say(counted(table.nodata, "point") +
+                         " without a coordinate are left out: "
                          "numbers of points do not count them");
   }
   if (table.positions.empty()) {

@@ -140,6 +140,8 @@ class BuildCommand final : public Command {
   }
 
  private:
+  /// What the store holds, one of it.
+  [[nodiscard]] std::string entity() const { return entities_.substr(0, entities_.size() - 1); }
   Summary build(const CommonOptions& common) {
     const Stopwatch watch;
     return_freed_memory();
@@ -162,21 +164,22 @@ class BuildCommand final : public Command {
                     {"reordered", outcome.order.reordered},
                     {"spread", outcome.order.spread},
                     {"temporary_bytes", outcome.order.temporary_bytes}};
-    const std::string outliers =
-        std::isfinite(request_.outlier_price)
-            ? with_commas(outcome.outliers) + " of them are marked: outlier = 1\n"
-            : std::string();
+    const std::string outliers = std::isfinite(request_.outlier_price)
+                                     ? with_commas(outcome.outliers) + " of them" +
+                                           (outcome.outliers == 1 ? " is" : " are") +
+                                           " marked: outlier = 1\n"
+                                     : std::string();
     std::string left_out;
     if (outcome.nodata > 0) {
-      left_out = with_commas(outcome.nodata) +
-                 (outcome.raster ? " cells without data" : " without a coordinate");
+      left_out = outcome.raster ? counted(outcome.nodata, "cell") + " without data"
+                                : with_commas(outcome.nodata) + " without a coordinate";
     }
     if (outcome.excluded > 0) {
-      left_out += (left_out.empty() ? "" : " and ") + with_commas(outcome.excluded) +
-                  " points that were not selected";
+      left_out += (left_out.empty() ? "" : " and ") +
+                  counted(outcome.excluded, "point", "that was", "that were") + " not selected";
     }
     if (!left_out.empty()) left_out = " (" + left_out + " left out)";
-    summary.text = with_commas(outcome.points) + " " + entities_ + left_out + " in " +
+    summary.text = counted(outcome.points, entity()) + left_out + " in " +
                    readable_seconds(seconds) + ", " + readable_rate(rate) + "\n" + outliers +
                    output_ + ": " + counted(outcome.top + 1, "level") + ", " +
                    readable_bytes(outcome.store_bytes) + ", peak memory " +
@@ -239,8 +242,8 @@ class BuildCommand final : public Command {
                       {"store_bytes", bytes},
                       {"seconds", seconds * scale},
                       {"temporary_bytes", temporary}};
-      summary.text = "about " + with_commas(static_cast<std::uint64_t>(points)) + " " + entities_ +
-                     ", " + readable_bytes(bytes) + " of disk" +
+      summary.text = "about " + counted(static_cast<std::uint64_t>(points), entity()) + ", " +
+                     readable_bytes(bytes) + " of disk" +
                      (temporary > 0 ? " and " + readable_bytes(temporary) + " more while it runs"
                                     : std::string()) +
                      ", " + readable_seconds(seconds * scale) + "; nothing was written\n";

@@ -204,12 +204,12 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
     label = number[label];
   }
   if (used < request.k) {
-    outcome.notes.push_back("there are only " + std::to_string(used) +
-                            " distinct points: as many clusters");
+    outcome.notes.push_back(std::string(used == 1 ? "there is only " : "there are only ") +
+                            counted(used, "distinct point") + ", so there are no more clusters");
   }
   if (!result.converged) {
-    outcome.notes.push_back("k-means stopped after " + std::to_string(result.iterations) +
-                            " iterations, before it had come to rest");
+    outcome.notes.push_back("k-means stopped after " + counted(result.iterations, "iteration") +
+                            ", before it had come to rest");
   }
   outcome.representatives = cluster::nearest_to_means(points, outcome.labels, used);
   return outcome;
@@ -296,7 +296,7 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
       std::size_t{*std::max_element(outcome.labels.begin(), outcome.labels.end())} + 1;
   if (request.k != 0 && clusters < request.k) {
     outcome.notes.push_back("merges of equal height leave no cut into " +
-                            std::to_string(request.k) + " clusters: there are " +
+                            counted(request.k, "cluster") + ": there are " +
                             std::to_string(clusters));
   }
   outcome.representatives = cluster::nearest_to_means(problem.points, outcome.labels, clusters);
@@ -440,7 +440,7 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
   text = counted(points, "point") + ", ";
   if (!outcome.labels.empty()) {
     text += counted(outcome.representatives.size(), "cluster");
-    if (outliers > 0) text += " and " + with_commas(outliers) + " outliers";
+    if (outliers > 0) text += " and " + counted(outliers, "outlier");
     text += ", ";
   }
   text += readable_seconds(watch.seconds()) + "\n";
@@ -553,7 +553,7 @@ class ClusterCommand final : public Command {
       throw stream::Error(
           {.file = input_,
            .where = {},
-           .cause = "has " + with_commas(table.size()) + " points",
+           .cause = "has " + counted(table.size(), "point"),
            .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
     }
     need_memory(table, common);
@@ -615,7 +615,7 @@ class ClusterCommand final : public Command {
     if (needed > memory) {
       throw stream::Error({.file = input_,
                            .where = {},
-                           .cause = "clustering its " + with_commas(table.size()) + " points by " +
+                           .cause = "clustering its " + counted(table.size(), "point") + " by " +
                                     method_ + " needs " + std::to_string((needed >> 20) + 1) +
                                     " MiB, --memory is " + readable_bytes(memory),
                            .remedy = "raise --memory, or build a store, which takes points of any "

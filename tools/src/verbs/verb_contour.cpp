@@ -61,7 +61,7 @@ class ContourCommand final : public Command {
     summary.json = {
         {"lines", outcome.lines}, {"closed", outcome.closed}, {"points", outcome.points}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(outcome.lines) + " lines, " +
+    summary.text = output_ + ": " + counted(outcome.lines, "line") + ", " +
                    with_commas(outcome.closed) + " of them closed, " +
                    counted(outcome.points, "point") + " in " + readable_seconds(watch.seconds()) +
                    "\n";

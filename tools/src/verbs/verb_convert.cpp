@@ -119,14 +119,16 @@ class ConvertCommand : public Command {
     summary.add_cost(watch);
     const stream::Progress done = source->progress();
     std::string left_out;
-    if (done.excluded > 0) left_out = with_commas(done.excluded) + " were not selected";
+    if (done.excluded > 0)
+      left_out =
+          with_commas(done.excluded) + (done.excluded == 1 ? " was" : " were") + " not selected";
     if (done.nodata > 0 && !info.grid) {
       left_out +=
           (left_out.empty() ? "" : ", ") + with_commas(done.nodata) + " lacked a coordinate";
     }
     if (done.empty_values > 0) {
-      left_out += (left_out.empty() ? "" : ", ") + with_commas(done.empty_values) +
-                  " attributes without a value are NaN";
+      left_out += (left_out.empty() ? "" : ", ") + counted(done.empty_values, "attribute") +
+                  " without a value are NaN";
     }
     summary.text = output_ + ": " + counted(writer->points(), "point") +
                    (left_out.empty() ? "" : " (" + left_out + ")") + ", " +

@@ -107,7 +107,7 @@ std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
     } else if (!change.identity()) {
       text += ", to WGS 84 by " + change.description();
     } else if (change.accuracy().value_or(0) > 0) {
-      text += ", counts as WGS 84 within " + number_text(*change.accuracy()) + " m";
+      text += ", counts as WGS 84 within " + plain_number(*change.accuracy()) + " m";
       if (!change.better().empty()) text += " (" + change.better() + ")";
     }
   } catch (const CrsError& error) {
@@ -130,8 +130,8 @@ std::string text_of(const stream::Box3& box) {
 /// "height int16 (metre)", with scale and offset where they are not 1 and 0.
 std::string text_of(const stream::Channel& channel) {
   std::string text = channel.name + ' ' + std::string(stream::name_of(channel.type));
-  if (channel.scale != 1) text += " x " + number_text(channel.scale);
-  if (channel.offset != 0) text += " + " + number_text(channel.offset);
+  if (channel.scale != 1) text += " x " + plain_number(channel.scale);
+  if (channel.offset != 0) text += " + " + plain_number(channel.offset);
   if (!channel.unit.empty()) text += " (" + channel.unit + ")";
   return text;
 }
@@ -324,8 +324,8 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
     text += raster_line(info);
     text += "cell:      " + readable_number(info.world.xy[0], 10) + ' ' +
             readable_number(info.world.xy[4], 10) + '\n';
-    text += "nodata:    " + with_commas(contents.nodata) + " cells" +
-            (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
+    text += "nodata:    " + counted(contents.nodata, "cell") +
+            (info.nodata ? ", value " + plain_number(*info.nodata) : std::string()) + '\n';
   }
   text += "points:    " + with_commas(contents.points) +
           (!info.grid && contents.nodata > 0
@@ -333,13 +333,13 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
                : std::string()) +
           '\n';
   if (info.octree) {
-    text += "octree:    " + with_commas(info.octree->nodes) + " nodes of " +
-            std::to_string(info.octree->depths) + " depths, the root's points " +
+    text += "octree:    " + counted(info.octree->nodes, "node") + " of " +
+            counted(info.octree->depths, "depth") + ", the root's points " +
             readable_number(info.octree->spacing, 6) + " apart\n";
   }
   if (contents.empty_values > 0) {
-    text += "empty:     " + with_commas(contents.empty_values) +
-            " attributes without a value, which are NaN\n";
+    text += "empty:     " + counted(contents.empty_values, "attribute") +
+            " without a value, which are NaN\n";
   }
   if (contents.withheld > 0) {
     text += "withheld:  " + with_commas(contents.withheld) + " of them\n";

@@ -81,7 +81,7 @@ constexpr std::uint64_t kWindowBytes = 150;
 void check_memory(std::uint64_t needed, const MatchRequest& request, std::size_t points,
                   const char* remedy) {
   if (request.memory_bytes == 0 || needed <= request.memory_bytes) return;
-  throw std::runtime_error("matching " + with_commas(points) + " points takes about " +
+  throw std::runtime_error("matching " + counted(points, "point") + " takes about " +
                            readable_bytes(needed) + " and --memory is " +
                            readable_bytes(request.memory_bytes) + ": " + remedy);
 }
@@ -388,8 +388,7 @@ class MatchCommand final : public Command {
     summary.json["left_over"] = nullptr;
     if (odd) summary.json["left_over"] = alone - outcome.mate.begin();
     summary.json["lower_bound"] = or_null(outcome.lower_bound);
-    summary.text =
-        with_commas(pairs) + " pairs, total distance " + readable_number(outcome.cost, 6);
+    summary.text = counted(pairs, "pair") + ", total distance " + readable_number(outcome.cost, 6);
     summary.text += guarantee(outcome);
     if (odd) {
       summary.text += ", point " + std::to_string(alone - outcome.mate.begin()) + " left over";
@@ -412,7 +411,7 @@ class MatchCommand final : public Command {
                     {"unmatched", 0},
                     {"levels", levels},
                     {"clusters", outcome.clusters}};
-    summary.text = "a tree of " + with_commas(outcome.tree.rows.size()) + " pairs on " +
+    summary.text = "a tree of " + counted(outcome.tree.rows.size(), "pair") + " on " +
                    counted(levels, "level") + ", total distance " + readable_number(cost, 6);
     finish(summary, watch);
     return summary;

@@ -160,18 +160,18 @@ class MeshCommand final : public Command {
     tell_coordinates(result.coordinates, common, summary);
     const bool all = result.uncovered == 0;
     summary.text =
-        output_ + ": " + with_commas(result.vertices) + " vertices, " +
-        with_commas(result.triangles) + " triangles, within " + readable_bound(result.max_error) +
-        " m of " + (all ? "all " : "") + with_commas(result.samples - result.uncovered) +
-        (all ? "" : " of " + with_commas(result.samples)) + " samples (RMS " +
-        readable_number(result.rms_error) + " m), in " + readable_seconds(watch.seconds()) + "\n";
+        output_ + ": " + counted(result.vertices, "vertex") + ", " +
+        counted(result.triangles, "triangle") + ", within " + readable_bound(result.max_error) +
+        " m of " + (all ? "all " : with_commas(result.samples - result.uncovered) + " of ") +
+        counted(result.samples, "sample") + " (RMS " + readable_number(result.rms_error) +
+        " m), in " + readable_seconds(watch.seconds()) + "\n";
     if (!all) {
-      summary.text += with_commas(result.uncovered) + " samples lie on no triangle: " +
+      summary.text += counted(result.uncovered, "sample", "lies", "lie") + " on no triangle: " +
                       why_uncovered(result, store.schema().grid, options.region.has_value()) + "\n";
     }
     if (result.duplicates > 0) {
       summary.text +=
-          with_commas(result.duplicates) + " samples share the place of another: " +
+          counted(result.duplicates, "sample", "shares", "share") + " the place of another: " +
           (duplicates == "all" ? "the bound holds for each of them"
                                : "the bound holds for the " + counting(duplicates) +
                                      " of each place (--duplicates " + duplicates + ")") +
@@ -248,12 +248,12 @@ class MeshCommand final : public Command {
     summary.json = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
     summary.add_cost(watch);
     tell_coordinates(coordinates, common, summary);
-    summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
-                   with_commas(mesh.triangles.size()) + " triangles in " +
+    summary.text = output_ + ": " + counted(mesh.positions.size(), "vertex") + ", " +
+                   counted(mesh.triangles.size(), "triangle") + " in " +
                    readable_seconds(watch.seconds()) + "\n";
     if (writer) {
       summary.json["overlay_values"] = writer->values();
-      summary.text += save_overlay_ + ": " + with_commas(writer->values()) + " changed heights\n";
+      summary.text += save_overlay_ + ": " + counted(writer->values(), "changed height") + "\n";
     }
     return summary;
   }

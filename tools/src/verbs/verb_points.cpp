@@ -93,7 +93,7 @@ class PointsCommand final : public Command {
     tell_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = replaced;
-      summary.text += with_commas(replaced) + " heights from " + overlay_ + "\n";
+      summary.text += counted(replaced, "height") + " from " + overlay_ + "\n";
     }
     return summary;
   }
@@ -146,8 +146,8 @@ class PointsCommand final : public Command {
     Summary summary;
     summary.json = {{"lines", lines.lines.size()}, {"vertices", lines.vertices.size()}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(lines.lines.size()) + " lines of " +
-                   with_commas(lines.vertices.size()) + " vertices in " +
+    summary.text = output_ + ": " + counted(lines.lines.size(), "line") + " of " +
+                   counted(lines.vertices.size(), "vertex") + " in " +
                    readable_seconds(watch.seconds()) + "\n";
     return summary;
   }
@@ -163,8 +163,8 @@ class PointsCommand final : public Command {
     const auto& [x, y] = place.xy;
     if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
       common.say(near_ + " lies outside the store: in its CRS X is from " +
-                 number_text(box.min[0]) + " to " + number_text(box.max[0]) + ", Y from " +
-                 number_text(box.min[1]) + " to " + number_text(box.max[1]));
+                 plain_number(box.min[0]) + " to " + plain_number(box.max[0]) + ", Y from " +
+                 plain_number(box.min[1]) + " to " + plain_number(box.max[1]));
     }
     stream::StoreQuery query(store);
     const std::vector<stream::FoundPoint> found =
@@ -175,7 +175,7 @@ class PointsCommand final : public Command {
           {.file = part_.path,
            .where = {},
            .cause = "no point is selected " +
-                    (radius_ ? "within " + number_text(*radius_) + " m of " : "near ") + near_,
+                    (radius_ ? "within " + plain_number(*radius_) + " m of " : "near ") + near_,
            .remedy = radius_ ? "raise --within" : "give another --where"});
     }
     std::vector<stream::Channel> attributes = store.schema().attributes;

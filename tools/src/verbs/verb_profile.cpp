@@ -64,7 +64,7 @@ class ProfileCommand final : public Command {
     summary.json = {
         {"points", outcome.points}, {"answered", outcome.answered}, {"metres", outcome.metres}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(outcome.points) + " places on " +
+    summary.text = output_ + ": " + counted(outcome.points, "place") + " on " +
                    readable_number(outcome.metres, 6) + " m in " +
                    readable_seconds(watch.seconds()) + "\n";
     return summary;

@@ -38,7 +38,7 @@ class PublishCommand final : public Command {
     summary.json = {
         {"stores", stores.size()}, {"files", published.files}, {"bytes", published.bytes}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(published.files) + " files, " +
+    summary.text = output_ + ": " + counted(published.files, "file") + ", " +
                    readable_bytes(published.bytes) + ", in " + readable_seconds(watch.seconds()) +
                    "; copy the folder to any web server\n";
     return summary;

@@ -290,8 +290,8 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
         std::max(file->vertices.positions.size(), file->triangles.size() / 2);
     memory_for_points(path, size, points * kDrawnBytesPerPoint, common);
     if (file->nodata > 0) {
-      common.context().say(with_commas(file->nodata) +
-                           " triangles are left out: a coordinate of a corner is NaN");
+      common.context().say(counted(file->nodata, "triangle") +
+                           " are left out: a coordinate of a corner is NaN");
     }
     return from_mesh(std::move(*file));
   }
@@ -397,7 +397,7 @@ class RenderCommand : public Command {
     summary.add_cost(watch);
     summary.text += counted(mesh.positions.size(), "point") + ", " +
                     (input.lines.empty() ? counted(mesh.triangles.size(), "triangle")
-                                         : with_commas(input.lines.size()) + " lines");
+                                         : counted(input.lines.size(), "line"));
     if (factor != 1) summary.text += ", heights x " + readable_number(factor);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
@@ -458,9 +458,9 @@ class RenderCommand : public Command {
     summary.json["lines"] = result.lines.size();
     summary.json["levels"] = result.top;
     summary.add_cost(watch);
-    summary.text +=
-        with_commas(result.lines.size()) + (result.tree ? " lines of a tree of " : " pairs of ") +
-        counted(result.points, "point") + ", " + readable_seconds(watch.seconds()) + '\n';
+    summary.text += counted(result.lines.size(), result.tree ? "line" : "pair") +
+                    (result.tree ? " of a tree of " : " of ") + counted(result.points, "point") +
+                    ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 

@@ -107,26 +107,24 @@ class SurfaceCommand final : public Command {
                     {"lids", surface.lids}};
     if (surface.samples_off) summary.json["samples_off"] = *surface.samples_off;
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(surface.mesh.positions.size()) + " vertices, ";
+    summary.text = output_ + ": " + counted(surface.mesh.positions.size(), "vertex") + ", ";
     if (tetrahedra_) {
       summary.json["tetrahedra"] = surface.tetrahedra.size();
-      summary.text += with_commas(surface.tetrahedra.size()) + " tetrahedra";
+      summary.text += counted(surface.tetrahedra.size(), "tetrahedron");
     } else {
       summary.json["triangles"] = surface.mesh.triangles.size();
-      summary.text += with_commas(surface.mesh.triangles.size()) + " triangles";
+      summary.text += counted(surface.mesh.triangles.size(), "triangle");
       if (!surface.open && surface.lids > 0) {
         summary.text += " (" + with_commas(surface.lids) + " over gaps of the scan)";
       }
       if (!surface.mesh.triangles.empty()) {
-        summary.text += (measures.closed ? ", closed, " : ", open, ") +
-                        with_commas(measures.components) +
-                        (measures.components == 1 ? " part" : " parts");
+        summary.text +=
+            (measures.closed ? ", closed, " : ", open, ") + counted(measures.components, "part");
       }
     }
     if (surface.open) summary.text += ", without the faces over the gaps of the scan";
     if (surface.samples_off.value_or(0) > 0) {
-      summary.text += ", " + with_commas(*surface.samples_off) +
-                      (*surface.samples_off == 1 ? " sample" : " samples") + " not on it";
+      summary.text += ", " + counted(*surface.samples_off, "sample") + " not on it";
     }
     summary.text += " in " + readable_seconds(watch.seconds()) + "\n";
     return summary;

@@ -102,8 +102,8 @@ class SynthCommand : public Command {
     summary.add_cost(watch);
     summary.text = output_ + ": " + std::to_string(dem_.size.width) + " x " +
                    std::to_string(dem_.size.height) + " cells, heights " +
-                   number_text(std::round(result.minimum)) + " to " +
-                   number_text(std::round(result.maximum)) + ", RMS step " +
+                   plain_number(std::round(result.minimum)) + " to " +
+                   plain_number(std::round(result.maximum)) + ", RMS step " +
                    readable_number(result.rms_step) + ", " + readable_bytes(result.bytes) + ", " +
                    readable_seconds(watch.seconds()) + '\n';
     return summary;

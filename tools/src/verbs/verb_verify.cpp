@@ -108,13 +108,13 @@ class VerifyCommand final : public Command {
         line["covered"] = zoom.samples - zoom.uncovered;
         line["uncovered"] = zoom.uncovered;
         line["max_error"] = zoom.max_error;
-        summary.text += ", within " + readable_bound(zoom.max_error) + " m of " +
-                        (zoom.uncovered == 0 ? "all " + with_commas(zoom.samples)
-                                             : with_commas(zoom.samples - zoom.uncovered) + " of " +
-                                                   with_commas(zoom.samples)) +
-                        " samples";
+        summary.text +=
+            ", within " + readable_bound(zoom.max_error) + " m of " +
+            (zoom.uncovered == 0 ? "all " : with_commas(zoom.samples - zoom.uncovered) + " of ") +
+            counted(zoom.samples, "sample");
         if (zoom.uncovered > 0) {
-          summary.text += " (" + with_commas(zoom.uncovered) + " lie on no triangle)";
+          summary.text += " (" + with_commas(zoom.uncovered) +
+                          (zoom.uncovered == 1 ? " lies" : " lie") + " on no triangle)";
         }
       }
       summary.text += "\n";
@@ -122,7 +122,7 @@ class VerifyCommand final : public Command {
     }
     const bool ok = result.problems.empty();
     if (result.torn > 0) {
-      summary.text += with_commas(result.torn) + (result.torn == 1 ? " file" : " files") +
+      summary.text += counted(result.torn, "file") +
                       " left over from a run that was killed, no part of the set: the next "
                       "`terrace tile` into the folder removes them\n";
     }

@@ -55,7 +55,7 @@ class ViewCommand final : public Command {
     const std::string address = "http://127.0.0.1:" + std::to_string(server.access().port) +
                                 "/?token=" + server.access().token;
     common.say(address + " shows " +
-               (stores_.size() == 1 ? "the store" : std::to_string(stores_.size()) + " stores") +
+               (stores_.size() == 1 ? "the store" : counted(stores_.size(), "store")) +
                " until Ctrl-C");
     if (!no_open_ && !open_browser(address)) {
       common.say("there is no xdg-open to open a browser: open the address yourself");

@@ -12,4 +12,13 @@ namespace terrace::stream {
 /// case. The text itself, without blanks around it, if it is not such a word.
 std::string canonical_unit(std::string_view text);
 
+/// A noun in messages after its number: "point" after 1, else "points"; "vertices", "entries".
+inline std::string noun_for(bool one, std::string_view noun) {
+  if (one) return std::string(noun);
+  if (noun == "vertex") return "vertices";
+  if (noun == "tetrahedron") return "tetrahedra";
+  if (noun.ends_with("ry")) return std::string(noun.substr(0, noun.size() - 1)) + "ies";
+  return std::string(noun) + 's';
+}
+
 }  // namespace terrace::stream

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "io/bytes.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -199,8 +200,8 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
   check_disjoint(file, octree);
   if (const std::uint64_t found = octree.points(); found != points) {
     fail(file, root.offset,
-         "the nodes of the COPC hierarchy have " + std::to_string(found) +
-             " points, but the header promises " + std::to_string(points));
+         "the nodes of the COPC hierarchy have " + counted(found, "point") +
+             ", but the header promises " + std::to_string(points));
   }
   return octree;
 }

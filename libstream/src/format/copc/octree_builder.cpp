@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -219,8 +220,8 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
   if (count > most_together_) {
     throw Error({.file = name_,
                  .where = {},
-                 .cause = std::to_string(count) +
-                          " points lie in one place, more than a node of "
+                 .cause = counted(count, "point") +
+                          " lie in one place, more than a node of "
                           "COPC can have in this memory: " +
                           std::to_string(most_together_),
                  .remedy = "raise `memory_bytes`, leave them out, or write LAZ"});

@@ -22,6 +22,7 @@
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
 #include "io/temporary.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
 #include "terrace/stream/sink.hpp"
@@ -179,8 +180,8 @@ class CopcWriter final : public PointWriter {
     if (coded.size() > std::numeric_limits<std::int32_t>::max()) {
       throw Error({.file = path_,
                    .where = {},
-                   .cause = std::to_string(node.points) +
-                            " points in one place are more bytes than a node of COPC can have",
+                   .cause = counted(node.points, "point") +
+                            " in one place are more bytes than a node of COPC can have",
                    .remedy = "leave them out, or write LAZ"});
     }
     node.offset = sink_.size();

@@ -144,7 +144,7 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
   }
   if (reading.found != points) {
     fail_ept((folder / "ept-hierarchy").string(), {},
-             "its nodes have " + std::to_string(reading.found) + " points, but ept.json promises " +
+             "its nodes have " + counted(reading.found, "point") + ", but ept.json promises " +
                  std::to_string(points));
   }
   return std::move(reading.nodes);

@@ -16,6 +16,7 @@
 
 #include "format/las/laz_records.hpp"
 #include "format/las/record_reader.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/input.hpp"
 
 namespace terrace::stream {
@@ -23,8 +24,7 @@ namespace {
 
 [[noreturn]] void fail_count(const std::string& file, std::uint64_t points,
                              const std::string& found) {
-  fail_ept(file, {},
-           "the hierarchy counts " + std::to_string(points) + " points, the file " + found);
+  fail_ept(file, {}, "the hierarchy counts " + counted(points, "point") + ", the file " + found);
 }
 
 /// Records that zstandard has compressed, in one frame or several.
@@ -133,7 +133,7 @@ class NodeReader final : public PartReader {
     const std::uint64_t bytes = input_->size().value_or(0), record = nodes_->record_bytes;
     if (bytes % record != 0 || bytes / record != node.points) {
       fail_count(input_->name(), node.points,
-                 "has " + std::to_string(bytes) + " bytes in records of " + std::to_string(record));
+                 "has " + counted(bytes, "byte") + " in records of " + std::to_string(record));
     }
   }
 

@@ -8,6 +8,7 @@
 
 #include "format/geotiff/tags.hpp"
 #include "format/geotiff/unpack.hpp"
+#include "io/text.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -184,7 +185,7 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
   if (bytes == 0) return fill_sparse(part, out);
   if (offset > handle_.file_bytes() || bytes > handle_.file_bytes() - offset) {
     fail(part, offset,
-         "claims " + std::to_string(bytes) + " bytes, beyond the end of the file at byte " +
+         "claims " + counted(bytes, "byte") + ", beyond the end of the file at byte " +
              std::to_string(handle_.file_bytes()));
   }
   if (layout_.plain) return read_plain(part, offset, bytes, out);
@@ -213,8 +214,8 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   const std::uint32_t rows = layout_.rows_in_image(part.down);
   if (bytes / row_bytes < rows) {
     fail(part, offset,
-         "has " + std::to_string(bytes) + " bytes where " + std::to_string(rows) + " rows of " +
-             std::to_string(row_bytes) + " bytes are due");
+         "has " + counted(bytes, "byte") + " where " + counted(rows, "row") + " of " +
+             counted(row_bytes, "byte") + " are due");
   }
   const std::uint64_t pixel_bytes = layout_.samples_per_pixel() * size_of(layout_.type);
   // Whole rows at a time, unless the part is so narrow that most of them would be for nothing.
@@ -357,8 +358,7 @@ void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t
   const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
   if (bytes > kMostGrowth * due + kMostOverhead) {
     fail(part, offset,
-         "claims " + std::to_string(bytes) + " bytes for " + std::to_string(due) +
-             " bytes of samples");
+         "claims " + counted(bytes, "byte") + " for " + counted(due, "byte") + " of samples");
   }
   if (raw_.size() < bytes) raw_.resize(bytes);
   if (!handle_.read(offset, std::span(raw_.data(), bytes))) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "format/geotiff/tags.hpp"
+#include "io/text.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -51,7 +52,7 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
   const std::size_t there = directory.size() / 4 - 1;
   std::size_t count = directory[3];
   if (count > there) {
-    faults_.push_back("GeoKeyDirectory claims " + std::to_string(count) + " keys and has " +
+    faults_.push_back("GeoKeyDirectory claims " + counted(count, "key") + " and has " +
                       std::to_string(there));
     count = there;
   }

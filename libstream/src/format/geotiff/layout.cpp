@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "io/text.hpp"
+
 namespace terrace::stream {
 namespace {
 
@@ -152,8 +154,7 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
       across * down * planes > UINT32_MAX) {
     handle.fail({},
                 "claims " + std::to_string(across) + " x " + std::to_string(down) + " " + what +
-                    "s, more than a file of " + std::to_string(handle.file_bytes()) +
-                    " bytes can list",
+                    "s, more than a file of " + counted(handle.file_bytes(), "byte") + " can list",
                 "fetch the file again; it is damaged or cut short");
   }
 }

@@ -169,7 +169,7 @@ class AsciiReader {
     if (input_.size() && columns_ * rows_ > *input_.size() / 2 + 1) {
       header_.fail({},
                    "promises " + std::to_string(columns_) + " x " + std::to_string(rows_) +
-                       " numbers, more than fit into " + std::to_string(*input_.size()) + " bytes",
+                       " numbers, more than fit into " + counted(*input_.size(), "byte"),
                    "fetch the file again; it is cut short");
     }
   }
@@ -203,8 +203,8 @@ class AsciiReader {
       double value = 0;
       if (word_.empty()) {
         header_.fail({},
-                     "holds " + std::to_string(cell) + " numbers where " +
-                         std::to_string(columns_) + " x " + std::to_string(rows_) + " are due",
+                     "holds " + counted(cell, "number") + " where " + std::to_string(columns_) +
+                         " x " + std::to_string(rows_) + " are due",
                      "fetch the file again; it is cut short");
       }
       if (parse_sample(word_, value) != word_.data() + word_.size()) {

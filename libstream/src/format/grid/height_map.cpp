@@ -21,6 +21,7 @@
 #include "format/raster_points.hpp"
 #include "format/world_file.hpp"
 #include "io/spool.hpp"
+#include "io/text.hpp"
 #include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
@@ -205,7 +206,7 @@ void check_size(const std::string& file, const PngHead& image, std::uint64_t pac
   if (image.rows > packed * kDeflateGrowth / stored) {
     refuse_grid(file, {},
                 "claims " + std::to_string(image.columns) + " x " + std::to_string(image.rows) +
-                    " pixels, which cannot be packed in " + std::to_string(packed) + " bytes");
+                    " pixels, which cannot be packed in " + counted(packed, "byte"));
   }
   // libpng holds two rows beside ours.
   if (row_bytes > memory_bytes / 4) {

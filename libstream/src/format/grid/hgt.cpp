@@ -70,7 +70,7 @@ std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, st
       static_cast<std::uint64_t>(std::lround(std::sqrt(static_cast<double>(bytes) / 2)));
   if (side < 2 || side > (1u << 20) || bytes != 2 * side * side) {
     refuse_grid(file, {},
-                "has " + std::to_string(bytes) + " bytes, which are no square of 16-bit samples",
+                "has " + counted(bytes, "byte") + ", which are no square of 16-bit samples",
                 "fetch the file again; it is cut short, or no tile of SRTM");
   }
   return {side, side};

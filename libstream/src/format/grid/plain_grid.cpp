@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "format/packed_column.hpp"
+#include "io/text.hpp"
 #include "raster/overlay.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -71,7 +72,7 @@ class PlainRaster final : public Raster {
     const std::uint64_t there = bytes_->size() > grid_.first ? bytes_->size() - grid_.first : 0;
     if (there >= row && (there - row) / grid_.row_bytes >= info.rows - 1) return;
     refuse_grid(bytes_->name(), {},
-                "has " + std::to_string(bytes_->size()) + " bytes, too few for " +
+                "has " + counted(bytes_->size(), "byte") + ", too few for " +
                     std::to_string(info.columns) + " x " + std::to_string(info.rows) +
                     " samples of " + std::string(name_of(info.sample.type)));
   }

@@ -23,7 +23,7 @@ void check_growth(const std::string& file, const std::string& where, std::uint64
                   std::uint64_t unpacked) {
   if (unpacked / kDeflateGrowth <= packed) return;
   refuse_grid(file, where,
-              "states " + std::to_string(unpacked) + " bytes, which cannot be packed in " +
+              "states " + counted(unpacked, "byte") + ", which cannot be packed in " +
                   std::to_string(packed));
 }
 
@@ -45,8 +45,8 @@ class Unpacked {
  private:
   [[noreturn]] void differs(const char* how) const {
     refuse_grid(file_, packed_.name,
-                "unpacks to " + std::string(how) + " than the " + std::to_string(packed_.size) +
-                    " bytes that it states");
+                "unpacks to " + std::string(how) + " than the " + counted(packed_.size, "byte") +
+                    " that it states");
   }
 
   const std::string& file_;

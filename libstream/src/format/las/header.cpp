@@ -13,6 +13,7 @@
 #include "format/las/fields.hpp"
 #include "io/bytes.hpp"
 #include "io/peek.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
@@ -208,7 +209,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
                                                 : kLasFirstBytes;
   if (header_bytes < least) {
     fail(input, "header",
-         "says that it has " + std::to_string(header_bytes) + " bytes; LAS 1." +
+         "says that it has " + counted(header_bytes, "byte") + "; LAS 1." +
              std::to_string(header.minor) + " has " + std::to_string(least));
   }
   head = input.fill(header_bytes);
@@ -233,7 +234,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
     evlrs = load_little_endian<std::uint32_t>(at + 243);
     const auto points = load_little_endian<std::uint64_t>(at + 247);
     if (header.points != 0 && points != 0 && points != header.points) {
-      comments.push_back("the header counts " + std::to_string(points) + " points and, for old " +
+      comments.push_back("the header counts " + counted(points, "point") + " and, for old " +
                          "readers, " + std::to_string(header.points) + ": the former is taken");
     }
     if (points != 0) header.points = points;
@@ -248,7 +249,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   if (header.record_bytes < record) {
     fail(input, "header",
          "records of point format " + std::to_string(header.point_format) + " take " +
-             std::to_string(record) + " bytes, not " + std::to_string(header.record_bytes));
+             counted(record, "byte") + ", not " + std::to_string(header.record_bytes));
   }
   if (header.points_offset < header_bytes) {
     fail(input, "header", "the points begin inside of the header");
@@ -264,9 +265,9 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
     const std::uint64_t left = *size - std::min(*size, header.points_offset);
     if (header.points > left / header.record_bytes) {
       fail(input, "byte " + std::to_string(header.points_offset),
-           "the header promises " + std::to_string(header.points) + " points of " +
-               std::to_string(header.record_bytes) + " bytes, but only " + std::to_string(left) +
-               " bytes are left",
+           "the header promises " + counted(header.points, "point") + " of " +
+               counted(header.record_bytes, "byte") + ", but only " + counted(left, "byte") +
+               (left == 1 ? " is" : " are") + " left",
            "the file is cut off or its header is wrong");
     }
     // EVLRs or packets of waveforms may follow the points.

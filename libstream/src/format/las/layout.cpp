@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "io/bytes.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -92,7 +93,7 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     throw Error(
         {.file = file,
          .where = {},
-         .cause = std::to_string(attributes.size()) + " attributes are more than LAS has room for",
+         .cause = counted(attributes.size(), "attribute") + " are more than LAS has room for",
          .remedy = "write PLY"});
   }
   return layout;

@@ -13,6 +13,7 @@
 #include "format/las/laz_chunks.hpp"
 #include "io/bytes.hpp"
 #include "io/peek.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
@@ -132,7 +133,7 @@ class LazInTurn final : public RecordReader {
       try {
         const laz::Chunk chunk = laz::layered_chunk(layout_.vlr, std::as_bytes(std::span(window)));
         if (chunk.points == 0 || chunk.points > left_) {
-          throw laz::Corrupt("the chunk has " + std::to_string(chunk.points) + " points", 0);
+          throw laz::Corrupt("the chunk has " + counted(chunk.points, "point"), 0);
         }
         chunk_left_ = chunk.points;
         chunk_bytes_ = chunk.bytes;

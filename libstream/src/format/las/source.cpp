@@ -22,6 +22,7 @@
 #include "format/record_parts.hpp"
 #include "format/record_source.hpp"
 #include "io/peek.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
@@ -46,8 +47,9 @@ class LasOpener {
     info.crs =
         options_.crs ? *options_.crs : las_crs(header_, stream_.input->name(), info.comments);
     if (header_.uncounted > 0) {
-      info.note = stream_.input->name() + ": the header counts " + std::to_string(header_.points) +
-                  " points, and the bytes of " + std::to_string(header_.uncounted) +
+      info.note = stream_.input->name() + ": the header counts " +
+                  counted(header_.points, "point") + ", and the bytes of " +
+                  std::to_string(header_.uncounted) +
                   " more follow, which are left out; a writer may have been interrupted";
       info.comments.push_back(info.note);
     }

@@ -15,6 +15,7 @@
 #include "format/las/record_encoder.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
 #include "terrace/stream/sink.hpp"
@@ -83,8 +84,8 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
   if (chunks < 2) {
     throw Error({.file = path,
                  .where = {},
-                 .cause = "writing LAZ of " + std::to_string(vlr.record_length()) +
-                          " bytes a point needs " + std::to_string((2 * chunk >> 20) + 1) +
+                 .cause = "writing LAZ of " + counted(vlr.record_length(), "byte") +
+                          " a point needs " + std::to_string((2 * chunk >> 20) + 1) +
                           "M of memory, more than there is for it",
                  .remedy = "raise `memory_bytes`"});
   }

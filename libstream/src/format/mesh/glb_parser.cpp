@@ -20,6 +20,7 @@
 #include "io/bounded_json.hpp"
 #include "io/bytes.hpp"
 #include "io/spool.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -158,7 +159,7 @@ class GlbParser final : public MeshParser {
     }
     const std::uint64_t all = word(8), json_bytes = word(12);
     if (input_->size() && *input_->size() < all) {
-      fail_here("is cut off: its header promises " + std::to_string(all) + " bytes and there are " +
+      fail_here("is cut off: its header promises " + counted(all, "byte") + " and there are " +
                     std::to_string(*input_->size()),
                 "get it anew");
     }
@@ -243,7 +244,7 @@ class GlbParser final : public MeshParser {
     if (!object.contains(name)) return false;
     const Json& all = list(object, name);
     if (all.size() != out.size()) {
-      fail(name, "does not have " + std::to_string(out.size()) + " numbers");
+      fail(name, "does not have " + counted(out.size(), "number"));
     }
     for (std::size_t i = 0; i < out.size(); ++i) {
       if (!all[i].is_number()) fail(name, "is not a list of numbers");
@@ -426,7 +427,7 @@ class GlbParser final : public MeshParser {
       part.corners = part.indices->count;
     }
     if (part.mode == glb::kTriangles && part.corners % 3 != 0) {
-      fail(where, "has " + std::to_string(part.corners) + " corners, not three for each triangle");
+      fail(where, "has " + counted(part.corners, "corner") + ", not three for each triangle");
     }
   }
 

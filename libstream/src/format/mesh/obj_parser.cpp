@@ -83,7 +83,7 @@ class ObjParser final : public MeshParser {
       joined_.append(line.substr(0, line.size() - (continued ? 1 : 0))).append(" ");
       if (joined_.size() > LineReader::kMaxLine) {
         fail("lines that continue each other are longer than " +
-             std::to_string(LineReader::kMaxLine) + " bytes");
+             counted(LineReader::kMaxLine, "byte"));
       }
       more = continued && lines_.next(line);
       if (more) line = trim(line);

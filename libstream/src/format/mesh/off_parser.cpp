@@ -48,8 +48,7 @@ class OffParser final : public MeshParser {
     std::string_view line;
     if (read_ < vertices_) {
       if (!next_line(line)) {
-        fail("ends after " + std::to_string(read_) + " of " + std::to_string(vertices_) +
-             " vertices");
+        fail("ends after " + std::to_string(read_) + " of " + counted(vertices_, "vertex"));
       }
       if (!read_vertex(line, vertex_)) fail("a vertex without three coordinates");
       ++read_;

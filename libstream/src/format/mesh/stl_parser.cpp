@@ -116,7 +116,7 @@ class StlBinary final : public StlParser {
     if (head.size() < kHeadBytes) fail("is too short for STL");
     count_ = load_little_endian<std::uint32_t>(head.data() + 80);
     if (input.size() && (*input.size() - kHeadBytes) / kFaceBytes < count_) {
-      fail("promises " + std::to_string(count_) + " triangles and has bytes for " +
+      fail("promises " + counted(count_, "triangle") + " and has bytes for " +
            std::to_string((*input.size() - kHeadBytes) / kFaceBytes));
     }
     input.consume(kHeadBytes);
@@ -132,8 +132,7 @@ class StlBinary final : public StlParser {
       if (faces_ == count_) return false;
       if (faces_ > 0) input_->consume(kFaceBytes);
       if (input_->fill(kFaceBytes).size() < kFaceBytes) {
-        fail("ends after " + std::to_string(faces_) + " of " + std::to_string(count_) +
-             " triangles");
+        fail("ends after " + std::to_string(faces_) + " of " + counted(count_, "triangle"));
       }
     }
     const char* at = input_->window().data() + kNormalBytes + std::size_t{12} * corner_;

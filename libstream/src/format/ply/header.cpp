@@ -26,7 +26,7 @@ class HeaderReader {
   std::string_view next() {
     std::string_view line;
     if (input_->offset() > kMaxHeaderBytes) {
-      fail("the header is longer than " + std::to_string(kMaxHeaderBytes) + " bytes",
+      fail("the header is longer than " + counted(kMaxHeaderBytes, "byte"),
            "this is no PLY file, or its end_header is missing");
     }
     if (!lines_.next(line)) {
@@ -114,9 +114,10 @@ void check_counts(const PlyHeader& header, const Input& input) {
     if (element.count > left / least) {
       throw Error({.file = input.name(),
                    .where = "byte " + std::to_string(input.offset()),
-                   .cause = "the header promises " + std::to_string(element.count) + " items of " +
-                            in_quotes(element.name) + " of at least " + std::to_string(least) +
-                            " bytes, but only " + std::to_string(left) + " bytes are left",
+                   .cause = "the header promises " + counted(element.count, "item") + " of " +
+                            in_quotes(element.name) + " of at least " + counted(least, "byte") +
+                            ", but only " + counted(left, "byte") + (left == 1 ? " is" : " are") +
+                            " left",
                    .remedy = "the file is cut off or its header is wrong"});
     }
     left -= element.count * least;

@@ -207,17 +207,16 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   layout.columns = split_fields(line, layout.separator).size();
   const std::string where = "line " + std::to_string(lines.number());
   if (layout.columns < 3) {
-    throw Error({.file = file,
-                 .where = where,
-                 .cause = "has " + std::to_string(layout.columns) +
-                          (layout.columns == 1 ? " column" : " columns") +
-                          ", but a point needs x, y and z",
-                 .remedy = "add the missing column (0 as z for points in the plane)"});
+    throw Error(
+        {.file = file,
+         .where = where,
+         .cause = "has " + counted(layout.columns, "column") + ", but a point needs x, y and z",
+         .remedy = "add the missing column (0 as z for points in the plane)"});
   }
   if (layout.columns > TextLayout::kMaxColumns) {
     throw Error({.file = file,
                  .where = where,
-                 .cause = "has " + std::to_string(layout.columns) + " columns",
+                 .cause = "has " + counted(layout.columns, "column"),
                  .remedy = "at most " + std::to_string(TextLayout::kMaxColumns) + " are read"});
   }
   if (header_line == 0 &&
@@ -229,7 +228,7 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   if (header_line != 0 && names.size() != layout.columns) {
     throw Error({.file = file,
                  .where = where,
-                 .cause = "has " + std::to_string(layout.columns) + " columns, but the header in " +
+                 .cause = "has " + counted(layout.columns, "column") + ", but the header in " +
                           "line " + std::to_string(header_line) + " names " +
                           std::to_string(names.size()),
                  .remedy = "one of them is wrong"});

@@ -311,7 +311,7 @@ class XyzSource final : public PointSource {
     };
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {
-      fail("has " + std::to_string(fields.size()) + " columns, the lines before have " +
+      fail("has " + counted(fields.size(), "column") + ", the lines before have " +
                std::to_string(layout_.columns),
            "every line needs the same columns");
     }

@@ -140,7 +140,7 @@ class VrtReader {
   void read_band(const XmlElement& root) {
     if (root.child("MaskBand") != nullptr) fail("MaskBand", "is not read", kAsGeoTiff);
     if (wanted_ > bands_) {
-      fail("", "has " + std::to_string(bands_) + " bands, and band " + std::to_string(wanted_) +
+      fail("", "has " + counted(bands_, "band") + ", and band " + std::to_string(wanted_) +
                    " is asked for");
     }
     int number_of_band = 0;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/text.hpp"
+
 namespace terrace::stream::store {
 namespace {
 
@@ -29,8 +31,8 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
   if (file->size() != entry.bytes) {
     throw Error({.file = file->name(),
                  .where = {},
-                 .cause = "the manifest says " + std::to_string(entry.bytes) +
-                          " bytes, the file has " + std::to_string(file->size()),
+                 .cause = "the manifest says " + counted(entry.bytes, "byte") + ", the file has " +
+                          std::to_string(file->size()),
                  .remedy = kRestoreStore});
   }
   return file;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "differing_bits.hpp"
+#include "io/text.hpp"
 #include "store/codec/column_codec.hpp"
 #include "store/codec/form.hpp"
 #include "terrace/stream/error.hpp"
@@ -270,7 +271,7 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   if (n > layout_->most_points()) {
     throw Error({.file = {},
                  .where = {},
-                 .cause = "a cluster has " + std::to_string(n) + " points, of this size a store " +
+                 .cause = "a cluster has " + counted(n, "point") + ", of this size a store " +
                           "has at most " + std::to_string(layout_->most_points()) + " in one",
                  .remedy = "make the blocks smaller"});
   }

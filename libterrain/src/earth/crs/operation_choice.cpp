@@ -118,7 +118,7 @@ OperationChoice choose_operation(const PJ* from, const PJ* to,
 }
 
 std::string quoted_with_accuracy(const std::string& name, double accuracy) {
-  return '"' + name + '"' + (accuracy > 0 ? " within " + number_text(accuracy) + " m" : "");
+  return '"' + name + '"' + (accuracy > 0 ? " within " + plain_number(accuracy) + " m" : "");
 }
 
 }  // namespace terrace::terrain

@@ -276,14 +276,13 @@ stream::Error PointMesher::shared_places_error() const {
       shared.add(samples);
     }
   }
-  const bool some = shared.places > 1;
   return stream::Error(
       {.file = store_.path().string(),
        .where = {},
-       .cause = with_commas(shared.places) + (some ? " places have" : " place has") +
+       .cause = counted(shared.places, "place", "has", "have") +
                 " several samples, whose heights differ by up to " +
                 readable_number(shared.range * metres_vertical()) + " m (at " +
-                number_text(shared.widest[0]) + ", " + number_text(shared.widest[1]) + ")",
+                plain_number(shared.widest[0]) + ", " + plain_number(shared.widest[1]) + ")",
        .remedy = options_.duplicates == tri::PointDuplicates::kAll
                      ? "say with `duplicates` min, max, mean or first which of them counts, or ask "
                        "for a larger `max_error`"

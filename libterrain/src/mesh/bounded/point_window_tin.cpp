@@ -252,8 +252,8 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
   const bool beyond = out.errors.largest > options.bound;
   if (missed || (beyond && !may_miss)) {
     fail(missed ? "the mesh leaves out samples"
-                : "the mesh misses its bound: " + number_text(out.errors.largest) + " of " +
-                      number_text(options.bound),
+                : "the mesh misses its bound: " + plain_number(out.errors.largest) + " of " +
+                      plain_number(options.bound),
          exact ? "this is a fault of terrace, please report it" : "write PLY, which is exact");
   }
   return out;

@@ -291,16 +291,16 @@ void WindowMesher::require_sound(const WindowTin& tin) const {
   if (options_.places.has_effect() && tin.check.max_error > options_.bound &&
       !(exact && tin.check.max_error <= rounding_of_errors(tin))) {
     fail(tin,
-         "the mesh misses its bound in the other CRS: " + number_text(tin.check.max_error) +
-             " of " + number_text(options_.bound),
+         "the mesh misses its bound in the other CRS: " + plain_number(tin.check.max_error) +
+             " of " + plain_number(options_.bound),
          "allow a larger `max_error`, or write the mesh in the store's CRS");
   }
   if (tin.check.max_error > options_.bound &&
       !(exact && tin.check.max_error <= rounding_of_errors(tin))) {
     if (exact) {
       fail(tin,
-           "the mesh misses its bound: " + number_text(tin.check.max_error) + " of " +
-               number_text(options_.bound),
+           "the mesh misses its bound: " + plain_number(tin.check.max_error) + " of " +
+               plain_number(options_.bound),
            "this is a fault of terrace, please report it");
     }
     fail(tin,

@@ -5,6 +5,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/units.hpp"
 #include "tile/format/quantized_mesh.hpp"
 #include "tile/format/quantized_mesh_layout.hpp"
 
@@ -26,8 +27,8 @@ class Reader {
   // Before anything is allocated for it.
   void need(std::uint64_t count, std::size_t size, const char* what) const {
     if (count > left() / size) {
-      fail(std::to_string(count) + " " + what + " of " + std::to_string(size) +
-           " bytes, but only " + std::to_string(left()) + " bytes are left");
+      fail(std::to_string(count) + " " + what + " of " + counted(size, "byte") + ", but only " +
+           counted(left(), "byte") + (left() == 1 ? " is" : " are") + " left");
     }
   }
   template <class T>

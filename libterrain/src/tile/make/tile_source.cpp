@@ -67,7 +67,7 @@ void check_heights(const stream::Store& store, double metres) {
     if (std::abs(height) <= kFarthest) continue;
     throw stream::Error({.file = store.path().string(),
                          .where = {},
-                         .cause = "has heights of " + number_text(height) +
+                         .cause = "has heights of " + plain_number(height) +
                                   " m: beyond 10,000 km there is no place on a globe",
                          .remedy = "look at the unit and the nodata value of the source, or leave "
                                    "wrong heights out: `where` 'z < 9000'"});

@@ -195,7 +195,8 @@ Checked SetCheck::check(const TileAddress& tile, const TileHeights& heights) con
   checked.borders = borders_of(decoded.mesh);
   if (heights.uncovered > 0) {
     checked.faults.push_back(
-        {0, with_commas(heights.uncovered) + " samples of the store lie over no triangle"});
+        {0, counted(heights.uncovered, "sample", "of the store lies", "of the store lie") +
+                " over no triangle"});
   }
   const double bound = bound_of(tile.zoom);
   if (heights.max_error > bound * (1.0 + 1e-9) + kHeightSlack) {
@@ -349,7 +350,7 @@ void SetCheck::absent(unsigned zoom, const std::vector<TileAddress>& tiles) {
     const std::uint64_t samples = count_samples(tile, surface);
     if (samples > 0) {
       result.problems.push_back(
-          {path_of(tile), 0, "no tile where the store has " + with_commas(samples) + " samples"});
+          {path_of(tile), 0, "no tile where the store has " + counted(samples, "sample")});
     }
   }
 }

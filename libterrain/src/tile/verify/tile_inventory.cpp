@@ -97,7 +97,7 @@ void Inventory::zoom(unsigned zoom) {
     const std::uint64_t height = std::uint64_t{range.y1} - range.y0 + 1;
     // A range that claims a planet is not walked through.
     if (width * height > 64 * (there.size() + (std::uint64_t{1} << 20))) {
-      problem(layer_path_, label + " claims " + with_commas(width * height) + " tiles, but only " +
+      problem(layer_path_, label + " claims " + counted(width * height, "tile") + ", but only " +
                                with_commas(there.size()) + " are there");
       continue;
     }
@@ -116,8 +116,8 @@ void Inventory::zoom(unsigned zoom) {
     }
   }
   if (missing > kMostNamed) {
-    problem(layer_path_, label + ": " + with_commas(missing - kMostNamed) +
-                             " more tiles are named and not there");
+    problem(layer_path_, label + ": " + counted(missing - kMostNamed, "more tile", "is", "are") +
+                             " named and not there");
   }
   for (std::size_t i = 0; i < there.size(); ++i) {
     if (named[i] == 1) continue;

@@ -149,8 +149,8 @@ class MeshCheck {
 };
 
 /// "triangle 5 ..." or "7 triangles ..., first triangle 5".
-std::string counted(std::uint64_t count, const std::string& kind, std::uint64_t first,
-                    const std::string& what) {
+std::string first_and_more(std::uint64_t count, const std::string& kind, std::uint64_t first,
+                           const std::string& what) {
   if (count == 1) return kind + " " + std::to_string(first) + " " + what;
   return kind + " " + std::to_string(first) + " and " + with_commas(count - 1) + " more " + what;
 }
@@ -165,11 +165,11 @@ void MeshCheck::triangles() {
     if (area == 0 && empty++ == 0) first_empty = t;
   }
   if (turned > 0) {
-    fault(triangle_at(first_turned),
-          counted(turned, "triangle", first_turned, "not counter-clockwise as seen from above"));
+    fault(triangle_at(first_turned), first_and_more(turned, "triangle", first_turned,
+                                                    "not counter-clockwise as seen from above"));
   }
   if (empty > 0) {
-    fault(triangle_at(first_empty), counted(empty, "triangle", first_empty, "without area"));
+    fault(triangle_at(first_empty), first_and_more(empty, "triangle", first_empty, "without area"));
   }
   constexpr std::int64_t kWhole = 2 * std::int64_t{kTileUnits} * kTileUnits;
   if (sum != kWhole) {
@@ -220,14 +220,15 @@ void MeshCheck::cover() {
     i = end;
   }
   if (open > 0) {
-    fault(triangle_at(first_open), with_commas(open) +
-                                       " edges inside the tile have one triangle only, the first "
-                                       "at triangle " +
-                                       std::to_string(first_open));
+    fault(triangle_at(first_open),
+          counted(open, "edge", "inside the tile has", "inside the tile have") +
+              " one triangle only, the first "
+              "at triangle " +
+              std::to_string(first_open));
   }
   if (crowded > 0) {
-    fault(triangle_at(first_crowded), with_commas(crowded) +
-                                          " edges have two triangles on one side, the first at "
+    fault(triangle_at(first_crowded), counted(crowded, "edge", "has", "have") +
+                                          " two triangles on one side, the first at "
                                           "triangle " +
                                           std::to_string(first_crowded));
   }
@@ -242,7 +243,7 @@ void MeshCheck::vertices() {
   if (unused > 0) {
     const auto first =
         static_cast<std::uint64_t>(std::find(used.begin(), used.end(), false) - used.begin());
-    fault(kVerticesAt + 4 + 2 * first, counted(unused, "vertex", first, "in no triangle"));
+    fault(kVerticesAt + 4 + 2 * first, first_and_more(unused, "vertex", first, "in no triangle"));
   }
   for (unsigned corner = 0; corner < 4; ++corner) {
     const std::uint16_t u = (corner & 1) != 0 ? kTileUnits : 0;
@@ -269,8 +270,8 @@ void MeshCheck::edges() {
       std::sort(right.begin(), right.end());
       fault(at, std::string("the list of vertices on the ") + name + " side " +
                     (list == right ? "is not sorted along it"
-                                   : "has " + with_commas(size) + " entries that are not its " +
-                                         with_commas(right.size()) + " vertices"));
+                                   : "has " + counted(size, "entry") + " that are not its " +
+                                         counted(right.size(), "vertex")));
     }
     at += 4 + index_size_ * list.size();
   };
@@ -293,7 +294,8 @@ void MeshCheck::normals() {
     if (!good && downward++ == 0) first = i;
   }
   if (downward > 0) {
-    fault(extensions_at_, counted(downward, "vertex", first, "with a normal that points downward"));
+    fault(extensions_at_,
+          first_and_more(downward, "vertex", first, "with a normal that points downward"));
   }
 }
 
