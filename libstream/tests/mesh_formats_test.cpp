@@ -312,6 +312,7 @@ TEST_F(MeshFormats, TextInUtf16IsRefusedWithTheRemedy) {
   const std::pair<const char*, std::string> files[] = {
       {"a.obj", obj},
       {"a.off", "OFF\n1 0 0\n0 0 0\n"},
+      {"a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"},
       {"a.xyz", "1 2 3\n4 5 6\n"},
       {"a.csv", "x,y,z\n1,2,3\n"},
       {"a.ply", "ply\nformat ascii 1.0\n"},

@@ -301,6 +301,17 @@ TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
             std::string::npos);
 }
 
+TEST_F(Xyz, RefusesDecimalCommasInPlainWords) {
+  for (const char* text : {"1,5\t2,5\t3,5\n", "1,5\t2\t3\n", "1,5 2,5 3,5\n", "-1,5e3\t2,5\t+3,5\n",
+                           "x\ty\tz\n1,5\t2,5\t3,5\n", "# points\n\"1,5\"\t\"2,5\"\t\"3,5\"\n",
+                           "1,5;2,5;3,5\n", "1\t2\t3\n1,5\t2,5\t3,5\n"}) {
+    EXPECT_NE(refusal(text).find("decimal point"), std::string::npos) << refusal(text);
+  }
+  EXPECT_EQ(read("1,5,2\n3,4,5\n").points.size(), 2u);
+  EXPECT_EQ(read("1, 5, 2\n").points.size(), 1u);
+  EXPECT_EQ(read("1,\t5,\t2\n").points.size(), 1u);
+}
+
 TEST_F(Xyz, RefusesLinesThatNeverEnd) {
   const std::string error = refusal("1 2 3\n" + std::string(200000, '7'));
   EXPECT_NE(error.find("line 2: longer than 65536 bytes"), std::string::npos) << error;

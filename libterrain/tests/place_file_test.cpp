@@ -35,5 +35,24 @@ TEST(PlaceFile, FindsPlacesBehindOtherColumnsByName) {
   EXPECT_THROW(PlaceLayout::of("id,first,second", "places.csv"), stream::Error);
 }
 
+TEST(PlaceFile, RefusesDecimalCommasInPlainWords) {
+  const auto refusal = [](const auto& work) -> std::string {
+    try {
+      work();
+    } catch (const stream::Error& error) {
+      return error.what();
+    }
+    return {};
+  };
+  for (const char* line : {"1,5\t2,5", "1,5;2,5;here", "1;2,5"}) {
+    const std::string error = refusal([&] { PlaceLayout::of(line, "places.csv"); });
+    EXPECT_NE(error.find("decimal point"), std::string::npos) << line << ": " << error;
+  }
+  const PlaceLayout tabs = PlaceLayout::of("x\ty", "places.csv");
+  const std::string error = refusal([&] { place_of("1,5\t2,5", tabs, "places.csv", 2); });
+  EXPECT_NE(error.find("decimal point"), std::string::npos) << error;
+  EXPECT_EQ(PlaceLayout::of("1,5,a;b", "places.csv").separator, ',');
+}
+
 }  // namespace
 }  // namespace terrace::terrain

@@ -69,6 +69,22 @@ std::optional<std::array<std::size_t, 2>> place_columns(
   return std::nullopt;
 }
 
+/// Whether a line is two numbers or more, some with a decimal comma, between semicolons or tabs.
+bool has_decimal_commas(std::string_view line) {
+  const std::size_t at = line.find_first_of(";\t");
+  if (at == std::string_view::npos) return false;
+  const char separator = line[at];
+  bool found = false;
+  for (int column = 0; column < 2; ++column) {
+    std::string cell(bare(take_text(line, separator)));
+    const std::size_t comma = cell.find(',');
+    if (comma != std::string::npos) cell[comma] = '.';
+    if (!number_in(cell)) return false;
+    found = found || comma != std::string::npos;
+  }
+  return found;
+}
+
 }  // namespace
 
 PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file,
@@ -89,6 +105,12 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
                                   ", not a table of places",
                          .remedy = "give CSV; 'ogr2ogr -f CSV -lco GEOMETRY=AS_XY out.csv " + file +
                                    "' converts what GDAL can read"});
+  }
+  if (has_decimal_commas(first_line)) {
+    throw stream::Error({.file = file,
+                         .where = "the first line",
+                         .cause = "has numbers with a decimal comma",
+                         .remedy = "write numbers with a decimal point"});
   }
   if (const std::size_t at = first_line.find_first_of(",;\t"); at != std::string_view::npos) {
     layout.separator = first_line[at];
@@ -190,9 +212,11 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
       throw stream::Error({.file = file,
                            .where = "line " + std::to_string(line_number),
                            .cause = "'" + std::string(cell.substr(0, 40)) + "' is no coordinate",
-                           .remedy = "coordinates are plain numbers, in column " +
-                                     std::to_string(layout.x + 1) + " and column " +
-                                     std::to_string(layout.y + 1)});
+                           .remedy = cell.find(',') != cell.npos
+                                         ? "write numbers with a decimal point"
+                                         : "coordinates are plain numbers, in column " +
+                                               std::to_string(layout.x + 1) + " and column " +
+                                               std::to_string(layout.y + 1)});
     }
     place[column == layout.x ? 0 : 1] = *value;
     ++cells;

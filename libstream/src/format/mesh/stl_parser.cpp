@@ -175,6 +175,11 @@ bool recognise_stl(std::span<const std::byte> bytes) {
 std::unique_ptr<MeshParser> stl_parser(Input& input, bool faces) {
   constexpr std::size_t kHeadBytes = 512;
   const std::string_view head = input.fill(kHeadBytes).substr(0, kHeadBytes);
+  // The binary form may begin with any bytes, so only text of an STL counts as UTF-16.
+  std::string narrow(head);
+  std::erase(narrow, '\0');
+  if (narrow.starts_with("\xFF\xFE") || narrow.starts_with("\xFE\xFF")) narrow.erase(0, 2);
+  if (recognise_stl(std::as_bytes(std::span(narrow)))) refuse_utf16(input);
   if (recognise_stl(std::as_bytes(std::span(head)))) {
     return std::make_unique<StlText>(input, faces);
   }

@@ -121,6 +121,29 @@ bool is_separated_by_tabs(std::string_view header, std::string_view line) {
   return names.size() == fields.size() && std::none_of(names.begin() + 1, names.end(), empty);
 }
 
+/// True for "1,5 2,5 3" with blanks or tabs: numbers of which some have a decimal comma. Fields
+/// between commas would not be numbers.
+bool has_decimal_commas(std::string_view line) {
+  const std::vector<std::string_view> words = split_fields(line, ' ');
+  bool found = false;
+  const bool numbers = std::all_of(words.begin(), words.end(), [&](std::string_view word) {
+    std::string number(unquoted(word));
+    const std::size_t comma = number.find(',');
+    const auto is_digit = [&](std::size_t at) {
+      return at < number.size() && number[at] >= '0' && number[at] <= '9';
+    };
+    if (comma != std::string::npos) {
+      if (comma == 0 || !is_digit(comma - 1) || !is_digit(comma + 1)) return false;
+      number[comma] = '.';
+      found = true;
+    }
+    double value = 0;
+    const char* const end = number.data() + number.size();
+    return parse_real(number.data(), end, value) == end;
+  });
+  return words.size() > 1 && numbers && found;
+}
+
 std::vector<std::string_view> header_names(std::string_view line, char separator) {
   std::vector<std::string_view> names = split_fields(line, separator);
   for (std::string_view& name : names) name = unquoted(name);
@@ -198,6 +221,12 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
     break;
   }
   layout.separator = separator_of(line);
+  if (layout.separator == ',' && has_decimal_commas(line)) {
+    throw Error({.file = file,
+                 .where = "line " + std::to_string(lines.number()),
+                 .cause = "has numbers with a decimal comma",
+                 .remedy = "write numbers with a decimal point"});
+  }
   const std::string& title = header_line != 0 ? header : last_comment;
   if (layout.separator == ' ' && separator_of(title) == ' ' &&
       (is_separated_by_tabs(title, line) || (header_line == 0 && is_separated_by_tabs({}, line)))) {
