@@ -231,6 +231,12 @@ class ViewTest(Stores):
             self.assertEqual(stream.read(10), data[i:i + 10])
         stream.close()
 
+    def test_several_hosts_are_no_request(self):
+        for hosts in ([self.port, self.port], [self.port, 1], [1, self.port]):
+            lines = ''.join(f'Host: localhost:{port}\r\n' for port in hosts)
+            answer = self.answer(f'GET /{self.query} HTTP/1.1\r\n{lines}Connection: close\r\n\r\n'.encode())
+            self.assertIn(b' 400 ', answer.split(b'\r\n')[0])
+
     def test_slow_clients_do_not_hold_it(self):
         idle = [self.connect() for _ in range(60)]
         for i, connection in enumerate(idle):
@@ -243,13 +249,19 @@ class ViewTest(Stores):
         self.assertEqual(len(self.get(self.URL)[2]), len(self.data()))
         self.assertLess(time.monotonic() - begin, 5)
 
-    def test_connections_are_limited(self):
+    def test_idle_connections_keep_nobody_out(self):
+        """They are limited; those that have waited longest for a request end."""
         crowd = []
         try:
-            for _ in range(300):
+            for i in range(300):
                 crowd.append(socket.create_connection(('127.0.0.1', self.port), timeout=20))
-            crowd[-1].sendall(b'GET / HTTP/1.1\r\n\r\n')
-            self.assertIn(b' 503 ', crowd[-1].recv(100))
+                if i % 2:
+                    crowd[-1].sendall(b'GET / HT')  # and no more
+            for _ in range(3):
+                self.assertEqual(len(self.get(self.URL)[2]), len(self.data()))
+            self.assertEqual(crowd[0].recv(100), b'')
+            crowd[-2].sendall(f'GET / HTTP/1.1\r\nHost: localhost:{self.port}\r\n\r\n'.encode())
+            self.assertIn(b' 200 ', crowd[-2].recv(100))
         finally:
             for connection in crowd:
                 connection.close()

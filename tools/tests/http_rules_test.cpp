@@ -142,6 +142,13 @@ TEST_F(HttpAnswers, NameTheServerInTheHeaderHost) {
       200u);
 }
 
+TEST_F(HttpAnswers, RefuseSeveralHosts) {
+  Request request{.method = "GET", .target = "/", .host = "localhost:8000", .hosts = 2};
+  EXPECT_EQ(answer_to(request, site_, {8000, "abc"}).status, 400u);
+  request.host = "evil.example";
+  EXPECT_EQ(answer_to(request, site_, {8000, "abc"}).status, 400u);
+}
+
 TEST_F(HttpAnswers, GiveOtherOriginsNoLeave) {
   for (const Answer& answer : {get("/"), get("/stores/a/data", "bytes=0-1"), get("/nothing")}) {
     const std::string header = header_of(answer);

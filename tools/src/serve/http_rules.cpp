@@ -157,6 +157,9 @@ std::string_view query_value(std::string_view target, std::string_view name) {
 }
 
 Answer answer_to(const Request& request, const Site& site, const Access& access) {
+  if (request.hosts > 1) {
+    return {.status = 400, .close = true, .reason = "there are several headers Host"};
+  }
   if (!names_this_server(request.host, access.port)) {
     return {.status = 403, .close = true, .reason = "the header Host names another server"};
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -17,6 +18,7 @@ struct Request {
   std::string_view method, target;
   std::string_view range{}, if_range{}, if_none_match{};  ///< empty: not given
   std::string_view host{};                                ///< likewise
+  std::size_t hosts = 1;                                  ///< header lines with a Host
   bool trusted = false;                                   ///< needs no token
 };
 
@@ -50,7 +52,8 @@ RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span)
 /// The value of a parameter in the query of a target; empty if it is not there.
 std::string_view query_value(std::string_view target, std::string_view name);
 
-/// Refuses (403) a Host that does not name this server, as a page has that a name server has led
+/// Refuses (400) several header lines Host, of which servers on the way may take another one;
+/// (403) a Host that does not name this server, as a page has that a name server has led
 /// here (DNS rebinding), and a request without the token for anything but the viewer's own files.
 Answer answer_to(const Request& request, const Site& site, const Access& access);
 

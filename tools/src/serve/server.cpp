@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -48,15 +49,31 @@ std::string random_token() {
   return text;
 }
 
+class Session;
+
+/// The connections of a server.
+struct Connections {
+  std::size_t open = 0;
+  /// Those of which no request is complete, by how long they have waited for one.
+  std::list<Session*> waiting;
+
+  /// Ends the one that has waited longest, so that idle ones never keep others out. False if none
+  /// waits.
+  bool end_oldest();
+};
+
 /// One connection: a request, its answer, and so on.
 class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(tcp::socket socket, const std::function<const Site&()>& site, const Access& access,
-          const ServerLimits& limits, std::size_t& open)
-      : stream_(std::move(socket)), site_(site), access_(access), limits_(limits), open_(open) {
-    ++open_;
+          const ServerLimits& limits, Connections& all)
+      : stream_(std::move(socket)), site_(site), access_(access), limits_(limits), all_(all) {
+    ++all_.open;
   }
-  ~Session() { --open_; }
+  ~Session() {
+    stop_waiting();
+    --all_.open;
+  }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -69,9 +86,18 @@ class Session : public std::enable_shared_from_this<Session> {
       read();
     }
   }
+  void close() {
+    error_code ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    stream_.close();
+  }
+  void stop_waiting() {
+    if (place_) all_.waiting.erase(*std::exchange(place_, std::nullopt));
+  }
 
  private:
   void read() {
+    place_ = all_.waiting.insert(all_.waiting.end(), this);
     parser_.emplace();
     parser_->header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
     parser_->body_limit(0);
@@ -81,6 +107,7 @@ class Session : public std::enable_shared_from_this<Session> {
         [self = shared_from_this()](error_code error, std::size_t) { self->received(error); });
   }
   void received(error_code error) {
+    stop_waiting();
     if (error == http::error::header_limit) {
       return answer({.status = 431, .close = true, .reason = "the header is too large"}, false);
     }
@@ -107,6 +134,7 @@ class Session : public std::enable_shared_from_this<Session> {
                               .if_range = field(http::field::if_range),
                               .if_none_match = field(http::field::if_none_match),
                               .host = field(http::field::host),
+                              .hosts = request.count(http::field::host),
                               .trusted = is_trusted()},
                              site_(), access_);
     reply.close = reply.close || !request.keep_alive();
@@ -159,17 +187,12 @@ class Session : public std::enable_shared_from_this<Session> {
       self->read();
     });
   }
-  void close() {
-    error_code ignored;
-    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    stream_.close();
-  }
-
   beast::tcp_stream stream_;
   const std::function<const Site&()>& site_;
   const Access& access_;
   const ServerLimits& limits_;
-  std::size_t& open_;
+  Connections& all_;
+  std::optional<std::list<Session*>::iterator> place_;  ///< among those that wait
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   Answer reply_;
@@ -178,6 +201,14 @@ class Session : public std::enable_shared_from_this<Session> {
   std::uint64_t at_ = 0, left_ = 0;
   std::optional<bool> own_session_;  ///< of the client, once it was asked
 };
+
+bool Connections::end_oldest() {
+  if (waiting.empty()) return false;
+  Session& oldest = *waiting.front();
+  oldest.stop_waiting();
+  oldest.close();
+  return true;
+}
 
 }  // namespace
 
@@ -189,11 +220,13 @@ struct Server::Impl {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
       if (!error) {
-        const bool full = open >= limits.connections;
-        std::make_shared<Session>(std::move(socket), site, access, limits, open)->start(full);
+        const bool full = connections.open >= limits.connections && !connections.end_oldest();
+        std::make_shared<Session>(std::move(socket), site, access, limits, connections)
+            ->start(full);
         return accept();
       }
       // Without descriptors for another connection: as soon as one may have ended.
+      connections.end_oldest();
       pause.expires_after(std::chrono::milliseconds(50));
       pause.async_wait([this](error_code again) {
         if (!again) accept();
@@ -212,7 +245,7 @@ struct Server::Impl {
   std::function<const Site&()> site;
   Access access;
   ServerLimits limits;
-  std::size_t open = 0;
+  Connections connections;
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
   asio::steady_timer timer{context}, pause{context};

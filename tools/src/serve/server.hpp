@@ -13,7 +13,9 @@
 namespace terrace::tools {
 
 struct ServerLimits {
-  std::size_t connections = 256;              ///< more are told to come later (503)
+  /// For more, those that have waited longest for a request end; if none waits, they are told to
+  /// come later (503).
+  std::size_t connections = 256;
   std::size_t header_bytes = 8 * 1024;        ///< of a request; larger ones are refused (431)
   std::chrono::milliseconds request{30'000};  ///< for a request to come, the wait for it included
   std::chrono::milliseconds piece{30'000};    ///< for a client to take 64 KiB
