@@ -393,6 +393,7 @@ class ErrorTest(CommandTest):
         dem, cloud, hills, scan = (self.path(name) for name in ('d.tif', 'c.ply', 'd.terrace', 'c.terrace'))
         self.run_ok('synth', 'dem', '--size', '200x200', '--crs', 'EPSG:32632', '-o', dem)
         self.run_ok('synth', 'surface', '--points', '20000', '-o', cloud)
+        self.run_ok('synth', 'surface', '--points', '500', '-o', self.path('few.ply'))
         self.run_ok('build', dem, '-o', hills)
         self.run_ok('build', cloud, '-o', scan)
         inputs = sorted(os.listdir(self.folder))
@@ -403,7 +404,7 @@ class ErrorTest(CommandTest):
                             ['o.ply', 'mesh', hills, '--max-error', 1], ['o.glb', 'mesh', hills], ['o.obj', 'mesh', hills],
                             ['o.tif', 'raster', hills], ['o.geojson', 'contour', hills, '--interval', 1],
                             ['o.png', 'render', hills], ['o.ply', 'surface', scan], ['o.vtk', 'surface', scan, '--tetrahedra'],
-                            ['o.csv', 'cluster', cloud], ['o.csv', 'match', cloud, '--method', 'monotone'],
+                            ['o.csv', 'cluster', cloud], ['o.csv', 'match', self.path('few.ply')],
                             ['o.csv', 'profile', hills, '--line', f'{west},{south},{west + 3000},{south + 3000}', '--step', 1]):
             with self.subTest(name=name, args=args):
                 result = terrace(*args, '-q', '-o', name, cwd=self.folder, preexec_fn=small_files)

@@ -324,6 +324,36 @@ class NothingSelectedTest(unittest.TestCase):
                 self.assertIn(message, result.stderr)
                 self.assertFalse(os.path.exists(self.path('none.ply')))
 
+    def test_a_focus_outside_the_points_is_noted(self):
+        store = self.build(f'{x} {y} {x * y % 7}\n' for x in range(20) for y in range(20))
+        note = 'is outside the store and adds no points: they have x from 0 to 19, y from 0 to 19'
+        outside, inside = ('--focus', '100,100,110,110:0'), ('--focus', '3,3,9,9:0')
+        for verb, out in (('points', 'f.csv'), ('mesh', 'f.ply'), ('render', 'f.png')):
+            for options, named in ((outside, '--focus ' + note), ((*inside, *outside), '--focus 2 ' + note), (inside, None)):
+                result = terrace(verb, store, *options, '-o', self.path(out), '--force')
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn(named or self.path(out), result.stderr)
+                self.assertEqual(note in result.stderr, named is not None, result.stderr)
+
+    def test_no_points_near_a_place_are_refused(self):
+        store = self.build(f'{x} {x} 1\n' for x in range(9))
+        result = terrace('points', store, '--near', '1,1', '-k', '0', '-o', self.path('none.csv'))
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('-k', result.stderr)
+        self.assertFalse(os.path.exists(self.path('none.csv')))
+
+    def test_one_is_not_counted_as_several(self):
+        store = self.build(['500000 1 2\n'])
+        for args in (('points', '-o', self.path('one.csv')), ('mesh', '-o', self.path('one.ply')), ('info',), ('verify',)):
+            result = terrace(args[0], store, *args[1:])
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertNotRegex(result.stdout + result.stderr, r'\b1 (points|vertices|samples|lines|cells|levels|clusters|files)\b')
+        result = terrace('convert', self.path('s.xyz'), '-o', self.path('copy.xyz'))
+        self.assertIn('1 point', result.stderr)
+        result = terrace('points', store, '--near', '1500000,1', '-k', '1', '-o', self.path('near.csv'))
+        self.assertNotIn('e+', result.stderr)
+        self.assertIn('500000', result.stderr)
+
     def test_a_mesh_without_triangles_says_why(self):
         for lines, why in ((['1 2 3\n', '1 2 4\n'], 'all points have the same x and y'),
                            ([f'{i} {2 * i} {i * i}\n' for i in range(9)], 'all points are on one line over x and y')):

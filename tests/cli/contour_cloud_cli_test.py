@@ -128,6 +128,27 @@ class CloudTestCase(unittest.TestCase):
                                          capture_output=True, check=True).stdout)
 
 
+class NoContourTest(CloudTestCase):
+    def test_no_lines_have_a_reason(self):
+        flat = self.build('flat', [(x, y, 5.5) for x in range(9) for y in range(9)])
+        line = self.build('line', [(i, 2 * i, 7 * i) for i in range(9)])
+        pair = self.build('pair', [(0, 0, 0), (9, 9, 99)])
+        one = self.build('one', [(3, 4, 5)])
+        for store, interval, why in ((flat, 1, 'no multiple of --interval 1 is between the heights, 5.5 to 5.5'),
+                                     (one, 1, 'is between the heights, 5 to 5'),
+                                     (line, 10, 'the points are on one line, so they span no triangles'),
+                                     (pair, 10, 'the points are on one line, so they span no triangles')):
+            result = self.terrace('contour', store, '--own-crs', '--interval', interval, '-o', self.path('none.geojson'), '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('there are no lines: ', result.stderr)
+            self.assertIn(why, result.stderr)
+            self.assertIn('0 lines', result.stderr)
+        result = self.terrace('contour', self.metres, '--interval', 50, '--max-edge', 0.001, '-o', self.path('none.geojson'), '--force')
+        self.assertIn('there are no lines: no triangle with sides of up to 0.001 m crosses', result.stderr)
+        result = self.terrace('contour', self.metres, '--interval', 50, '-o', self.path('some.geojson'))
+        self.assertNotIn('there are no lines', result.stderr)
+
+
 class CloudContourTest(CloudTestCase):
     def lines(self, store, *options):
         return json.loads(self.run_ok('contour', store, '-o', '-', *options))['features']

@@ -59,7 +59,8 @@ class MatchPictureTest(unittest.TestCase):
 
     def test_pairs_of_match_are_red_lines(self):
         points, pairs, _ = self.square()
-        result = terrace('match', points, '-o', pairs, '--force')
+        os.remove(pairs)
+        result = terrace('match', points, '-o', pairs)
         self.assertEqual(result.returncode, 0, result.stderr)
         summary, rows = self.render(pairs, '--points', points)
         self.assertEqual((summary['points'], summary['lines'], summary['levels']), (4, 2, 1))

@@ -89,6 +89,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
   terrain::MeshUnits units;
   terrain::TriangleMesh made = Job(how).run([&](const terrain::Context& context) {
+    note_idle_focuses(store, detail, context);
     std::optional<stream::Overlay> overlay;
     if (!overlay_path.empty()) {
       options.heights.overlay = &overlay.emplace(terrain::open_height_overlay(overlay_path, store));
@@ -128,8 +129,10 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
                 const py::list& focuses, const std::string& where, const py::tuple& how) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, focuses);
-  terrain::LineSet made = Job(how).run(
-      [&](const terrain::Context& context) { return detail_lines(store, detail, context); });
+  terrain::LineSet made = Job(how).run([&](const terrain::Context& context) {
+    note_idle_focuses(store, detail, context);
+    return detail_lines(store, detail, context);
+  });
   std::vector<std::int64_t> begins{0}, numbers;
   for (const terrain::LineSet::Line& line : made.lines) {
     begins.push_back(static_cast<std::int64_t>(line.end));

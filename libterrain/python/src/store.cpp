@@ -138,6 +138,7 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
   const std::size_t payload = store.schema().payload_size();
   std::vector<std::byte> records = Job(how).run([&](const terrain::Context& context) {
     const auto to = change_to(store, crs);
+    note_idle_focuses(store, detail, context);
     std::vector<std::byte> bytes;
     // Known beforehand where everything is wanted.
     if (!detail.region && detail.focuses.empty() && !detail.cluster && where.empty()) {

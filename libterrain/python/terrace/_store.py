@@ -309,7 +309,7 @@ class Store:
             raise ValueError('`near` needs either `k` or `radius`')
         place = [float(number) for number in near]
         if k is not None:
-            k = whole(k, 'k')
+            k = whole(k, 'k', 1)
         return real_values(self._core.near(place, k, radius, level, where), self._info['attributes'])
 
     def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):

@@ -86,6 +86,11 @@ class Stores(StoreCase):
         corners = [[300000, 5200000], [301000, 5200000], [300000, 5200800], [300000, 5200000]]
         got = self.scan.points(region={'type': 'Polygon', 'coordinates': [corners]})
         self.assertEqual(len(got), ((x - 300000) / 1000 + (y - 5200000) / 800 <= 1).sum())
+        far = (-9e6, -9e6, -8e6, -8e6)
+        for use in (self.scan.points, self.scan.mesh):
+            with self.assertLogs('terrace', 'INFO') as log:
+                use(level=self.scan.top, focus=[(far, 0)])
+            self.assertIn('is outside the store and adds no points: they have x from ', log.output[0])
         focused = self.scan.points(level=self.scan.top, focus=[(box, 0)])
         self.assertGreaterEqual(len(focused), inside.sum())
         self.assertLess(len(focused), len(self.points))
@@ -264,6 +269,8 @@ class Stores(StoreCase):
         # On the ground: the map's scale is within a thousandth.
         np.testing.assert_allclose(got['distance'], distances[order], rtol=1e-3)
         self.assertEqual(len(self.scan.query(near=place, k=10 ** 6)), len(self.points))
+        with self.assertRaisesRegex(ValueError, '`k` is at least 1'):
+            self.scan.query(near=place, k=0)
         within = self.scan.query(near=place, radius=50.0)
         self.assertTrue((within['distance'] <= 50).all())
         self.assertAlmostEqual(len(within), (distances <= 50).sum(), delta=2)

@@ -60,6 +60,33 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
                 "give a larger `interval`");
 }
 
+/// Why a store with points has no lines.
+std::string reason_for_none(const stream::Store& store, const ContourRequest& request) {
+  const std::string interval = plain_number(request.interval);
+  const stream::Channel& z = store.schema().coordinates[2];
+  const auto height = [&](double raw) { return raw * z.scale + z.offset; };
+  const auto [low, high] =
+      std::minmax({height(store.bounds().min[2]), height(store.bounds().max[2])});
+  if ((std::floor(low / request.interval) + 1.0) * request.interval >= high) {
+    return "no multiple of `interval` " + interval + " is between the heights, " +
+           readable_number(low, 10) + " to " + readable_number(high, 10);
+  }
+  if (request.max_edge) {
+    return "no triangle with sides of up to " + plain_number(*request.max_edge) +
+           " m crosses a multiple of `interval` " + interval;
+  }
+  if (request.region) {
+    return "inside the region no multiple of `interval` " + interval + " is crossed";
+  }
+  if (store.schema().grid && request.level == 0) {
+    return "no square of four neighbouring samples with data crosses a multiple of `interval` " +
+           interval;
+  }
+  if (request.level == 0) return "the points are on one line, so they span no triangles";
+  return "no triangle of the points of level " + std::to_string(request.level) +
+         " crosses a multiple of `interval` " + interval;
+}
+
 }  // namespace
 
 StoredBox box_around(const Region& region, const GroundSlope& ground) {
@@ -122,6 +149,10 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
     draw_point_contours(parts);
   }
   text.finish();
+  if (text.outcome().lines == 0) {
+    context.say("there are no lines: " + (store.points() == 0 ? "the store has no points"
+                                                              : reason_for_none(store, request)));
+  }
   return text.outcome();
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/ordered_work.hpp"
+#include "base/store_checks.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -37,6 +38,17 @@ bool Detail::reaches_into(const Region& there, const stream::Box3& world_box) co
     wide.max[axis] += margin;
   }
   return there.overlap(wide) != Overlap::none;
+}
+
+void note_idle_focuses(const stream::Store& store, const Detail& detail, const Context& context) {
+  if (store.whole().points() == 0) return;
+  const stream::Box3 all = world_box(store.schema(), store.whole().bounds());
+  for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
+    if (detail.reaches_into(detail.focuses[i].region, all)) continue;
+    const std::string which = detail.focuses.size() > 1 ? " " + std::to_string(i + 1) : "";
+    context.say("`focus`" + which + " is outside the store and adds no points: they have " +
+                extent_text(store.whole()));
+  }
 }
 
 namespace {

@@ -23,6 +23,7 @@ constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_
     {"entities", "--entities"},
     {"facility_cost", "--facility-cost"},
     {"fill", "--fill"},
+    {"focus", "--focus"},
     {"format", "--input-format"},
     {"geoid", "--geoid"},
     {"heights_of_colour", "--rgb"},

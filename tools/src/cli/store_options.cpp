@@ -89,6 +89,7 @@ CLI::Option* PartOptions::define_cluster(CLI::App& app, const std::string& given
 
 Detail PartOptions::detail(const stream::Store& store, const CommonOptions& common) const {
   Detail detail = parse_detail(store, level, region, focuses, crs.regions(store, common));
+  note_idle_focuses(store, detail, common.context());
   if (cluster.empty()) return detail;
   detail.cluster = parse_cluster(cluster);
   if (level.empty()) detail.level = stream::level_of(*detail.cluster);

@@ -83,9 +83,9 @@ struct Published {
 };
 
 /// Writes the site of the stores as a folder for any web server. It appears whole and synced, by
-/// one rename. replace: a folder that terrace has published before gives way. repack_threads:
-/// unless 0, stores are repacked, by so many. Throws: stream::Error; stream::Stopped if a store is
-/// to stop.
+/// one rename. replace: a folder that terrace has published before gives way, unless it has files
+/// of others. repack_threads: unless 0, stores are repacked, by so many. Throws: stream::Error;
+/// stream::Stopped if a store is to stop.
 Published publish(std::span<const stream::Store> stores, const std::filesystem::path& folder,
                   bool replace, unsigned repack_threads);
 

@@ -48,7 +48,7 @@ class PointsCommand final : public Command {
         ->excludes("--region")
         ->excludes("--focus");
     app.add_option("-k", count_, "with --near: the number of points")
-        ->check(CLI::Range(0U, 4294967295U))
+        ->check(CLI::Range(1U, 4294967295U))
         ->type_name("K")
         ->needs("--near");
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
@@ -170,7 +170,7 @@ class PointsCommand final : public Command {
     const std::vector<stream::FoundPoint> found =
         count_ ? nearest_points(query, place, *count_, detail.level)
                : points_within(query, place, *radius_, detail.level);
-    if (found.empty() && count_ != 0 && store.whole().points() > 0) {
+    if (found.empty() && store.whole().points() > 0) {
       throw stream::Error(
           {.file = part_.path,
            .where = {},

@@ -218,6 +218,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   RegionConversion regions(store);
   regions.on_note([&common](const std::string& line) { common.say(line); });
   const Detail detail = parse_detail(store, level, selection.region, selection.focuses, regions);
+  note_idle_focuses(store, detail, common.context());
   memory_for_points(path, size, wanted_points(store, detail) * kDrawnBytesPerPoint, common);
   // These positions are in the CRS already.
   stream::Placement world;

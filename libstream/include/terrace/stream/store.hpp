@@ -95,7 +95,8 @@ class StoreWriter {
 
   /// threads: how many work where one call of append() or finish() encodes many blocks, which is
   /// when symbols have been counted in 64 of them. The bytes do not depend on it.
-  /// Throws: Error if `path` exists (unless `replace`, and it is a store) or cannot be written.
+  /// Throws: Error if `path` exists (unless `replace`, and it is a store without files of others,
+  /// see Store::ownership_of()) or cannot be written.
   StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace = false,
               unsigned threads = 1);
   ~StoreWriter();

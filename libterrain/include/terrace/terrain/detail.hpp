@@ -12,6 +12,7 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "terrace/terrain/context.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -43,6 +44,9 @@ struct Detail {
   /// `there`, which is `region` or that of a focus.
   [[nodiscard]] bool reaches_into(const Region& there, const stream::Box3& world_box) const;
 };
+
+/// Notes each focus that meets none of the store's points, so that it adds nothing.
+void note_idle_focuses(const stream::Store& store, const Detail& detail, const Context& context);
 
 /// Visits every cluster that `detail` wants, the root (or `cluster`) first, then level by level
 /// downward; within a level in order of ordinals. A wanted cluster's parent is always wanted as

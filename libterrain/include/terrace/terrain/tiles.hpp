@@ -69,6 +69,7 @@ struct TilesOutcome {
 /// the last run was interrupted or data changed elsewhere; one that is rebuilt and comes out the
 /// same is not touched. The result is the same as in an empty folder. `resume` without `replace` is
 /// refused for a finished set of other samples or options. The folder is locked against other runs.
+/// Files that are not tiles stay. A tile that a finished set does not list is refused.
 ///
 /// Memory: within the context's bound, at least 176 MiB. Reports "tiles". Throws: UsageError for
 /// options that do not go together or not with this store; stream::Error for a folder that holds
