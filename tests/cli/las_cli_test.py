@@ -183,6 +183,42 @@ class LasFormatTest(LasCase):
         only = self.put('only.las', las(1, records, vlrs=[wkt(UTM_WKT)]))
         self.assertEqual(self.info(only)['crs']['epsg'], 32633)
 
+    def test_the_unit_of_heights_survives(self):
+        """From the header of a CSV to a store, LAS, LAZ and COPC, with a CRS and without."""
+        def metres(path):
+            return {'metre': 1, None: 1, 'foot': 0.3048, 'US survey foot': 1200 / 3937}[
+                (self.info(path)['crs'] or {'vertical_unit': None})['vertical_unit']]
+        header = {'foot': 'z (ft)', 'US survey foot': 'elev_us_ft', 'metre': 'height [m a.s.l.]'}
+        for unit, name in header.items():
+            rows = '\n'.join(f'{i},{40 + i / 5},{i * i / 4}' for i in range(50))
+            table = self.put('table.csv', f'x,y,{name}\n{rows}\n'.encode())
+            expected = {'foot': 0.3048, 'US survey foot': 1200 / 3937, 'metre': 1}[unit]
+            for crs, heights in (('', None), ('EPSG:32632', None), ('EPSG:2263', None), ('EPSG:4326', None),
+                                 ('EPSG:4979', 'ellipsoidal'), ('EPSG:4326+5773', 'orthometric')):
+                store = self.path('unit.store')
+                shutil.rmtree(store, ignore_errors=True)
+                self.run_ok('build', table, *(('--crs', crs) if crs else ()), '-o', store)
+                for ending in '.las', '.laz', '.copc.laz':
+                    file = self.path('unit' + ending)
+                    self.run_ok('points', store, '-o', file, '--force')
+                    self.assertEqual(metres(file), expected, (unit, crs, ending))
+                    told = self.info(file)
+                    self.assertEqual(told['vertical'], heights, (unit, crs, ending))
+                    if crs == 'EPSG:2263':
+                        self.assertEqual(told['crs']['vertical_unit'], unit)
+                        self.assertEqual(told['crs']['epsg'], 2263)
+                if crs:
+                    self.run_ok('points', store, '--to-crs', 'EPSG:3857', '-o', file, '--force')
+                    self.assertEqual(metres(file), expected, (unit, crs))
+            copy = self.path('copy.laz')
+            self.run_ok('convert', table, '-o', copy, '--force')
+            self.assertEqual(metres(copy), expected)
+            for ending in '.csv', '.xyz', '.ply':
+                result = terrace('convert', copy, '-o', self.path('lost' + ending), '--force')
+                self.assertEqual(b'no place for a unit' in result.stderr, unit != 'metre', result.stderr)
+        strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')
+        self.assertIn(b"'NAVD88' in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
+
     def test_wkt_behind_the_points_is_read_and_in_a_pipe_asked_for(self):
         records = random_records(6, 20)
         data = las(6, records, encoding=16, evlrs=[

@@ -77,4 +77,9 @@ std::string canonical_unit(std::string_view text) {
   return std::string(trim(text));
 }
 
+bool is_length_unit(std::string_view name) {
+  return std::any_of(kUnitWords.begin(), kUnitWords.end(),
+                     [name](const UnitWords& unit) { return unit.name == name; });
+}
+
 }  // namespace terrace::stream

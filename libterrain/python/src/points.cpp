@@ -8,8 +8,8 @@
 
 #include <pybind11/stl.h>
 #include <terrace/stream/point_writer.hpp>
-#include <terrace/terrain/crs.hpp>
 #include <terrace/terrain/output_kinds.hpp>
+#include <terrace/terrain/point_file_crs.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -85,16 +85,14 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
     const std::unique_ptr<stream::PointSource> from = open(options);
     const stream::SourceInfo& info = from->info();
     stream::PointHeader header{.attributes = info.attributes,
-                               .crs =
-                                   [&info, &path] {
-                                     const auto system =
-                                         terrain::CoordinateSystem::of(info.crs, path);
-                                     return system ? system->crs_with_wkt1() : info.crs;
-                                   },
+                               .crs = [&info] { return terrain::crs_of_point_file(info); },
                                .lattice = lattice_of(info)};
     const auto writer = stream::open_point_writer(
         path, header,
         {.format = format, .replace = replace, .stop = context.stop, .threads = context.threads});
+    if (const std::string lost = terrain::lost_height_unit(path, *writer, info); !lost.empty()) {
+      context.say(lost);
+    }
     stream::PointBlock block;
     const auto report = [&](bool ended) {
       if (!context.progress) return;

@@ -73,6 +73,18 @@ std::optional<double> metres_in_unit(std::string_view unit) {
   return std::nullopt;
 }
 
+std::string unit_name(double metres) {
+  for (const UnitName& known : kUnits) {
+    if (std::abs(metres / known.metres - 1) < 1e-9) return std::string(known.name);
+  }
+  return {};
+}
+
+std::string plural_unit(const std::string& unit) {
+  if (unit.ends_with("foot")) return unit.substr(0, unit.size() - 4) + "feet";
+  return unit.ends_with('s') || unit.ends_with("feet") ? unit : unit + "s";
+}
+
 Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::move(placement)) {
   const stream::Crs& crs = placement_.crs;
   const auto assume = [this](const std::string& what) {
@@ -107,15 +119,18 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
 
   // The heights' own unit if it is named, else that of a CRS in feet, else metres.
   const std::string& own = placement_.coordinates[2].unit;
-  const std::string& word = own.empty() ? crs.vertical_unit : own;
+  // A file may name the unit in WKT alone.
+  const double of_heights = crs.vertical_unit.empty() && known ? known->metres_per_height : 0;
+  const std::string of_crs = of_heights != 0 ? unit_name(of_heights) : crs.vertical_unit;
+  const std::string& word = own.empty() ? of_crs : own;
   const bool unknown = !word.empty() && !metres_in_unit(word);
   std::string taken = "metres";
   if (const auto channel = metres_in_unit(own)) {
     metres_vertical_ = *channel;
     height_unit_ = own;
-  } else if (const auto vertical = metres_in_unit(crs.vertical_unit)) {
+  } else if (const auto vertical = metres_in_unit(of_crs)) {
     metres_vertical_ = *vertical;
-    height_unit_ = crs.vertical_unit;
+    height_unit_ = of_crs;
     taken = "the vertical unit of the CRS";
   } else if (kind_ != Kind::geographic && metres_horizontal_ < 1.0) {
     metres_vertical_ = metres_horizontal_;

@@ -14,6 +14,7 @@
 
 #include "base/file_marks.hpp"
 #include "base/units.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 
@@ -44,11 +45,6 @@ std::string projection_at(double longitude, double latitude) {
   const double turned = longitude - 360 * std::floor((longitude + 180) / 360);
   const double zone = std::clamp(std::floor((turned + 180) / 6) + 1, 1.0, 60.0);
   return "EPSG:" + std::to_string((latitude < 0 ? 32700 : 32600) + static_cast<int>(zone));
-}
-
-std::string plural(const std::string& unit) {
-  if (unit.ends_with("foot")) return unit.substr(0, unit.size() - 4) + "feet";
-  return unit.ends_with('s') || unit.ends_with("feet") ? unit : unit + "s";
 }
 
 /// As mesh_coordinates() has them, and as the note describes them.
@@ -93,7 +89,7 @@ struct Coordinates {
     return crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : crs.name;
   }
   [[nodiscard]] std::string horizontal_unit() const {
-    if (!crs.horizontal_unit.empty()) return plural(crs.horizontal_unit);
+    if (!crs.horizontal_unit.empty()) return plural_unit(crs.horizontal_unit);
     return degrees ? "degrees" : metres[0] == 1 ? "metres" : "feet";
   }
   [[nodiscard]] std::string projection() const {
@@ -139,7 +135,7 @@ std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
                                ? here.horizontal_unit()
                                : "metres of a map that stretches lengths to " +
                                      readable_number(1 / here.metres[0]) + " times";
-  return "x and y are " + what + " and heights " + plural(heights) +
+  return "x and y are " + what + " and heights " + plural_unit(heights) +
          ", which most programs take for one unit; pass `to_crs`" + here.projection() +
          " for metres, or write GLB, which is in metres";
 }

@@ -8,28 +8,13 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
-#include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/error.hpp"
-#include "terrace/terrain/crs.hpp"
 
 namespace terrace::tools {
 
 bool written_by_terrace(const std::string& path) {
   const std::optional<bool> marked = marked_by_terrace(path);
   return marked ? *marked : stream::is_unchanged_output(path);
-}
-
-std::function<stream::Crs()> crs_to_write(stream::Crs recorded) {
-  return [recorded = std::move(recorded)] {
-    try {
-      const auto system = CoordinateSystem::of(recorded, {});
-      return system ? system->crs_with_wkt1() : recorded;
-    } catch (const terrain::CrsDatabaseError&) {
-      throw;
-    } catch (const stream::Error&) {
-      return recorded;
-    }
-  };
 }
 
 void tell_rounding(const stream::PointWriter& writer, Summary& summary) {

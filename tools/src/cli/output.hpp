@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <functional>
 #include <string>
 #include <string_view>
 
@@ -26,10 +25,6 @@ inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 /// (points as CSV and XYZ, tables, labels), and any program may write the very same: it counts as
 /// ours as long as nothing has changed it (stream::is_unchanged_output).
 bool written_by_terrace(const std::string& path);
-
-/// A CRS for the header of points, found when it is asked for: with WKT 1, which LAS wants. A CRS
-/// that cannot be interpreted is written as it is recorded.
-std::function<stream::Crs()> crs_to_write(stream::Crs recorded);
 
 /// Reports in the summary if coordinates were rounded to fit the file's format.
 void tell_rounding(const stream::PointWriter& writer, Summary& summary);

@@ -35,6 +35,7 @@
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 #include "terrace/terrain/output_kinds.hpp"
+#include "terrace/terrain/point_file_crs.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -360,7 +361,7 @@ ChannelTable read_channels(const PointTable& table, const std::vector<std::strin
 /// Throws: stream::Error, stream::Stopped.
 void write_clustered(const std::string& path, stream::WriterOptions writing,
                      const PointTable& table, const ClusterOutcome& outcome,
-                     std::uint64_t memory_bytes) {
+                     const CommonOptions& common) {
   // Columns of an earlier clustering are replaced.
   struct Kept {
     std::size_t offset = 0, size = 0;
@@ -377,13 +378,16 @@ void write_clustered(const std::string& path, stream::WriterOptions writing,
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
   const std::uint64_t held = table.payload.size() + table.size() * sizeof(stream::Point3);
   writing.memory_bytes -= std::min(writing.memory_bytes, held);
-  const auto writer = stream::open_point_writer(path,
-                                                {.attributes = std::move(attributes),
-                                                 .comments = {kWriterMark},
-                                                 .crs = crs_to_write(table.info.crs),
-                                                 .lattice = lattice_of(table.info)},
-                                                writing);
-  writing_within_memory(*writer, path, memory_bytes, held);
+  const auto writer =
+      stream::open_point_writer(path,
+                                {.attributes = std::move(attributes),
+                                 .comments = {kWriterMark},
+                                 .crs = [&table] { return crs_of_point_file(table.info); },
+                                 .lattice = lattice_of(table.info)},
+                                writing);
+  writing_within_memory(*writer, path, common.memory_or(0), held);
+  const std::string lost = lost_height_unit(path, *writer, table.info);
+  if (!lost.empty()) common.say(lost);
   constexpr std::size_t kBlock = 65536;
   const std::size_t record_bytes = table.info.payload_size();
   stream::PointBlock block;
@@ -591,7 +595,7 @@ class ClusterCommand final : public Command {
     if (!labels_.empty()) write_labels(labels_, outcome.labels, replace_labels);
     if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
     if (!output_.empty()) {
-      write_clustered(output_, writing, table, outcome, common.memory_or(0));
+      write_clustered(output_, writing, table, outcome, common);
     }
     outputs.commit();
     Summary summary = summary_of(outcome, table.size(), watch);

@@ -2,7 +2,6 @@
 // convert: a stream of points from one format to another.
 #include <algorithm>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +24,7 @@
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/output_kinds.hpp"
+#include "terrace/terrain/point_file_crs.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -67,13 +67,16 @@ class ConvertCommand : public Command {
     const std::uint64_t held = reading_within_memory(*source, memory);
     writing.memory_bytes -= std::min(writing.memory_bytes, held);
     const stream::SourceInfo& info = source->info();
-    const auto writer = stream::open_point_writer(output_,
-                                                  {.attributes = info.attributes,
-                                                   .comments = {kWriterMark},
-                                                   .crs = crs_of(info),
-                                                   .lattice = lattice_of(info)},
-                                                  writing);
+    const auto writer =
+        stream::open_point_writer(output_,
+                                  {.attributes = info.attributes,
+                                   .comments = {kWriterMark},
+                                   .crs = [&info] { return crs_of_point_file(located(info)); },
+                                   .lattice = lattice_of(info)},
+                                  writing);
     writing_within_memory(*writer, output_, memory, held);
+    const std::string lost = lost_height_unit(output_, *writer, located(info));
+    if (!lost.empty()) common.say(lost);
     UndeclaredVoids voids(info);
     ProgressMeter meter(common.progress, "points");
     // Each thread holds a block as it was read, and encoded; both have some room to grow.
@@ -142,17 +145,17 @@ class ConvertCommand : public Command {
   static std::string selected_of(const stream::Progress& done) {
     return done.excluded > 0 ? with_commas(done.excluded) + ' ' : std::string();
   }
-  /// The CRS of the file, or of the .prj beside it.
-  static std::function<stream::Crs()> crs_of(const stream::SourceInfo& info) {
-    return [&info] {
-      try {
-        return crs_to_write(crs_of_source(info).crs)();
-      } catch (const terrain::CrsDatabaseError&) {
-        throw;
-      } catch (const stream::Error&) {
-        return info.crs;
-      }
-    };
+  /// With the CRS of the file, or of the .prj beside it.
+  static stream::Placement located(const stream::SourceInfo& info) {
+    stream::Placement placement = info;
+    try {
+      placement.crs = crs_of_source(info).crs;
+    } catch (const terrain::CrsDatabaseError&) {
+      throw;
+    } catch (const stream::Error&) {
+      // What the file says is repeated.
+    }
+    return placement;
   }
 
   std::vector<std::string> inputs_;

@@ -28,6 +28,7 @@
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
 #include "terrace/terrain/output_kinds.hpp"
+#include "terrace/terrain/point_file_crs.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -79,6 +80,7 @@ class PointsCommand final : public Command {
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
+    tell_lost_unit(*writer, store, to, common);
     const std::uint64_t replaced = write_points(store, detail, *writer, places(to),
                                                 overlay ? &*overlay : nullptr, common.context());
     const std::uint64_t points = writer->points();
@@ -112,16 +114,23 @@ class PointsCommand final : public Command {
   static PlaceConversion places(const std::optional<Transformation>& to) {
     return to ? PlaceConversion(*to) : PlaceConversion();
   }
+  static std::optional<stream::Crs> crs_of(const std::optional<Transformation>& to) {
+    return to ? std::optional(to->to().crs()) : std::nullopt;
+  }
+  void tell_lost_unit(const stream::PointWriter& writer, const stream::Store& store,
+                      const std::optional<Transformation>& to, const CommonOptions& common) const {
+    const std::string note = lost_height_unit(output_, writer, store.schema(), crs_of(to));
+    if (!note.empty()) common.say(note);
+  }
   /// In another CRS the points have neither the store's lattice nor its bounds.
   static stream::PointHeader header(const stream::Store& store,
                                     std::vector<stream::Channel> attributes,
                                     const std::optional<Transformation>& to) {
-    stream::PointHeader wanted{.attributes = std::move(attributes),
-                               .comments = {kWriterMark},
-                               .crs = crs_to_write(store.schema().crs)};
-    if (to) {
-      wanted.crs = [system = to->to()] { return system.crs_with_wkt1(); };
-    } else {
+    stream::PointHeader wanted{
+        .attributes = std::move(attributes),
+        .comments = {kWriterMark},
+        .crs = [&store, other = crs_of(to)] { return crs_of_point_file(store.schema(), other); }};
+    if (!to) {
       wanted.lattice = lattice_of(store.schema());
       wanted.bounds = world_box(store.schema(), store.whole().bounds());
     }
@@ -184,6 +193,7 @@ class PointsCommand final : public Command {
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
                                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
+    tell_lost_unit(*writer, store, to, common);
     write_found_points(query, found, *writer, places(to));
     writer->finish();
     Summary summary;

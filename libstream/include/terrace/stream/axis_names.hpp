@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace terrace::stream {
@@ -25,8 +26,13 @@ struct AxisName {
   bool angle = false;  ///< a longitude or latitude
 };
 
-/// Case and units ("Easting(m)", "z_ft") do not matter. nullopt if the name is not that of a
-/// coordinate.
+/// Case and units ("Easting(m)", "z_ft") do not matter; see axis_unit(). nullopt if the name is not
+/// that of a coordinate.
 std::optional<AxisName> axis_named(std::string_view name);
+
+/// The unit that such a name has in brackets or as its last words, as canonical_unit() gives it, or
+/// "degree": "Z (ft)", "height [m a.s.l.]", "elev_us_ft". What is in brackets and begins with no
+/// unit as it is; empty without brackets and unit.
+std::string axis_unit(std::string_view name);
 
 }  // namespace terrace::stream

@@ -21,8 +21,9 @@ struct PointHeader {
   /// (float64).
   std::vector<Channel> attributes{};
   std::vector<std::string> comments{};  ///< written if the format has comments (PLY)
-  /// The CRS of the coordinates, of which formats that have a place for it (LAS) write the WKT. The
-  /// others do not ask: WKT is mostly searched for in a database. Null if the CRS is unknown.
+  /// The CRS of the coordinates, of which formats that have a place for it (LAS) write the WKT, or
+  /// GeoKeys where there is none. The others do not ask: WKT is mostly searched for in a database.
+  /// Null if the CRS is unknown.
   std::function<Crs()> crs{};
   /// The lattice on which coordinates lie: text gets its decimals (849393.95, not
   /// 849393.9500000001), and formats with integer coordinates (LAS) use it. Without a lattice these
@@ -62,6 +63,8 @@ class PointWriter {
   virtual void finish() = 0;
   /// Points appended so far.
   [[nodiscard]] virtual std::uint64_t points() const = 0;
+  /// Whether the file has a place for the CRS and the units of coordinates.
+  [[nodiscard]] virtual bool records_units() const { return false; }
   /// How far a coordinate was moved to fit the integers of the format, at most; 0 where none was
   /// moved by more than doubles lose on the way.
   [[nodiscard]] virtual double rounding() const { return 0.0; }

@@ -21,4 +21,7 @@ inline std::string noun_for(bool one, std::string_view noun) {
   return std::string(noun) + 's';
 }
 
+/// Whether it is one of the names that canonical_unit() gives.
+bool is_length_unit(std::string_view name);
+
 }  // namespace terrace::stream

@@ -164,6 +164,7 @@ class CopcWriter final : public PointWriter {
   }
 
   std::uint64_t points() const override { return records_.sums().points; }
+  bool records_units() const override { return true; }
   double rounding() const override { return records_.sums().rounding; }
   std::uint64_t writing_bytes() const override { return Shares{}.bytes(record_bytes()); }
 

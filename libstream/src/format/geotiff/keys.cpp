@@ -2,6 +2,8 @@
 #include "format/geotiff/keys.hpp"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "format/geotiff/tags.hpp"
@@ -10,30 +12,42 @@
 namespace terrace::stream {
 namespace {
 
-/// Codes of units (EPSG 9001 ...) that heights and coordinates come in.
+/// EPSG codes of the units that heights and coordinates come in, by the names that Crs has.
+struct UnitCode {
+  std::uint16_t code;
+  std::string_view name;
+};
+constexpr std::array<UnitCode, 17> kUnitCodes{{{9001, "metre"},
+                                               {9002, "foot"},
+                                               {9003, "US survey foot"},
+                                               {9005, "Clarke's foot"},
+                                               {9014, "fathom"},
+                                               {9030, "nautical mile"},
+                                               {9035, "US survey mile"},
+                                               {9036, "kilometre"},
+                                               {9093, "mile"},
+                                               {9096, "yard"},
+                                               {1025, "millimetre"},
+                                               {1033, "centimetre"},
+                                               {9101, "radian"},
+                                               {9102, "degree"},
+                                               {9103, "arc-minute"},
+                                               {9104, "arc-second"},
+                                               {9105, "grad"}}};
+
 std::string unit_name(std::uint16_t code) {
-  switch (code) {
-    case 9001:
-      return "metre";
-    case 9002:
-      return "foot";
-    case 9003:
-      return "US survey foot";
-    case 9036:
-      return "kilometre";
-    case 9101:
-      return "radian";
-    case 9102:
-      return "degree";
-    case 9103:
-      return "arc-minute";
-    case 9104:
-      return "arc-second";
-    case 9105:
-      return "grad";
-    default:
-      return code == 0 || code == kUserDefined ? std::string() : "EPSG:" + std::to_string(code);
+  for (const UnitCode& unit : kUnitCodes) {
+    if (unit.code == code) return std::string(unit.name);
   }
+  return code == 0 || code == kUserDefined ? std::string() : "EPSG:" + std::to_string(code);
+}
+
+/// 0 for one without a code.
+std::uint16_t unit_code(std::string_view name) {
+  for (const UnitCode& unit : kUnitCodes) {
+    if (unit.name == name) return unit.code;
+  }
+  return 0;
 }
 
 int epsg_of(std::optional<std::uint16_t> code) {
@@ -137,6 +151,77 @@ Crs crs_of(const GeoKeys& keys) {
   crs.geo_keys = keys.range(kGTModelType, kGTModelType);
   for (GeoKey& key : keys.range(kGeodeticCrs, kLastOfCrs)) crs.geo_keys.push_back(std::move(key));
   return crs;
+}
+
+void GeoKeyDirectory::add(std::uint16_t key, const std::string& text) {
+  const auto at = static_cast<std::uint16_t>(ascii_.size());
+  constexpr std::size_t kMost = 16384;
+  ascii_ += text.substr(0, kMost) + "|";
+  const auto length = static_cast<std::uint16_t>(ascii_.size() - at);
+  entries_.push_back({key, static_cast<std::uint16_t>(kGeoAsciiParams), length, at});
+}
+
+void GeoKeyDirectory::add(std::uint16_t key, const std::vector<double>& values) {
+  const auto at = static_cast<std::uint16_t>(doubles_.size());
+  doubles_.insert(doubles_.end(), values.begin(), values.end());
+  entries_.push_back({key, static_cast<std::uint16_t>(kGeoDoubleParams),
+                      static_cast<std::uint16_t>(values.size()), at});
+}
+
+void GeoKeyDirectory::add(const GeoKey& key) {
+  const bool measures = key.key == 2053 || key.key == 2055 ||
+                        (key.key >= 2057 && key.key <= 2062) ||
+                        (key.key >= 3077 && key.key <= 3096);
+  if (key.values.empty()) {
+    add(key.key, key.text);
+  } else if (measures) {
+    add(key.key, key.values);
+  } else {
+    add(key.key, static_cast<std::uint16_t>(key.values.front()));
+  }
+}
+
+std::vector<std::uint16_t> GeoKeyDirectory::shorts() const {
+  std::vector<std::uint16_t> all{1, 1, 1, static_cast<std::uint16_t>(entries_.size())};
+  for (const auto& entry : entries_) all.insert(all.end(), entry.begin(), entry.end());
+  return all;
+}
+
+GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type) {
+  const auto code = [](int epsg) {
+    return static_cast<std::uint16_t>(epsg > 0 && epsg < kUserDefined ? epsg : 0);
+  };
+  const std::uint16_t epsg = code(crs.epsg), unit = unit_code(crs.horizontal_unit);
+  GeoKeyDirectory keys;
+  const std::span<const GeoKey> own =
+      epsg == 0 ? std::span(crs.geo_keys) : std::span<const GeoKey>();
+  // Longitudes and latitudes of no known datum.
+  const bool angles = epsg == 0 && own.empty() && crs.geographic && unit != 0;
+  if (epsg != 0) keys.add(kGTModelType, crs.geographic ? kModelGeographic : kModelProjected);
+  if (angles) keys.add(kGTModelType, kModelGeographic);
+  for (const GeoKey& key : own) {
+    if (key.key == kGTModelType) keys.add(key);
+  }
+  if (raster_type) keys.add(kGTRasterType, *raster_type);
+  if (!crs.name.empty()) keys.add(kGTCitation, crs.name);
+  for (const GeoKey& key : own) {
+    const bool known_unit = key.key == kLinearUnit && unit != 0 && !crs.geographic;
+    if (key.key > kGTCitation && key.key < kVerticalCrs && !known_unit) keys.add(key);
+  }
+  if (angles) keys.add(kAngularUnit, unit);
+  if (epsg == 0 && !crs.geographic && unit != 0) keys.add(kLinearUnit, unit);
+  if (epsg != 0 && crs.geographic) {
+    keys.add(kGeodeticCrs, epsg);
+    keys.add(kAngularUnit, unit != 0 ? unit : std::uint16_t{9102});
+  } else if (epsg != 0) {
+    keys.add(kProjectedCrs, epsg);
+    if (unit != 0) keys.add(kLinearUnit, unit);
+  }
+  const std::uint16_t vertical = code(crs.vertical_epsg),
+                      vertical_unit = unit_code(crs.vertical_unit);
+  if (vertical != 0) keys.add(kVerticalCrs, vertical);
+  if (vertical_unit != 0 && (vertical != 0 || !raster_type)) keys.add(kVerticalUnit, vertical_unit);
+  return keys;
 }
 
 }  // namespace terrace::stream

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -37,5 +38,30 @@ class GeoKeys {
 
 /// The coordinate reference system named by the keys; user-defined codes count as none.
 Crs crs_of(const GeoKeys& keys);
+
+/// GeoKeys to be written, which are added in ascending order.
+class GeoKeyDirectory {
+ public:
+  void add(std::uint16_t key, std::uint16_t value) { entries_.push_back({key, 0, 1, value}); }
+  void add(std::uint16_t key, const std::string& text);
+  void add(std::uint16_t key, const std::vector<double>& values);
+  /// As a file had it: what measures something is a double, what names something a short.
+  void add(const GeoKey& key);
+
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  [[nodiscard]] std::vector<std::uint16_t> shorts() const;
+  [[nodiscard]] const std::string& ascii() const { return ascii_; }
+  [[nodiscard]] const std::vector<double>& doubles() const { return doubles_; }
+
+ private:
+  std::vector<std::array<std::uint16_t, 4>> entries_;
+  std::vector<double> doubles_;
+  std::string ascii_;
+};
+
+/// The keys that name a system and its units. raster_type: of a raster, kPixelIsArea or
+/// kPixelIsPoint; heights without a vertical CRS have a unit only where there is none, since the
+/// samples of a raster have their own.
+GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type);
 
 }  // namespace terrace::stream

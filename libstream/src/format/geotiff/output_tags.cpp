@@ -5,12 +5,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
 #include <tiff.h>
 
+#include "format/geotiff/keys.hpp"
 #include "format/geotiff/tags.hpp"
 
 namespace terrace::stream {
@@ -44,92 +44,6 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-/// Collects GeoKeys; they must be in ascending order.
-class KeyDirectory {
- public:
-  void add(std::uint16_t key, std::uint16_t value) { entries_.push_back({key, 0, 1, value}); }
-  void add(std::uint16_t key, const std::string& text) {
-    const auto at = static_cast<std::uint16_t>(ascii_.size());
-    constexpr std::size_t kMost = 16384;
-    ascii_ += text.substr(0, kMost) + "|";
-    const auto length = static_cast<std::uint16_t>(ascii_.size() - at);
-    entries_.push_back({key, static_cast<std::uint16_t>(kGeoAsciiParams), length, at});
-  }
-  void add(std::uint16_t key, const std::vector<double>& values) {
-    const auto at = static_cast<std::uint16_t>(doubles_.size());
-    doubles_.insert(doubles_.end(), values.begin(), values.end());
-    entries_.push_back({key, static_cast<std::uint16_t>(kGeoDoubleParams),
-                        static_cast<std::uint16_t>(values.size()), at});
-  }
-  /// As it stands: what measures something is a double, what names something a short.
-  void add(const GeoKey& key) {
-    const bool measures = key.key == 2053 || key.key == 2055 ||
-                          (key.key >= 2057 && key.key <= 2062) ||
-                          (key.key >= 3077 && key.key <= 3096);
-    if (key.values.empty()) {
-      add(key.key, key.text);
-    } else if (measures) {
-      add(key.key, key.values);
-    } else {
-      add(key.key, static_cast<std::uint16_t>(key.values.front()));
-    }
-  }
-  [[nodiscard]] std::vector<std::uint16_t> shorts() const {
-    std::vector<std::uint16_t> all{1, 1, 1, static_cast<std::uint16_t>(entries_.size())};
-    for (const auto& entry : entries_) all.insert(all.end(), entry.begin(), entry.end());
-    return all;
-  }
-  [[nodiscard]] const std::string& ascii() const { return ascii_; }
-  [[nodiscard]] const std::vector<double>& doubles() const { return doubles_; }
-
- private:
-  std::vector<std::array<std::uint16_t, 4>> entries_;
-  std::vector<double> doubles_;
-  std::string ascii_;
-};
-
-std::uint16_t unit_code(const std::string& unit) {
-  if (unit == "metre") return 9001;
-  if (unit == "foot") return 9002;
-  if (unit == "US survey foot") return 9003;
-  if (unit == "degree") return 9102;
-  return 0;
-}
-
-KeyDirectory keys_of(const GeoTiffOptions& options) {
-  const Crs& crs = options.crs;
-  const auto code = [](int epsg) {
-    return static_cast<std::uint16_t>(epsg > 0 && epsg < kUserDefined ? epsg : 0);
-  };
-  const std::uint16_t epsg = code(crs.epsg), unit = unit_code(crs.horizontal_unit);
-  KeyDirectory keys;
-  const std::span<const GeoKey> own =
-      epsg == 0 ? std::span(crs.geo_keys) : std::span<const GeoKey>();
-  if (epsg != 0) keys.add(kGTModelType, crs.geographic ? kModelGeographic : kModelProjected);
-  for (const GeoKey& key : own) {
-    if (key.key == kGTModelType) keys.add(key);
-  }
-  keys.add(kGTRasterType, options.pixel_is_point ? kPixelIsPoint : kPixelIsArea);
-  if (!crs.name.empty()) keys.add(kGTCitation, crs.name);
-  for (const GeoKey& key : own) {
-    if (key.key > kGTCitation && key.key < kVerticalCrs) keys.add(key);
-  }
-  if (epsg == 0 && !crs.geographic && unit != 0) keys.add(kLinearUnit, unit);
-  if (epsg != 0 && crs.geographic) {
-    keys.add(kGeodeticCrs, epsg);
-    keys.add(kAngularUnit, unit != 0 ? unit : std::uint16_t{9102});
-  } else if (epsg != 0) {
-    keys.add(kProjectedCrs, epsg);
-    if (unit != 0) keys.add(kLinearUnit, unit);
-  }
-  if (const std::uint16_t vertical = code(crs.vertical_epsg); vertical != 0) {
-    keys.add(kVerticalCrs, vertical);
-    const std::uint16_t vertical_unit = unit_code(crs.vertical_unit);
-    if (vertical_unit != 0) keys.add(kVerticalUnit, vertical_unit);
-  }
-  return keys;
-}
-
 std::string metadata_of(const Channel& sample) {
   if (sample.scale == 1 && sample.offset == 0 && sample.unit.empty()) return {};
   std::string xml = "<GDALMetadata>\n";
@@ -156,7 +70,8 @@ void add_georeference(TiffDirectory& directory, const GeoTiffOptions& options) {
     directory.add(kModelTransformation, std::vector<double>{m[0], m[1], 0, m[2], m[3], m[4], 0,
                                                             m[5], 0, 0, 0, 0, 0, 0, 0, 1});
   }
-  const KeyDirectory keys = keys_of(options);
+  const GeoKeyDirectory keys =
+      keys_of(options.crs, options.pixel_is_point ? kPixelIsPoint : kPixelIsArea);
   directory.add(kGeoKeyDirectory, keys.shorts());
   if (!keys.doubles().empty()) directory.add(kGeoDoubleParams, keys.doubles());
   if (!keys.ascii().empty()) directory.add(kGeoAsciiParams, keys.ascii());

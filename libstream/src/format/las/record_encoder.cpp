@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "format/geotiff/keys.hpp"
+#include "format/geotiff/tags.hpp"
 #include "format/las/header.hpp"
 #include "format/las/lattice.hpp"
 #include "io/bytes.hpp"
@@ -304,6 +306,27 @@ std::string evlr_head(std::string_view user, std::uint16_t id, std::uint64_t byt
   return out;
 }
 
+namespace {
+
+/// GeoKeys of what has no WKT, such as units alone. Point formats from 6 on ask for WKT, and
+/// readers that insist on it see no CRS, as without the keys.
+void append_geo_keys(std::string& out, const Crs& crs, LasFile& file) {
+  const GeoKeyDirectory keys = keys_of(crs, std::nullopt);
+  if (keys.empty()) return;
+  const auto append = [&](std::uint32_t id, std::string_view data) {
+    append_vlr(out, kLasProjection, static_cast<std::uint16_t>(id), data);
+    ++file.vlrs;
+  };
+  std::string shorts, doubles;
+  for (const std::uint16_t value : keys.shorts()) append_little_endian(shorts, value);
+  for (const double value : keys.doubles()) append_little_endian(doubles, value);
+  append(kGeoKeyDirectory, shorts);
+  if (!doubles.empty()) append(kGeoDoubleParams, doubles);
+  if (!keys.ascii().empty()) append(kGeoAsciiParams, keys.ascii());
+}
+
+}  // namespace
+
 void append_vlrs(std::string& out, const Crs& crs, const LasLayout& layout, const std::string& path,
                  LasFile& file) {
   if (!crs.wkt.empty()) {
@@ -317,6 +340,8 @@ void append_vlrs(std::string& out, const Crs& crs, const LasLayout& layout, cons
     append_vlr(out, kLasProjection, kLasWkt, wkt);
     ++file.vlrs;
     file.has_wkt = true;
+  } else {
+    append_geo_keys(out, crs, file);
   }
   if (!layout.extra_bytes.empty()) {
     append_vlr(out, kLasSpec, kLasExtraBytes, layout.extra_bytes);

@@ -140,6 +140,7 @@ class LasWriter final : public PointWriter {
   }
 
   std::uint64_t points() const override { return records_.sums().points; }
+  bool records_units() const override { return true; }
   double rounding() const override { return records_.sums().rounding; }
 
  private:

@@ -5,6 +5,9 @@
 #include <initializer_list>
 #include <string>
 
+#include "io/text.hpp"
+#include "terrace/stream/unit_words.hpp"
+
 namespace terrace::stream {
 namespace {
 
@@ -12,11 +15,32 @@ bool is_among(std::string_view word, std::initializer_list<std::string_view> wor
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
+bool is_degree(std::string_view word) {
+  return is_among(word, {"deg", "degree", "degrees", "dd", "\xC2\xB0"});
+}
+
+/// Units that a name may end with, without brackets. Letters such as "h" and "n" are no units.
+bool is_suffix_unit(std::string_view word) {
+  return is_among(word, {"m", "meter", "meters", "metre", "metres", "ft", "foot", "feet", "usft",
+                         "ftus", "km", "cm", "mm"});
+}
+
+/// The longest beginning of the words that is a unit.
+std::string unit_of_words(std::string_view words) {
+  if (is_degree(words)) return "degree";
+  for (std::size_t end = words.size(); end != 0 && end != words.npos;
+       end = words.find_last_of(" ,;", end - 1)) {
+    const std::string unit = canonical_unit(words.substr(0, end));
+    if (is_length_unit(unit)) return unit;
+  }
+  return {};
+}
+
 /// Says that the rest of a name is a coordinate, or its unit.
 bool is_decoration(std::string_view word) {
-  return is_among(word,
-                  {"point", "pos", "position", "coord", "coordinate", "utm", "m", "meter", "meters",
-                   "metre", "metres", "ft", "feet", "deg", "degree", "degrees", "dd"});
+  return is_among(word, {"point", "pos", "position", "coord", "coordinate", "utm", "us", "survey",
+                         "intl", "deg", "degree", "degrees", "dd"}) ||
+         is_suffix_unit(word);
 }
 
 /// The name in lower case without brackets, decorations and what separates words. decorated: it had
@@ -85,6 +109,26 @@ std::optional<AxisName> axis_named(std::string_view name) {
   if (bare == "e") return AxisName{.axis = 0, .kind = AxisNameKind::abbreviation};
   if (bare == "n") return AxisName{.axis = 1, .kind = AxisNameKind::abbreviation};
   return std::nullopt;
+}
+
+std::string axis_unit(std::string_view name) {
+  constexpr std::string_view kOpen = "([{", kClose = ")]}";
+  if (const std::size_t open = name.find_first_of(kOpen); open != name.npos) {
+    const std::string_view inside = name.substr(open + 1);
+    const std::size_t last = inside.find_last_of(kClose);
+    const std::string words(trim(inside.substr(0, last)));
+    const std::string unit = unit_of_words(lower_case(words));
+    return unit.empty() ? words : unit;
+  }
+  // From the last word on, as long as the words are parts of one unit.
+  std::string unit;
+  for (std::size_t at = name.find_last_of("_ -."); at != name.npos && at > 0;
+       at = name.find_last_of("_ -.", at - 1)) {
+    const std::string longer = canonical_unit(name.substr(at + 1));
+    if (!is_length_unit(longer)) break;
+    unit = longer;
+  }
+  return unit;
 }
 
 }  // namespace terrace::stream

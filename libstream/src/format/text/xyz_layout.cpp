@@ -83,7 +83,11 @@ void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
     }
     layout.xyz[axis] = *found.columns[axis];
   }
-  layout.geographic = found.angle[0] && found.angle[1];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    layout.units[axis] = axis_unit(names[layout.xyz[axis]]);
+  }
+  layout.geographic = (found.angle[0] && found.angle[1]) ||
+                      (layout.units[0] == "degree" && layout.units[1] == "degree");
 }
 
 /// Names and numbers the columns that are no coordinates; names become distinct and not empty.

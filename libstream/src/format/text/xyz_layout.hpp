@@ -22,6 +22,7 @@ struct TextLayout {
   std::vector<std::size_t> attributes;      ///< the other columns, in order
   std::vector<std::string> names;           ///< of the attributes
   bool geographic = false;                  ///< the header says longitude and latitude
+  std::array<std::string, 3> units;         ///< of the coordinates: see axis_unit()
   std::vector<std::string> comments;        ///< before the first point
 };
 

@@ -24,6 +24,7 @@
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -163,6 +164,7 @@ class XyzSource final : public PointSource {
       info_.crs.horizontal_unit = "degree";
       info_.coordinates[0].unit = info_.coordinates[1].unit = "degree";
     }
+    set_units();
     if (options.crs) info_.crs = *options.crs;
     for (const std::string& name : layout_.names) {
       info_.attributes.push_back({.name = name, .type = ScalarType::f64});
@@ -236,6 +238,28 @@ class XyzSource final : public PointSource {
   }
 
  private:
+  /// Those that the header names.
+  void set_units() {
+    const auto& [x, y, z] = layout_.units;
+    if (!layout_.geographic && x == y && is_length_unit(x)) {
+      info_.crs.horizontal_unit = info_.coordinates[0].unit = info_.coordinates[1].unit = x;
+    }
+    if (is_length_unit(z)) {
+      info_.crs.vertical_unit = info_.coordinates[2].unit = z;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::string& unit = layout_.units[axis];
+      const bool known = axis < 2 && layout_.geographic ? unit == "degree" : is_length_unit(unit);
+      if (unit.empty() || known) continue;
+      info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") + in_quotes(unit) +
+                    " in the header, after the name of " + "xyz"[axis] +
+                    ", is not a unit that is known and is ignored";
+    }
+    if (!layout_.geographic && x != y && (is_length_unit(x) || is_length_unit(y))) {
+      info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") +
+                    "x and y have different units in the header, which are ignored";
+    }
+  }
   /// Integers that doubles do not hold are kept as integers where the first lines have them.
   void choose_types(std::span<const Channel> first) {
     // Some hundred lines; a pipe is waited for, as it is when formats are told apart.

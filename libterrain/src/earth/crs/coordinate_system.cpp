@@ -22,14 +22,6 @@
 
 namespace terrace::terrain {
 
-std::string unit_name(double metres) {
-  if (metres == 1) return "metre";
-  if (metres == 0.3048) return "foot";
-  if (std::abs(metres / (1200.0 / 3937.0) - 1) < 1e-9) return "US survey foot";
-  if (metres == 1000) return "kilometre";
-  return {};
-}
-
 namespace {
 
 std::string angle_name(double degrees) {
@@ -201,7 +193,11 @@ stream::Crs CoordinateSystem::crs() const {
   crs.geographic = is_geographic();
   crs.horizontal_unit =
       is_geographic() ? angle_name(own.degrees_per_unit) : unit_name(own.metres_per_unit);
-  if (own.metres_per_height != 0) crs.vertical_unit = unit_name(own.metres_per_height);
+  if (own.metres_per_height != 0) {
+    crs.vertical_unit = unit_name(own.metres_per_height);
+    // A length without a name is an unknown unit, not a missing one.
+    if (crs.vertical_unit.empty()) crs.vertical_unit = number_text(own.metres_per_height) + " m";
+  }
   return crs;
 }
 

@@ -83,6 +83,27 @@ std::string bound(const std::string& text, const DatumShift& shift) {
   return result + "]]";
 }
 
+/// Whether the WKT is that of a vertical system.
+bool is_vertical(const std::string& wkt) { return wkt.starts_with("VERT"); }
+
+std::string compound(const std::string& name, const std::string& wkt,
+                     const std::string& vertical_name, const std::string& vertical_wkt) {
+  return "COMPOUNDCRS[" + wkt_name(name + " + " + vertical_name) + "," + wkt + "," + vertical_wkt +
+         "]";
+}
+
+std::string length_name(double metres) {
+  const std::string name = unit_name(metres);
+  return name.empty() ? "unknown" : name;
+}
+
+/// A vertical system of which nothing but the name and the unit is known.
+std::string vertical_wkt(const std::string& name, double metres) {
+  return "VERTCRS[" + wkt_name(name) +
+         ",VDATUM[\"unknown\"],CS[vertical,1],AXIS[\"height (H)\",up]," + "LENGTHUNIT[" +
+         wkt_name(length_name(metres)) + "," + plain_number(metres) + "]]";
+}
+
 bool near(const Ellipsoid& a, const Ellipsoid& b) {
   return std::abs(a.semi_major / b.semi_major - 1) < 1e-9 &&
          std::abs(a.flattening() - b.flattening()) < 1e-9;
@@ -116,18 +137,41 @@ std::string CrsDefinition::title() const {
 }
 
 std::string wkt_of(const CrsDefinition& definition) {
-  const bool three = definition.heights == Heights::ellipsoidal && !definition.height_wkt.empty();
-  std::string text = three ? definition.height_wkt : definition.wkt;
+  const bool vertical = is_vertical(definition.height_wkt);
+  std::string text =
+      vertical || definition.height_wkt.empty() ? definition.wkt : definition.height_wkt;
   if (definition.shift) text = bound(text, *definition.shift);
-  if (definition.heights != Heights::orthometric || definition.height_wkt.empty()) return text;
-  return "COMPOUNDCRS[" + wkt_name(definition.name + " + " + definition.vertical_name) + "," +
-         text + "," + definition.height_wkt + "]";
+  if (!vertical) return text;
+  return compound(definition.name, text, definition.vertical_name, definition.height_wkt);
+}
+
+void write_height_unit(CrsDefinition& definition, double metres) {
+  const bool same = std::abs(definition.metres_per_height / metres - 1) < 1e-9;
+  if (same && !definition.height_wkt.empty()) return;
+  definition.metres_per_height = metres;
+  if (is_vertical(definition.height_wkt)) {
+    const ProjObject system = proj_crs_of_text(definition.height_wkt);
+    const ProjObject changed(proj_crs_alter_cs_linear_unit(
+        proj_context(), system.get(), length_name(metres).c_str(), metres, nullptr, nullptr));
+    check_proj_database();
+    definition.height_wkt = changed != nullptr ? wkt_of(changed.get()) : std::string();
+    return;
+  }
+  const bool ellipsoidal = definition.heights == Heights::ellipsoidal;
+  definition.vertical_name = ellipsoidal ? "Ellipsoidal height" : kUnknownHeights;
+  definition.height_wkt = vertical_wkt(definition.vertical_name, metres);
+}
+
+std::string with_height_unit(const stream::Crs& local, double metres) {
+  return compound(local.name, local.wkt, kUnknownHeights, vertical_wkt(kUnknownHeights, metres));
 }
 
 bool mean_the_same(const std::string& wkt, const std::string& other) {
   try {
     const CrsDefinition a = definition_of_contents(wkt), b = definition_of_contents(other);
-    return a.epsg() == b.epsg() && a.heights == b.heights && same_places(a, b);
+    return a.epsg() == b.epsg() && a.heights == b.heights &&
+           std::abs(a.metres_per_height - b.metres_per_height) <= 1e-9 * a.metres_per_height &&
+           same_places(a, b);
   } catch (const CrsError&) {
     return false;
   }

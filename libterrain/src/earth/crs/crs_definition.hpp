@@ -74,8 +74,13 @@ class GeocentricCrs : public LocalCrs {
                  "converts points") {}
 };
 
-/// "metre", "foot", "US survey foot", "kilometre"; else empty.
+/// The name of a vertical system of which only the unit is known, as GDAL writes it.
+inline constexpr char kUnknownHeights[] = "unknown";
+
+/// "metre", "foot", "US survey foot", ...: those that metres_in_unit() knows; else empty.
 std::string unit_name(double metres);
+/// "feet", "US survey feet", "metres".
+std::string plural_unit(const std::string& unit);
 
 /// "ellipsoidal", "orthometric", or empty: as stores record it.
 std::string name_of(Heights heights);
@@ -104,7 +109,8 @@ struct CrsDefinition {
   ProjectionParameters parameters;
 
   Heights heights = Heights::unknown;
-  std::string height_wkt;  ///< of a vertical system, or of a geographic one with three axes
+  /// Of a vertical system, or of the horizontal one with a third axis.
+  std::string height_wkt;
   std::string vertical_name;
   int vertical_epsg = 0;
   double metres_per_height = 0;  ///< 0: unknown
@@ -136,6 +142,11 @@ CrsDefinition definition_of_epsg(int code);
 void set_vertical_epsg(CrsDefinition& definition, int code);
 /// Leaves what heights refer to unsaid.
 void forget_heights(CrsDefinition& definition);
+/// Writes a unit of heights of that many metres into the definition's WKT, with a vertical system
+/// named "unknown" if none is known.
+void write_height_unit(CrsDefinition& definition, double metres);
+/// The same for the WKT of a local system.
+std::string with_height_unit(const stream::Crs& local, double metres);
 /// The system as WKT 2 (ISO 19162:2019), with a shift as a bound CRS.
 std::string wkt_of(const CrsDefinition& definition);
 /// The same as WKT 1, as GDAL writes it; empty where that cannot say it, as is known by reading it.

@@ -311,9 +311,10 @@ void read_vertical_crs(const PJ* crs, CrsDefinition& definition) {
     throw CrsError("the vertical CRS \"" + name + "\" counts depths downwards",
                    "name one of heights, or say what heights refer to with `vertical`");
   }
+  definition.metres_per_height = metres_of(axes[0].unit);
+  if (plain_name(name) == kUnknownHeights) return;
   definition.vertical_epsg = epsg_of(crs);
   definition.vertical_name = name;
-  definition.metres_per_height = metres_of(axes[0].unit);
   // OGC's type 2002: above the ellipsoid.
   const std::string wkt1 = text_of(proj_as_wkt(context, crs, PJ_WKT1_GDAL, nullptr));
   const bool ellipsoidal = wkt1.find(",2002") != std::string::npos ||
@@ -340,7 +341,16 @@ CrsDefinition read_crs(const PJ* crs) {
     throw CrsError("the compound CRS \"" + text_of(proj_get_name(crs)) + "\" is incomplete",
                    kByCode);
   }
-  read_horizontal(horizontal.get(), definition);
+  try {
+    read_horizontal(horizontal.get(), definition);
+  } catch (const GeocentricCrs&) {
+    throw;
+  } catch (const LocalCrs& error) {
+    stream::Crs local = error.crs();
+    const std::vector<Axis> axes = axes_of(vertical.get());
+    if (axes.size() == 1) local.vertical_unit = unit_name(metres_of(axes[0].unit));
+    throw LocalCrs(local);
+  }
   read_vertical_crs(vertical.get(), definition);
   return definition;
 }

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/terrain/point_file_crs.hpp"
+
+#include "base/store_checks.hpp"
+#include "earth/crs/crs_definition.hpp"
+#include "earth/ground.hpp"
+#include "terrace/stream/unit_words.hpp"
+#include "terrace/terrain/crs.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// As Ground takes it. In their own CRS heights without a unit stay without: readers assume the
+/// same again.
+std::string unit_of_heights(const stream::Placement& own, bool converted) {
+  if (!own.coordinates[2].unit.empty()) return own.coordinates[2].unit;
+  if (!own.crs.vertical_unit.empty()) return own.crs.vertical_unit;
+  if (converted) return Ground(own).height_unit();
+  const std::optional<CrsDefinition> known = definition_of(own.crs);
+  return known && known->metres_per_height != 0 ? unit_name(known->metres_per_height)
+                                                : std::string();
+}
+
+/// Nothing for a local system. Throws: CrsError.
+std::optional<CrsDefinition> definition_in_file(const stream::Placement& own,
+                                                const std::optional<stream::Crs>& other) {
+  stream::Crs crs = own.crs;
+  crs.vertical_unit.clear();  // that of its WKT or code counts
+  std::optional<CrsDefinition> definition = definition_of(crs);
+  if (!other) return definition;
+  std::optional<CrsDefinition> written = definition_of(*other);
+  if (!written) return written;
+  forget_heights(*written);
+  if (!definition) return written;
+  written->heights = definition->heights;
+  if (definition->heights == Heights::orthometric) {
+    written->height_wkt = definition->height_wkt;
+    written->vertical_name = definition->vertical_name;
+    written->vertical_epsg = definition->vertical_epsg;
+    written->metres_per_height = definition->metres_per_height;
+  }
+  return written;
+}
+
+}  // namespace
+
+stream::Crs crs_of_point_file(const stream::Placement& own,
+                              const std::optional<stream::Crs>& other) {
+  stream::Crs crs = other.value_or(own.crs);
+  try {
+    const std::string unit = unit_of_heights(own, other.has_value());
+    crs.vertical_unit = stream::canonical_unit(unit);
+    const std::optional<double> metres = metres_in_unit(unit);
+    std::optional<CrsDefinition> definition = definition_in_file(own, other);
+    if (definition) {
+      // Readers of what names no unit take heights for metres, unless x and y are in feet.
+      const bool assumed = definition->geographic || definition->metres_per_unit >= 1;
+      const bool said = definition->metres_per_height != 0;
+      if (metres && (said || !assumed || *metres != 1)) write_height_unit(*definition, *metres);
+      stream::Crs known = CoordinateSystem(*definition).crs_with_wkt1();
+      known.vertical_unit = crs.vertical_unit;
+      return known;
+    }
+    const std::optional<stream::Crs> local = local_crs_of(crs);
+    if (local && !is_geocentric(*local) && metres) crs.wkt = with_height_unit(*local, *metres);
+  } catch (const CrsError&) {
+    // The file repeats what is recorded.
+  }
+  return crs;
+}
+
+std::string lost_height_unit(const std::string& path, const stream::PointWriter& writer,
+                             const stream::Placement& own,
+                             const std::optional<stream::Crs>& other) {
+  if (writer.records_units() || is_geocentric(own.crs)) return {};
+  try {
+    const std::string unit = unit_of_heights(own, other.has_value());
+    if (unit.empty() || metres_in_unit(unit).value_or(0) == 1) return {};
+    return path + ": heights are in " + plural_unit(unit) +
+           ", and the format has no place for a unit: whatever reads the file takes them for "
+           "metres; write LAS or LAZ to keep the unit";
+  } catch (const CrsError&) {
+    return {};
+  }
+}
+
+}  // namespace terrace::terrain
