@@ -295,6 +295,34 @@ class MetresTest(unittest.TestCase):
             self.assertAlmostEqual(largest, summary['max_error'], delta=1e-3)
             self.assertLess(len(uncovered), 30 if glb else 5)
 
+    def test_heights_become_metres(self):
+        """Heights in feet over a map in metres, or over none; of an unknown unit they stay, and a note says so."""
+        rows = '\n'.join(f'{i % 20 * 50},{i // 20 * 50},{i % 7 * 10}' for i in range(400))
+        for unit, crs, most, note in (('ft', 'EPSG:32632', 60 * 0.3048, 'heights are converted from feet to metres'),
+                                      ('ft', '', 60 * 0.3048, 'heights are converted from feet to metres'),
+                                      ('m', 'EPSG:32632', 60, '')):
+            with open(self.path('feet.csv'), 'w', encoding='ascii') as file:
+                file.write(f'x,y,z ({unit})\n{rows}\n')
+            store = self.path(unit + crs[-1:])
+            self.assertEqual(terrace('build', self.path('feet.csv'), '-o', store, *(('--crs', crs) if crs else ()))
+                             .returncode, 0)
+            for how in ('--level', 0), ('--max-error', 0.01):
+                _, notes, path = self.mesh(store, 'feet.glb', *how)
+                self.assertAlmostEqual(max(v[2] for v in Glb(path).vertices), most, delta=1e-3)
+                self.assertIn(note, notes)
+
+    def test_an_unknown_unit_of_heights_is_noted(self):
+        dem = self.path('strange.tif')
+        write_tiff(dem, 8, 8, range(64), corner=(500000, 5200000), cell=10.0, keys=utm(32))
+        with open(dem + '.aux.xml', 'w', encoding='ascii') as file:
+            file.write('<PAMDataset><PAMRasterBand band="1"><UnitType>furlong</UnitType></PAMRasterBand></PAMDataset>')
+        store = self.path('strange')
+        self.assertEqual(terrace('build', dem, '-o', store).returncode, 0)
+        for verb, how in ('mesh', ('--level', 0)), ('mesh', ('--max-error', 1)), ('surface', ()):
+            for name in 'strange.glb', 'strange.ply':
+                notes = self.mesh(store, name, *how, verb=verb)[1]
+                self.assertEqual(notes.count('the unit of heights, "furlong", is not known'), 1, (verb, how, notes))
+
     def test_other_formats_say_that_units_differ(self):
         store, _ = self.raster(GEOGRAPHIC, (8, 46.1), 0.001)
         for name in 'dem.ply', 'dem.obj':

@@ -375,6 +375,7 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   const MetricChoice::Kind kind = options.metric.kind;
   if (holds_lines(store.schema())) need_points(store, "a mesh");
   if (is_geocentric(store.schema().crs)) need_terrain(store, "a mesh over x and y");
+  say_unknown_height_unit(Ground(store.schema()), context);
   if (entities_of(store.schema()) == stream::Entities::triangles) {
     if (kind != MetricChoice::Kind::euclidean || options.heights.any()) {
       throw UsageError(

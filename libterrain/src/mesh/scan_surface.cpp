@@ -161,6 +161,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
     throw UsageError("a surface by another method has no tetrahedra");
   }
   need_points(store, "a surface");
+  say_unknown_height_unit(Ground(store.schema()), context);
   const stream::Store source = store.with_stop(context.stop);
   const bool poles = options.restore.shape.rule == tri::ShapeRule::kPoles;
   check_surface_memory(source, detail,

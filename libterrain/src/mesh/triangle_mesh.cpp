@@ -54,9 +54,13 @@ struct Coordinates {
     placement.crs = crs;
     placement.coordinates[2].unit = units.height_unit;
     const Ground ground(placement);
-    const bool known =
-        crs.epsg != 0 || !crs.wkt.empty() || crs.geographic || !crs.horizontal_unit.empty();
-    if (!known || bounds.empty()) return;
+    height_unit = ground.height_unit();
+    known = crs.epsg != 0 || !crs.wkt.empty() || crs.geographic || !crs.horizontal_unit.empty();
+    if (bounds.empty()) return;
+    if (!known) {
+      metres[2] = ground.metres_vertical();
+      return;
+    }
     for (std::size_t axis = 0; axis < 2; ++axis) {
       middle[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
     }
@@ -84,6 +88,10 @@ struct Coordinates {
     }
   }
 
+  /// "; heights are converted from feet", if they are not in metres.
+  [[nodiscard]] std::string heights_too() const {
+    return metres[2] == 1 ? "" : "; heights are converted from " + plural_unit(height_unit);
+  }
   [[nodiscard]] bool as_they_are() const { return !local && metres == stream::Point3{1, 1, 1}; }
   [[nodiscard]] std::string name() const {
     return crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : crs.name;
@@ -102,6 +110,8 @@ struct Coordinates {
   stream::Point3 metres{1, 1, 1};
   Point2 middle{};
   double width = 0;
+  std::string height_unit;
+  bool known = false;  ///< of x and y
   bool local = false, degrees = false;
   double widest_error = 0;  ///< of lengths from west to east, as a share
 };
@@ -109,9 +119,17 @@ struct Coordinates {
 std::string note_in_metres(const Coordinates& here) {
   const std::string name = here.name().empty() ? "" : " of " + here.name();
   const std::string back = "; asset.extras says how to get the coordinates" + name + " back";
+  if (!here.local && here.metres[0] == 1) {
+    return "heights are converted from " + plural_unit(here.height_unit) +
+           " to metres, as glTF asks" + (here.known ? "" : ", and x and y taken for metres") + back;
+  }
   if (!here.local) {
-    return "in metres, as glTF asks, in place of " +
-           (here.metres[0] != 1 ? here.horizontal_unit() : "heights in another unit") + back;
+    const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-9;
+    return "in metres, as glTF asks, in place of " + here.horizontal_unit() +
+           (same                  ? ""
+            : here.metres[2] == 1 ? "; heights are metres"
+                                  : here.heights_too()) +
+           back;
   }
   std::string note = "in metres, as glTF asks, east and north of " +
                      readable_number(here.middle[0], 10) + ", " +
@@ -123,12 +141,12 @@ std::string note_in_metres(const Coordinates& here) {
       note += " (a projection, as `to_crs`" + here.projection() + ", is truer)";
     }
   }
-  return note + "; asset.extras says how to get the coordinates back";
+  return note + here.heights_too() + "; asset.extras says how to get the coordinates back";
 }
 
 std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
   const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-3;
-  if (!here.local && same) return {};
+  if (!here.known || (!here.local && same)) return {};
   std::string heights = units.height_unit.empty() ? here.crs.vertical_unit : units.height_unit;
   if (!metres_in_unit(heights)) heights = "metre";
   const std::string what = here.degrees || !here.local
