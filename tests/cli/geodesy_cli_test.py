@@ -522,6 +522,18 @@ class GeodesyTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn('on both sides of the antimeridian', result.stderr)
 
+    def test_what_is_wrong_with_longitudes_is_said(self):
+        for longitudes, words in (((15, 415), 'whole turns apart (15 to 415)'), ((179.5, -179.5), 'sides of the antimeridian'),
+                                  ((0.5, 359.5), 'both sides of the meridian of 0')):
+            cloud = self.cloud([(x, 10 + i / 100) for i in range(100) for x in longitudes])
+            store = self.path('turns.store')
+            shutil.rmtree(store, ignore_errors=True)
+            result = terrace('build', cloud, '--crs', 'EPSG:4326', '-o', store)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(words, result.stderr)
+            bounds = self.info(store)['bounds']
+            self.assertLess(bounds['max'][0] - bounds['min'][0], 41)
+
     def test_latitudes_beyond_a_pole_are_refused(self):
         random.seed(1)
         swapped = [(-12 + random.random() / 100, 130 + random.random() / 100) for _ in range(200)]

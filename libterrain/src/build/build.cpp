@@ -269,19 +269,18 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
 
 /// Ends a build whose points are to be joined across the antimeridian.
 struct AcrossAntimeridian {
-  double middle;  ///< see JoinedLongitudes
+  JoinedLongitudes::Joint joint;
 };
 
 /// Throws: AcrossAntimeridian if the input can be read again; else stream::Error.
 void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longitudes,
                      const Context& context) {
-  const std::optional<double> middle = longitudes.middle();
-  if (!middle || request.most_points > 0) return;
-  const std::string what = "is on both sides of the antimeridian";
+  const std::optional<JoinedLongitudes::Joint> joint = longitudes.joint();
+  if (!joint || request.most_points > 0) return;
   if (request.entities != stream::Entities::points) {
     // Their corners are in attributes.
-    context.say("the input " + what +
-                ", and what crosses it goes around the earth: count longitudes on beyond 180");
+    context.say("the points " + joint->what +
+                ", and what connects them goes around the earth: count longitudes on beyond 180");
     return;
   }
   if (!request.open &&
@@ -290,10 +289,11 @@ void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longit
     throw stream::Error(
         {.file = request.inputs.front(),
          .where = {},
-         .cause = what + ", which is known at its end, and can be read only once",
+         .cause =
+             "its points " + joint->what + ", which is known at its end, and can be read only once",
          .remedy = "name a file, or count longitudes from 0 to 360 or on beyond 180"});
   }
-  throw AcrossAntimeridian{*middle};
+  throw AcrossAntimeridian{*joint};
 }
 
 }  // namespace
@@ -478,10 +478,11 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   try {
     return build_once(request, context, std::nullopt);
   } catch (const AcrossAntimeridian& across) {
-    context.say(
-        "the points are on both sides of the antimeridian: they are read again and joined, "
-        "with longitudes that go on beyond 180 degrees");
-    return build_once(request, context, across.middle);
+    const auto& [middle, what] = across.joint;
+    const bool beyond = what.ends_with("antimeridian");
+    context.say("the points " + what + ": they are read again and joined" +
+                (beyond ? ", with longitudes that go on beyond 180 degrees" : ""));
+    return build_once(request, context, middle);
   }
 }
 

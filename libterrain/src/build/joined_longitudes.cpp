@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "base/units.hpp"
 #include "earth/whole_turns.hpp"
 
 namespace terrace::terrain {
@@ -40,7 +41,7 @@ void JoinedLongitudes::operator()(std::span<stream::Point3> stored) {
   }
 }
 
-std::optional<double> JoinedLongitudes::middle() const {
+std::optional<JoinedLongitudes::Joint> JoinedLongitudes::joint() const {
   if (!(most_ - least_ > 180 && most_ - least_ <= 720)) return std::nullopt;
   // The widest gap, around the circle; a gap that goes on beyond the last degree counts once.
   std::size_t gap = 0, gap_end = 0, run = 0;
@@ -52,9 +53,18 @@ std::optional<double> JoinedLongitudes::middle() const {
     }
   }
   if (gap <= kBins / 2) return std::nullopt;
-  const double middle =
-      std::remainder(static_cast<double>(gap_end) + 0.5 * static_cast<double>(kBins - gap), 360);
-  return middle < -90 ? middle + 360 : middle;
+  const double width = static_cast<double>(kBins - gap);
+  double middle = std::remainder(static_cast<double>(gap_end) + 0.5 * width, 360);
+  const bool crosses = std::abs(middle) + 0.5 * width > 180;
+  const bool from_zero = least_ >= 0 && most_ <= 360;
+  if (middle < -90) middle += 360;
+  Joint joint{.middle = middle, .what = "are on both sides of the antimeridian"};
+  if (!crosses && from_zero) joint.what = "are on both sides of the meridian of 0";
+  if (!crosses && !from_zero) {
+    joint.what = "have longitudes that are whole turns apart (" + readable_number(least_, 10) +
+                 " to " + readable_number(most_, 10) + ")";
+  }
+  return joint;
 }
 
 }  // namespace terrace::terrain

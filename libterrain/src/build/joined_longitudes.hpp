@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 
 #include <terrace/stream/schema.hpp>
 
@@ -15,16 +16,21 @@ namespace terrace::terrain {
 /// those of rasters do.
 class JoinedLongitudes {
  public:
-  /// middle: see middle(); nullopt: points stay as they are.
+  /// middle: see Joint; nullopt: points stay as they are.
   JoinedLongitudes(const stream::Placement& placement, std::optional<double> middle);
 
   /// Looks at stored points, and moves them by whole turns to half a turn on either side of the
   /// middle.
   void operator()(std::span<stream::Point3> stored);
 
-  /// The middle of the longitudes seen, if they span less than half the globe, but more than that
-  /// as they are written.
-  [[nodiscard]] std::optional<double> middle() const;
+  /// Longitudes as they are joined: to half a turn on either side of the middle.
+  struct Joint {
+    double middle = 0;
+    std::string what;  ///< "are on both sides of the antimeridian", or what else is wrong with them
+  };
+  /// The joint of the longitudes seen, if they span less than half the globe, but more than that as
+  /// they are written.
+  [[nodiscard]] std::optional<Joint> joint() const;
 
  private:
   static constexpr std::size_t kBins = 360;
