@@ -554,6 +554,28 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(1, 'sample', store, '--points', places, '--points-crs', 'EPSG:4326')
         self.assertIn('line 3: the latitude 146.9 is beyond a pole', error)
 
+    def test_requests_beyond_a_pole_are_refused(self):
+        random.seed(2)
+        degrees = self.build(self.cloud([(9 + random.random(), 45 + random.random()) for _ in range(200)]),
+                             '--crs', 'EPSG:4326')
+        metres = self.build(self.cloud([(5e5 + random.random(), 5e6 + random.random()) for _ in range(200)]),
+                            '--crs', 'EPSG:32632')
+        shape = self.geojson('beyond.json', [[9, 45], [10, 45], [10, 95], [9, 45]])
+        box, line = '9,45,10,95', '9,45,9,95'
+        requests = [('points', '--near', '9,95', '-k', 3), ('points', '--near', '9,-95', '--within', 3),
+                    ('points', '--region', box), ('points', '--focus', box + ':0'), ('points', '--region', shape),
+                    ('mesh', '--region', box), ('raster', '--region', box, '--cell', '0.1'),
+                    ('profile', '--line', line), ('render', '--region', box)]
+        elsewhere = [('points', '--region', box, '--region-crs', 'EPSG:4326'),
+                     ('profile', '--line', line, '--line-crs', 'EPSG:4326')]
+        outputs = {'points': 'o.ply', 'mesh': 'o.ply', 'raster': 'o.tif', 'profile': 'o.csv', 'render': 'o.png'}
+        for store, wanted in (degrees, requests), (metres, elsewhere):
+            for verb, *how in wanted:
+                error = self.refused(1, verb, store, *how, '-o', self.path(outputs[verb]))
+                self.assertRegex(error, 'the latitude -?95 is beyond a pole', (verb, how))
+        # Half a cell of a raster of the globe may be beyond.
+        self.ok('points', degrees, '--region', '-180.5,-90.5,180.5,90.5', '-o', self.path('all.ply'))
+
     def geojson(self, name, ring, **members):
         path = self.path(name)
         with open(path, 'w', encoding='utf-8') as file:

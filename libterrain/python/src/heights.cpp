@@ -12,6 +12,7 @@
 #include <terrace/terrain/contours.hpp>
 #include <terrace/terrain/error.hpp>
 #include <terrace/terrain/heights.hpp>
+#include <terrace/terrain/latitudes.hpp>
 #include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/profile.hpp>
 #include <terrace/terrain/raster.hpp>
@@ -40,6 +41,7 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
     const auto change = change_to(store, crs);
     if (!change) return sample_places(store, given, options, context);
     std::vector<terrain::Point2> places(given.begin(), given.end());
+    terrain::check_latitudes(places, change->to().most_latitude(), "`xy`");
     change->reverse(places);
     return sample_places(store, places, options, context);
   });
@@ -67,8 +69,7 @@ py::array profile(const OpenStore& open, const Array<double>& line,
     conversion.on_note(log_note);
     stream::Box3 box;
     for (const terrain::Point2& p : request.line) box.include(stream::Point3{p[0], p[1], 0});
-    const auto to_line = conversion.to_places({.name = *crs, .file = "`line`"}, box);
-    if (to_line) to_line->reverse(request.line);
+    request.to_line = conversion.to_places({.name = *crs, .file = "`line`"}, box);
   }
   if (step && !(*step > 0)) throw py::value_error("`step` must be above 0");
   request.step = step;

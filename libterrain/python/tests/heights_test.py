@@ -76,6 +76,11 @@ class Heights(StoreCase):
         np.testing.assert_allclose(self.raster.heights(lonlat, crs='EPSG:4326'), there['z'][:200], rtol=0, atol=1e-4)
         self.assertFalse(np.isnan(self.raster.heights(here)).any())
 
+    def test_latitudes_beyond_a_pole_are_refused(self):
+        for method in self.raster.heights, self.raster.gradients:
+            with self.assertRaisesRegex(terrace.Error, 'the latitude 95.0* is beyond a pole'):
+                method([[9, 45], [9, 95]], crs='EPSG:4326')
+
     def test_masked_places_have_no_height(self):
         xy = np.ma.array(places(5))
         xy[2, 0] = np.ma.masked

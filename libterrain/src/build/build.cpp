@@ -28,8 +28,8 @@
 #include "build/undeclared_voids.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
-#include "earth/latitudes.hpp"
 #include "earth/source_crs.hpp"
+#include "terrace/terrain/latitudes.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_sink.hpp"
 

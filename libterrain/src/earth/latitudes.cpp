@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "earth/latitudes.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -12,6 +13,37 @@
 #include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
+namespace {
+
+[[noreturn]] void fail_beyond_pole(const std::string& file, const std::string& where,
+                                   double latitude, const std::string& remedy) {
+  throw stream::Error({.file = file,
+                       .where = where,
+                       .cause = "the latitude " + number_text(latitude) + " is beyond a pole",
+                       .remedy = remedy});
+}
+
+std::string place_text(double x, double y) { return number_text(x) + ' ' + number_text(y); }
+
+}  // namespace
+
+void check_latitudes(std::span<const Point2> places, double most, const std::string& file,
+                     const std::string& where, double beyond) {
+  const double degrees = 90 / most;
+  for (const auto& [x, y] : places) {
+    const double latitude = y * degrees;
+    if (!(std::abs(latitude) > 90 + beyond) || !std::isfinite(latitude)) continue;
+    if (!std::isnan(latitude_on_earth(latitude))) continue;
+    fail_beyond_pole(file, where.empty() ? "place " + place_text(x, y) : where, latitude,
+                     "places are longitude, latitude: exchange them if they are the wrong way "
+                     "round");
+  }
+}
+
+double most_latitude(const stream::Crs& crs) {
+  const double degrees = degrees_of_latitude(crs);
+  return degrees != 0 ? 90 / degrees : std::numeric_limits<double>::infinity();
+}
 
 double latitude_on_earth(double degrees) {
   constexpr double kPole = 90, kRounding = 1e-9;
@@ -43,12 +75,9 @@ void LatitudeCheck::operator()(std::span<const stream::Point3> stored) const {
     const double y = m[3] * p[0] + m[4] * p[1] + m[5];
     if (!std::isnan(latitude_on_earth(y * degrees_))) continue;
     const double x = m[0] * p[0] + m[1] * p[1] + m[2];
-    throw stream::Error(
-        {.file = file_,
-         .where = "point " + plain_number(x) + ' ' + plain_number(y),
-         .cause = "the latitude " + plain_number(y * degrees_) + " is beyond a pole",
-         .remedy = "x is the longitude and y the latitude: exchange them if they are the wrong way "
-                   "round, or name the right `crs`"});
+    fail_beyond_pole(file_, "point " + place_text(x, y), y * degrees_,
+                     "x is the longitude and y the latitude: exchange them if they are the wrong "
+                     "way round, or name the right `crs`");
   }
 }
 

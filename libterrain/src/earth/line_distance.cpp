@@ -7,7 +7,7 @@
 #include "base/portable_math.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
-#include "earth/latitudes.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 namespace {

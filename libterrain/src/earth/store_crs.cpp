@@ -12,13 +12,13 @@
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
-#include "earth/latitudes.hpp"
 #include "earth/region_crs.hpp"
 #include "earth/source_crs.hpp"
 #include "earth/whole_turns.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 
@@ -188,15 +188,37 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
   return change;
 }
 
+namespace {
+
+/// Throws: stream::Error for a region beyond a pole. file: of GeoJSON.
+void check_region(const Region& region, double most, const std::string& file) {
+  // The outermost cells of a raster of the globe may lie half beyond.
+  constexpr double kHalfCell = 1;
+  const stream::Box3& box = region.box();
+  const std::array<Point2, 2> corners{{{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}};
+  check_latitudes(corners, most, file, "the region", kHalfCell);
+}
+
+}  // namespace
+
 Region RegionConversion::operator()(Region region) const {
   const std::optional<PlacesCrs> given = region.crs();
   region = region.in_crs({});
-  if (to_regions_) return region_in(region, *to_regions_, bounds_);
+  if (to_regions_) {
+    check_region(region, to_regions_->to().most_latitude(), given ? given->file : std::string());
+    return region_in(region, *to_regions_, bounds_);
+  }
+  // Longitudes alone have turns that short, in degrees or gradians.
+  constexpr double kLongestTurn = 400;
+  const bool turns = turn_ > 0 && turn_ <= kLongestTurn;
+  const double most = turns ? turn_ / 4 : std::numeric_limits<double>::infinity();
   if (given && !given_) {
     if (const auto change = to_places(*given, region.box())) {
+      check_region(region, change->to().most_latitude(), given->file);
       return region_in(region, *change, bounds_);
     }
   }
+  check_region(region, most, given ? given->file : std::string());
   return with_turns(region, turn_, bounds_, tolerance_);
 }
 

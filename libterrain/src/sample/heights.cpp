@@ -8,6 +8,7 @@
 #include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 
@@ -28,6 +29,7 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& given,
 std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<const Point2> places,
                                        const SamplerOptions& options, const Context& context) {
   constexpr std::size_t kPlacesAtOnce = 16384;
+  check_latitudes(places, most_latitude(store.schema().crs), store.path().string());
   const std::unique_ptr<HeightSampler> sampler = make_sampler(store, options, context);
   const GroundSlope ground(store);
   if (options.gradients) say_unknown_height_unit(ground.ground(), context);

@@ -22,6 +22,7 @@
 #include "sample/surface_crossings.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -200,10 +201,15 @@ double largest_height(const stream::Store& store) {
 
 }  // namespace
 
-ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
+ProfileOutcome profile(const stream::Store& store, const ProfileRequest& given,
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context) {
   need_terrain(store, "a profile");
+  ProfileRequest request = given;
+  const double most =
+      request.to_line ? request.to_line->to().most_latitude() : most_latitude(store.schema().crs);
+  check_latitudes(request.line, most, store.path().string());
+  if (request.to_line) request.to_line->reverse(request.line);
   if (request.line.size() < 2) throw UsageError("a profile needs a line of two places or more");
   for (const Point2& place : request.line) {
     constexpr double kFarthest = 0x1p40;  // columns and rows must differ by 1 there

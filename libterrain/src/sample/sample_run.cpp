@@ -15,6 +15,7 @@
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "surface/ground_slope.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -83,12 +84,8 @@ class Answers {
               if (!is_place(batch, i)) continue;
               places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
               if (!(std::abs(places_[i][1]) > conversions.most_latitude)) continue;
-              throw stream::Error(
-                  {.file = file_.name(),
-                   .where = "line " + std::to_string(batch.first_line + i),
-                   .cause = "the latitude " + plain_number(places_[i][1]) + " is beyond a pole",
-                   .remedy = "places are longitude, latitude: name the columns lon and lat, or "
-                             "exchange them"});
+              check_latitudes({&places_[i], 1}, conversions.most_latitude, file_.name(),
+                              "line " + std::to_string(batch.first_line + i));
             }
             const std::span<Point2> here(places_.data() + piece * kLines,
                                          end_of(piece) - piece * kLines);

@@ -11,6 +11,7 @@
 #include "earth/ground.hpp"
 #include "earth/whole_turns.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -28,6 +29,7 @@ Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
     throw UsageError("`near` needs finite coordinates");
   }
   const stream::StoreSchema& schema = store.schema();
+  check_latitudes({&near.xy, 1}, most_latitude(schema.crs), store.path().string());
   const std::array<double, 2> xy =
       stream::stored_place(schema, WholeTurns(schema, store.whole().bounds())(near.xy));
   const stream::Channel& height = schema.coordinates[2];

@@ -2,7 +2,7 @@
 #include "terrace/terrain/store_view.hpp"
 
 #include "earth/ground.hpp"
-#include "earth/latitudes.hpp"
+#include "terrace/terrain/latitudes.hpp"
 #include "view/view_impl.hpp"
 
 namespace terrace::terrain {

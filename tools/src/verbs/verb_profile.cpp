@@ -46,13 +46,11 @@ class ProfileCommand final : public Command {
     Line line = parse_line(line_);
     request.line = std::move(line.places);
     const stream::Store store = surface_.open(request.sampler);
-    if (const auto change = crs_.given(store, common)) {
-      change->reverse(request.line);
-    } else if (line.crs) {
+    request.to_line = crs_.given(store, common);
+    if (!request.to_line && line.crs) {
       stream::Box3 box;
       for (const Point2& p : request.line) box.include(stream::Point3{p[0], p[1], 0});
-      const auto to_line = crs_.regions(store, common).to_places(*line.crs, box);
-      if (to_line) to_line->reverse(request.line);
+      request.to_line = crs_.regions(store, common).to_places(*line.crs, box);
     }
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     const ProfileOutcome outcome = write_profile(

@@ -12,6 +12,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -19,7 +20,9 @@ namespace terrace::terrain {
 
 struct ProfileRequest {
   SamplerOptions sampler{};
-  std::vector<Point2> line{};    ///< in the store's CRS, straight between its places there
+  std::vector<Point2> line{};  ///< straight between its places in the store's CRS
+  /// From the store's CRS to that of the line, if it is another.
+  std::optional<Transformation> to_line{};
   std::optional<double> step{};  ///< metres
 };
 
@@ -45,8 +48,9 @@ struct ProfilePoint {
 /// does not show; without a CRS they are the map's.
 ///
 /// take: gets the points in order, some thousand at a time.
-/// Throws: stream::Error on a damaged store, stream::Stopped, UsageError as make_sampler() and for
-/// a line of less than two places or with one that is 2^40 stored units away or not finite.
+/// Throws: stream::Error on a damaged store and for a latitude beyond a pole, stream::Stopped,
+/// UsageError as make_sampler() and for a line of less than two places or with one that is 2^40
+/// stored units away or not finite.
 ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context = {});

@@ -15,10 +15,10 @@
 #include "earth/crs/crs_geo_keys.hpp"
 #include "earth/crs/datum_change.hpp"
 #include "earth/crs/projection.hpp"
-#include "earth/latitudes.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/latitudes.hpp"
 
 namespace terrace::terrain {
 

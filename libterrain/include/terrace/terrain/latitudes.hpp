@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include <terrace/stream/store.hpp>
 
@@ -12,6 +13,14 @@
 /// metres are declared as degrees. Nothing may be made of them.
 
 namespace terrace::terrain {
+
+/// Throws: stream::Error if one of the places, longitude and latitude, is beyond a pole.
+/// most: the y of the north pole, see CoordinateSystem::most_latitude(). file: named in the error;
+/// where: likewise, else the place. beyond: how far is let through, in degrees.
+void check_latitudes(std::span<const Point2> places, double most, const std::string& file,
+                     const std::string& where = {}, double beyond = 0);
+/// The y of the north pole where y is a latitude, else infinite.
+double most_latitude(const stream::Crs& crs);
 
 /// The latitude in degrees, a pole where rounding alone is beyond it; NaN beyond a pole.
 double latitude_on_earth(double degrees);
