@@ -194,6 +194,12 @@ class GridTest(unittest.TestCase):
             self.assertNotIn(b'tmp', result.stderr.replace(self.folder.encode(), b''))
             self.assertEqual(sorted(os.listdir(self.folder)), ['a.asc'])
 
+    def test_pictures_of_tiny_cells_end(self):
+        for cell in (1e-160, 1e-155, 1e-300):
+            path = self.ascii_grid(0, 0, cell)
+            result = self.terrace('render', path, '-o', self.path('tiny.png'), '--size', '40x30', '--force')
+            self.assertIn(result.returncode, (0, 1), result.stderr)
+
     def test_undeclared_voids_are_noted(self):
         with open(self.path('a.asc'), 'w') as file:
             file.write('ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 -3.4028235e+38\n3 -3.4028235e+38\n')
@@ -207,6 +213,16 @@ class GridTest(unittest.TestCase):
         self.assertIn(b"--where 'z > -1e30'", result.stderr)
         self.assertEqual(self.json_of('convert', self.path('a.csv'), '-o', self.path('c.csv'), '--where',
                                       'z > -1e30')['points'], 2)
+        # Usual values for no data, far from all others; -9999 among such depths is one of them.
+        for void, others, noted in (('-9999', '1 2', True), ('-32768', '1 2', True), ('-99999', '1 2', True),
+                                    ('-9999', '-9998 -9600', False)):
+            with open(self.path('v.asc'), 'w') as file:
+                file.write(f'ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n{others}\n{void} 3\n')
+            for verb, name in (('build', 'v.terrace'), ('convert', 'v.ply'), ('cluster', 'v.csv'), ('match', 'm.csv'),
+                               ('render', 'v.png')):
+                result = self.terrace(verb, self.path('v.asc'), '-o', self.path(void + others[:2] + name))
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertEqual(f'1 cell has the height {void}'.encode() in result.stderr, noted, (verb, void))
         # With the remedy there are none.
         with open(self.path('a.asc')) as file:
             text = file.read()

@@ -2,6 +2,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/point_file_crs.hpp>
+#include <terrace/terrain/undeclared_voids.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -31,6 +33,7 @@ class PointReader {
       return open(options);
     });
     type_ = record_type(source_->info());
+    voids_.emplace(source_->info());
   }
 
   /// Records, or None at the end.
@@ -42,6 +45,7 @@ class PointReader {
       const std::lock_guard lock(mutex_);
       some = source_->next(block_);
       if (some) {
+        voids_->add(block_);
         stream::to_world(source_->info(), block_);
         const std::size_t payload = source_->info().payload_size();
         records.resize(block_.size() * (sizeof(stream::Point3) + payload));
@@ -54,7 +58,11 @@ class PointReader {
         }
       }
     }
-    if (!some) return py::none();
+    if (!some) {
+      if (const std::string note = voids_->note(); !ended_ && !note.empty()) log_note(note);
+      ended_ = true;
+      return py::none();
+    }
     return to_records(std::move(records), type_);
   }
 
@@ -67,6 +75,8 @@ class PointReader {
   std::mutex mutex_;
   std::unique_ptr<stream::PointSource> source_;
   stream::PointBlock block_;
+  std::optional<terrain::UndeclaredVoids> voids_;
+  bool ended_ = false;
 };
 
 /// (points written, points left out as a coordinate is NaN, how far a coordinate was moved at most)
@@ -100,13 +110,16 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
       context.progress(
           {.what = "points", .count = at.points, .fraction = at.fraction, .ended = ended});
     };
+    terrain::UndeclaredVoids voids(info);
     while (from->next(block)) {
       context.check_stop();
+      voids.add(block);
       stream::to_world(info, block);
       writer->append(block);
       report(false);
     }
     writer->finish();
+    if (const std::string note = voids.note(); !note.empty()) context.say(note);
     report(true);
     points = writer->points();
     nodata = from->progress().nodata;

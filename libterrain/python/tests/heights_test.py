@@ -78,7 +78,7 @@ class Heights(StoreCase):
 
     def test_latitudes_beyond_a_pole_are_refused(self):
         for method in self.raster.heights, self.raster.gradients:
-            with self.assertRaisesRegex(terrace.Error, 'the latitude 95.0* is beyond a pole'):
+            with self.assertRaisesRegex(terrace.Error, 'the latitude 95 is beyond a pole'):
                 method([[9, 45], [9, 95]], crs='EPSG:4326')
 
     def test_masked_places_have_no_height(self):

@@ -41,6 +41,20 @@ class Points(StoreCase):
         terrace.write_points(self.path('points.laz'), records, crs='EPSG:32632', replace=True)
         self.assertEqual(terrace.build(self.path('points.laz'), self.path('of-laz')).info['crs']['epsg'], 32632)
 
+    def test_undeclared_voids_and_lost_units_are_noted(self):
+        path = self.path('voids.csv')
+        with open(path, 'w', encoding='ascii') as file:
+            file.write('x,y,z (ft)\n1,2,3\n2,3,-9999\n')
+        with self.assertLogs('terrace') as notes:
+            self.assertEqual(len(terrace.read_points(path)), 2)
+        self.assertIn('1 point has the height -9999', notes.output[0])
+        with self.assertLogs('terrace') as notes:
+            terrace.write_points(self.path('voids.ply'), path)
+        self.assertIn('heights are in feet', notes.output[0])
+        self.assertIn('1 point has the height -9999', notes.output[1])
+        terrace.write_points(self.path('voids.las'), path)
+        self.assertEqual(terrace.point_batches(self.path('voids.las')).crs['vertical_unit'], 'foot')
+
     def test_a_part(self):
         path = self.path('part.laz')
         records = self.records()

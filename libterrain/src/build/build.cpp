@@ -25,13 +25,13 @@
 #include "build/clustering.hpp"
 #include "build/damage_report.hpp"
 #include "build/joined_longitudes.hpp"
-#include "build/undeclared_voids.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
-#include "terrace/terrain/latitudes.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/latitudes.hpp"
 #include "terrace/terrain/store_sink.hpp"
+#include "terrace/terrain/undeclared_voids.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -19,11 +19,11 @@ namespace {
                                    double latitude, const std::string& remedy) {
   throw stream::Error({.file = file,
                        .where = where,
-                       .cause = "the latitude " + number_text(latitude) + " is beyond a pole",
+                       .cause = "the latitude " + plain_number(latitude) + " is beyond a pole",
                        .remedy = remedy});
 }
 
-std::string place_text(double x, double y) { return number_text(x) + ' ' + number_text(y); }
+std::string place_text(double x, double y) { return plain_number(x) + ' ' + plain_number(y); }
 
 }  // namespace
 

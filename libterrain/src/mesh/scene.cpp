@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "base/portable_math.hpp"
 #include "base/steepness.hpp"
@@ -59,8 +60,9 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
     whole += areas.back();
   }
   std::vector<double> shown;
-  if (!(whole > 0) || !std::isfinite(whole)) return shown;
   const double each = whole / static_cast<double>(kShownHeights);
+  // Areas so small that they are hardly numbers add up to steps of 0.
+  if (!(each >= std::numeric_limits<double>::min()) || !std::isfinite(whole)) return shown;
   double before = 0;
   for (std::size_t i = 0; i < areas.size(); ++i) {
     const auto& t = mesh.triangles[i];

@@ -11,6 +11,7 @@
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/raster.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/undeclared_voids.hpp"
 
 namespace terrace::tools {
 
@@ -90,7 +91,9 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     table.positions.reserve(*table.info.points);
     table.payload.reserve(*table.info.points * table.info.payload_size());
   }
+  UndeclaredVoids voids(source->info());
   for_each_block(*source, common, [&](stream::PointBlock& block) {
+    voids.add(block);
     stream::to_world(table.info, block);
     // A growing vector exists twice for a moment.
     const std::size_t count = table.size() + block.size();
@@ -107,6 +110,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());
   });
   table.nodata = source->progress().nodata;
+  if (const std::string note = voids.note(); !note.empty()) common.say(note);
   if (table.nodata > 0 && !table.info.grid) {
     common.context().say(counted(table.nodata, "point") +
                          " without a coordinate are left out: "

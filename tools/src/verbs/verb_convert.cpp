@@ -13,7 +13,6 @@
 #include "base/ordered_work.hpp"
 #include "base/units.hpp"
 #include "build/damage_report.hpp"
-#include "build/undeclared_voids.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
@@ -25,6 +24,7 @@
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/point_file_crs.hpp"
+#include "terrace/terrain/undeclared_voids.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -14,7 +14,6 @@
 
 #include "base/stored_entities.hpp"
 #include "base/units.hpp"
-#include "build/undeclared_voids.hpp"
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_names.hpp"
@@ -28,6 +27,7 @@
 #include "terrace/stream/store.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/undeclared_voids.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -40,6 +40,7 @@
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/scan_surface.hpp"
+#include "terrace/terrain/undeclared_voids.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -156,7 +157,9 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
   PictureInput input;
   std::optional<HeightGrid> grid;
   if (info.grid) grid.emplace(info.columns, info.rows, most_cells);
+  UndeclaredVoids voids(info);
   for_each_block(*source, common, [&](const stream::PointBlock& block) {
+    voids.add(block);
     if (grid) {
       for (const stream::Point3& p : block.positions) grid->add(p);
     } else {
@@ -170,6 +173,7 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
       }
     }
   });
+  if (const std::string note = voids.note(); !note.empty()) common.say(note);
   if (grid) {
     input.mesh = grid->mesh();
     input.terrain = true;

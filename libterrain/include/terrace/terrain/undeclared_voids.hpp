@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include <terrace/stream/source.hpp>
+
+namespace terrace::terrain {
+
+/// Counts heights that are probably values for no data that their file does not declare: those that
+/// no place has, such as -3.4e38, and usual ones, such as -9999, far from all other heights. They
+/// are kept, and a note says so.
+class UndeclaredVoids {
+ public:
+  /// info: of the source, which must outlive this.
+  explicit UndeclaredVoids(const stream::SourceInfo& info) : info_(info) {}
+
+  /// Heights of a block in stored coordinates. May be called by several threads.
+  void add(const stream::PointBlock& block);
+  /// Empty if there are none.
+  [[nodiscard]] std::string note() const;
+
+ private:
+  static constexpr std::size_t kUsual = 8;
+  struct Seen {
+    std::uint64_t beyond = 0;  ///< heights that no place has
+    double value = 0;          ///< one of them, stored
+    std::array<std::uint64_t, kUsual> usual{};
+    double least = 1e300;  ///< of all other heights
+  };
+
+  [[nodiscard]] double height(double stored) const {
+    return stored * info_.coordinates[2].scale + info_.coordinates[2].offset;
+  }
+  [[nodiscard]] std::string note_of(std::uint64_t count, double stored,
+                                    const std::string& heights) const;
+
+  const stream::SourceInfo& info_;
+  std::mutex mutex_;
+  Seen seen_;
+};
+
+}  // namespace terrace::terrain

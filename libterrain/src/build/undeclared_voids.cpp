@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/terrain/undeclared_voids.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/units.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr double kMost = 1e30;
+/// Values for no data that programs write, the greatest first: -9999 is Esri's, -10000 what black
+/// means in Mapbox's encoding, -32768 in SRTM's files and Terrarium's encoding.
+constexpr std::array<double, 8> kUsualVoids{-9999,  -10000, -32767,  -32768,
+                                            -99999, -99998, -999999, -2147483648.0};
+/// Regular heights are farther above a void than this, else it may be one of them.
+constexpr double kApart = 1000;
+
+}  // namespace
+
+void UndeclaredVoids::add(const stream::PointBlock& block) {
+  Seen seen;
+  for (const stream::Point3& point : block.positions) {
+    const double z = height(point[2]);
+    if (z > kUsualVoids.front() && z <= kMost) {
+      seen.least = std::min(seen.least, z);
+      continue;
+    }
+    if (!(std::abs(z) <= kMost)) {
+      ++seen.beyond;
+      seen.value = point[2];
+      continue;
+    }
+    // A raster's value is its sample, before scale and offset.
+    const auto* const usual =
+        std::find_if(kUsualVoids.begin(), kUsualVoids.end(),
+                     [&](double value) { return z == value || (info_.grid && point[2] == value); });
+    if (usual == kUsualVoids.end()) {
+      seen.least = std::min(seen.least, z);
+    } else {
+      ++seen.usual[static_cast<std::size_t>(usual - kUsualVoids.begin())];
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  if (seen.beyond > 0) seen_.value = seen.value;
+  seen_.beyond += seen.beyond;
+  seen_.least = std::min(seen_.least, seen.least);
+  for (std::size_t i = 0; i < kUsual; ++i) seen_.usual[i] += seen.usual[i];
+}
+
+std::string UndeclaredVoids::note_of(std::uint64_t count, double stored,
+                                     const std::string& heights) const {
+  const std::string value = number_text(stored);
+  const std::string file = info_.files.size() == 1 ? info_.files.front() : "FILE";
+  std::string remedy;
+  if (!info_.grid) {
+    const std::string limit = std::abs(stored) > kMost ? (stored > 0 ? "1e30" : "-1e30") : value;
+    remedy = std::string("leave them out: `where` 'z ") + (stored > 0 ? "< " : "> ") + limit + "'";
+  } else if (info_.format == "ascii-grid" || info_.format == "binary-grid") {
+    remedy = "declare the value in the header: NODATA_value " + value;
+  } else {
+    remedy = "declare the value: gdal_edit.py -a_nodata " + value + " " + file;
+  }
+  const bool one = count == 1;
+  return (info_.files.size() == 1 ? file + ": " : std::string()) +
+         counted(count, info_.grid ? "cell" : "point") + (one ? " has " : " have ") + heights +
+         ", and " + (one ? "is" : "are") + " kept; if " + (one ? "that means" : "these mean") +
+         " no data, " + remedy;
+}
+
+std::string UndeclaredVoids::note() const {
+  if (seen_.beyond > 0) {
+    return note_of(seen_.beyond, seen_.value,
+                   "heights beyond 1e30, such as " + number_text(seen_.value));
+  }
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < kUsual; ++i) {
+    if (seen_.usual[i] > seen_.usual[most]) most = i;
+  }
+  const double value = kUsualVoids[most];
+  if (seen_.usual[most] == 0 || !(seen_.least > value + kApart)) return {};
+  return note_of(seen_.usual[most], value,
+                 "the height " + number_text(value) + ", far below all others");
+}
+
+}  // namespace terrace::terrain
