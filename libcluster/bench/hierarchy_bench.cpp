@@ -127,7 +127,7 @@ void hierarchy_overhead(benchmark::State& state) {
     NullSink sink;
     HierarchyOptions options;
     if (mapped) {
-      options.ground = [](const Bounds&) { return GroundMap{2, 0, 0, 0, 3, 0, 0, 0, 1}; };
+      options.ground = [](const Box3&) { return GroundMap{2, 0, 0, 0, 3, 0, 0, 0, 1}; };
     }
     HierarchyEngine engine(options, sink, [&] { return cluster; });
     push_all(engine, points);

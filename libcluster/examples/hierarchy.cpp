@@ -71,7 +71,7 @@ int main() {
   options.block_size = 400;
   options.threads = 2;
   // Positions are in degrees, heights in metres; clusters should be compact in metres.
-  options.ground = [](const Bounds& block) {
+  options.ground = [](const Box3& block) {
     constexpr double kDegree = 3.14159265358979323846 / 180;
     constexpr double kMetresPerDegree = 111195.0;
     const double latitude = 0.5 * (block.min[1] + block.max[1]);

@@ -32,8 +32,7 @@ std::size_t first_not_finite(std::span<const Point3> positions) {
   return static_cast<std::size_t>(bad - positions.begin());
 }
 
-void check_ground_map(const GroundMap& map, const Bounds& box, unsigned level,
-                      std::uint64_t block) {
+void check_ground_map(const GroundMap& map, const Box3& box, unsigned level, std::uint64_t block) {
   const auto fail = [&](const std::string& what) {
     throw std::invalid_argument("block " + std::to_string(block) + " of level " +
                                 std::to_string(level) + ": " + what);

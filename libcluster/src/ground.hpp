@@ -14,20 +14,6 @@
 
 namespace terrace::cluster {
 
-inline void include(Bounds& box, const Point3& p) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.min[axis] = p[axis] < box.min[axis] ? p[axis] : box.min[axis];
-    box.max[axis] = p[axis] > box.max[axis] ? p[axis] : box.max[axis];
-  }
-}
-
-inline void include(Bounds& box, const Bounds& other) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.min[axis] = std::min(box.min[axis], other.min[axis]);
-    box.max[axis] = std::max(box.max[axis], other.max[axis]);
-  }
-}
-
 inline Point3 difference(const Point3& a, const Point3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
@@ -47,7 +33,7 @@ inline double squared_length(const Point3& v) { return v[0] * v[0] + v[1] * v[1]
 
 /// The sum of the ground extents of a box, with the absolute values of the map's entries: no vector
 /// between two points of the box is longer on the ground, and nothing is squared.
-inline double ground_extent(const GroundMap& m, const Bounds& box) {
+inline double ground_extent(const GroundMap& m, const Box3& box) {
   const Point3 size = difference(box.max, box.min);
   double sum = 0.0;
   for (std::size_t row = 0; row < 3; ++row) {
@@ -61,7 +47,7 @@ std::size_t first_not_finite(std::span<const Point3> positions);
 
 /// Throws std::invalid_argument, naming the block, if the map is not finite or zero, or if ground
 /// distances within the box are beyond 1e150 (their squares would overflow).
-void check_ground_map(const GroundMap& map, const Bounds& box, unsigned level, std::uint64_t block);
+void check_ground_map(const GroundMap& map, const Box3& box, unsigned level, std::uint64_t block);
 
 /// out[i] = map * (positions[i] - origin).
 void to_ground(std::span<const Point3> positions, const Point3& origin, const GroundMap& map,

@@ -6,8 +6,9 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "ground.hpp"
-#include "portable_math.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -32,7 +33,7 @@ LinearMap upright(double angle_degrees) {
         "the angle of an ellipse is not finite: give it in degrees, "
         "counter-clockwise from +x");
   }
-  const auto [s, c] = portable::sine_cosine(angle_degrees);
+  const auto [s, c] = base::sin_cos_degrees(angle_degrees);
   return {c, s, 0, -s, c, 0, 0, 0, 1};
 }
 
@@ -56,12 +57,12 @@ double minkowski(double p, double x, double y, double z) {
   if (largest == 0.0 || std::isinf(p)) return largest;
   if (p == 1.0) return x + y + z;
   // Relative to the largest, so that powers neither overflow nor underflow.
-  using portable::power;
-  return largest *
-         power(power(x / largest, p) + power(y / largest, p) + power(z / largest, p), 1.0 / p);
+  return largest * base::pow(base::pow(x / largest, p) + base::pow(y / largest, p) +
+                                 base::pow(z / largest, p),
+                             1.0 / p);
 }
 
-bool separate(const Bounds& a, const Bounds& b) {
+bool separate(const Box3& a, const Box3& b) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (a.max[axis] < b.min[axis] || b.max[axis] < a.min[axis]) return true;
   }
@@ -123,7 +124,7 @@ Point3 EllipticalField::framed(const Point3& position) const {
 const EllipticalField::Region* EllipticalField::find(const Point3& position) const {
   const Point3 place = framed(position);
   for (const Region& region : regions_) {
-    if (contains(region.box, place)) return &region;
+    if (region.box.contains(place)) return &region;
   }
   return nullptr;
 }
@@ -138,11 +139,11 @@ double EllipticalField::least_scale(const Point3& position) const {
   return region ? region->metric.least_scale() : 1.0;
 }
 
-std::optional<LinearMap> EllipticalField::uniform_in(const Bounds& box) const {
+std::optional<LinearMap> EllipticalField::uniform_in(const Box3& box) const {
   // The bounding box of the box as transformed to the frame.
-  Bounds around = box;
+  Box3 around = box;
   if (frame_ && box.min[0] <= box.max[0]) {
-    around = kEmptyBounds;
+    around = Box3{};
     for (unsigned corner = 0; corner < 8; ++corner) {
       const Point3 place =
           framed({corner & 1u ? box.max[0] : box.min[0], corner & 2u ? box.max[1] : box.min[1],
@@ -155,7 +156,7 @@ std::optional<LinearMap> EllipticalField::uniform_in(const Bounds& box) const {
   }
   for (const Region& region : regions_) {
     if (separate(region.box, around)) continue;
-    if (contains(region.box, around.min) && contains(region.box, around.max)) {
+    if (region.box.contains(around.min) && region.box.contains(around.max)) {
       return region.metric.map();
     }
     return std::nullopt;
@@ -181,7 +182,7 @@ bool obeys_triangle_inequality(const Metric& metric) {
                     metric);
 }
 
-std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box) {
+std::optional<LinearMap> linear_map(const Metric& metric, const Box3& box) {
   if (std::holds_alternative<Euclidean>(metric)) return kIdentityMap;
   if (const auto* elliptical = std::get_if<Elliptical>(&metric)) return elliptical->map();
   if (const auto* field = std::get_if<EllipticalField>(&metric)) return field->uniform_in(box);
@@ -190,7 +191,7 @@ std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box) {
 
 std::optional<std::vector<Point3>> linear_points(const Metric& metric,
                                                  std::span<const Point3> points) {
-  const std::optional<LinearMap> map = linear_map(metric, bounds_of(points));
+  const std::optional<LinearMap> map = linear_map(metric, base::box_of(points));
   if (!map) return std::nullopt;
   std::vector<Point3> result(points.begin(), points.end());
   if (*map != kIdentityMap) {
@@ -245,7 +246,7 @@ double distance(const Metric& metric, const Point3& facility, const Point3& clie
       metric);
 }
 
-double diagonal(const Metric& metric, const Bounds& box) {
+double diagonal(const Metric& metric, const Box3& box) {
   if (!(box.min[0] <= box.max[0])) return 0.0;
   if (std::holds_alternative<EllipticalField>(metric)) return euclidean(box.min, box.max);
   double longest = 0.0;

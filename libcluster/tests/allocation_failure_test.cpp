@@ -12,7 +12,6 @@
 #include <gtest/gtest.h>
 
 #include "terrace/cluster/hierarchy.hpp"
-#include "thread_team.hpp"
 
 namespace {
 
@@ -80,18 +79,6 @@ TEST(AllocationFailure, OfTheHierarchyComesOut) {
     builder.finish();
   };
   EXPECT_GT(fail_in_turn(400, build), 100);
-}
-
-TEST(AllocationFailure, OfATeamComesOut) {
-  const auto run = [] {
-    ThreadTeam team(4);
-    for (int round = 0; round < 5; ++round) {
-      team.run(40, [](std::size_t i) {
-        std::vector<double>(i + 1).swap(*std::make_unique<std::vector<double>>());
-      });
-    }
-  };
-  EXPECT_GT(fail_in_turn(200, run), 50);
 }
 
 }  // namespace

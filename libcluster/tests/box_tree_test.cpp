@@ -32,7 +32,7 @@ void expect_tree(const BoxTree& tree, const std::vector<Point3>& points,
       inside.push_back(points[tree.order()[k]]);
       longest = std::max(longest, connections[tree.order()[k]]);
     }
-    ASSERT_EQ(bounds_of(inside), node.box) << n;
+    ASSERT_EQ(base::box_of(inside), node.box) << n;
     ASSERT_EQ(longest, node.longest) << n;
     std::uint32_t count = 0;
     for (std::uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {

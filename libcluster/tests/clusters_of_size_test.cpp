@@ -46,7 +46,7 @@ TEST(ClustersOfSize, ClustersAreCompact) {
   for (std::size_t i = 0; i < points.size(); ++i) members[labels[i]].push_back(points[i]);
   double widest = 0.0;
   for (const auto& of_cluster : members) {
-    const Bounds box = bounds_of(of_cluster);
+    const Box3 box = base::box_of(of_cluster);
     for (std::size_t d = 0; d < 3; ++d) widest = std::max(widest, box.max[d] - box.min[d]);
   }
   // A block of 10,000 points is half as wide as all.

@@ -35,7 +35,7 @@ TEST(CostMatrix, HoldsTheWeightedDistancesOfAllPairs) {
           cost_matrix(FacilityPoints{.points = scaled, .weights = weights, .metric = metric}, 0);
       ASSERT_EQ(matrix.connection.size(), points.size() * points.size());
       for (std::size_t j = 0; j < points.size(); ++j) {
-        EXPECT_NEAR(matrix.opening[j] / diagonal(metric, bounds_of(scaled)), 1.0, 1e-12);
+        EXPECT_NEAR(matrix.opening[j] / diagonal(metric, base::box_of(scaled)), 1.0, 1e-12);
         for (std::size_t i = 0; i < points.size(); ++i) {
           const double expected = weights[i] * distance(metric, scaled[j], scaled[i]);
           EXPECT_NEAR(matrix.view().cost(j, i), expected, 1e-12 * expected);

@@ -117,7 +117,7 @@ TEST(Entities, PointsByIndexAreThePointsThemselves) {
   std::mt19937_64 random(9);
   const std::vector<Point3> points = inputs::cube(250, random);
   const FacilityPoints by_points{.points = points, .facility_cost = 0.5, .outlier_price = 0.2};
-  const double unit = diagonal(Euclidean{}, bounds_of(points));
+  const double unit = diagonal(Euclidean{}, base::box_of(points));
   const auto function = [&](std::uint32_t f, std::uint32_t c) {
     return distance(Euclidean{}, points[f], points[c]);
   };

@@ -202,7 +202,7 @@ TEST(HierarchyEngine, EachBlockHasItsSeed) {
 }
 
 TEST(HierarchyEngine, ClusteringSeesGroundPositions) {
-  std::vector<Bounds> asked;
+  std::vector<Box3> asked;
   std::vector<std::vector<Point3>> seen;
   const auto cluster = [&](std::span<const Point3> points, std::span<const double> weights,
                            const BlockOptions& options, BlockClustering& result) {
@@ -210,7 +210,7 @@ TEST(HierarchyEngine, ClusteringSeesGroundPositions) {
     runs_of_ten(points, weights, options, result);
   };
   HierarchyOptions options = small_blocks();
-  options.ground = [&](const Bounds& box) {
+  options.ground = [&](const Box3& box) {
     asked.push_back(box);
     return GroundMap{2, 0, 0, 0, 3, 1, 0, 0, box.max[0]};
   };
@@ -219,8 +219,8 @@ TEST(HierarchyEngine, ClusteringSeesGroundPositions) {
   push_all(engine, line(150), 50);
   engine.finish();
   ASSERT_EQ(seen.size(), 2u);
-  EXPECT_EQ(asked[0], (Bounds{{0, 0.5, -1}, {99, 0.5, -1}}));
-  EXPECT_EQ(asked[1], (Bounds{{100, 0.5, -1}, {149, 0.5, -1}}));
+  EXPECT_EQ(asked[0], (Box3{{0, 0.5, -1}, {99, 0.5, -1}}));
+  EXPECT_EQ(asked[1], (Box3{{100, 0.5, -1}, {149, 0.5, -1}}));
   EXPECT_EQ(seen[0][7], (Point3{14, 0, 0}));
   EXPECT_EQ(seen[1][7], (Point3{14, 0, 0})) << "relative to the minimum of the block";
 }
@@ -234,7 +234,7 @@ TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
     for (double& x : p) x = static_cast<double>(random() >> 11) * 0x1p-53;
   }
   std::sort(points.begin(), points.end());
-  const auto map_of = [](const Bounds& box) {
+  const auto map_of = [](const Box3& box) {
     const double scale = 1.0 + box.min[0];
     return GroundMap{scale, 0, 0, 0, 1 / scale, 0, 0, 0, 1};
   };
@@ -255,7 +255,7 @@ TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
     std::vector<std::vector<Descendant>> clusters;
     std::size_t number = 0;
     for (const RecordedBlock& block : level) {
-      Bounds box{block.positions[0], block.positions[0]};
+      Box3 box{block.positions[0], block.positions[0]};
       for (const Point3& p : block.positions) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
           box.min[axis] = std::min(box.min[axis], p[axis]);
@@ -383,7 +383,7 @@ TEST(HierarchyEngine, ExceptionsComeOutOnce) {
         Trap trap{where, visit, {}};
         TrappedSink sink(trap);
         HierarchyOptions options = small_blocks(threads);
-        options.ground = [&](const Bounds&) {
+        options.ground = [&](const Box3&) {
           trap.visit(Where::ground);
           return GroundMap{2, 0, 0, 0, 1, 0, 0, 0, 1};
         };
@@ -458,7 +458,7 @@ TEST(HierarchyEngine, UselessGroundMapsAreRefused) {
                                        {1e200, 0, 0, 0, 1, 0, 0, 0, 1}};
   for (const GroundMap& map : maps) {
     HierarchyOptions options = small_blocks();
-    options.ground = [&](const Bounds&) { return map; };
+    options.ground = [&](const Box3&) { return map; };
     RecordingSink sink;
     HierarchyEngine engine(options, sink, [] { return runs_of_ten; });
     EXPECT_THROW(push_all(engine, line(101), 50), std::invalid_argument);

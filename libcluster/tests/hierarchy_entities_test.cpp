@@ -112,7 +112,7 @@ TEST(HierarchyEntities, AreWithTheNearestRepresentative) {
       HierarchyOptions options;
       options.block_size = 500;
       options.block.facility_cost = 0.3;
-      options.ground = [&](const Bounds&) { return map; };
+      options.ground = [&](const Box3&) { return map; };
       const BuiltEntities built(entities, options);
       ASSERT_GE(built.result.top, 1u);
       laws::check_hierarchy(built.sink, built.result, entities.first_corners(), options.block_size,
@@ -194,7 +194,7 @@ TEST(HierarchyEntities, WhatCannotBeClusteredIsRefused) {
   refused([](HierarchyOptions& o) { o.corners.count = 4; });
   refused([](HierarchyOptions& o) { o.corners.read = nullptr; });
   refused([](HierarchyOptions& o) { o.metric = SquaredEuclidean{}; });
-  refused([](HierarchyOptions& o) { o.metric_of = [](const Bounds&) { return Euclidean{}; }; });
+  refused([](HierarchyOptions& o) { o.metric_of = [](const Box3&) { return Euclidean{}; }; });
   refused([](HierarchyOptions& o) {
     o.channels = {{1.0}, [](std::span<const std::byte>, std::span<double>) {}};
   });

@@ -76,7 +76,7 @@ inline void check_summary(const Expanded& cluster, std::span<const Point3> input
   const Summary& summary = cluster.block->summaries[cluster.c];
   const Point3& from = cluster.block->positions[cluster.representative()];
   EXPECT_EQ(summary.descendants, cluster.descendants.size());
-  Bounds box{from, from};
+  Box3 box{from, from};
   long double farthest = 0.0L;
   for (const std::uint64_t id : cluster.descendants) {
     for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -57,7 +57,7 @@ TEST(HierarchyMetric, LawsHoldUnderEveryMetric) {
         HierarchyOptions options;
         options.block_size = 70;
         options.metric = metric;
-        if (mapped) options.ground = [&](const Bounds&) { return map; };
+        if (mapped) options.ground = [&](const Box3&) { return map; };
         RecordingSink sink, again;
         const HierarchyResult result = build(input.points, options, sink);
         // Errors are ground distances, whatever the metric.
@@ -114,7 +114,7 @@ TEST(HierarchyMetric, FieldsAreOnTheGround) {
       {{{{0x1p20, 0x1p21, -1}, {0x1p20 + 512, 0x1p21 + 700, 1}}, Elliptical(5.0, 1.0, 45.0)}});
   RecordingSink by_metres, by_degrees, plain;
   build(metres, options, by_metres);
-  options.ground = [](const Bounds&) { return GroundMap{0x1p16, 0, 0, 0, 0x1p17, 0, 0, 0, 1}; };
+  options.ground = [](const Box3&) { return GroundMap{0x1p16, 0, 0, 0, 0x1p17, 0, 0, 0, 1}; };
   build(degrees, options, by_degrees);
   ASSERT_EQ(by_metres.levels[0].size(), by_degrees.levels[0].size());
   for (std::size_t b = 0; b < by_metres.levels[0].size(); ++b) {
@@ -122,12 +122,12 @@ TEST(HierarchyMetric, FieldsAreOnTheGround) {
     EXPECT_EQ(by_metres.levels[0][b].representatives, by_degrees.levels[0][b].representatives);
   }
   // The same if each block has its own frame, here twice as large for every other one.
-  const auto growth = [](const Bounds& box) { return box.min[1] > 0x1p4 + 0x1p-9 ? 2.0 : 1.0; };
-  options.ground = [&](const Bounds& box) {
+  const auto growth = [](const Box3& box) { return box.min[1] > 0x1p4 + 0x1p-9 ? 2.0 : 1.0; };
+  options.ground = [&](const Box3& box) {
     return GroundMap{growth(box) * 0x1p16, 0, 0, 0, growth(box) * 0x1p17, 0, 0, 0, growth(box)};
   };
   options.metric = Euclidean{};
-  options.metric_of = [&](const Bounds& box) -> Metric {
+  options.metric_of = [&](const Box3& box) -> Metric {
     const double g = growth(box);
     return EllipticalField(
         {{{{g * 0x1p20, g * 0x1p21, -1}, {g * (0x1p20 + 512), g * (0x1p21 + 700), 1}},

@@ -65,7 +65,7 @@ std::vector<FacilityStrategy> searches() {
 TEST(HierarchyOutliers, SteerNoCluster) {
   std::mt19937_64 random(71);
   const std::vector<Point3> surface = inputs::scan(2, 50, random);
-  const Bounds box = bounds_of(surface);
+  const Box3 box = base::box_of(surface);
   const double size = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1]);
   std::vector<Point3> all = surface;
   const std::vector<std::pair<std::size_t, Point3>> birds{
@@ -170,7 +170,7 @@ TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
     leave_out(p.view(), trimmed);
     EXPECT_EQ(trimmed.facilities, clustering.facilities);
 
-    const double unit = diagonal(p.metric, bounds_of(p.points));
+    const double unit = diagonal(p.metric, base::box_of(p.points));
     // A cluster whose members are all left out or elsewhere costs nothing.
     std::vector<char> used(trimmed.facilities.size(), 0);
     for (const std::uint32_t c : trimmed.assignment) {

@@ -166,7 +166,7 @@ TEST(Hierarchy, DegreesClusterLikeTheirTwinInMetres) {
   RecordingSink by_metres, by_degrees, without_map;
   const HierarchyResult result = build(metres, options, by_metres, 256);
   build(degrees, options, without_map, 256);
-  options.ground = [&](const Bounds&) { return GroundMap{kEast, 0, 0, 0, kNorth, 0, 0, 0, 1}; };
+  options.ground = [&](const Box3&) { return GroundMap{kEast, 0, 0, 0, kNorth, 0, 0, 0, 1}; };
   const HierarchyResult twin = build(degrees, options, by_degrees, 256);
   laws::check_hierarchy(by_degrees, twin, degrees, 512,
                         GroundMap{kEast, 0, 0, 0, kNorth, 0, 0, 0, 1});
@@ -203,7 +203,7 @@ TEST(Hierarchy, AnyLinearMapAndLargeOffsets) {
     SCOPED_TRACE(testing::PrintToString(map));
     HierarchyOptions options;
     options.block_size = 90;
-    options.ground = [&](const Bounds&) { return map; };
+    options.ground = [&](const Box3&) { return map; };
     RecordingSink sink;
     const HierarchyResult result = build(points, options, sink, 30);
     laws::check_hierarchy(sink, result, points, 90, map);

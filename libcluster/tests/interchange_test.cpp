@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+#include <terrace/base/stop_check.hpp>
 
 #include "facility/matrix/cost_rows.hpp"
 #include "facility/matrix/matrix_search.hpp"
@@ -31,7 +32,7 @@ TEST(Interchange, GainIsWhatOpeningSpares) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 40, 60);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    const StopCheck never;
+    const base::StopCheck never;
     const MatrixRows costs(matrix, never);
     MatrixSearch search(costs, costs.opening());
     std::mt19937_64 random(seed);

@@ -74,7 +74,7 @@ void expect_medians(const FacilityPoints& problem, std::size_t k, const Facility
   for (std::uint32_t c = 0; c < k; ++c) EXPECT_EQ(s.assignment[s.facilities[c]], c);
   const double price =
       problem.outlier_price < kInfinity
-          ? problem.outlier_price * diagonal(problem.metric, bounds_of(problem.points))
+          ? problem.outlier_price * diagonal(problem.metric, base::box_of(problem.points))
           : kInfinity;
   double connection = 0.0, outliers = 0.0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {

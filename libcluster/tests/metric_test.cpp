@@ -145,7 +145,7 @@ TEST(Metric, LinearPointsAreAsFarApartAsTheMetricSays) {
   int linear = 0;
   for (const Metric& metric : all_metrics()) {
     const auto mapped = linear_points(metric, points);
-    EXPECT_EQ(mapped.has_value(), linear_map(metric, bounds_of(points)).has_value());
+    EXPECT_EQ(mapped.has_value(), linear_map(metric, base::box_of(points)).has_value());
     if (!mapped) continue;
     ++linear;
     ASSERT_EQ(mapped->size(), points.size());
@@ -193,7 +193,7 @@ TEST(Metric, NoVectorIsShorterThanTheLeastScaleSays) {
 
 TEST(Metric, TheDiagonalIsTheDiameterOfTheBox) {
   std::mt19937_64 random(9);
-  const Bounds box{{-3, 2, 0}, {5, 4, 7}};
+  const Box3 box{{-3, 2, 0}, {5, 4, 7}};
   for (const Metric& metric : all_metrics()) {
     if (std::holds_alternative<EllipticalField>(metric)) continue;
     SCOPED_TRACE(name_of(metric));
@@ -206,7 +206,7 @@ TEST(Metric, TheDiagonalIsTheDiameterOfTheBox) {
       }
       EXPECT_LE(distance(metric, p, q), length * (1.0 + 1e-12));
     }
-    EXPECT_EQ(diagonal(metric, kEmptyBounds), 0.0);
+    EXPECT_EQ(diagonal(metric, Box3{}), 0.0);
   }
 }
 

@@ -76,7 +76,7 @@ struct AsMatrix {
 
   explicit AsMatrix(const FacilityPoints& p) {
     const std::size_t n = p.points.size(), k = p.channels.size();
-    double diagonal = terrace::cluster::diagonal(p.metric, bounds_of(p.points));
+    double diagonal = terrace::cluster::diagonal(p.metric, base::box_of(p.points));
     for (std::size_t c = 0; c < k; ++c) {
       double low = kInfinity, high = -kInfinity;
       for (std::size_t i = 0; i < n; ++i) {
@@ -232,7 +232,7 @@ TEST(PointBound, EqualAndSinglePoints) {
 TEST(PointBound, EntitiesHaveTheBoundOfTheirMatrix) {
   std::mt19937_64 random(7);
   const std::vector<Point3> points = inputs::cube(60, random);
-  const double unit = diagonal(Euclidean{}, bounds_of(points));
+  const double unit = diagonal(Euclidean{}, base::box_of(points));
   for (const double price : {kInfinity, 0.2}) {
     FacilityPoints by_points{.points = points, .facility_cost = 0.4, .outlier_price = price};
     const AsMatrix same(by_points);

@@ -26,7 +26,7 @@ constexpr FacilityStrategy kSearches[] = {FacilityStrategy::full_scan, FacilityS
 bool admits(const OwnedProblem& p, FacilityStrategy strategy) {
   if (strategy == FacilityStrategy::full_scan) return true;
   if (strategy == FacilityStrategy::facilities) {
-    return linear_map(p.metric, bounds_of(p.points)) ||
+    return linear_map(p.metric, base::box_of(p.points)) ||
            (is_symmetric(p.metric) && obeys_triangle_inequality(p.metric));
   }
   return !std::holds_alternative<CustomMetric>(p.metric);

@@ -57,7 +57,7 @@ inline double full_diagonal(const OwnedProblem& p) {
   box.channel_weights = p.channel_weights;
   box.points = {{}, {}};
   // The channels' ranges, and a first coordinate as long as the diagonal in the metric.
-  const double d = diagonal(p.metric, bounds_of(p.points));
+  const double d = diagonal(p.metric, base::box_of(p.points));
   const std::size_t count = p.channel_weights.size();
   if (count == 0) return d;
   std::vector<double> low(count, 1e308), high(count, -1e308);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Long work calls its check at intervals, and what the check throws ends it.
-#include "terrace/cluster/stop_check.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/stop_check.hpp>
 
 #include "inputs.hpp"
 #include "terrace/cluster/block.hpp"
@@ -24,7 +24,7 @@ namespace terrace::cluster {
 namespace {
 
 struct Stop {};
-using Work = std::function<void(const StopCheck&)>;
+using Work = std::function<void(const base::StopCheck&)>;
 
 /// work: with one thread, so that the calls are the same each time.
 void expect_stops(const Work& work, std::size_t least_calls) {
@@ -54,14 +54,14 @@ TEST(StopCheck, EndsEveryLinkage) {
     SCOPED_TRACE(static_cast<int>(method));
     for (const MatrixEntry entry : {MatrixEntry::float32, MatrixEntry::float64}) {
       expect_stops(
-          [&](const StopCheck& check) {
+          [&](const base::StopCheck& check) {
             static_cast<void>(linkage(method == single ? many : points, method,
                                       {.entry = entry, .check_stop = check}));
           },
           60);
     }
     expect_stops(
-        [&](const StopCheck& check) {
+        [&](const base::StopCheck& check) {
           const auto of_pair = [&](std::uint32_t i, std::uint32_t j) {
             return distance(Euclidean{}, points[i], points[j]);
           };
@@ -76,7 +76,7 @@ TEST(StopCheck, EndsTheChainOfCompleteLinkage) {
   std::vector<Point3> points;
   for (int i = 0; i < 600; ++i) points.push_back({std::ldexp(1.0, i), 0, 0});
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(linkage(points, LinkageMethod::complete, {.check_stop = check}));
       },
       60);
@@ -98,13 +98,13 @@ TEST(StopCheck, EndsWorkOfSeveralThreads) {
 
 TEST(StopCheck, EndsKMeans) {
   const std::vector<Point3> points = some(20000);
-  const auto work = [&](const StopCheck& check) {
+  const auto work = [&](const base::StopCheck& check) {
     static_cast<void>(k_means(points, {}, {.clusters = 300, .check_stop = check}));
   };
   expect_stops(work, 100);
   const std::vector<Point3> centres = some(300);
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(
             k_means_from(centres, points, {}, {.max_iterations = 20, .check_stop = check}));
       },
@@ -120,7 +120,7 @@ TEST(StopCheck, EndsKMeansWhereEveryCentreIsEquallyNear) {
   }
   points.back() = {1e-6, 0, 0};
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(
             k_means_from(centres, points, {}, {.max_iterations = 0, .check_stop = check}));
       },
@@ -137,21 +137,21 @@ TEST(StopCheck, EndsFacilityLocation) {
     SCOPED_TRACE(name_of(strategy));
     const FacilityPoints problem{.points = points, .facility_cost = 0.2};
     expect_stops(
-        [&, strategy = strategy](const StopCheck& check) {
+        [&, strategy = strategy](const base::StopCheck& check) {
           static_cast<void>(solve(
               problem, {.strategy = strategy, .restarts = 1, .steps = 50, .check_stop = check}));
         },
         least);
   }
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(solve(FacilityPoints{.points = many, .facility_cost = 0.02},
                                 {.strategy = fast, .check_stop = check}));
       },
       10);
   // A single candidate of a large set takes long.
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(solve(FacilityPoints{.points = many, .facility_cost = 1.0},
                                 {.strategy = full_scan, .steps = 30, .check_stop = check}));
       },
@@ -175,14 +175,14 @@ TEST(StopCheck, EndsKMedianAndBounds) {
   const std::vector<Point3> points = some(1500);
   const FacilityPoints problem{.points = points, .facility_cost = 0.2};
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(
             k_median(problem, 10, {.restarts = 1, .bound_steps = 2, .check_stop = check}));
       },
       1000);
   const FacilitySolution solution = solve(problem, {.steps = 50});
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(lower_bound(problem, solution, {.steps = 3, .check_stop = check}));
       },
       100);
@@ -195,12 +195,12 @@ TEST(StopCheck, EndsKMedianAndBounds) {
   const std::vector<double> opening(60, 0.5);
   const FacilityMatrix matrix{60, 60, opening, costs};
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(lower_bound(matrix, {}, {.steps = 3, .check_stop = check}));
       },
       100);
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(k_median(matrix, 5, {.restarts = 1, .check_stop = check}));
       },
       100);

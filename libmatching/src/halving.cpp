@@ -11,10 +11,11 @@
 #include <thread>
 #include <utility>
 
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/random.hpp>
+#include <terrace/base/stop_check.hpp>
 #include <unistd.h>
 
-#include "parallel.hpp"
-#include "stop_ticks.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -22,17 +23,6 @@ namespace {
 
 /// Fills in the distances from one point to some others.
 using Row = std::function<void(std::uint32_t from, std::span<const std::uint32_t> to, double* out)>;
-
-std::uint64_t seed_of_iteration(std::uint64_t seed, std::uint64_t iteration) {
-  std::uint64_t z = seed + (iteration + 1) * 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
-std::uint32_t below(std::size_t bound, std::mt19937_64& random) {
-  return static_cast<std::uint32_t>(((random() >> 32) * bound) >> 32);
-}
 
 /// Two halves; the second has one more if the number of points is odd.
 struct Halves {
@@ -42,7 +32,8 @@ struct Halves {
 Halves random_halves(std::uint32_t count, std::mt19937_64& random) {
   std::vector<std::uint32_t> order(count);
   std::iota(order.begin(), order.end(), 0u);
-  for (std::uint32_t i = count; i > 1; --i) std::swap(order[i - 1], order[below(i, random)]);
+  for (std::uint32_t i = count; i > 1; --i)
+    std::swap(order[i - 1], order[base::draw_below(i, random)]);
   const auto middle = order.begin() + count / 2;
   return {{order.begin(), middle}, {middle, order.end()}};
 }
@@ -69,14 +60,14 @@ struct Trial {
 
 class Matcher {
  public:
-  Matcher(std::uint32_t count, const Row& row, const StopCheck& check_stop)
+  Matcher(std::uint32_t count, const Row& row, const base::StopCheck& check_stop)
       : count_(count), row_(row), check_stop_(check_stop) {}
 
   /// The least total distance between the halves.
   Trial match(const Halves& halves) {
     const std::size_t rows = halves.first.size(), columns = halves.second.size();
     costs_.resize(rows * columns);
-    StopTicks ticks(check_stop_);
+    base::StopTicks ticks(check_stop_);
     for (std::size_t r = 0; r < rows; ++r) {
       ticks(2 * columns);
       row_(halves.first[r], halves.second, costs_.data() + r * columns);
@@ -98,7 +89,7 @@ class Matcher {
  private:
   std::uint32_t count_;
   const Row& row_;
-  const StopCheck& check_stop_;
+  const base::StopCheck& check_stop_;
   std::vector<double> costs_;
 };
 
@@ -140,8 +131,8 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
     // A round of one iteration per thread; results are evaluated in iteration order.
     const auto round = static_cast<unsigned>(std::min<std::uint64_t>(threads, search.left()));
     const std::uint64_t first = search.result.iterations;
-    for_each_index(round, round, [&](std::size_t t) {
-      std::mt19937_64 random(seed_of_iteration(options.seed, first + t));
+    base::parallel_for(round, round, [&](std::size_t t) {
+      std::mt19937_64 random(base::seed_of_run(options.seed, first + t));
       trials[t] = matchers[t].match(random_halves(count, random));
     });
     for (unsigned t = 0; t < round; ++t) search.take(std::move(trials[t]));
@@ -151,7 +142,7 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
 void monotone(std::uint32_t count, const Row& row, const HalvingOptions& options, Search& search) {
   Matcher matcher(count, row, options.check_stop);
   while (search.goes_on()) {
-    std::mt19937_64 random(seed_of_iteration(options.seed, search.result.iterations));
+    std::mt19937_64 random(base::seed_of_run(options.seed, search.result.iterations));
     search.take(matcher.match(search.result.mate.empty() ? random_halves(count, random)
                                                          : ends_apart(search.result.mate, random)));
   }

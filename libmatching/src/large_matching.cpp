@@ -9,8 +9,9 @@
 #include <thread>
 #include <utility>
 
+#include <terrace/base/parallel.hpp>
+
 #include "label_groups.hpp"
-#include "parallel.hpp"
 #include "windows/cut.hpp"
 #include "windows/discs.hpp"
 
@@ -201,13 +202,15 @@ class Windows {
     if (keep_duals_) discs.start(parts.count());
     parts_ = parts.count();
     planned_ = windows_done_.load() + parts_;
-    const bool all = for_each_index(
-        parts.count(), threads_,
-        [&](std::size_t k) {
-          match_part(k, parts.part(k), first, discs);
-          ++windows_done_;
-        },
-        [&] { return report(); });
+    // The caller is asked after each part that its own thread matches; after a stop no more begin.
+    std::atomic<bool> stopped = false;
+    base::parallel_for(parts.count(), threads_, [&](std::size_t k, unsigned thread) {
+      if (stopped) return;
+      match_part(k, parts.part(k), first, discs);
+      ++windows_done_;
+      if (thread == 0 && !report()) stopped = true;
+    });
+    const bool all = !stopped;
     result_.windows = windows_done_.load();
     if (all && keep_duals_) discs_ = std::move(discs);
     return all;

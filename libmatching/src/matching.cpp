@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "blossom/proof.hpp"
 #include "blossom/solver.hpp"
 
@@ -42,9 +44,9 @@ void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
 
 template <class AnyEdge>
 Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exponent,
-               const std::vector<Edge>& doubled, const StopCheck& check_stop) {
+               const std::vector<Edge>& doubled, const base::StopCheck& check_stop) {
   Solver solver(static_cast<std::uint32_t>(vertex_count), doubled, blossom::kNone,
-                StopTicks(check_stop));
+                base::StopTicks(check_stop));
   const std::uint32_t alone = solver.solve();
   if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
@@ -172,7 +174,7 @@ double Matching::dual_bound() const {
 }
 
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const WeightedEdge> edges,
-                                     const StopCheck& check_stop) {
+                                     const base::StopCheck& check_stop) {
   check_ends(vertex_count, edges);
   double largest = 0.0;
   for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -196,7 +198,7 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const W
 }
 
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges,
-                                     const StopCheck& check_stop) {
+                                     const base::StopCheck& check_stop) {
   check_ends(vertex_count, edges);
   std::vector<Edge> doubled;
   doubled.reserve(edges.size());

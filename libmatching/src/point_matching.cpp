@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "blossom/box_tree.hpp"
 #include "blossom/pricing.hpp"
 #include "blossom/proof.hpp"
@@ -32,7 +34,7 @@ class Problem {
   Problem(std::span<const Point> points, const PointMatchingOptions& options)
       : given_(points), options_(options) {
     check();
-    order_ = blossom::halving_order(points, StopTicks(options.check_stop));
+    order_ = blossom::halving_order(points, base::StopTicks(options.check_stop));
     place_.resize(points.size());
     for (std::uint32_t k = 0; k < order_.size(); ++k) place_[order_[k]] = k;
     scale_points();
@@ -121,7 +123,7 @@ class Problem {
     const auto join = [&](std::uint32_t i, std::uint32_t j) {
       candidates_.emplace_back(std::min(i, j), std::max(i, j));
     };
-    StopTicks ticks(options_.check_stop);
+    base::StopTicks ticks(options_.check_stop);
     constexpr std::size_t kTicksOfSearch = 1024;
     for (std::uint32_t i = 0; i < n; ++i) {
       ticks(kTicksOfSearch);
@@ -148,7 +150,7 @@ class Problem {
     // An odd number of points gets a vertex for nobody, at cost 0 to all.
     const std::uint32_t nobody = n % 2 == 0 ? blossom::kNone : n;
     for (std::uint32_t i = 0; nobody != blossom::kNone && i < n; ++i) edges.push_back({i, n, 0});
-    const StopTicks ticks(options_.check_stop);
+    const base::StopTicks ticks(options_.check_stop);
     Solver solver(n + n % 2, std::move(edges), nobody, ticks);
     Pricing<D> pricing(points_, cost_, ticks);
     PointMatching result;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/simd.hpp>
 
 namespace terrace::matching {
 namespace {
@@ -18,8 +19,9 @@ TYPED_TEST_SUITE(ScanKernelsTyped, CostTypes);
 // Each instruction set against the definition, column by column.
 TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
   using Number = LabelOf<TypeParam>;
-  for (const ScanPath path : {ScanPath::portable, ScanPath::avx2, ScanPath::avx512}) {
-    if (!has_scan_path(path)) continue;
+  for (const base::SimdPath path :
+       {base::SimdPath::portable, base::SimdPath::avx2, base::SimdPath::avx512}) {
+    if (!base::supports(path)) continue;
     const ScanKernels<TypeParam>& kernels = scan_kernels<TypeParam>(path);
     for (std::size_t columns = 1; columns <= 400; columns += 1 + columns / 9) {
       SCOPED_TRACE(testing::Message() << "path " << static_cast<int>(path) << ", " << columns);
@@ -66,11 +68,11 @@ TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
 
 // The tests of all paths skip instruction sets that the machine lacks; this one reports it.
 TEST(InstructionSets, Avx2IsTested) {
-  if (!has_scan_path(ScanPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
+  if (!base::supports(base::SimdPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }
 
 TEST(InstructionSets, Avx512IsTested) {
-  if (!has_scan_path(ScanPath::avx512)) GTEST_SKIP() << "the processor lacks AVX-512";
+  if (!base::supports(base::SimdPath::avx512)) GTEST_SKIP() << "the processor lacks AVX-512";
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Long work calls its check at intervals, and what the check throws ends it.
-#include "terrace/matching/stop_check.hpp"
 
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/stop_check.hpp>
 
 #include "terrace/matching/assignment.hpp"
 #include "terrace/matching/halving.hpp"
@@ -25,7 +25,7 @@ namespace terrace::matching {
 namespace {
 
 struct Stop {};
-using Work = std::function<void(const StopCheck&)>;
+using Work = std::function<void(const base::StopCheck&)>;
 
 /// work: with one thread, so that the calls are the same each time.
 void expect_stops(const Work& work, std::size_t least_calls) {
@@ -55,7 +55,7 @@ std::vector<Point2> some(std::size_t count, std::uint64_t seed = 1) {
 TEST(StopCheck, EndsExactMatchings) {
   const std::vector<Point2> points = some(4000);
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         PointMatchingOptions options;
         options.check_stop = check;
         match_points(points, options);
@@ -67,17 +67,19 @@ TEST(StopCheck, EndsExactMatchings) {
       edges.push_back({i, j, std::hypot(points[i][0] - points[j][0], points[i][1] - points[j][1])});
     }
   }
-  expect_stops([&](const StopCheck& check) { min_weight_perfect_matching(400, edges, check); }, 20);
+  expect_stops(
+      [&](const base::StopCheck& check) { min_weight_perfect_matching(400, edges, check); }, 20);
 }
 
 TEST(StopCheck, EndsMatchingsInWindowsBeforeTheFirstIsComplete) {
   const std::vector<Point2> points = some(6000);
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         match_large(points, {.exact_limit = 0, .window = 1000, .rounds = 2, .check_stop = check});
       },
       100);
-  expect_stops([&](const StopCheck& check) { match_large(points, {.check_stop = check}); }, 100);
+  expect_stops([&](const base::StopCheck& check) { match_large(points, {.check_stop = check}); },
+               100);
 }
 
 TEST(StopCheck, EndsAnIterationOfHalving) {
@@ -85,7 +87,7 @@ TEST(StopCheck, EndsAnIterationOfHalving) {
   for (const Point2& p : some(1200)) points.push_back({p[0], p[1], 0});
   for (const Halving method : {Halving::monotone, Halving::monte_carlo}) {
     expect_stops(
-        [&](const StopCheck& check) {
+        [&](const base::StopCheck& check) {
           static_cast<void>(
               match_by_halving(points, {.method = method, .iterations = 1, .check_stop = check}));
         },
@@ -103,19 +105,23 @@ TEST(StopCheck, EndsAssignments) {
       edges.push_back({i, j, costs.back()});
     }
   }
-  expect_stops([&](const StopCheck& check) { assign(costs, rows.size(), columns.size(), check); },
-               10);
-  const std::vector<float> singles(costs.begin(), costs.end());
-  expect_stops([&](const StopCheck& check) { assign(singles, rows.size(), columns.size(), check); },
-               10);
-  const std::vector<std::int32_t> numbers(costs.size(), 7);
-  expect_stops([&](const StopCheck& check) { assign(numbers, rows.size(), columns.size(), check); },
-               2);
   expect_stops(
-      [&](const StopCheck& check) { assign_sparse(edges, rows.size(), columns.size(), check); },
+      [&](const base::StopCheck& check) { assign(costs, rows.size(), columns.size(), check); }, 10);
+  const std::vector<float> singles(costs.begin(), costs.end());
+  expect_stops(
+      [&](const base::StopCheck& check) { assign(singles, rows.size(), columns.size(), check); },
       10);
-  expect_stops([&](const StopCheck& check) { assign_points(some(3000), some(3000, 2), check); },
-               10);
+  const std::vector<std::int32_t> numbers(costs.size(), 7);
+  expect_stops(
+      [&](const base::StopCheck& check) { assign(numbers, rows.size(), columns.size(), check); },
+      2);
+  expect_stops(
+      [&](const base::StopCheck& check) {
+        assign_sparse(edges, rows.size(), columns.size(), check);
+      },
+      10);
+  expect_stops(
+      [&](const base::StopCheck& check) { assign_points(some(3000), some(3000, 2), check); }, 10);
 }
 
 TEST(StopCheck, EndsTrees) {
@@ -123,12 +129,12 @@ TEST(StopCheck, EndsTrees) {
   std::vector<std::uint32_t> labels(points.size());
   for (std::uint32_t i = 0; i < labels.size(); ++i) labels[i] = i % 5;
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(make_matching_tree(points, {.check_stop = check}));
       },
       100);
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(make_matching_tree(points, {.labels = labels, .check_stop = check}));
       },
       100);

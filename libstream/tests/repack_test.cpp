@@ -5,14 +5,12 @@
 #include <cstring>
 #include <filesystem>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "read_pieces.hpp"
-#include "store/write/hilbert.hpp"
 #include "store_mending.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
@@ -24,34 +22,6 @@ namespace {
 using testing::Block;
 using testing::TemporaryFolder;
 using testing::uniform;
-
-/// The law of the curve: it comes to every cell once, and each step is to a neighbour.
-TEST(Repack, TheCurveGoesFromNeighbourToNeighbour) {
-  for (const auto& [axes, bits] : {std::array{1u, 6u}, {2u, 5u}, {3u, 4u}}) {
-    std::vector<std::array<std::uint32_t, 3>> cells(std::size_t{1} << (axes * bits));
-    std::set<std::uint64_t> places;
-    for (std::uint32_t i = 0; i < cells.size(); ++i) {
-      std::array<std::uint32_t, 3> cell{};
-      for (unsigned axis = 0; axis < axes; ++axis)
-        cell[axis] = i >> (axis * bits) & ((1 << bits) - 1);
-      auto given = cell;
-      const std::uint64_t place = store::hilbert_place(std::span(given).first(axes), bits);
-      ASSERT_LT(place, cells.size());
-      places.insert(place);
-      cells[place] = cell;
-    }
-    ASSERT_EQ(places.size(), cells.size());
-    EXPECT_EQ(cells[0], (std::array<std::uint32_t, 3>{}));
-    for (std::size_t i = 1; i < cells.size(); ++i) {
-      std::uint32_t steps = 0;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        steps += std::max(cells[i][axis], cells[i - 1][axis]) -
-                 std::min(cells[i][axis], cells[i - 1][axis]);
-      }
-      ASSERT_EQ(steps, 1u) << "step " << i << " in " << axes << " dimensions";
-    }
-  }
-}
 
 template <class T>
 void append_bytes(std::string& text, const T& value) {

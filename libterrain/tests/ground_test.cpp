@@ -7,8 +7,8 @@
 
 #include <GeographicLib/Geodesic.hpp>
 #include <gtest/gtest.h>
+#include <terrace/base/portable_math.hpp>
 
-#include "base/portable_math.hpp"
 #include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
@@ -37,7 +37,7 @@ TEST(MetresPerDegree, AgreesWithGeodesics) {
     double along_meridian = 0, along_parallel = 0;
     wgs84.Inverse(latitude - kStep, 10, latitude + kStep, 10, along_meridian);
     // The shorter the chord against the parallel's radius, the closer geodesic and parallel.
-    const double east = kStep * std::cos(latitude * kDegree);
+    const double east = kStep * std::cos(latitude * base::kRadiansPerDegree);
     wgs84.Inverse(latitude, 10 - east, latitude, 10 + east, along_parallel);
     EXPECT_NEAR(metres.latitude / (along_meridian / (2 * kStep)), 1.0, 1e-6) << latitude;
     EXPECT_NEAR(metres.longitude / (along_parallel / (2 * east)), 1.0, 1e-6) << latitude;
@@ -48,7 +48,8 @@ TEST(MetresPerDegree, IsZeroEastwardAtThePolesOnly) {
   EXPECT_EQ(metres_per_degree(90).longitude, 0.0);
   EXPECT_EQ(metres_per_degree(-120).longitude, 0.0);  // clamped
   EXPECT_NEAR(metres_per_degree(0).longitude, 111319.490793, 1e-6);
-  EXPECT_NEAR(metres_per_degree(90).latitude, 6399593.6258 * kDegree, 1e-5);  // a^2 / b
+  EXPECT_NEAR(metres_per_degree(90).latitude, 6399593.6258 * base::kRadiansPerDegree,
+              1e-5);  // a^2 / b
 }
 
 TEST(Ground, MapsDegreesAtTheLatitudeOfTheBlock) {
@@ -135,7 +136,7 @@ TEST(Ground, UndoesTheGrowthOfWebMercator) {
   constexpr double kA = 6378137.0;
   for (double latitude = -80; latitude <= 80; latitude += 16) {
     const auto northing = [&](double phi) {
-      return kA * std::log(std::tan((45 + phi / 2) * kDegree));
+      return kA * std::log(std::tan((45 + phi / 2) * base::kRadiansPerDegree));
     };
     const double y = northing(latitude);
     const GroundMap map = ground.map({.min = {0, y - 1, 0}, .max = {2, y + 1, 0}});
@@ -144,7 +145,7 @@ TEST(Ground, UndoesTheGrowthOfWebMercator) {
     EXPECT_NEAR(map[4] * (northing(latitude + 1e-3) - northing(latitude - 1e-3)) / metres, 1.0,
                 1e-6);
     wgs84.Inverse(latitude, -1e-4, latitude, 1e-4, metres);
-    EXPECT_NEAR(map[0] * (2e-4 * kDegree * kA) / metres, 1.0, 1e-6);
+    EXPECT_NEAR(map[0] * (2e-4 * base::kRadiansPerDegree * kA) / metres, 1.0, 1e-6);
   }
 }
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/random.hpp>
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "tile/make/raster_tile_surface.hpp"
@@ -46,8 +46,8 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
   }
 
   double random() {
-    seed_ = scramble(seed_);
-    return unit_interval(seed_);
+    seed_ = base::splitmix64(seed_);
+    return base::unit_interval(seed_);
   }
 
   /// A raster that is tiled, and a surface of it.

@@ -16,12 +16,12 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/random.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "base/parallel.hpp"
-#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "tile/format/quantized_mesh.hpp"
@@ -39,8 +39,8 @@ class RasterOfDegrees : public ::testing::Test {
   static constexpr double kNodata = -9999.0;
 
   double random() {
-    seed_ = scramble(seed_);
-    return unit_interval(seed_);
+    seed_ = base::splitmix64(seed_);
+    return base::unit_interval(seed_);
   }
 
   template <class T>

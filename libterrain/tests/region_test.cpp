@@ -14,9 +14,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 #include <terrace/tri/predicates.hpp>
 
-#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
@@ -370,9 +371,9 @@ std::vector<Point2> jagged_ring(std::size_t corners, const Point2& middle, doubl
   std::vector<Point2> ring;
   for (std::size_t i = 0; i < corners; ++i) {
     const double angle = 360.0 * static_cast<double>(i) / static_cast<double>(corners);
-    const double r = radius * (0.8 + 0.2 * unit_interval(random()));
+    const double r = radius * (0.8 + 0.2 * base::unit_interval(random()));
     ring.push_back(
-        {middle[0] + r * portable_cos_degrees(angle), middle[1] + r * portable_sin_degrees(angle)});
+        {middle[0] + r * base::cos_degrees(angle), middle[1] + r * base::sin_degrees(angle)});
   }
   return ring;
 }
@@ -402,7 +403,7 @@ TEST(Region, ManyThreadsAskOneOfManyCorners) {
   for (std::size_t t = 0; t < kThreads; ++t) {
     threads.emplace_back([&, t] {
       std::mt19937_64 random(t);
-      const auto near = [&] { return 2.2e5 * (unit_interval(random()) - 0.5); };
+      const auto near = [&] { return 2.2e5 * (base::unit_interval(random()) - 0.5); };
       for (std::size_t i = 0; i < kQuestions; ++i) {
         // Every other one is the middle of two corners, rounded: as near to a ring as can be.
         const Point2 &a = ring[random() % ring.size()], &b = ring[random() % ring.size()];

@@ -13,6 +13,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <terrace/base/stop_check.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -98,7 +99,7 @@ TEST_F(ScanSurfaceTest, CornersOfAMethodAreNewPointsUnlessItNamesThem) {
   ScanSurfaceOptions options;
   std::size_t given = 0;
   options.method =
-      SurfaceMethod{[&](std::span<const tri::Point3> points, const tri::StopCheck&) {
+      SurfaceMethod{[&](std::span<const tri::Point3> points, const base::StopCheck&) {
                       given = points.size();
                       tri::RestoredSurface surface;
                       // In metres about the middle of the points.
@@ -115,7 +116,7 @@ TEST_F(ScanSurfaceTest, CornersOfAMethodAreNewPointsUnlessItNamesThem) {
   EXPECT_NEAR(radius_of(made.mesh.positions[1]), kRadius, 1.0);
   EXPECT_NEAR(made.mesh.positions[2][2] - made.mesh.positions[0][2], kRadius, 0.1);
 
-  options.method->restore = [](std::span<const tri::Point3> points, const tri::StopCheck&) {
+  options.method->restore = [](std::span<const tri::Point3> points, const base::StopCheck&) {
     tri::RestoredSurface surface;
     surface.surface.points = {points[7], points[8], points[9]};
     surface.surface.faces = {{0, 1, 2}};

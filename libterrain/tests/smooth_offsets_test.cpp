@@ -9,8 +9,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/random.hpp>
 
-#include "base/portable_math.hpp"
 #include "earth/quintic_surface.hpp"
 
 namespace terrace::terrain {
@@ -21,8 +21,8 @@ constexpr double kTolerance = 1e-5;
 class SmoothOffsets : public ::testing::Test {
  protected:
   double random() {
-    seed_ = scramble(seed_);
-    return unit_interval(seed_);
+    seed_ = base::splitmix64(seed_);
+    return base::unit_interval(seed_);
   }
   std::vector<Point2> places(std::size_t count, const Point2& low, const Point2& size) {
     std::vector<Point2> places;
@@ -66,7 +66,7 @@ double on_grid(const Point2& p, double cells_per_degree) {
   const auto value = [](double x, double y) {
     const auto number = static_cast<std::uint64_t>(std::int64_t{1} << 40) +
                         static_cast<std::uint64_t>(x) * 7919 + static_cast<std::uint64_t>(y);
-    return 40.0 + unit_interval(scramble(number));
+    return 40.0 + base::unit_interval(base::splitmix64(number));
   };
   const double x = (p[0] + 360) * cells_per_degree, y = (p[1] + 90) * cells_per_degree;
   const double fx = x - std::floor(x), fy = y - std::floor(y);

@@ -2,8 +2,7 @@
 #include "tile/format/tile_address.hpp"
 
 #include <gtest/gtest.h>
-
-#include "base/portable_math.hpp"
+#include <terrace/base/random.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -37,8 +36,8 @@ TEST(TileAddress, NeighboursShareTheirBorders) {
 TEST(TileAddress, RangesHoldTheTilesThatMeetABox) {
   std::uint64_t seed = 7;
   const auto random = [&](double low, double high) {
-    seed = scramble(seed);
-    return low + (high - low) * unit_interval(seed);
+    seed = base::splitmix64(seed);
+    return low + (high - low) * base::unit_interval(seed);
   };
   for (int round = 0; round < 200; ++round) {
     SCOPED_TRACE(round);

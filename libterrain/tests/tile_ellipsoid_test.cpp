@@ -4,8 +4,8 @@
 
 #include <GeographicLib/Geocentric.hpp>
 #include <gtest/gtest.h>
+#include <terrace/base/random.hpp>
 
-#include "base/portable_math.hpp"
 #include "base/vector.hpp"
 #include "tile/format/ellipsoid.hpp"
 
@@ -17,8 +17,8 @@ using stream::Point3;
 struct Random {
   std::uint64_t seed;
   double between(double low, double high) {
-    seed = scramble(seed);
-    return low + (high - low) * unit_interval(seed);
+    seed = base::splitmix64(seed);
+    return low + (high - low) * base::unit_interval(seed);
   }
 };
 

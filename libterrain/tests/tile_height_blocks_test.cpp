@@ -8,10 +8,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/random.hpp>
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "tile/make/height_blocks.hpp"
@@ -53,8 +53,8 @@ class HeightBlocksOfAStore : public ::testing::Test {
   }
 
   double random() {
-    seed_ = scramble(seed_);
-    return unit_interval(seed_);
+    seed_ = base::splitmix64(seed_);
+    return base::unit_interval(seed_);
   }
   [[nodiscard]] stream::Store store() const { return stream::Store::open(folder_ / "dem.terrace"); }
 

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <terrace/base/random.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/tile_check.hpp"
 
@@ -32,8 +32,8 @@ TEST(TileRanges, CoverExactlyTheTiles) {
     std::vector<TileAddress> tiles;
     for (std::uint32_t y = 0; y < 16; ++y) {
       for (std::uint32_t x = 0; x < 32; ++x) {
-        seed = scramble(seed);
-        if (unit_interval(seed) < round / 100.0) tiles.push_back({4, x, y});
+        seed = base::splitmix64(seed);
+        if (base::unit_interval(seed) < round / 100.0) tiles.push_back({4, x, y});
       }
     }
     std::vector<TileAddress> covered;

@@ -9,10 +9,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 #include <terrace/tri/point_tin.hpp>
 
 #include "analytic_surface.hpp"
-#include "base/portable_math.hpp"
 #include "tile/verify/tile_height_check.hpp"
 #include "tile/verify/tile_mesh_check.hpp"
 
@@ -190,8 +191,8 @@ TEST(TileMesher, DataAtTheBordersOfTilesFitsTogether) {
 TEST(TileMesher, ScatteredSmallRastersFitTogether) {
   std::uint64_t seed = 5;
   const auto between = [&seed](double low, double high) {
-    seed = scramble(seed);
-    return low + (high - low) * unit_interval(seed);
+    seed = base::splitmix64(seed);
+    return low + (high - low) * base::unit_interval(seed);
   };
   for (int round = 0; round < 12; ++round) {
     const double west = between(-170, 160), south = between(-85, 75);
@@ -250,7 +251,8 @@ TEST(TileMesher, NormalsAndWaterAreThoseOfTheSurface) {
         east += static_cast<double>(n[axis]) * frame.east[axis];
         north += static_cast<double>(n[axis]) * frame.north[axis];
       }
-      const double metres = std::cos(lat * kDegree) * kDegree * 6388000;
+      const double metres =
+          std::cos(lat * base::kRadiansPerDegree) * base::kRadiansPerDegree * 6388000;
       EXPECT_NEAR(east / up, -8000 / metres, 0.001);
       EXPECT_NEAR(north / up, 0, 1e-5);
     }

@@ -4,9 +4,10 @@
 #include <cstring>
 
 #include <gtest/gtest.h>
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/portable_math.hpp"
 #include "base/vector.hpp"
 #include "tile/format/quantized_mesh.hpp"
 
@@ -21,7 +22,7 @@ TileMesh lattice(std::uint32_t side, std::uint64_t seed) {
   std::vector<std::uint32_t> place(std::size_t{side} * side);
   for (std::uint32_t i = 0; i < place.size(); ++i) place[i] = i;
   for (std::size_t i = place.size(); i > 1; --i) {
-    seed = scramble(seed);
+    seed = base::splitmix64(seed);
     std::swap(place[i - 1], place[seed % i]);
   }
   mesh.u.resize(place.size());
@@ -32,7 +33,7 @@ TileMesh lattice(std::uint32_t side, std::uint64_t seed) {
       const std::uint32_t vertex = place[row * side + column];
       mesh.u[vertex] = static_cast<std::uint16_t>(kTileUnits * column / (side - 1));
       mesh.v[vertex] = static_cast<std::uint16_t>(kTileUnits * row / (side - 1));
-      seed = scramble(seed);
+      seed = base::splitmix64(seed);
       mesh.height[vertex] = static_cast<std::uint16_t>(seed % (kTileUnits + 1));
     }
   }
@@ -152,7 +153,7 @@ TEST(QuantizedMesh, DamagedTilesAreRefusedOrRead) {
   for (int round = 0; round < 20000; ++round) {
     auto bytes = good;
     for (int change = 0; change <= round % 3; ++change) {
-      seed = scramble(seed);
+      seed = base::splitmix64(seed);
       bytes[seed % bytes.size()] = static_cast<std::byte>(seed >> 40);
     }
     try {
@@ -171,8 +172,8 @@ TEST(QuantizedMesh, DamagedTilesAreRefusedOrRead) {
 TEST(QuantizedMesh, NormalsComeBackWithinADegree) {
   std::uint64_t seed = 12;
   const auto random = [&] {
-    seed = scramble(seed);
-    return 2 * unit_interval(seed) - 1;
+    seed = base::splitmix64(seed);
+    return 2 * base::unit_interval(seed) - 1;
   };
   for (int round = 0; round < 20000; ++round) {
     stream::Point3 d{random(), random(), random()};
@@ -181,7 +182,7 @@ TEST(QuantizedMesh, NormalsComeBackWithinADegree) {
     d = unit(d);
     const auto back = oct_decode(
         oct_encode({static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])}));
-    EXPECT_GT(dot(d, {back[0], back[1], back[2]}), std::cos(1.0 * kDegree));
+    EXPECT_GT(dot(d, {back[0], back[1], back[2]}), std::cos(1.0 * base::kRadiansPerDegree));
   }
 }
 

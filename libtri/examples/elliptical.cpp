@@ -23,7 +23,7 @@ double stretch(const Triangulation& t, const std::vector<std::array<tri::VertexI
   for (const auto& corners : triangles) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Point a = t.point(corners[i]), b = t.point(corners[(i + 1) % 3]);
-      if (!tri::contains(box, {{a[0], a[1], 0}, {a[0], a[1], 0}})) continue;
+      if (!box.covers({{a[0], a[1], 0}, {a[0], a[1], 0}})) continue;
       along += std::abs(c * (b[0] - a[0]) + s * (b[1] - a[1]));
       across += std::abs(c * (b[1] - a[1]) - s * (b[0] - a[0]));
     }

@@ -9,7 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "for_blocks.hpp"
+#include <terrace/base/parallel.hpp>
+
 #include "pool.hpp"
 
 /// Sorts points by their cell on a space-filling curve.
@@ -24,7 +25,7 @@ void for_ranges(std::uint32_t count, unsigned threads, const Work& work) {
     work(0, count);
     return;
   }
-  for_blocks(
+  base::parallel_blocks(
       count, kRange, threads, [] { return 0; },
       [&](std::size_t from, std::size_t to, int) {
         work(static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to));

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "check_input.hpp"
 #include "delaunay2/access.hpp"
 #include "delaunay2/build.hpp"
@@ -143,8 +145,8 @@ void Delaunay2<Coord, Metric>::reserve(std::size_t vertices) {
 }
 
 template <class Coord, class Metric>
-void Delaunay2<Coord, Metric>::set_check_stop(StopCheck check_stop) {
-  impl_->mesh.ticks = StopTicks(std::move(check_stop));
+void Delaunay2<Coord, Metric>::set_check_stop(base::StopCheck check_stop) {
+  impl_->mesh.ticks = base::StopTicks(std::move(check_stop));
 }
 
 template <class Coord, class Metric>

@@ -3,6 +3,8 @@
 
 #include <cassert>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "check_input.hpp"
 #include "delaunay3/access.hpp"
 #include "delaunay3/build.hpp"
@@ -89,8 +91,8 @@ void Delaunay3<Coord, Metric>::reserve(std::size_t vertices) {
 }
 
 template <class Coord, class Metric>
-void Delaunay3<Coord, Metric>::set_check_stop(StopCheck check_stop) {
-  impl_->mesh.ticks = StopTicks(std::move(check_stop));
+void Delaunay3<Coord, Metric>::set_check_stop(base::StopCheck check_stop) {
+  impl_->mesh.ticks = base::StopTicks(std::move(check_stop));
 }
 
 template <class Coord, class Metric>

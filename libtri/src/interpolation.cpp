@@ -7,12 +7,13 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/portable_math.hpp>
+
 #include "delaunay2/access.hpp"
 #include "delaunay2/hilbert.hpp"
-#include "for_blocks.hpp"
 #include "interpolation/check_heights.hpp"
 #include "interpolation/sampler.hpp"
-#include "portable_math.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -40,7 +41,7 @@ void answer_all(const Mesh& mesh, std::span<const Point2> queries, std::vector<R
   for (std::size_t done = 0; done < queries.size(); done += kSorted) {
     const auto part = queries.subspan(done, std::min(kSorted, queries.size() - done));
     const auto order = planar::hilbert_order<double>(part);
-    for_blocks(
+    base::parallel_blocks(
         part.size(), kBlock, threads, [&] { return std::make_unique<Sampler>(mesh); },
         [&](std::size_t begin, std::size_t end, std::unique_ptr<Sampler>& sampler) {
           sampler->start_at(planar::kNone);
@@ -105,12 +106,12 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
 }
 
 double slope_degrees(const Gradient& gradient) {
-  return portable::angle_degrees(portable::length(gradient.x, gradient.y), 1);
+  return base::atan2_degrees(base::hypot(gradient.x, gradient.y), 1);
 }
 
 double aspect_degrees(const Gradient& gradient) {
   if (gradient.x == 0 && gradient.y == 0) return std::numeric_limits<double>::quiet_NaN();
-  const double degrees = portable::angle_degrees(-gradient.x, -gradient.y);
+  const double degrees = base::atan2_degrees(-gradient.x, -gradient.y);
   // A tiny negative angle would round to 360.
   return !(degrees < 0) ? degrees + 0.0 : degrees + 360 < 360 ? degrees + 360 : 0;
 }

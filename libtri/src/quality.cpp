@@ -7,15 +7,16 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "interpolation/check_heights.hpp"
-#include "portable_math.hpp"
 
 namespace terrace::tri {
 namespace {
 
 using Vector = std::array<double, 2>;
 
-double length(const Vector& v) { return portable::length(v[0], v[1]); }
+double length(const Vector& v) { return base::hypot(v[0], v[1]); }
 
 /// The volume above zero under a triangle with these heights, divided by its area.
 double mean_above(std::array<double, 3> h) {
@@ -81,7 +82,7 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
   const Vector& a = edge[(least + 1) % 3];
   const Vector& b = edge[(least + 2) % 3];
   const double twice_area = std::max(0.0, cross(a, b));
-  result.min_angle_degrees = portable::angle_degrees(twice_area, -dot(a, b));
+  result.min_angle_degrees = base::atan2_degrees(twice_area, -dot(a, b));
   result.area = std::scalbn(twice_area, 2 * exponent - 1);
   result.aspect = *std::max_element(lengths.begin(), lengths.end()) *
                   (lengths[0] + lengths[1] + lengths[2]) / (2 * std::numbers::sqrt3 * twice_area);
@@ -90,8 +91,7 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
   const double ch = std::scalbn(height[2] - height[0], -exponent);
   const double x = bh * -edge[1][1] - ch * edge[2][1];
   const double y = ch * edge[2][0] - bh * -edge[1][0];
-  result.surface_area =
-      std::scalbn(portable::length(portable::length(twice_area, x), y), 2 * exponent - 1);
+  result.surface_area = std::scalbn(base::hypot(base::hypot(twice_area, x), y), 2 * exponent - 1);
   result.volume_above = result.area * mean_above(height);
   result.volume_below = result.area * mean_above({-height[0], -height[1], -height[2]});
   return result;

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "delaunay3/access.hpp"
 #include "shape/criterion.hpp"
 #include "shape/flood.hpp"
@@ -51,14 +53,14 @@ BasicShape3<Triangulation>& BasicShape3<Triangulation>::operator=(BasicShape3&&)
 
 template <class Triangulation>
 void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, unsigned threads,
-                                         const StopCheck& check_stop) {
+                                         const base::StopCheck& check_stop) {
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   shape::State& state = impl_->state;
   if (impl_->options.rule == ShapeRule::kPoles) {
     [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
     return shape::restore_by_poles(mesh, state, threads, check_stop);
   }
-  state.ticks = StopTicks(check_stop);
+  state.ticks = base::StopTicks(check_stop);
   const bool keep_vertices = impl_->options.keep_vertices;
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
     if (impl_->options.rule == ShapeRule::kFlood) {

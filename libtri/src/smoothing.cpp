@@ -6,10 +6,11 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "delaunay2/access.hpp"
 #include "interpolation/check_heights.hpp"
 #include "interpolation/place.hpp"
-#include "stop_ticks.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -90,7 +91,7 @@ bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
 }
 
 template <class Mesh>
-Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, StopTicks& ticks) {
+Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTicks& ticks) {
   Rows rows;
   for (const VertexId v : region) rows.vertex.push_back(slot(v));
   std::sort(rows.vertex.begin(), rows.vertex.end());
@@ -140,7 +141,7 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, StopTicks& ti
 /// neighbour that is higher by d.
 template <class Count>
 void take_step(const Rows& rows, double step, std::vector<double>& height,
-               std::vector<double>& next, Count count, StopTicks& ticks) {
+               std::vector<double>& next, Count count, base::StopTicks& ticks) {
   for (std::size_t i = 0; i < rows.moving; ++i) {
     ticks(4 * (rows.begin[i + 1] - rows.begin[i]));
     double sum = 0;
@@ -164,7 +165,7 @@ std::vector<HeightChange> smooth(const Delaunay2<Coord>& triangulation, const He
                                  const SmoothingOptions& options) {
   check(options);
   check_heights(triangulation, heights);
-  StopTicks ticks(options.check_stop);
+  base::StopTicks ticks(options.check_stop);
   const Rows rows = make_rows(Delaunay2Access::mesh(triangulation), region, ticks);
   std::vector<double> height;
   for (const std::uint32_t v : rows.vertex) {

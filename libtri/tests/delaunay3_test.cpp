@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include <gtest/gtest.h>
+#include <terrace/base/simd.hpp>
 
 #include "delaunay3/access.hpp"
 #include "points3.hpp"
@@ -261,8 +262,8 @@ TYPED_TEST(Delaunay3Test, EveryPathOfTheScanLeavesTheSameTetrahedra) {
     const auto points = make_points3<TypeParam>(kind, 200, 12);
     std::vector<Delaunay3<TypeParam>> triangulations;
     for (const auto set :
-         {InstructionSet::kPortable, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
-      if (!supported(set)) continue;
+         {base::SimdPath::portable, base::SimdPath::avx2, base::SimdPath::avx512}) {
+      if (!base::supports(set)) continue;
       auto& triangulation = triangulations.emplace_back();
       triangulation.build(points);
       Delaunay3Access::mesh(triangulation).hole.scan = spatial::scan_function(set);

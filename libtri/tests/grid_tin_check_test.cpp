@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/simd.hpp>
 
 #include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
@@ -145,10 +146,10 @@ template <class T>
 void expect_same_on_every_processor(const GridWindow<T>& window, const Tangle& any) {
   for (const double tolerance : {0.0, 0.3}) {
     const GridTinCheck expected = tin::check_grid_tin_by(window, any.points, any.triangles,
-                                                         tolerance, InstructionSet::kPortable);
+                                                         tolerance, base::SimdPath::portable);
     EXPECT_GT(expected.covered, 0U);
-    for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
-      if (!supported(set)) continue;
+    for (const base::SimdPath set : {base::SimdPath::avx2, base::SimdPath::avx512}) {
+      if (!base::supports(set)) continue;
       const GridTinCheck check =
           tin::check_grid_tin_by(window, any.points, any.triangles, tolerance, set);
       EXPECT_EQ(check.max_error, expected.max_error);
@@ -187,11 +188,11 @@ TEST(GridTinCheck, MisuseIsRefused) {
 
 // The tests of all paths skip instruction sets that the machine lacks; this one reports it.
 TEST(InstructionSets, Avx2IsTested) {
-  if (!supported(InstructionSet::kAvx2)) GTEST_SKIP() << "the processor lacks AVX2";
+  if (!base::supports(base::SimdPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }
 
 TEST(InstructionSets, Avx512IsTested) {
-  if (!supported(InstructionSet::kAvx512)) GTEST_SKIP() << "the processor lacks AVX-512";
+  if (!base::supports(base::SimdPath::avx512)) GTEST_SKIP() << "the processor lacks AVX-512";
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/simd.hpp>
 
 #include "grid_tin_oracle.hpp"
 #include "tin/grid/make.hpp"
@@ -97,9 +98,9 @@ TEST(GridTin, SameBytesOnEveryProcessor) {
         const auto all_paths = [&](const auto& any) {
           const GridSides sides = settle_sides(any.window(), options.max_error);
           const GridTin expected =
-              tin::make_grid_tin(any.window(), sides, options, InstructionSet::kPortable);
-          for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
-            if (!supported(set)) continue;
+              tin::make_grid_tin(any.window(), sides, options, base::SimdPath::portable);
+          for (const base::SimdPath set : {base::SimdPath::avx2, base::SimdPath::avx512}) {
+            if (!base::supports(set)) continue;
             const GridTin found = tin::make_grid_tin(any.window(), sides, options, set);
             EXPECT_EQ(found.vertices, expected.vertices);
             EXPECT_EQ(found.triangles, expected.triangles);

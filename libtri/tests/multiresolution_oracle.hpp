@@ -60,7 +60,7 @@ inline ClusterSet wanted(const WholeTree& tree, MemorySource& source, const Deta
     for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
       const Focus& focus = detail.focuses[i];
       const Box3& box = source.at(id).record.box;
-      if (level_of(id) >= focus.level && intersects(focus.box, box) &&
+      if (level_of(id) >= focus.level && focus.box.intersects(box) &&
           (!detail.needs || detail.needs(i, box))) {
         is_wanted = true;
       }
@@ -80,7 +80,7 @@ inline ClusterSet coarsened(const WholeTree& tree, MemorySource& source, const C
                             const Box3& box, unsigned level) {
   ClusterSet result = set;
   for (const ClusterId id : set) {
-    if (level_of(id) >= level || !contains(box, source.at(id).record.box)) continue;
+    if (level_of(id) >= level || !box.covers(source.at(id).record.box)) continue;
     std::erase_if(result, [&](ClusterId other) { return other == id || tree.is_below(other, id); });
   }
   return result;

@@ -33,14 +33,14 @@ TEST(PointId, HigherLevelThenSmallerIdStands) {
 
 TEST(Box, IsClosed) {
   const Box3 a{{0, 0, 0}, {2, 2, 2}};
-  EXPECT_TRUE(intersects(a, {{2, 2, 2}, {3, 3, 3}}));
-  EXPECT_FALSE(intersects(a, {{2.5, 0, 0}, {3, 2, 2}}));
-  EXPECT_TRUE(intersects(a, box2(1, 1, 1, 1)));
-  EXPECT_FALSE(intersects(a, box2(3, 1, 4, 1)));
-  EXPECT_FALSE(intersects(a, {{1, 1, 3}, {1, 1, 2.5}})) << "an empty box";
-  EXPECT_TRUE(contains(a, a));
-  EXPECT_TRUE(contains(box2(0, 0, 2, 2), a));
-  EXPECT_FALSE(contains(a, box2(0, 0, 1, 1)));
+  EXPECT_TRUE(a.intersects({{2, 2, 2}, {3, 3, 3}}));
+  EXPECT_FALSE(a.intersects({{2.5, 0, 0}, {3, 2, 2}}));
+  EXPECT_TRUE(a.intersects(box2(1, 1, 1, 1)));
+  EXPECT_FALSE(a.intersects(box2(3, 1, 4, 1)));
+  EXPECT_FALSE(a.intersects({{1, 1, 3}, {1, 1, 2.5}})) << "an empty box";
+  EXPECT_TRUE(a.covers(a));
+  EXPECT_TRUE(box2(0, 0, 2, 2).covers(a));
+  EXPECT_FALSE(a.covers(box2(0, 0, 1, 1)));
 }
 
 // Against std::map, with ids that differ little, so that long probe sequences form and dissolve.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/simd.hpp>
 
 #include "delaunay2/double_kernel.hpp"
 #include "point_tin_oracle.hpp"
@@ -297,18 +298,18 @@ TEST(PointRows, AllPathsGiveTheSame) {
       ASSERT_TRUE(tin::rows::padded_samples(grid.rows(), frame));
       ASSERT_TRUE(tin::rows::padded_samples(turned, frame));
       const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
-      const auto of_rows = [&](InstructionSet set) {
+      const auto of_rows = [&](base::SimdPath set) {
         return tin::rows::make_tin(grid.rows(), frame, options, set);
       };
-      const auto of_turned = [&](InstructionSet set) {
+      const auto of_turned = [&](base::SimdPath set) {
         return tin::rows::make_tin(turned, frame, options, set);
       };
-      EXPECT_GT(of_rows(InstructionSet::kPortable).triangles.size(), 100u);
-      EXPECT_GT(of_turned(InstructionSet::kPortable).triangles.size(), 100u);
-      for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
-        if (!supported(set)) continue;
-        expect_same(of_rows(InstructionSet::kPortable), of_rows(set));
-        expect_same(of_turned(InstructionSet::kPortable), of_turned(set));
+      EXPECT_GT(of_rows(base::SimdPath::portable).triangles.size(), 100u);
+      EXPECT_GT(of_turned(base::SimdPath::portable).triangles.size(), 100u);
+      for (const base::SimdPath set : {base::SimdPath::avx2, base::SimdPath::avx512}) {
+        if (!base::supports(set)) continue;
+        expect_same(of_rows(base::SimdPath::portable), of_rows(set));
+        expect_same(of_turned(base::SimdPath::portable), of_turned(set));
       }
     }
   }

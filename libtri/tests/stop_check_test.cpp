@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Long work calls its check at intervals, and what the check throws ends it.
-#include "terrace/tri/stop_check.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/stop_check.hpp>
 
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
@@ -24,7 +24,7 @@ namespace terrace::tri {
 namespace {
 
 struct Stop {};
-using Work = std::function<void(const StopCheck&)>;
+using Work = std::function<void(const base::StopCheck&)>;
 
 /// work: with one thread, so that the calls are the same each time.
 void expect_stops(const Work& work, std::size_t least_calls) {
@@ -56,14 +56,14 @@ template <class Triangulation>
 void expect_building_stops(const std::vector<typename Triangulation::Point>& points,
                            std::size_t least_calls) {
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         Triangulation triangulation;
         triangulation.set_check_stop(check);
         triangulation.build(points);
       },
       least_calls);
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         Triangulation triangulation;
         triangulation.build(std::span(points).first(9));
         triangulation.set_check_stop(check);
@@ -88,7 +88,7 @@ TEST(StopCheck, EndsTriangulationsOfAwkwardPoints) {
   }
   for (const auto& points : {line, circle, equal}) {
     expect_stops(
-        [&](const StopCheck& check) {
+        [&](const base::StopCheck& check) {
           Delaunay2<double> triangulation;
           triangulation.set_check_stop(check);
           triangulation.build(points);
@@ -98,7 +98,7 @@ TEST(StopCheck, EndsTriangulationsOfAwkwardPoints) {
   std::vector<std::array<double, 3>> plane;
   for (const auto& p : some<2, double>(20000)) plane.push_back({p[0], p[1], 1});
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         Delaunay3<double> triangulation;
         triangulation.set_check_stop(check);
         triangulation.build(plane);
@@ -153,7 +153,7 @@ TEST(StopCheck, EndsShapes) {
     ShapeOptions options;
     options.rule = rule;
     expect_stops(
-        [&](const StopCheck& check) {
+        [&](const base::StopCheck& check) {
           Shape3<double> shape(options);
           shape.restore(triangulation, 1, check);
         },
@@ -161,14 +161,14 @@ TEST(StopCheck, EndsShapes) {
     RestoreOptions restore;
     restore.shape = options;
     expect_stops(
-        [&](const StopCheck& check) {
+        [&](const base::StopCheck& check) {
           restore.check_stop = check;
           restore_surface(points, restore);
         },
         150);
   }
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         DynamicSurface<double> surface;
         surface.set_check_stop(check);
         surface.build(points);
@@ -198,7 +198,7 @@ TEST(StopCheck, EndsSmoothingAndFlips) {
     options.method = method;
     options.edge_height = 1;
     expect_stops(
-        [&](const StopCheck& check) {
+        [&](const base::StopCheck& check) {
           options.check_stop = check;
           smooth(triangulation, heights, vertices, options);
         },
@@ -206,7 +206,7 @@ TEST(StopCheck, EndsSmoothingAndFlips) {
   }
   MetricField2 field({{box2(-1, -1, 2e6, 2e6), ellipse_map(3.0, 1.0, 30.0)}});
   expect_stops(
-      [&](const StopCheck& check) {
+      [&](const base::StopCheck& check) {
         static_cast<void>(metric_triangles(triangulation, field, TriangleFilter(), check));
       },
       200);

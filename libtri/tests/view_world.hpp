@@ -111,13 +111,12 @@ inline Demands own_demands(const View& view, const ViewOptions& options,
   };
   for (const ErrorRegion& region : view.regions) {
     const double demand = record.error == 0.0 ? 0.0 : record.error / region.error;
-    raise(intersects(region.box, box) ? demand : 0.0,
-          intersects(wider(region.box), box) ? demand : 0.0);
+    raise(region.box.intersects(box) ? demand : 0.0,
+          wider(region.box).intersects(box) ? demand : 0.0);
   }
   for (const Focus& focus : view.focuses) {
     if (level < focus.level) continue;
-    raise(intersects(focus.box, box) ? 1e300 : 0.0,
-          intersects(wider(focus.box), box) ? 1e300 : 0.0);
+    raise(focus.box.intersects(box) ? 1e300 : 0.0, wider(focus.box).intersects(box) ? 1e300 : 0.0);
   }
   return result;
 }

@@ -15,11 +15,12 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 #include <terrace/stream/byte_source.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "base/portable_math.hpp"
 #include "cli/cli.hpp"
 #include "cli/option_values.hpp"
 #include "sample/place_file.hpp"
@@ -98,8 +99,8 @@ std::vector<terrace::terrain::Point2> random_places() {
   std::vector<terrace::terrain::Point2> places(place_count());
   std::uint64_t seed = 1;
   const auto next = [&seed] {
-    seed = terrace::terrain::scramble(seed);
-    return terrace::terrain::unit_interval(seed);
+    seed = terrace::base::splitmix64(seed);
+    return terrace::base::unit_interval(seed);
   };
   for (terrace::terrain::Point2& place : places) place = {next() * columns, next() * rows};
   return places;
@@ -153,9 +154,9 @@ terrace::terrain::Region random_square(double share, std::uint64_t seed) {
   std::string text[2];
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double side = std::sqrt(share) * (all.max[axis] - all.min[axis]);
-    seed = terrace::terrain::scramble(seed);
-    const double low = all.min[axis] + terrace::terrain::unit_interval(seed) *
-                                           (all.max[axis] - all.min[axis] - side);
+    seed = terrace::base::splitmix64(seed);
+    const double low =
+        all.min[axis] + terrace::base::unit_interval(seed) * (all.max[axis] - all.min[axis] - side);
     text[0] += std::to_string(low) + ',';
     text[1] += std::to_string(low + side) + (axis == 0 ? "," : "");
   }
@@ -248,14 +249,14 @@ terrace::terrain::Region coast() {
     for (int octave = 2; octave < 15; ++octave) {
       const double waves = std::ldexp(1.0, octave);
       const auto height = [&](double wave) {
-        return terrace::terrain::unit_interval(
-            terrace::terrain::scramble(static_cast<std::uint64_t>(std::fmod(wave, waves) + waves)));
+        return terrace::base::unit_interval(
+            terrace::base::splitmix64(static_cast<std::uint64_t>(std::fmod(wave, waves) + waves)));
       };
       const double wave = std::floor(turn * waves), t = turn * waves - wave;
       radius -= 0.3 / waves * ((1 - t) * height(wave) + t * height(wave + 1));
     }
-    const std::array<double, 2> direction{terrace::terrain::portable_cos_degrees(360 * turn),
-                                          terrace::terrain::portable_sin_degrees(360 * turn)};
+    const std::array<double, 2> direction{terrace::base::cos_degrees(360 * turn),
+                                          terrace::base::sin_degrees(360 * turn)};
     // Between a circle and a square, so that it fills the store.
     const double reach = radius / std::max(std::abs(direction[0]), std::abs(direction[1]));
     for (std::size_t axis = 0; axis < 2; ++axis) {

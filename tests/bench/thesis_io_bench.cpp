@@ -48,7 +48,7 @@ int measure(const std::string& file, std::size_t block_points, double facility_c
   options.block_size = block_points;
   options.block.facility_cost = facility_cost;
   options.threads = threads;
-  options.ground = [&ground](const terrace::cluster::Bounds& bounds) {
+  options.ground = [&ground](const terrace::base::Box3& bounds) {
     return ground.map({bounds.min, bounds.max});
   };
   terrace::cluster::HierarchyBuilder builder(options, sink);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program outside the workspace that knows the five libraries by pkg-config alone: it clusters a
+// A program outside the workspace that knows the libraries by pkg-config alone: it clusters a
 // small terrain into a store, reads it back, triangulates the top level and solves an assignment.
 // Usage: consumer FOLDER, where the store is to be made.
 #include <cmath>

@@ -3,14 +3,14 @@
 # Installs the build into a temporary folder and uses it from there, away from its prefix, as programs of others do:
 # - no installed text file names the source or the build folder, or a library by its absolute path;
 # - every public header compiles with nothing but its own library's pkg-config flags;
-# - consumer.cpp, which uses all five libraries, links by pkg-config and runs;
+# - consumer.cpp, which uses all libraries, links by pkg-config and runs;
 # - the CMake lines of each library's README build and run use_LIBRARY.cpp.
 # The same CMake projects are then built with shared libraries (see below).
 # Usage: install_test.sh BUILD SOURCE PREFIX LIBDIR STATIC-OR-SHARED COMPILER...
 set -eu
 build=$1 source=$2 prefix=$3 libdir=$4 kind=$5
 shift 5
-libraries='stream cluster matching tri terrain'
+libraries='base stream cluster matching tri terrain'
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -19,7 +19,7 @@ OPTIONS
 cat >"$folder/meson.build" <<'BUILD'
 project('stranger', 'cpp', default_options : ['cpp_std=c++20'])
 BUILD
-for library in stream cluster matching tri terrain; do
+for library in base stream cluster matching tri terrain; do
   mkdir "$folder/subprojects/terrace-$library"
   (cd "$source/lib$library" && tar -c --exclude './build*' .) | tar -x -C "$folder/subprojects/terrace-$library"
   cat >>"$folder/meson.build" <<BUILD
@@ -29,15 +29,17 @@ BUILD
 done
 cp "$source"/tests/install/use_*.cpp "$folder"
 
-for library in stream cluster matching tri terrain; do
+for library in base stream cluster matching tri terrain; do
   meson setup "$folder/alone-$library" "$source/lib$library" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 done
 # Unoptimised: what is tested is the building, not the result.
 meson setup "$folder/build" "$folder" --buildtype=plain -Dunity=on -Dunity_size=30 >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
-ninja -C "$folder/build" use_matching use_stream.p/use_stream.cpp.o use_cluster.p/use_cluster.cpp.o \
+ninja -C "$folder/build" use_base use_matching use_stream.p/use_stream.cpp.o use_cluster.p/use_cluster.cpp.o \
   use_tri.p/use_tri.cpp.o use_terrain.p/use_terrain.cpp.o >"$folder/log" 2>&1 || { tail -n 50 "$folder/log"; exit 1; }
 if grep -o 'subprojects/[^ ]*_tests' "$folder/build/build.ninja"; then
   echo 'a subproject would build its tests'
   exit 1
 fi
-"$folder/build/use_matching" || { echo "use_matching failed"; exit 1; }
+for program in use_base use_matching; do
+  "$folder/build/$program" || { echo "$program failed"; exit 1; }
+done

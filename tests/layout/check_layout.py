@@ -10,8 +10,8 @@ import os
 import re
 import sys
 
-LIBRARIES = ['stream', 'cluster', 'matching', 'tri', 'terrain']
-# Who may use whom among them; the others know no sibling.
+LIBRARIES = ['base', 'stream', 'cluster', 'matching', 'tri', 'terrain']
+# Whom each may use besides libbase, which all may use and which uses none.
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 # What joins all of them for another language.
 BINDINGS = 'libterrain/python'
@@ -20,9 +20,10 @@ TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sa
                  'mesh': 3, 'tile': 3}
 # The same in libstream; a room in a room (`store/read`) belongs to it.
 STREAM_ROOMS = {'io': 0, 'laz': 0, 'order': 1, 'raster': 1, 'store': 1, 'format': 2}
-# So many sources a newcomer can overlook.
+# The most sources that a newcomer can take in at a glance.
 MOST_SOURCES = 40
 LICENCES = {
+    'libbase': 'Apache-2.0',
     'libstream': 'Apache-2.0',
     'libcluster': 'Apache-2.0',
     'libmatching': 'Apache-2.0',
@@ -34,8 +35,8 @@ LICENCES = {
 
 # What may be included where: a pattern of the name, and the folders and files that may name it. Public headers
 # are stricter still, see check_public_header().
-TESTS = ['tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests']
-BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
+TESTS = ['tests', 'libbase/tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests']
+BENCHES = ['tests/bench', 'libbase/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
            'libterrain/bench']
 # Where CGAL is: what computes on integers must compile without it.
 IN_CGAL = ['libtri/src/delaunay2/double_kernel.cpp', 'libtri/src/delaunay2/elliptical_kernel.cpp', 'libtri/src/delaunay3',
@@ -60,7 +61,7 @@ RESTRICTED = [
 
 # Functions of the C library whose last bit differs from release to release and from processor to
 # processor. Where bytes depend on them the same input gives other bytes elsewhere, so sources use
-# the portable_math.hpp of their room instead (sqrt, fma, fmod, remquo, frexp and ldexp are exact).
+# <terrace/base/portable_math.hpp> instead (sqrt, fma, fmod, remquo, frexp and ldexp are exact).
 INEXACT = (r'(?:acosh?|asinh?|atan[2h]?|cbrt|cosh?|erfc?|exp(?:2|m1)?|hypot|[lt]gamma|'
            r'log(?:10|1p|2)?|pow|sincos|sinh?|tanh?)')
 INEXACT_USE = re.compile(rf'\bstd::{INEXACT}[fl]?\b|(?<![\w.>:]){INEXACT}[fl]?\(')
@@ -68,14 +69,15 @@ INEXACT_USE = re.compile(rf'\bstd::{INEXACT}[fl]?\b|(?<![\w.>:]){INEXACT}[fl]?\(
 CAMERA = 'the camera: which clusters a view asks for, never what a file holds'
 EARTH = 'places on the earth, by formulas of such functions: ARCHITECTURE.md says what depends on them'
 MAY_DIFFER = {
+    'libbase/include/terrace/base/portable_math.hpp': 'defines functions of these names',
     'libtri/src/view/columns.cpp': CAMERA,
     'libtri/src/view/view.cpp': CAMERA,
     'libterrain/src/earth/crs/projection.cpp': EARTH,
     'libterrain/src/base/units.cpp': 'summaries for people, rounded; files have all digits',
 }
 
-# What of CGAL is LGPL. Whatever else it has counts as GPL: libraries, which are Apache-2.0, do without, and
-# a test or benchmark of theirs that compares with it is GPL itself.
+# The parts of CGAL under the LGPL. All others count as GPL: libraries, which are Apache-2.0, do not use them,
+# and a test or benchmark that compares with one is GPL itself.
 CGAL_LGPL = re.compile(r'CGAL/(Exact_(predicates|rational)|Gmpq|Mpzf|Simple_cartesian|hilbert_sort)')
 COMPARES = re.compile(r'lib[a-z]+/(tests|bench)/')
 
@@ -91,10 +93,11 @@ LISTED = [('include/terrace/{}', '.hpp', 'src/meson.build', ''),
 
 
 def files_below(root, folder):
-    """Paths relative to root; build folders, links and hidden folders are left out."""
+    """Paths relative to root, without links, hidden folders and the build folders of root and its rooms."""
     for path, folders, names in os.walk(os.path.join(root, folder)):
+        builds = re.compile('build(-.*)?$' if os.path.relpath(path, root).count('/') == 0 else '$.')
         folders[:] = sorted(f for f in folders
-                            if not f.startswith(('.', 'build')) and f != '__pycache__')
+                            if not f.startswith('.') and f != '__pycache__' and not builds.match(f))
         for name in sorted(names):
             yield os.path.relpath(os.path.join(path, name), root)
 
@@ -123,7 +126,7 @@ def check_include(path, bracket, name):
     library = library_of(path)
     if library:
         for other in LIBRARIES if not below(path, BINDINGS) else []:
-            if other not in [library] + SIBLINGS.get(library, []) and name.startswith(f'terrace/{other}/'):
+            if other not in ['base', library] + SIBLINGS.get(library, []) and name.startswith(f'terrace/{other}/'):
                 yield f'includes its sibling\'s <{name}>'
         if bracket == '"':
             target = os.path.normpath(os.path.join(os.path.dirname(path), name))
@@ -142,7 +145,7 @@ def check_include(path, bracket, name):
     if library and is_gpl(name) and not COMPARES.match(path):
         yield f'includes <{name}>, which is GPL; a library may not use it'
     if library and below(path, f'lib{library}/include'):
-        own = name.startswith(tuple(f'terrace/{known}/' for known in [library] + SIBLINGS.get(library, [])))
+        own = name.startswith(tuple(f'terrace/{known}/' for known in ['base', library] + SIBLINGS.get(library, [])))
         if not own and not (bracket == '<' and re.fullmatch(r'[a-z_0-9]+', name)):
             yield f'is a public header and includes <{name}>; it may use the standard library only'
 
@@ -172,7 +175,7 @@ def check_sources(root):
 
 
 def check_inexact(root):
-    """Functions of the C library that are not exact, where nobody allowed them."""
+    """Functions of the C library that are not exact, where they are not allowed."""
     used = set()
     for folder in [f'lib{library}/{part}' for library in LIBRARIES for part in ('include', 'src')] + ['tools/src']:
         for path in files_below(root, folder):
@@ -188,7 +191,7 @@ def check_inexact(root):
 
 
 def strings_of(line):
-    """The string literals of a line, without those in a comment behind it."""
+    """The string literals of a line, without those in a comment after it."""
     return re.findall(r'"(?:[^"\\]|\\.)*"', re.sub(r'("(?:[^"\\]|\\.)*")|//.*', lambda m: m.group(1) or '', line))
 
 
@@ -218,13 +221,15 @@ def check_meson(root):
             if os.path.basename(path) != 'meson.build':
                 continue
             for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
-                sibling = not below(path, BINDINGS) and name.startswith('terrace-') and name[8:] not in [library] + SIBLINGS.get(library, [])
+                sibling = not below(path, BINDINGS) and name.startswith('terrace-') and name[8:] not in ['base', library] + SIBLINGS.get(library, [])
                 if sibling or (name in ('geographiclib', 'proj', 'geos') and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
                     yield f'{path}: depends on {name}'
         for folder, ending, list_path, cut in LISTED:
             folder = folder.format(library)
             if not os.path.isdir(os.path.join(root, room, folder)):
                 continue
+            # libbase has headers alone, listed at its top.
+            list_path = list_path if os.path.isfile(os.path.join(root, room, list_path)) else 'meson.build'
             listed = read(root, f'{room}/{list_path}')
             for name in sorted(os.listdir(os.path.join(root, room, folder))):
                 if name.endswith(ending):
@@ -246,6 +251,15 @@ def check_rooms(root):
             yield f'tools/{name}: is missing'
 
 
+def check_versions(root):
+    """The projects of the libraries name the version that the file VERSION has; others read that file."""
+    version = read(root, 'VERSION').strip()
+    for path in [f'lib{library}/meson.build' for library in LIBRARIES] + ['CITATION.cff']:
+        found = re.search(r"^\s*version\s*: '?([^',\n]*)", read(root, path), re.MULTILINE)
+        if not found or found.group(1) != version:
+            yield f'{path}: does not have the version {version} of the file VERSION'
+
+
 def check_folders(root):
     for folder in [f'lib{library}/src' for library in LIBRARIES] + ['tools/src']:
         sources = collections.Counter(os.path.dirname(path) for path in files_below(root, folder)
@@ -261,6 +275,7 @@ def breaches(root):
     yield from check_inexact(root)
     yield from check_command(root)
     yield from check_meson(root)
+    yield from check_versions(root)
     yield from check_folders(root)
 
 

@@ -23,8 +23,8 @@ def make_tree(root):
         spdx = f'SPDX-License-Identifier: {check_layout.LICENCES[room]}\n'
         for name in ('LICENSE', 'README.md'):
             write(root, f'{room}/{name}', 'text\n')
-        for name in ('meson.build', 'meson_options.txt'):
-            write(root, f'{room}/{name}', '# ' + spdx)
+        write(root, f'{room}/meson.build', f"# {spdx}project('{library}',\n  version : '1.2.3')\n")
+        write(root, f'{room}/meson_options.txt', '# ' + spdx)
         write(root, f'{room}/src/meson.build', f"# {spdx}names = ['a.hpp']\n")
         write(root, f'{room}/tests/meson.build', f"# {spdx}files('a_test.cpp')\n")
         write(root, f'{room}/bench/meson.build', f"# {spdx}names = ['a']\n")
@@ -37,6 +37,8 @@ def make_tree(root):
     for name in ('LICENSE', 'README.md'):
         write(root, f'tools/{name}', 'text\n')
     write(root, 'tools/src/main.cpp', f'// {gpl}#include <terrace/tri/a.hpp>\n#include <CLI/CLI.hpp>\n')
+    write(root, 'VERSION', '1.2.3\n')
+    write(root, 'CITATION.cff', 'cff-version: 1.2.0\nversion: 1.2.3\n')
     write(root, 'tests/run.sh', f'#!/bin/sh\n# {gpl}')
 
 
@@ -54,8 +56,13 @@ class CheckLayout(unittest.TestCase):
 
     def test_sound_tree_has_none(self):
         self.assertEqual(self.breaches(lambda root: None), [])
-        # Build folders and what lies in them are nobody's source.
+        # Build folders and their contents are not sources.
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/build-x/a.cpp', '')), [])
+
+    def test_versions_are_equal(self):
+        for path, text in (('libtri/meson.build', "version : '1.2.4'"), ('CITATION.cff', 'version: 1.2')):
+            found = self.breaches(lambda root: write(root, path, f'# SPDX-License-Identifier: Apache-2.0\n{text}\n'))
+            self.assertEqual(found, [f'{path}: does not have the version 1.2.3 of the file VERSION'])
 
     def test_bindings_may_use_every_library(self):
         text = head('libterrain') + '#include <pybind11/numpy.h>\n#include <terrace/matching/a.hpp>\n'
@@ -132,7 +139,7 @@ class CheckLayout(unittest.TestCase):
                      'std::fmod(x, 360.0); std::remquo(x, y, &n); std::frexp(x, &e);'):
             with self.subTest(line=line):
                 self.assertEqual(self.breaches(lambda root: write(root, 'libtri/src/b.cpp', head('libtri') + line + '\n')), [])
-        # Tests and benchmarks may use what they like; a permission that nobody needs goes.
+        # Tests and benchmarks may use what they like; an unused permission is a breach.
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/tests/b.cpp', head('libtri') + 'std::sin(x);\n')), [])
         self.assertEqual(len(self.breaches(lambda root: None, {'tools/src/main.cpp': 'a reason'})), 1)
 

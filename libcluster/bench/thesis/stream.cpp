@@ -34,7 +34,7 @@ class StreamClustering::Weighing final : public HierarchySink {
   std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
     if (block.level > 0) return nullptr;
     StreamBlock weighed{.block = block};
-    weighed.facility_cost = facility_cost_ * diagonal(Euclidean{}, bounds_of(block.positions));
+    weighed.facility_cost = facility_cost_ * diagonal(Euclidean{}, base::box_of(block.positions));
     for (std::size_t c = 0; c < block.representatives.size(); ++c) {
       const Point3& facility = block.positions[block.representatives[c]];
       for (std::uint32_t k = block.first[c]; k < block.first[c + 1]; ++k) {

@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include <terrace/base/simd.hpp>
+
 #include "block/block_state.hpp"
 #include "block/engine.hpp"
 #include "block/exact_finish.hpp"
@@ -15,16 +17,6 @@
 
 namespace terrace::cluster {
 namespace {
-
-bool available(SimdPath path) {
-#ifdef TERRACE_CLUSTER_X86
-  if (path == SimdPath::avx2) return __builtin_cpu_supports("avx2") != 0;
-  if (path == SimdPath::avx512) {
-    return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
-  }
-#endif
-  return path == SimdPath::portable;
-}
 
 EngineFunction engine_of(SimdPath path) {
 #ifdef TERRACE_CLUSTER_X86
@@ -100,7 +92,7 @@ struct BlockClusterer::Impl {
 
 BlockClusterer::BlockClusterer(SimdPath path) : impl_(std::make_unique<Impl>()) {
   if (path == SimdPath::automatic) path = best_simd_path();
-  if (!available(path)) {
+  if (!base::supports(path)) {
     throw std::invalid_argument(
         "this processor lacks the instructions of the SIMD path asked for; "
         "SimdPath::automatic takes the best there is");
@@ -147,13 +139,6 @@ void BlockClusterer::run(std::span<const Point3> points, std::span<const double>
       impl_->finish.run(points, weights, scaling, facility_cost, options.check_stop, result);
   result.facility_cost = scaling.unscaled(facility_cost);
   result.connection_cost = scaling.unscaled(connections);
-}
-
-SimdPath best_simd_path() {
-  for (const SimdPath path : {SimdPath::avx512, SimdPath::avx2}) {
-    if (available(path)) return path;
-  }
-  return SimdPath::portable;
 }
 
 }  // namespace terrace::cluster

@@ -6,9 +6,10 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "scaling.hpp"
 #include "terrace/cluster/point.hpp"
-#include "terrace/cluster/stop_check.hpp"
 
 namespace terrace::cluster {
 
@@ -84,7 +85,7 @@ struct BlockState {
   Column<float> scratch_pool;
 
   /// Of the options; never null.
-  const StopCheck* check_stop = nullptr;
+  const base::StopCheck* check_stop = nullptr;
   std::uint32_t vectors_since_check = 0;
   /// To be called once per so many vectors; throws what the check throws.
   [[gnu::always_inline]] void tick(std::uint32_t vectors) {

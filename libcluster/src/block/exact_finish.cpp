@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include <terrace/base/stop_check.hpp>
+
 namespace terrace::cluster {
 namespace {
 
@@ -33,8 +35,8 @@ ExactFinish::Costs ExactFinish::costs(std::span<const Point3> points,
 }
 
 double ExactFinish::run(std::span<const Point3> points, std::span<const double> weights,
-                        const Scaling& scaling, double facility_cost, const StopCheck& check_stop,
-                        BlockClustering& clustering) {
+                        const Scaling& scaling, double facility_cost,
+                        const base::StopCheck& check_stop, BlockClustering& clustering) {
   facilities_.clear();
   for (const std::uint32_t f : clustering.facilities) {
     facilities_.push_back(scaling.scaled(points[f]));

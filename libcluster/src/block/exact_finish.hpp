@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "scaling.hpp"
 #include "terrace/cluster/block.hpp"
 
@@ -18,7 +20,7 @@ class ExactFinish {
   /// facility_cost: scaled. Changes facilities and assignment of `clustering` if necessary. Returns
   /// the scaled connection cost. Throws what the check throws.
   double run(std::span<const Point3> points, std::span<const double> weights,
-             const Scaling& scaling, double facility_cost, const StopCheck& check_stop,
+             const Scaling& scaling, double facility_cost, const base::StopCheck& check_stop,
              BlockClustering& clustering);
 
  private:

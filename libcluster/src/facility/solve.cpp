@@ -65,7 +65,7 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
   if (problem.points.size() >= (std::size_t{1} << 24)) {
     refuse(kFast, "takes fewer than 2^24 points", "cluster them in blocks (hierarchy.hpp)");
   }
-  if (!linear_map(problem.metric, bounds_of(problem.points))) {
+  if (!linear_map(problem.metric, base::box_of(problem.points))) {
     refuse(kFast, "needs a metric that a linear map of the points makes Euclidean, and \"" +
                       name_of(problem.metric) + "\" is not one on these points");
   }

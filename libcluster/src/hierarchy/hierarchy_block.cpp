@@ -10,7 +10,8 @@
 #include <utility>
 #include <variant>
 
-#include "draws.hpp"
+#include <terrace/base/random.hpp>
+
 #include "ground.hpp"
 #include "hierarchy/summary.hpp"
 
@@ -88,7 +89,7 @@ FinishedBlock HierarchyBlock::finished() const {
 }
 
 std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block) {
-  return splitmix64(splitmix64(splitmix64(seed) ^ level) ^ block);
+  return base::splitmix64(base::splitmix64(base::splitmix64(seed) ^ level) ^ block);
 }
 
 BlockProcessor::BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster)
@@ -102,7 +103,7 @@ BlockProcessor::BlockProcessor(const HierarchyOptions& options, ClusterFunction 
 
 void BlockProcessor::process(HierarchyBlock& block) {
   assert(block.size() > 0);
-  const Bounds box = bounds_of(block.positions);
+  const Box3 box = base::box_of(block.positions);
   const GroundMap map = options_.ground ? options_.ground(box) : kIdentityMap;
   check_ground_map(map, box, block.level, block.number);
   if (options_.metric_of) {
@@ -172,7 +173,7 @@ void BlockProcessor::read_corners(const HierarchyBlock& block, const Point3& ori
                                 std::to_string(block.level) + " is not finite");
   }
   if (map == kIdentityMap) return;
-  check_ground_map(map, bounds_of(corners_), block.level, block.number);
+  check_ground_map(map, base::box_of(corners_), block.level, block.number);
   to_ground(corners_, origin, map, corners_);
 }
 

@@ -183,11 +183,11 @@ void HierarchyEngine::deliver_root(Level& level) {
   block.first = {0, static_cast<std::uint32_t>(block.size())};
   block.order.resize(block.size());
   std::iota(block.order.begin(), block.order.end(), 0u);
-  Summary summary{bounds_of(block.positions), 0.0, block.size()};
+  Summary summary{base::box_of(block.positions), 0.0, block.size()};
   if (block.level > 0) {
     summary.descendants = 0;
     for (const Summary& head : block.heads) {
-      include(summary.box, head.box);
+      summary.box.include(head.box);
       summary.descendants += head.descendants;
     }
   }

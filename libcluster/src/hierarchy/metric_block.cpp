@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include <terrace/base/box.hpp>
+
 #include "block/linear_block.hpp"
 #include "facility/points/search_frame.hpp"
 #include "hierarchy/outliers.hpp"
@@ -72,7 +74,7 @@ void MetricBlockClusterer::run_once(const FacilityPoints& problem, const Facilit
                                     BlockClustering& result) {
   const bool automatic = options.strategy == FacilityStrategy::automatic;
   if (automatic && problem.channels.size() == 0 &&
-      linear_map(problem.metric, bounds_of(problem.points))) {
+      linear_map(problem.metric, base::box_of(problem.points))) {
     run_linear(clusterer_, problem, {.effort = options.effort, .seed = options.seed}, result);
     leave_out(problem, result);
     return;

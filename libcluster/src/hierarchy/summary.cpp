@@ -18,14 +18,14 @@ constexpr double kSmallestSquare = 1e-280;
 constexpr double kSmallestLength = 1e-139;  // more than its root
 
 // The length whose square is `squared`, never too small, if it is one between points of `box`.
-double length_bound(double squared, const GroundMap& map, const Bounds& box) {
+double length_bound(double squared, const GroundMap& map, const Box3& box) {
   const double extent = ground_extent(map, box);
   const double length = squared < kSmallestSquare ? kSmallestLength : std::sqrt(squared);
   return std::min(extent, length + kRounding * extent);
 }
 
 // From `from` to the farthest corner of the box: no point of the box is farther.
-double farthest_corner(const Point3& from, const GroundMap& map, const Bounds& box) {
+double farthest_corner(const Point3& from, const GroundMap& map, const Box3& box) {
   const Point3 low = difference(box.min, from);
   const Point3 high = difference(box.max, from);
   double squared = 0.0;
@@ -42,11 +42,11 @@ template <class Ground>
 Summary summarise(std::span<const Point3> positions, std::span<const std::uint32_t> members,
                   std::uint32_t representative, const GroundMap& map, Ground ground) {
   const Point3 from = positions[representative];
-  Bounds box{from, from};
+  Box3 box{from, from};
   double squared = 0.0;
   for (const std::uint32_t member : members) {
     const Point3& p = positions[member];
-    include(box, p);
+    box.include(p);
     const double d = squared_length(ground(difference(p, from)));
     squared = d > squared ? d : squared;
   }
@@ -71,7 +71,7 @@ Summary summarise_heads(std::span<const Point3> positions, std::span<const Summa
                         std::span<const std::uint32_t> members, std::uint32_t representative,
                         const GroundMap& map) {
   const Point3& from = positions[representative];
-  Summary result{kEmptyBounds, 0.0, 0};
+  Summary result{Box3{}, 0.0, 0};
   double by_triangle = 0.0;
   for (const std::uint32_t member : members) {
     const Point3& p = positions[member];
@@ -80,7 +80,7 @@ Summary summarise_heads(std::span<const Point3> positions, std::span<const Summa
                      {{std::min(p[0], from[0]), std::min(p[1], from[1]), std::min(p[2], from[2])},
                       {std::max(p[0], from[0]), std::max(p[1], from[1]), std::max(p[2], from[2])}});
     by_triangle = std::max(by_triangle, (leg + heads[member].error) * (1.0 + 0x1p-52));
-    include(result.box, heads[member].box);
+    result.box.include(heads[member].box);
     result.descendants += heads[member].descendants;
   }
   result.error = std::min(by_triangle, farthest_corner(from, map, result.box));

@@ -9,12 +9,14 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/thread_team.hpp>
+
 #include "k_means/k_means_filter.hpp"
 #include "k_means/k_means_seeds.hpp"
 #include "k_means/k_means_tree.hpp"
 #include "scaling.hpp"
 #include "terrace/cluster/metric.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -78,8 +80,8 @@ struct ScaledWeights {
 
 /// One run of Lloyd's iteration. Everything is in scaled units.
 struct Run {
-  Run(const KMeansTree& the_tree, ThreadTeam& team, std::vector<Point3> start,
-      const StopCheck& check_stop)
+  Run(const KMeansTree& the_tree, base::ThreadTeam& team, std::vector<Point3> start,
+      const base::StopCheck& check_stop)
       : tree(the_tree),
         filter(the_tree, start.size(), team, check_stop),
         centres(std::move(start)) {}
@@ -206,7 +208,7 @@ KMeansResult k_means(std::span<const Point3> points, std::span<const double> wei
   const Scaling scaling(points);
   const ScaledWeights scaled_weights(weights);
   const KMeansTree tree(points, scaled_weights.values, scaling, options.check_stop);
-  ThreadTeam team(std::max(options.threads, 1u));
+  base::ThreadTeam team(std::max(options.threads, 1u));
   std::mt19937_64 random(options.seed);
   KMeansResult best;
   double least = 0;
@@ -228,7 +230,7 @@ KMeansResult k_means_from(std::span<const Point3> centres, std::span<const Point
   const Scaling scaling(points);
   const ScaledWeights scaled_weights(weights);
   const KMeansTree tree(points, scaled_weights.values, scaling, options.check_stop);
-  ThreadTeam team(std::max(options.threads, 1u));
+  base::ThreadTeam team(std::max(options.threads, 1u));
   std::vector<Point3> start;
   start.reserve(centres.size());
   for (const Point3& c : centres) {

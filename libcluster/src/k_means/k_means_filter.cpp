@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/thread_team.hpp>
+
 namespace terrace::cluster {
 namespace {
 
@@ -32,8 +35,8 @@ double distance2(double ax, double ay, double az, double bx, double by, double b
 
 }  // namespace
 
-KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team,
-                           const StopCheck& check_stop)
+KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, base::ThreadTeam& team,
+                           const base::StopCheck& check_stop)
     : tree_(tree),
       clusters_(clusters),
       team_(team),

@@ -6,9 +6,10 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/thread_team.hpp>
+
 #include "k_means/k_means_tree.hpp"
-#include "stop_ticks.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::cluster {
 
@@ -24,8 +25,8 @@ class KMeansFilter {
   };
 
   /// tree, team and check_stop outlive this object.
-  KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team,
-               const StopCheck& check_stop);
+  KMeansFilter(const KMeansTree& tree, std::size_t clusters, base::ThreadTeam& team,
+               const base::StopCheck& check_stop);
 
   /// One assignment. Returns whether a point has changed its cluster since the last one.
   bool assign(std::span<const Point3> centres);
@@ -47,8 +48,8 @@ class KMeansFilter {
     std::size_t count;
   };
   struct Scratch {
-    explicit Scratch(const StopCheck& check_stop) : ticks(check_stop) {}
-    StopTicks ticks;
+    explicit Scratch(const base::StopCheck& check_stop) : ticks(check_stop) {}
+    base::StopTicks ticks;
     std::vector<double> x, y, z;  // room for k candidates on each level
     std::vector<std::uint32_t> number;
     std::vector<Sum> sums;  // of the current chunk
@@ -69,7 +70,7 @@ class KMeansFilter {
 
   const KMeansTree& tree_;
   const std::size_t clusters_;
-  ThreadTeam& team_;
+  base::ThreadTeam& team_;
   std::size_t chunk_level_ = 0;         // the nodes of this level are divided among threads
   std::vector<std::uint32_t> cluster_;  // by position, padded
   std::vector<std::uint32_t> owner_;    // by block: the cluster of all its points, or kMixed

@@ -5,8 +5,8 @@
 #include <bit>
 #include <limits>
 
-#include "draws.hpp"
-#include "stop_ticks.hpp"
+#include <terrace/base/random.hpp>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -25,7 +25,7 @@ double below_box(const Point3& p, const KMeansTree::Node& box) {
 
 class CentreSeeder {
  public:
-  CentreSeeder(const KMeansTree& tree, const StopCheck& check_stop)
+  CentreSeeder(const KMeansTree& tree, const base::StopCheck& check_stop)
       : tree_(tree),
         ticks_(check_stop),
         cost_(tree.x.size(), std::numeric_limits<double>::infinity()) {
@@ -43,7 +43,7 @@ class CentreSeeder {
 
   /// A position drawn with probability proportional to its cost; requires total() > 0.
   [[nodiscard]] std::size_t draw(bool first, std::mt19937_64& random) const {
-    double at = draw_unit(random) * total();
+    double at = base::draw_unit(random) * total();
     std::size_t node = 0;
     for (std::size_t level = states_.size() - 1; level-- > 0;) {
       node = chosen(node * kFan, std::min((node + 1) * kFan, states_[level].size()), at,
@@ -120,7 +120,7 @@ class CentreSeeder {
   }
 
   const KMeansTree& tree_;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
   std::vector<double> cost_;  // by position: squared distance to the nearest seed
   std::vector<std::vector<State>> states_;
 };
@@ -128,7 +128,7 @@ class CentreSeeder {
 }  // namespace
 
 std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
-                                  std::mt19937_64& random, const StopCheck& check_stop) {
+                                  std::mt19937_64& random, const base::StopCheck& check_stop) {
   CentreSeeder seeder(tree, check_stop);
   std::vector<Point3> seeds{tree.point(seeder.draw(true, random))};
   seeder.add(seeds.front());

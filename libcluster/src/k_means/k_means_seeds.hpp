@@ -5,6 +5,8 @@
 #include <random>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "k_means/k_means_tree.hpp"
 
 namespace terrace::cluster {
@@ -14,6 +16,6 @@ namespace terrace::cluster {
 /// least sum of these is taken. Boxes that a new seed cannot improve are skipped.
 [[nodiscard]] std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
                                                 std::mt19937_64& random,
-                                                const StopCheck& check_stop);
+                                                const base::StopCheck& check_stop);
 
 }  // namespace terrace::cluster

@@ -5,7 +5,7 @@
 #include <array>
 #include <utility>
 
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -34,7 +34,7 @@ struct Keyed {
 };
 
 /// Stable, by the lowest `bits` of the keys.
-void radix_sort(std::vector<Keyed>& items, unsigned bits, const StopCheck& check_stop) {
+void radix_sort(std::vector<Keyed>& items, unsigned bits, const base::StopCheck& check_stop) {
   constexpr unsigned kKeyDigitBits = 10;
   constexpr std::size_t kKeyDigits = std::size_t{1} << kKeyDigitBits;
   std::vector<Keyed> other(items.size());
@@ -70,7 +70,7 @@ KMeansTree::Node joined(std::span<const KMeansTree::Node> children) {
 }  // namespace
 
 KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> weights,
-                       const Scaling& scaling, const StopCheck& check_stop)
+                       const Scaling& scaling, const base::StopCheck& check_stop)
     : count(points.size()) {
   const bool flat = scaling.extent[2] == 0.0;
   std::vector<Keyed> order(count);
@@ -86,7 +86,7 @@ KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> w
     order[i] = {key, static_cast<std::uint32_t>(i)};
   }
   radix_sort(order, (flat ? 2 : 3) * kAxisBits, check_stop);
-  StopTicks ticks(check_stop);
+  base::StopTicks ticks(check_stop);
 
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   for (std::vector<double>* column : {&x, &y, &z, &w}) column->resize(blocks * kBlock);

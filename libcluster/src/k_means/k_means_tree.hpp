@@ -6,9 +6,10 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "scaling.hpp"
 #include "terrace/cluster/point.hpp"
-#include "terrace/cluster/stop_check.hpp"
 
 namespace terrace::cluster {
 
@@ -35,7 +36,7 @@ struct KMeansTree {
 
   /// weights: scaled to at most 1, or empty.
   KMeansTree(std::span<const Point3> points, std::span<const double> weights,
-             const Scaling& scaling, const StopCheck& check_stop);
+             const Scaling& scaling, const base::StopCheck& check_stop);
 
   [[nodiscard]] std::size_t block_count() const { return levels.front().size(); }
   /// Blocks [first, last) below a node.

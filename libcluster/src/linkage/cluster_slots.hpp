@@ -8,7 +8,8 @@
 #include <numeric>
 #include <vector>
 
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/dendrogram.hpp"
 
 /// Agglomeration by nearest clusters, over any distances of clusters. Private to linkage.
@@ -34,7 +35,7 @@ struct NearCluster {
 class ClusterSlots {
  public:
   /// check_stop: outlives this object.
-  ClusterSlots(std::size_t count, const StopCheck& check_stop)
+  ClusterSlots(std::size_t count, const base::StopCheck& check_stop)
       : points_(count, 1.0), name_(count), ticks_(check_stop) {
     std::iota(name_.begin(), name_.end(), 0u);
   }
@@ -65,7 +66,7 @@ class ClusterSlots {
  private:
   std::vector<double> points_;
   std::vector<std::uint32_t> name_;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
 };
 
 /// Merges two slots. Returns the link, at the given height.

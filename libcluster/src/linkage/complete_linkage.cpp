@@ -6,10 +6,11 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "linkage/complete_rounds.hpp"
 #include "linkage/linkage_points.hpp"
 #include "linkage/linkage_tree.hpp"
-#include "stop_ticks.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
@@ -91,7 +92,7 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
   // As for points: clusters that merge should have nearby rows in the matrix.
   std::vector<std::uint32_t> thing(count);
   std::iota(thing.begin(), thing.end(), 0u);
-  StopTicks ticks(options.check_stop);
+  base::StopTicks ticks(options.check_stop);
   order_by_distance(thing, [&](std::uint32_t i, std::uint32_t j) {
     ticks(kTicksOfDistance);
     return checked(i, j);

@@ -5,8 +5,8 @@
 #include <cassert>
 #include <limits>
 
-#include "parallel.hpp"
-#include "stop_ticks.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -39,7 +39,7 @@ CompleteRounds<T>::CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>
 template <class T>
 std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
   begin_minima(size());
-  parallel_blocks(
+  base::parallel_blocks(
       size(), kRowsPerBlock, threads(), [&](std::size_t begin, std::size_t end, unsigned thread) {
         for (std::size_t c = begin; c < end; ++c) {
           check_stop();
@@ -52,13 +52,13 @@ std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
     const std::size_t before = size();
     const std::size_t pairs = match();
     list_parts();
-    parallel_blocks(first_.size(), kRowsPerBlock, threads(),
-                    [&](std::size_t begin, std::size_t end, unsigned thread) {
-                      check_stop();
-                      for (std::size_t k = begin; k < end; ++k) {
-                        bring_in(static_cast<std::uint32_t>(k), columns_[thread]);
-                      }
-                    });
+    base::parallel_blocks(first_.size(), kRowsPerBlock, threads(),
+                          [&](std::size_t begin, std::size_t end, unsigned thread) {
+                            check_stop();
+                            for (std::size_t k = begin; k < end; ++k) {
+                              bring_in(static_cast<std::uint32_t>(k), columns_[thread]);
+                            }
+                          });
     shrink();
     if (pairs * kChainBelow < before && size() > 1) {
       chain();
@@ -219,15 +219,15 @@ void CompleteRounds<T>::shrink() {
   begin_minima(count);
   for (Columns& columns : columns_) columns.buffer.resize(size());
   std::vector<Cluster> next(count);
-  parallel_blocks(count, kRowsPerBlock, threads(),
-                  [&](std::size_t begin, std::size_t end, unsigned thread) {
-                    check_stop();
-                    for (std::size_t k = begin; k < end; ++k) {
-                      const auto c = static_cast<std::uint32_t>(k);
-                      next[k] = shrunk(c, columns_[thread]);
-                      note_minima(c, next[k], count, columns_[thread]);
-                    }
-                  });
+  base::parallel_blocks(count, kRowsPerBlock, threads(),
+                        [&](std::size_t begin, std::size_t end, unsigned thread) {
+                          check_stop();
+                          for (std::size_t k = begin; k < end; ++k) {
+                            const auto c = static_cast<std::uint32_t>(k);
+                            next[k] = shrunk(c, columns_[thread]);
+                            note_minima(c, next[k], count, columns_[thread]);
+                          }
+                        });
   clusters_.swap(next);
   end_minima();
 }
@@ -318,7 +318,7 @@ void CompleteRounds<T>::chain() {
   std::vector<bool> gone(m, false);
   std::vector<std::uint32_t> chain;
   std::uint32_t start = 0;
-  StopTicks ticks(check_stop_);
+  base::StopTicks ticks(check_stop_);
   for (std::uint32_t left = m; left > enough;) {
     ticks(m);
     if (chain.empty()) {

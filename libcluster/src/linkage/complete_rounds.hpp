@@ -5,6 +5,8 @@
 #include <functional>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "linkage/linkage_kernels.hpp"
 #include "terrace/cluster/band_matrix.hpp"
 #include "terrace/cluster/dendrogram.hpp"
@@ -103,7 +105,7 @@ class CompleteRounds {
 
   const LinkageKernels<T>& kernels_;
   const unsigned threads_;
-  const StopCheck& check_stop_;
+  const base::StopCheck& check_stop_;
   std::vector<Cluster> clusters_;
   std::vector<Columns> columns_;         ///< by thread
   std::vector<Nearest> ahead_, behind_;  ///< nearest in the own row, and in the own column

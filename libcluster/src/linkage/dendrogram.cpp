@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "linkage/union_find.hpp"
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/union_find.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -20,7 +20,7 @@ std::string text_of(const Link& link) {
 }
 
 /// Indices of the links by height, ties in their original order.
-std::vector<std::uint32_t> by_height(std::span<const Link> links, StopTicks& ticks) {
+std::vector<std::uint32_t> by_height(std::span<const Link> links, base::StopTicks& ticks) {
   struct Key {
     double height;
     std::uint32_t link;
@@ -77,11 +77,11 @@ std::vector<std::uint32_t> labels_below(const Dendrogram& dendrogram,
 
 /// The dendrogram of links that are taken in the given order.
 Dendrogram join(std::size_t points, std::span<const Link> links,
-                std::span<const std::uint32_t> order, StopTicks& ticks) {
+                std::span<const std::uint32_t> order, base::StopTicks& ticks) {
   constexpr std::size_t kTicksOfJoin = 64;
   Dendrogram dendrogram{.points = points, .merges = {}};
   dendrogram.merges.reserve(links.size());
-  UnionFind sets(points);
+  base::UnionFind sets(points);
   std::vector<std::uint32_t> cluster(points);
   std::vector<std::uint32_t> size(points, 1);
   std::iota(cluster.begin(), cluster.end(), 0u);
@@ -126,18 +126,18 @@ void check_links(std::size_t points, std::span<const Link> links) {
 }  // namespace
 
 Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links,
-                           const StopCheck& check_stop) {
+                           const base::StopCheck& check_stop) {
   check_links(points, links);
-  StopTicks ticks(check_stop);
+  base::StopTicks ticks(check_stop);
   return join(points, links, by_height(links, ticks), ticks);
 }
 
 Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> links,
-                                    const StopCheck& check_stop) {
+                                    const base::StopCheck& check_stop) {
   check_links(points, links);
   std::vector<std::uint32_t> order(links.size());
   std::iota(order.begin(), order.end(), 0u);
-  StopTicks ticks(check_stop);
+  base::StopTicks ticks(check_stop);
   return join(points, links, order, ticks);
 }
 

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "linkage/linkage_kernels.hpp"
-#include "parallel.hpp"
 #include "terrace/cluster/band_matrix.hpp"
 
 namespace terrace::cluster {
@@ -40,38 +42,38 @@ DistanceTriangle<T>::DistanceTriangle(const LinkagePoints& points, LinkageMethod
   for (unsigned a = 0; a < 3; ++a) {
     for (const Point3& p : points.scaled()) axis[a].push_back(p[a]);
   }
-  parallel_blocks(size(), kRowsOfTriangle, options.threads,
-                  [&](std::size_t begin, std::size_t end, unsigned) {
-                    StopTicks ticks(options.check_stop);
-                    for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
-                      ticks(end);
-                      T* const to = row(i);
-                      kernels.distances(axis[0].data(), axis[1].data(), axis[2].data(), i,
-                                        axis[0][i], axis[1][i], axis[2][i], to);
-                      if (squares_) continue;
-                      for (std::size_t j = 0; j < i; ++j) to[j] = std::sqrt(to[j]);
-                    }
-                  });
+  base::parallel_blocks(size(), kRowsOfTriangle, options.threads,
+                        [&](std::size_t begin, std::size_t end, unsigned) {
+                          base::StopTicks ticks(options.check_stop);
+                          for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
+                            ticks(end);
+                            T* const to = row(i);
+                            kernels.distances(axis[0].data(), axis[1].data(), axis[2].data(), i,
+                                              axis[0][i], axis[1][i], axis[2][i], to);
+                            if (squares_) continue;
+                            for (std::size_t j = 0; j < i; ++j) to[j] = std::sqrt(to[j]);
+                          }
+                        });
 }
 
 template <class T>
 DistanceTriangle<T>::DistanceTriangle(std::size_t count, const PairDistance& distance,
                                       LinkageMethod method, const LinkageOptions& options)
     : DistanceTriangle(count, method, options) {
-  parallel_blocks(count, kRowsOfTriangle, options.threads,
-                  [&](std::size_t begin, std::size_t end, unsigned) {
-                    StopTicks ticks(options.check_stop);
-                    for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
-                      T* const to = row(i);
-                      for (std::size_t j = 0; j < i; ++j) {
-                        ticks(kTicksOfDistance);
-                        const double value =
-                            distance(static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(i));
-                        check_distance(value, std::numeric_limits<T>::max(), j, i);
-                        to[j] = static_cast<T>(value);
-                      }
-                    }
-                  });
+  base::parallel_blocks(
+      count, kRowsOfTriangle, options.threads, [&](std::size_t begin, std::size_t end, unsigned) {
+        base::StopTicks ticks(options.check_stop);
+        for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
+          T* const to = row(i);
+          for (std::size_t j = 0; j < i; ++j) {
+            ticks(kTicksOfDistance);
+            const double value =
+                distance(static_cast<std::uint32_t>(j), static_cast<std::uint32_t>(i));
+            check_distance(value, std::numeric_limits<T>::max(), j, i);
+            to[j] = static_cast<T>(value);
+          }
+        }
+      });
   double largest = 0.0;
   for (std::size_t i = 1; i < count; ++i) {
     tick(i);

@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "linkage/cluster_means.hpp"
 #include "linkage/distance_triangle.hpp"
 
@@ -12,7 +14,8 @@ namespace terrace::cluster {
 namespace {
 
 template <class Clusters>
-Dendrogram agglomerate(Clusters&& clusters, LinkageMethod method, const StopCheck& check_stop) {
+Dendrogram agglomerate(Clusters&& clusters, LinkageMethod method,
+                       const base::StopCheck& check_stop) {
   const std::size_t points = clusters.size();
   if (method == LinkageMethod::centroid || method == LinkageMethod::median) {
     return make_dendrogram_in_order(points, nearest_pair_links(clusters), check_stop);

@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/point.hpp"
 
 /// The representation of points for linkage. Private to linkage.
 
 namespace terrace::cluster {
 
-/// What a distance that the caller computes costs, see StopTicks.
+/// What a distance that the caller computes costs, see base::StopTicks.
 inline constexpr std::size_t kTicksOfDistance = 64;
 
 /// Copies of points, scaled by a power of two so that squares of distances do not overflow, nor

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/linkage_tree.hpp"
 
-#include "parallel.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -11,7 +12,7 @@ constexpr unsigned kSharedLevels = 6;  ///< their nodes are split one level afte
 }  // namespace
 
 LinkageTree::LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
-                         unsigned threads, const StopCheck& check_stop) {
+                         unsigned threads, const base::StopCheck& check_stop) {
   const std::size_t count = chosen.size();
   while (count > (kLeaf << depth_)) ++depth_;
   boxes_.resize(nodes());
@@ -23,14 +24,14 @@ LinkageTree::LinkageTree(std::span<const Point3> points, std::span<const std::ui
   const unsigned shared = std::min(kSharedLevels, depth_);
   for (unsigned level = 0; level < shared; ++level) {
     const std::size_t first = std::size_t{1} << level;
-    parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
+    base::parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
       if (check_stop) check_stop();
       split(first + q, level, records);
     });
   }
   const std::size_t first = std::size_t{1} << shared;
-  parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
-    StopTicks ticks(check_stop);
+  base::parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
+    base::StopTicks ticks(check_stop);
     split_all(first + q, shared, records, ticks);
     const std::size_t end = ((q + 1) * count) >> shared;
     for (std::size_t i = (q * count) >> shared; i < end; ++i) {
@@ -73,7 +74,7 @@ void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& r
 }
 
 void LinkageTree::split_all(std::size_t node, unsigned level, std::vector<Record>& records,
-                            StopTicks& ticks) {
+                            base::StopTicks& ticks) {
   constexpr std::size_t kTicksOfPoint = 8;
   ticks(kTicksOfPoint * (size() >> level));
   split(node, level, records);

@@ -7,7 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/point.hpp"
 
 /// Private to linkage.
@@ -27,7 +28,7 @@ class LinkageTree {
 
   /// The order depends on the points alone. O(n log n).
   LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
-              unsigned threads, const StopCheck& check_stop = {});
+              unsigned threads, const base::StopCheck& check_stop = {});
 
   [[nodiscard]] std::size_t size() const { return number_.size(); }
   [[nodiscard]] std::size_t leaves() const { return std::size_t{1} << depth_; }
@@ -51,7 +52,8 @@ class LinkageTree {
     std::uint32_t number;
   };
   void split(std::size_t node, unsigned level, std::vector<Record>& records);
-  void split_all(std::size_t node, unsigned level, std::vector<Record>& records, StopTicks& ticks);
+  void split_all(std::size_t node, unsigned level, std::vector<Record>& records,
+                 base::StopTicks& ticks);
 
   unsigned depth_ = 0;
   std::vector<Box> boxes_;

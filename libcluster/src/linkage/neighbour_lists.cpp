@@ -3,7 +3,8 @@
 
 #include <limits>
 
-#include "parallel.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -32,15 +33,15 @@ struct Best {
 }  // namespace
 
 NeighbourLists::NeighbourLists(const LinkageTree& tree, unsigned threads,
-                               const StopCheck& check_stop)
+                               const base::StopCheck& check_stop)
     : length_(static_cast<unsigned>(std::min<std::size_t>(NeighbourLists::kMost, tree.size() - 1))),
       lists_(tree.size() * length_) {
   if (length_ == 0) return;
-  parallel_blocks(tree.leaves(), kLeavesPerListBlock, threads,
-                  [&](std::size_t begin, std::size_t end, unsigned) {
-                    if (check_stop) check_stop();
-                    for (std::size_t leaf = begin; leaf < end; ++leaf) search(tree, leaf);
-                  });
+  base::parallel_blocks(tree.leaves(), kLeavesPerListBlock, threads,
+                        [&](std::size_t begin, std::size_t end, unsigned) {
+                          if (check_stop) check_stop();
+                          for (std::size_t leaf = begin; leaf < end; ++leaf) search(tree, leaf);
+                        });
 }
 
 /// All points of a leaf search together: they mostly need the same nodes.

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "linkage/linkage_tree.hpp"
 
 /// Private to single linkage.
@@ -30,7 +32,7 @@ class NeighbourLists {
  public:
   static constexpr unsigned kMost = 8;
 
-  NeighbourLists(const LinkageTree& tree, unsigned threads, const StopCheck& check_stop);
+  NeighbourLists(const LinkageTree& tree, unsigned threads, const base::StopCheck& check_stop);
   /// The length of each list: kMost, or the number of all other points if less.
   [[nodiscard]] unsigned length() const { return length_; }
   [[nodiscard]] std::uint32_t* of(std::size_t place) { return lists_.data() + place * length_; }

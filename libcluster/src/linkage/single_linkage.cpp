@@ -4,11 +4,12 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/union_find.hpp>
+
 #include "linkage/linkage_points.hpp"
 #include "linkage/linkage_tree.hpp"
 #include "linkage/spanning_tree.hpp"
-#include "linkage/union_find.hpp"
-#include "stop_ticks.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
@@ -17,9 +18,9 @@ namespace {
 /// The first point at each position; the others at the position are linked to it, at height 0. The
 /// tree over the distinct points then has only geometric ties.
 std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vector<Link>& links,
-                                    const StopCheck& check_stop) {
+                                    const base::StopCheck& check_stop) {
   constexpr std::size_t kTicksOfLookup = 64;
-  StopTicks ticks(check_stop);
+  base::StopTicks ticks(check_stop);
   const auto hash = [](const Point3& p) {
     std::uint64_t h = 0;
     for (const double v : p) {
@@ -86,7 +87,7 @@ Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointP
     edges[e] = TreeEdge::of(squared_distance(scaled[i], scaled[j]), i, j);
   }
   std::sort(edges.begin(), edges.end());
-  UnionFind sets(points.size());
+  base::UnionFind sets(points.size());
   std::vector<Link> links;
   for (const TreeEdge& edge : edges) {
     if (sets.unite(edge.low, edge.high)) {

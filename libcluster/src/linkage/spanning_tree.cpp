@@ -5,8 +5,10 @@
 #include <bit>
 #include <limits>
 
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "linkage/linkage_points.hpp"
-#include "parallel.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -17,7 +19,8 @@ constexpr std::size_t kLeavesPerBlock = 256;
 
 }  // namespace
 
-SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads, const StopCheck& check_stop)
+SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads,
+                           const base::StopCheck& check_stop)
     : tree_(tree),
       threads_(threads),
       count_(static_cast<std::uint32_t>(tree.size())),
@@ -40,17 +43,17 @@ SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads, const Stop
   while (roots_.size() > 1) {
     for (const std::uint32_t root : roots_)
       shortest_[root] = {std::numeric_limits<double>::infinity(), kMixed, kMixed};
-    parallel_blocks(count_, kPointsPerBlock, threads_,
-                    [&](std::size_t begin, std::size_t end, unsigned) {
-                      if (check_stop) check_stop();
-                      take_from_lists(begin, end);
-                    });
+    base::parallel_blocks(count_, kPointsPerBlock, threads_,
+                          [&](std::size_t begin, std::size_t end, unsigned) {
+                            if (check_stop) check_stop();
+                            take_from_lists(begin, end);
+                          });
     label_nodes();
-    parallel_blocks(tree_.leaves(), kLeavesPerBlock, threads_,
-                    [&](std::size_t begin, std::size_t end, unsigned) {
-                      if (check_stop) check_stop();
-                      search_tree(begin, end);
-                    });
+    base::parallel_blocks(tree_.leaves(), kLeavesPerBlock, threads_,
+                          [&](std::size_t begin, std::size_t end, unsigned) {
+                            if (check_stop) check_stop();
+                            search_tree(begin, end);
+                          });
     merge();
   }
 }
@@ -87,18 +90,18 @@ void SpanningTree::take_from_lists(std::size_t begin, std::size_t end) {
 }
 
 void SpanningTree::label_nodes() {
-  parallel_blocks(tree_.leaves(), kPointsPerBlock, threads_,
-                  [this](std::size_t first, std::size_t last, unsigned) {
-                    for (std::size_t leaf = first; leaf < last; ++leaf) {
-                      const std::size_t begin = tree_.leaf_begin(leaf);
-                      const std::size_t end = tree_.leaf_begin(leaf + 1);
-                      std::uint32_t label = component_[begin];
-                      for (std::size_t i = begin + 1; i < end; ++i) {
-                        if (component_[i] != label) label = kMixed;
-                      }
-                      label_[tree_.leaf_node(leaf)] = label;
-                    }
-                  });
+  base::parallel_blocks(tree_.leaves(), kPointsPerBlock, threads_,
+                        [this](std::size_t first, std::size_t last, unsigned) {
+                          for (std::size_t leaf = first; leaf < last; ++leaf) {
+                            const std::size_t begin = tree_.leaf_begin(leaf);
+                            const std::size_t end = tree_.leaf_begin(leaf + 1);
+                            std::uint32_t label = component_[begin];
+                            for (std::size_t i = begin + 1; i < end; ++i) {
+                              if (component_[i] != label) label = kMixed;
+                            }
+                            label_[tree_.leaf_node(leaf)] = label;
+                          }
+                        });
   for (std::size_t node = tree_.leaves(); node-- > 1;) {
     const std::uint32_t label = label_[2 * node];
     label_[node] = label == label_[2 * node + 1] ? label : kMixed;
@@ -191,11 +194,11 @@ void SpanningTree::merge() {
     if (root != largest_ && sets_.unite(edge.low, edge.high)) edges_.push_back(edge);
   }
   for (const std::uint32_t root : roots_) sets_.flatten(root);
-  parallel_blocks(count_, kPointsPerBlock, threads_,
-                  [this](std::size_t begin, std::size_t end, unsigned) {
-                    for (std::size_t i = begin; i < end; ++i)
-                      component_[i] = sets_.root(component_[i]);
-                  });
+  base::parallel_blocks(count_, kPointsPerBlock, threads_,
+                        [this](std::size_t begin, std::size_t end, unsigned) {
+                          for (std::size_t i = begin; i < end; ++i)
+                            component_[i] = sets_.flat(component_[i]);
+                        });
   std::vector<std::uint32_t> size(count_, 0);
   for (const std::uint32_t component : component_) ++size[component];
   std::size_t kept = 0;

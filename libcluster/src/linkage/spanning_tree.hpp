@@ -8,9 +8,11 @@
 #include <thread>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/union_find.hpp>
+
 #include "linkage/linkage_tree.hpp"
 #include "linkage/neighbour_lists.hpp"
-#include "linkage/union_find.hpp"
 
 /// Private to single linkage.
 
@@ -25,7 +27,7 @@ namespace terrace::cluster {
 /// the component. The largest component, which would search longest, is found by the others.
 class SpanningTree {
  public:
-  SpanningTree(const LinkageTree& tree, unsigned threads, const StopCheck& check_stop);
+  SpanningTree(const LinkageTree& tree, unsigned threads, const base::StopCheck& check_stop);
   [[nodiscard]] const std::vector<TreeEdge>& edges() const { return edges_; }
 
  private:
@@ -80,7 +82,7 @@ class SpanningTree {
   Locks locks_;                           ///< protect shortest_, which several threads lower
   std::vector<std::uint32_t> roots_;      ///< the components
   std::uint32_t largest_ = 0;             ///< largest component, kMixed at first
-  UnionFind sets_;
+  base::UnionFind sets_;
   std::vector<TreeEdge> edges_;
 };
 

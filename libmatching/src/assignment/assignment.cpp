@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "assignment/dense_solver.hpp"
 #include "assignment/input_check.hpp"
 
@@ -15,7 +17,8 @@ namespace {
 
 template <class Cost>
 BasicAssignment<LabelOf<Cost>> assign_matrix(std::span<const Cost> costs, std::size_t rows,
-                                             std::size_t columns, const StopCheck& check_stop) {
+                                             std::size_t columns,
+                                             const base::StopCheck& check_stop) {
   check_matrix(costs, rows, columns);
   const auto row = [&](std::size_t i) { return costs.data() + i * columns; };
   return DenseSolver<Cost, decltype(row)>(rows, columns, row, check_stop).solve();
@@ -24,17 +27,17 @@ BasicAssignment<LabelOf<Cost>> assign_matrix(std::span<const Cost> costs, std::s
 }  // namespace
 
 Assignment assign(std::span<const double> costs, std::size_t rows, std::size_t columns,
-                  const StopCheck& check_stop) {
+                  const base::StopCheck& check_stop) {
   return assign_matrix(costs, rows, columns, check_stop);
 }
 
 Assignment assign(std::span<const float> costs, std::size_t rows, std::size_t columns,
-                  const StopCheck& check_stop) {
+                  const base::StopCheck& check_stop) {
   return assign_matrix(costs, rows, columns, check_stop);
 }
 
 IntegerAssignment assign(std::span<const std::int32_t> costs, std::size_t rows, std::size_t columns,
-                         const StopCheck& check_stop) {
+                         const base::StopCheck& check_stop) {
   return assign_matrix(costs, rows, columns, check_stop);
 }
 

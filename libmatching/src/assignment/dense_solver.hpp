@@ -7,8 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "assignment/scan_kernels.hpp"
-#include "stop_ticks.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -25,7 +26,8 @@ class DenseSolver {
   using Number = LabelOf<Cost>;
 
   /// check_stop: outlives this object.
-  DenseSolver(std::size_t rows, std::size_t columns, Rows& source, const StopCheck& check_stop)
+  DenseSolver(std::size_t rows, std::size_t columns, Rows& source,
+              const base::StopCheck& check_stop)
       : rows_(rows),
         columns_(columns),
         source_(source),
@@ -198,7 +200,7 @@ class DenseSolver {
 
   std::size_t rows_, columns_;
   Rows& source_;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
   const ScanKernels<Cost>& kernels_;
   bool retiring_ = false;
   BasicAssignment<Number> result_;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "assignment/check_optimal.hpp"
 #include "assignment/column_tree.hpp"
 #include "assignment/input_check.hpp"
@@ -112,7 +114,7 @@ class NearCandidates {
 /// For rows.size() <= columns.size(); does not compute the cost.
 template <std::size_t D>
 Assignment assign_wide(const Points<D>& rows, const Points<D>& columns,
-                       const StopCheck& check_stop) {
+                       const base::StopCheck& check_stop) {
   ColumnTree<D> tree(columns);
   NearCandidates<D> source(rows, tree, columns.size());
   SparseSolver<NearCandidates<D>> solver(rows.size(), columns.size(), source, check_stop);
@@ -130,7 +132,7 @@ Assignment assign_wide(const Points<D>& rows, const Points<D>& columns,
 template <std::size_t D>
 Assignment assign_sets(std::span<const std::array<double, D>> rows,
                        std::span<const std::array<double, D>> columns,
-                       const StopCheck& check_stop) {
+                       const base::StopCheck& check_stop) {
   const Scaled<D> scaled(rows, columns);
   Assignment result;
   if (rows.size() <= columns.size()) {
@@ -168,12 +170,12 @@ double check_sets(const Assignment& assignment, std::span<const std::array<doubl
 }  // namespace
 
 Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns,
-                         const StopCheck& check_stop) {
+                         const base::StopCheck& check_stop) {
   return assign_sets<2>(rows, columns, check_stop);
 }
 
 Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns,
-                         const StopCheck& check_stop) {
+                         const base::StopCheck& check_stop) {
   return assign_sets<3>(rows, columns, check_stop);
 }
 

@@ -6,6 +6,8 @@
 #include <limits>
 #include <type_traits>
 
+#include <terrace/base/simd.hpp>
+
 namespace terrace::matching {
 
 /// The type in which costs are added: double for double and float, 64-bit integers for 32-bit
@@ -46,10 +48,8 @@ struct ScanKernels {
 template <class Cost>
 const ScanKernels<Cost>& scan_kernels();
 
-/// The instruction sets; tests compare them with each other.
-enum class ScanPath { portable, avx2, avx512 };
-bool has_scan_path(ScanPath path);
+/// The kernels for a supported instruction set; tests compare them with each other.
 template <class Cost>
-const ScanKernels<Cost>& scan_kernels(ScanPath path);
+const ScanKernels<Cost>& scan_kernels(base::SimdPath path);
 
 }  // namespace terrace::matching

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "assignment/check_optimal.hpp"
 #include "assignment/input_check.hpp"
 #include "assignment/sparse_solver.hpp"
@@ -127,7 +129,7 @@ bool chosen_cost(const EdgeLists& lists, std::size_t row, std::uint32_t column, 
   return found;
 }
 
-Assignment solve_wide(EdgeLists& lists, const char* side, const StopCheck& check_stop) {
+Assignment solve_wide(EdgeLists& lists, const char* side, const base::StopCheck& check_stop) {
   SparseSolver<EdgeLists> solver(lists.rows(), lists.columns, lists, check_stop);
   if (!solver.solve()) {
     const std::vector<std::uint32_t> tree = solver.tree_rows();
@@ -143,7 +145,7 @@ Assignment solve_wide(EdgeLists& lists, const char* side, const StopCheck& check
   return solver.result();
 }
 
-Assignment solve(EdgeLists lists, const StopCheck& check_stop) {
+Assignment solve(EdgeLists lists, const base::StopCheck& check_stop) {
   Assignment result;
   if (lists.rows() <= lists.columns) {
     result = solve_wide(lists, "row", check_stop);
@@ -183,12 +185,12 @@ double check_lists(const Assignment& assignment, const EdgeLists& lists) {
 
 }  // namespace
 
-Assignment assign_sparse(const SparseCosts& costs, const StopCheck& check_stop) {
+Assignment assign_sparse(const SparseCosts& costs, const base::StopCheck& check_stop) {
   return solve(lists_of(costs), check_stop);
 }
 
 Assignment assign_sparse(std::span<const CostEdge> edges, std::size_t rows, std::size_t columns,
-                         const StopCheck& check_stop) {
+                         const base::StopCheck& check_stop) {
   return solve(lists_of(edges, rows, columns), check_stop);
 }
 

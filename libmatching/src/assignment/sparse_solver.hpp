@@ -9,8 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "assignment/bidding.hpp"
-#include "stop_ticks.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -36,7 +37,8 @@ template <class Source>
 class SparseSolver {
  public:
   /// check_stop: outlives this object.
-  SparseSolver(std::size_t rows, std::size_t columns, Source& source, const StopCheck& check_stop)
+  SparseSolver(std::size_t rows, std::size_t columns, Source& source,
+               const base::StopCheck& check_stop)
       : rows_(rows),
         source_(source),
         ticks_(check_stop),
@@ -254,7 +256,7 @@ class SparseSolver {
 
   std::size_t rows_;
   Source& source_;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
   Assignment result_;
   std::vector<std::uint32_t> row_of_, previous_;
   std::vector<double> distance_, row_distance_;

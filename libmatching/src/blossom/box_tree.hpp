@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::matching::blossom {
 
@@ -22,7 +22,7 @@ inline constexpr std::uint32_t kLeaf = 8;
 
 template <std::size_t D>
 std::vector<std::uint32_t> halving_order(std::span<const std::array<double, D>> points,
-                                         StopTicks ticks = {}) {
+                                         base::StopTicks ticks = {}) {
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, points.size()}};

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "blossom/box_tree.hpp"
 #include "blossom/nest.hpp"
 #include "blossom/solver.hpp"
@@ -52,7 +54,7 @@ class Pricing {
   using Point = std::array<double, D>;
 
   /// points: in halving order, as the solver's vertices 0 .. points.size() - 1.
-  Pricing(std::span<const Point> points, const PairCost& cost, StopTicks ticks = {})
+  Pricing(std::span<const Point> points, const PairCost& cost, base::StopTicks ticks = {})
       : points_(points), cost_(cost), ticks_(ticks) {}
 
   /// Some of the violated pairs: the worst few of each part, more for large parts.
@@ -235,7 +237,7 @@ class Pricing {
 
   std::span<const Point> points_;
   const PairCost& cost_;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
   Nest nest_;
   std::vector<Head> heads_;
   std::vector<Member> members_;

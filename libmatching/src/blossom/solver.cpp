@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
+
 namespace terrace::matching::blossom {
 
-Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late, StopTicks ticks)
+Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late, base::StopTicks ticks)
     : n_(n),
       late_(late),
       ticks_(ticks),

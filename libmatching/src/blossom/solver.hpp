@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::matching::blossom {
 
@@ -37,7 +37,7 @@ class Solver {
   /// given, may have edges to all others: it is matched last, so that its many edges are not
   /// scanned repeatedly.
   Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone,
-         StopTicks ticks = {});
+         base::StopTicks ticks = {});
 
   /// Computes a perfect matching of least weight.
   /// Returns kNone, or an exposed vertex that cannot be matched (then witness() proves it).
@@ -143,7 +143,7 @@ class Solver {
   };
 
   std::uint32_t n_, late_;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
   std::vector<Edge> edges_;
   std::vector<std::size_t> arc_begin_;
   std::vector<Arc> arcs_;

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/large_matching.hpp"
 
 namespace terrace::matching::tree {
@@ -15,7 +17,7 @@ namespace terrace::matching::tree {
 /// one left over. The result must not depend on the number of threads.
 template <std::size_t D>
 std::vector<std::uint32_t> match_level(std::span<const std::array<double, D>> points,
-                                       unsigned threads, const StopCheck& check_stop) {
+                                       unsigned threads, const base::StopCheck& check_stop) {
   LargeMatchingOptions options;
   options.threads = threads;
   options.check_stop = check_stop;

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "stop_ticks.hpp"
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::matching::windows {
 
@@ -30,8 +30,8 @@ struct Unit {
 /// Cost: O(n log(n / most)).
 template <std::size_t D>
 void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t seed,
-         std::size_t first, std::vector<std::size_t>& ends, const StopCheck& check_stop) {
-  StopTicks ticks(check_stop);
+         std::size_t first, std::vector<std::size_t>& ends, const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, units.size()}};
   while (!open.empty()) {
     const auto [begin, end] = open.back();

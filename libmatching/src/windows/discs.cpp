@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "blossom/box_tree.hpp"
-#include "parallel.hpp"
 
 namespace terrace::matching::windows {
 
@@ -98,13 +100,13 @@ class Excess {
   using Point = std::array<double, D>;
 
   Excess(std::span<const Point> points, const PointMetric& metric,
-         std::span<const std::uint32_t> window, unsigned threads, const StopCheck& check_stop)
+         std::span<const std::uint32_t> window, unsigned threads, const base::StopCheck& check_stop)
       : points_(points),
         metric_(metric),
         window_(window),
         threads_(threads),
         check_stop_(check_stop),
-        order_(blossom::halving_order(points, StopTicks(check_stop))),
+        order_(blossom::halving_order(points, base::StopTicks(check_stop))),
         tree_(sorted(points, order_)),
         owner_(tree_.nodes().size()),
         largest_(tree_.nodes().size()) {
@@ -195,9 +197,9 @@ class Excess {
   void for_each_chunk(const Work& work) const {
     constexpr std::size_t kChunk = 4096, kTicksOfSearch = 1024;
     const std::size_t n = points_.size();
-    for_each_index((n + kChunk - 1) / kChunk, threads_, [&](std::size_t chunk) {
+    base::parallel_for((n + kChunk - 1) / kChunk, threads_, [&](std::size_t chunk) {
       std::vector<std::uint32_t> open;
-      StopTicks ticks(check_stop_);
+      base::StopTicks ticks(check_stop_);
       for (std::size_t k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k) {
         ticks(kTicksOfSearch);
         work(static_cast<std::uint32_t>(k), open);
@@ -209,7 +211,7 @@ class Excess {
   const PointMetric& metric_;
   std::span<const std::uint32_t> window_;
   unsigned threads_;
-  const StopCheck& check_stop_;
+  const base::StopCheck& check_stop_;
   std::vector<std::uint32_t> order_;
   BoxTree<D> tree_;
   std::vector<std::uint32_t> owner_;  // for each box: the window, if all its points are in one
@@ -220,7 +222,7 @@ class Excess {
 
 template <std::size_t D>
 double Discs::bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
-                    unsigned threads, const StopCheck& check_stop) {
+                    unsigned threads, const base::StopCheck& check_stop) {
   Excess<D> excess(points, metric, window_, threads, check_stop);
   // First shrink those that reach far beyond their window, as if the radii of all others were at
   // most the distance to their nearest neighbour: otherwise one wide moat would lower a thousand
@@ -236,8 +238,8 @@ double Discs::bound(std::span<const std::array<double, D>> points, const PointMe
 }
 
 template double Discs::bound(std::span<const Point2>, const PointMetric&, unsigned,
-                             const StopCheck&);
+                             const base::StopCheck&);
 template double Discs::bound(std::span<const Point3>, const PointMetric&, unsigned,
-                             const StopCheck&);
+                             const base::StopCheck&);
 
 }  // namespace terrace::matching::windows

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/point_matching.hpp"
 
 namespace terrace::matching::windows {
@@ -34,7 +36,7 @@ class Discs {
   /// Cost: O(n log n) if radii are of the order of the distances between neighbours.
   template <std::size_t D>
   double bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
-               unsigned threads, const StopCheck& check_stop);
+               unsigned threads, const base::StopCheck& check_stop);
 
  private:
   struct Moat {

@@ -13,11 +13,12 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/thread_team.hpp>
+
 #include "order/kd_cut.hpp"
 #include "order/point_buckets.hpp"
 #include "order/record_packer.hpp"
 #include "terrace/stream/error.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -523,7 +524,7 @@ class SpatialSource final : public OrderedSource {
   std::optional<BucketFile> file_;
   std::vector<Pending> pending_;  ///< the next one is the last
 
-  ThreadTeam team_;
+  base::ThreadTeam team_;
   std::vector<RecordPacker> packers_;  ///< by thread of the team
   Region region_;                      ///< that is delivered
   std::size_t next_piece_ = 0;

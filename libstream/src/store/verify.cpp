@@ -5,29 +5,24 @@
 #include <string>
 #include <type_traits>
 
+#include <terrace/base/random.hpp>
+#include <terrace/base/thread_team.hpp>
+
 #include "store/codec/bytes.hpp"
 #include "store/read/store_impl.hpp"
-#include "thread_team.hpp"
 #include "with_type.hpp"
 
 namespace terrace::stream::store {
 namespace {
 
-/// Mixes 64 bits well. Source: S. Vigna, SplitMix64.
-constexpr std::uint64_t mixed(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
 /// Fingerprint of the point that heads cluster `ordinal`. children: what it heads on the levels
 /// below.
 std::uint64_t hash_of(std::uint64_t ordinal, const Point3& p, std::span<const std::byte> payload,
                       std::span<const std::uint64_t> children) {
-  std::uint64_t h = mixed(ordinal + 0x9e3779b97f4a7c15u);
-  for (const double c : p) h = mixed(h ^ std::bit_cast<std::uint64_t>(c));
-  for (const std::uint64_t child : children) h = mixed(h ^ (child + 0x9e3779b97f4a7c15u));
-  return mixed(h ^ crc32(0, payload.data(), payload.size()));
+  std::uint64_t h = base::splitmix64(ordinal);
+  for (const double c : p) h = base::mix64(h ^ std::bit_cast<std::uint64_t>(c));
+  for (const std::uint64_t child : children) h = base::mix64(h ^ (child + base::kGoldenGamma));
+  return base::mix64(h ^ crc32(0, payload.data(), payload.size()));
 }
 
 /// Pages that a thread checks before what was found is put together.
@@ -397,7 +392,7 @@ class Verification {
   const std::stop_token& stop_;
   const std::function<void(const Problem&)>& report_;
   std::vector<LevelSums> sums_;
-  ThreadTeam team_;
+  base::ThreadTeam team_;
   Box3 bounds_;
   double height_sum_ = 0.0;
   std::uint64_t looked_into_ = 0, most_looked_into_ = 0;

@@ -336,8 +336,7 @@ py::tuple entity_location(const Array<double>& given, bool ordered, double facil
                           const Array<double>& weights, double outlier_price, const py::dict& how) {
   const Search search = search_of(how);
   const Entities entities(given, ordered);
-  const double diagonal =
-      cluster::diagonal(cluster::Euclidean{}, cluster::bounds_of(entities.places));
+  const double diagonal = cluster::diagonal(cluster::Euclidean{}, base::box_of(entities.places));
   return search.solve(cluster::FacilityEntities{.count = entities.count,
                                                 .distance =
                                                     [&](std::uint32_t a, std::uint32_t b) {

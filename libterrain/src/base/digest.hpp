@@ -5,14 +5,14 @@
 #include <cstdint>
 #include <string_view>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/random.hpp>
 
 namespace terrace::terrain {
 
 /// A 64-bit hash of a sequence of numbers and texts. Not cryptographic.
 class Digest {
  public:
-  constexpr void add(std::uint64_t number) { value_ = scramble(value_ ^ number); }
+  constexpr void add(std::uint64_t number) { value_ = base::splitmix64(value_ ^ number); }
   constexpr void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
   constexpr void add(std::string_view text) {
     add(std::uint64_t{text.size()});

@@ -1,25 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <stop_token>
+#include <type_traits>
+
+#include <terrace/base/parallel.hpp>
+#include <terrace/stream/error.hpp>
 
 namespace terrace::terrain {
 
-/// Calls work(thread, item) once for every item below `items` on at most `threads` threads, this
-/// one among them; items begin in order, `thread` is below `threads`. When all have ended, the
-/// exception of the smallest item that threw is rethrown; items after it may be skipped. After a
-/// request to stop no further item begins, and stream::Stopped is thrown.
-void parallel_for(std::size_t items, unsigned threads,
-                  const std::function<void(unsigned thread, std::size_t item)>& work,
-                  const std::stop_token& stop = {});
+/// base::parallel_for() that hears a stop: after a request no further item begins, and
+/// stream::Stopped is thrown.
+template <class Work>
+void parallel_for(std::size_t items, unsigned threads, const Work& work,
+                  const std::stop_token& stop = {}) {
+  base::parallel_for(items, std::max(1u, threads), [&](std::size_t item, unsigned thread) {
+    if (stop.stop_requested()) throw stream::Stopped();
+    if constexpr (std::is_invocable_v<const Work&, std::size_t, unsigned>) {
+      work(item, thread);
+    } else {
+      work(item);
+    }
+  });
+}
 
-/// Calls work(first_row, last_row) for bands of rows, concurrently on `threads` threads. A band
-/// must not touch the rows of another. An exception of any band is rethrown. stop: as above.
-void for_bands(std::uint32_t rows, unsigned threads,
-               const std::function<void(std::uint32_t, std::uint32_t)>& work,
-               const std::stop_token& stop = {});
+/// Calls work(first_row, last_row) for bands of rows, concurrently. A band must not touch the rows
+/// of another. Errors and stops: as above.
+template <class Work>
+void for_bands(std::uint32_t rows, unsigned threads, const Work& work,
+               const std::stop_token& stop = {}) {
+  const std::uint32_t bands = std::clamp<std::uint32_t>(threads * 4, 1, std::max(rows / 16, 1u));
+  parallel_for(
+      bands, threads,
+      [&](std::size_t band) {
+        work(static_cast<std::uint32_t>(std::uint64_t{rows} * band / bands),
+             static_cast<std::uint32_t>(std::uint64_t{rows} * (band + 1) / bands));
+      },
+      stop);
+}
 
 }  // namespace terrace::terrain

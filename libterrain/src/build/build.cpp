@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/portable_math.hpp>
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/input.hpp>
@@ -189,8 +190,8 @@ void check_cells(const stream::SourceInfo& info) {
       {.file = info.files.empty() ? std::string() : info.files.front(),
        .where = {},
        .cause = std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
-                " cannot be told apart: steps of " + plain_number(std::hypot(m[0], m[3])) + " x " +
-                plain_number(std::hypot(m[1], m[4])) + " from " + plain_number(m[2]) + ", " +
+                " cannot be told apart: steps of " + plain_number(base::hypot(m[0], m[3])) + " x " +
+                plain_number(base::hypot(m[1], m[4])) + " from " + plain_number(m[2]) + ", " +
                 plain_number(m[5]),
        .remedy =
            info.grid ? "correct the size of its cells" : "correct the scale of its coordinates"});
@@ -221,7 +222,7 @@ class FirstPoints final : public stream::PointSource {
 /// Lengths of the stored coordinates' units on the ground, heights weighted.
 std::array<double, 3> unit_lengths(const GroundMap& map) {
   const auto length = [&map](std::size_t axis) {
-    return std::hypot(map[axis], map[3 + axis], map[6 + axis]);
+    return base::hypot(base::hypot(map[axis], map[3 + axis]), map[6 + axis]);
   };
   return {length(0), length(1), length(2)};
 }

@@ -28,7 +28,7 @@ void set_metric(const BuildRequest& request, const stream::Placement& info, cons
   // From the CRS by way of stored coordinates, which are columns and rows for a raster.
   const std::array<double, 6>& xy = info.world.xy;
   const stream::Channel& height = info.coordinates[2];
-  options.metric_of = [&choice, &ground, xy, height](const cluster::Bounds& bounds) {
+  options.metric_of = [&choice, &ground, xy, height](const base::Box3& bounds) {
     const GroundMap map = ground.map({bounds.min, bounds.max});
     const double area = xy[0] * xy[4] - xy[1] * xy[3];
     const auto across = [&](double a, double b) { return (a * xy[4] - b * xy[3]) / area; };
@@ -176,7 +176,7 @@ cluster::HierarchyOptions clustering_of(const BuildRequest& request, const strea
   options.block.seed = request.seed;
   options.strategy = request.strategy;
   options.payload_size = schema.payload_size();
-  options.ground = [&ground](const cluster::Bounds& bounds) {
+  options.ground = [&ground](const base::Box3& bounds) {
     return ground.map({bounds.min, bounds.max});
   };
   set_metric(request, schema, ground, options);

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <terrace/base/portable_math.hpp>
 
 #include "base/json_of_file.hpp"
-#include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -77,7 +77,7 @@ cluster::LinearMap axes_of(const nlohmann::json& region, const Place& place) {
   }
   // Not the library's own constructor by angle: its sine may differ in the last bit between
   // machines.
-  const double s = portable_sin_degrees(angle), c = portable_cos_degrees(angle);
+  const double s = base::sin_degrees(angle), c = base::cos_degrees(angle);
   return {c, s, 0, -s, c, 0, 0, 0, 1};
 }
 
@@ -207,8 +207,7 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
                                               origin};
   std::vector<cluster::EllipticalField::Region> field;
   for (const Region& region : regions) {
-    cluster::Bounds box{{-kUnbounded, -kUnbounded, -kUnbounded},
-                        {kUnbounded, kUnbounded, kUnbounded}};
+    base::Box3 box{{-kUnbounded, -kUnbounded, -kUnbounded}, {kUnbounded, kUnbounded, kUnbounded}};
     if (region.box) {
       for (std::size_t axis = 0; axis < (flat ? 2U : 3U); ++axis) {
         const double low = region.box->min[axis], high = region.box->max[axis];

@@ -6,8 +6,9 @@
 #include <cstddef>
 #include <utility>
 
+#include <terrace/base/random.hpp>
+
 #include "base/parallel.hpp"
-#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -25,7 +26,7 @@ ContourLines::ContourLines(std::int64_t columns, double interval,
       threads_(threads) {}
 
 std::size_t ContourLines::Hash::operator()(const Crossing& c) const {
-  return scramble(c.edge ^ scramble(static_cast<std::uint64_t>(c.level)));
+  return base::splitmix64(c.edge ^ base::splitmix64(static_cast<std::uint64_t>(c.level)));
 }
 
 ContourLines::Crossing ContourLines::crossing(std::int64_t level, const Corner& a,
@@ -67,13 +68,13 @@ void ContourLines::emit_whole(std::int64_t last_row, bool all) {
 void ContourLines::find_crossed(std::span<const double> heights, std::int64_t rows) {
   const auto columns = static_cast<std::size_t>(columns_);
   levels_.resize(heights.size());
-  parallel_for(static_cast<std::size_t>(rows), threads_, [&](unsigned, std::size_t row) {
+  parallel_for(static_cast<std::size_t>(rows), threads_, [&](std::size_t row) {
     for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
       levels_[i] = std::isnan(heights[i]) ? 0 : contour_levels_.at_or_above(heights[i]);
     }
   });
   crossed_.resize(std::max(crossed_.size(), static_cast<std::size_t>(rows - 1)));
-  parallel_for(static_cast<std::size_t>(rows - 1), threads_, [&](unsigned, std::size_t row) {
+  parallel_for(static_cast<std::size_t>(rows - 1), threads_, [&](std::size_t row) {
     crossed_[row].clear();
     for (std::size_t column = 0; column + 1 < columns; ++column) {
       const std::size_t at = row * columns + column, below = at + columns;

@@ -156,7 +156,7 @@ void ContourText::flush() {
     if (points * pieces >= points_ * begin.size()) begin.push_back(i + 1);
   }
   texts_.resize(std::max(texts_.size(), begin.size() - 1));
-  parallel_for(begin.size() - 1, threads_, [&](unsigned, std::size_t piece) {
+  parallel_for(begin.size() - 1, threads_, [&](std::size_t piece) {
     std::vector<Point2> places;
     std::string& text = texts_[piece];
     text.clear();

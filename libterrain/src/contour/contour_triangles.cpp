@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/random.hpp>
 
 namespace terrace::terrain {
 
@@ -22,7 +22,7 @@ std::size_t ContourTriangles::Hash::operator()(const ContourCrossing& c) const {
   hash = std::rotl(hash ^ bits(c.a[0]), 29) * 0xBF58476D1CE4E5B9U;
   hash = std::rotl(hash ^ bits(c.a[1]), 29) * 0x94D049BB133111EBU;
   hash = std::rotl(hash ^ bits(c.b[0]), 29) * 0xBF58476D1CE4E5B9U;
-  return scramble(hash ^ bits(c.b[1]));
+  return base::splitmix64(hash ^ bits(c.b[1]));
 }
 
 void ContourTriangles::join(std::span<const Triangle> triangles) {

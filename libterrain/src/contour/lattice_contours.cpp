@@ -81,7 +81,7 @@ void draw_lattice_contours(const ContourParts& parts) {
     heights.resize(static_cast<std::size_t>(lattice.columns * rows));
     parallel_for(
         windows, parts.threads,
-        [&](unsigned thread, std::size_t i) {
+        [&](std::size_t i, unsigned thread) {
           if (readers[thread] == nullptr) {
             readers[thread] = std::make_unique<StoreWindow>(store);
           }

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include <GeographicLib/Constants.hpp>
+#include <terrace/base/portable_math.hpp>
 
-#include "base/portable_math.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/unit_words.hpp"
 
@@ -58,11 +58,11 @@ MetresPerDegree metres_per_degree(double latitude) {
   const double f = GeographicLib::Constants::WGS84_f();
   const double e2 = f * (2.0 - f);
   const double phi = std::clamp(latitude, -90.0, 90.0);
-  const double sine = portable_sin_degrees(phi);
+  const double sine = base::sin_degrees(phi);
   const double w2 = 1.0 - e2 * sine * sine;
   const double w = std::sqrt(w2);
-  return {.longitude = kDegree * a * portable_cos_degrees(phi) / w,
-          .latitude = kDegree * a * (1.0 - e2) / (w2 * w)};
+  return {.longitude = base::kRadiansPerDegree * a * base::cos_degrees(phi) / w,
+          .latitude = base::kRadiansPerDegree * a * (1.0 - e2) / (w2 * w)};
 }
 
 std::optional<double> metres_in_unit(std::string_view unit) {
@@ -201,7 +201,7 @@ GroundMap Ground::map(const stream::Box3& stored) const {
       // y = a ln tan(pi/4 + phi/2), so cos(phi) = 1 / cosh(y/a). One metre of the map is
       // rho cos(phi)/a metres northward on the ground, N cos(phi)/a eastward.
       const double a = GeographicLib::Constants::WGS84_a();
-      const double growth = portable_exp(-std::abs(centre[1]) / a);
+      const double growth = base::exp(-std::abs(centre[1]) / a);
       const double cosine = 2.0 * growth / (1.0 + growth * growth);
       const double f = GeographicLib::Constants::WGS84_f();
       const double e2 = f * (2.0 - f);

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/terrain/latitudes.hpp"
@@ -42,7 +43,7 @@ double LineDistance::between(const Point2& a, const Point2& b) const {
     earth_.Inverse(ends[0][1], ends[0][0], ends[1][1], ends[1][0], metres);
     if (std::isfinite(metres)) return metres;
   }
-  return metres_per_unit_ * portable_hypot(b[0] - a[0], b[1] - a[1]);
+  return metres_per_unit_ * base::hypot(b[0] - a[0], b[1] - a[1]);
 }
 
 double LineDistance::pieces(const Point2& a, const Point2& b, double metres) const {
@@ -51,7 +52,7 @@ double LineDistance::pieces(const Point2& a, const Point2& b, double metres) con
                       : system_->is_geographic()
                           ? kMetresPerDegree * system_->definition().degrees_per_unit
                           : system_->metres_per_unit();
-  return std::max(1.0, std::ceil(unit * portable_hypot(b[0] - a[0], b[1] - a[1]) / metres));
+  return std::max(1.0, std::ceil(unit * base::hypot(b[0] - a[0], b[1] - a[1]) / metres));
 }
 
 double LineDistance::along(const Point2& a, const Point2& b) const {

@@ -9,7 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "base/region_shape.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/error.hpp"
@@ -72,9 +73,9 @@ class Outline {
       return add_from(middle, b, place, depth + 1, result);
     }
     const Point2 place = moved(middle, start), end = moved(b, place);
-    const double length = portable_hypot(end[0] - start[0], end[1] - start[1]);
+    const double length = base::hypot(end[0] - start[0], end[1] - start[1]);
     const double off =
-        portable_hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
+        base::hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
     if (off <= 1e-6 * length) return end;
     if (depth == kMost) {
       // By now the pieces of a smooth curve are straight; a jump never is.

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "base/steepness.hpp"
 #include "base/vector.hpp"
 
@@ -55,7 +56,7 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   double whole = 0;
   for (const auto& t : mesh.triangles) {
     const stream::Point3 n = area_vector(mesh, t);
-    const double area = flat ? std::abs(n[2]) : portable_hypot(portable_hypot(n[0], n[1]), n[2]);
+    const double area = flat ? std::abs(n[2]) : base::hypot(base::hypot(n[0], n[1]), n[2]);
     areas.push_back(std::isfinite(area) ? area : 0.0);
     whole += areas.back();
   }

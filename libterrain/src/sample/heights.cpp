@@ -38,7 +38,7 @@ std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<con
   std::vector<GroundPoint> found(places.size());
   const auto in_pieces = [&](const auto& work) {
     parallel_for((places.size() + kPlacesAtOnce - 1) / kPlacesAtOnce, std::max(1U, context.threads),
-                 [&](unsigned, std::size_t piece) {
+                 [&](std::size_t piece) {
                    const std::size_t begin = piece * kPlacesAtOnce;
                    const std::size_t end = std::min(begin + kPlacesAtOnce, places.size());
                    for (std::size_t i = begin; i < end; ++i) work(i);

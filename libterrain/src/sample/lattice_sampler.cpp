@@ -100,7 +100,7 @@ class LatticeSampler final : public HeightSampler {
     sort_by_tile(places);
     parallel_for(
         tiles_.size(), static_cast<unsigned>(workers_.size()),
-        [&](unsigned thread, std::size_t i) {
+        [&](std::size_t i, unsigned thread) {
           std::unique_ptr<Worker<T>>& worker = workers_[thread];
           if (worker == nullptr) worker = std::make_unique<Worker<T>>(store_);
           answer_tile(*worker, tiles_[i], places, out);

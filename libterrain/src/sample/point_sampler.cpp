@@ -177,7 +177,7 @@ class PointSampler final : public HeightSampler {
     });
     parallel_for(
         parts.size(), static_cast<unsigned>(workers_.size()),
-        [&](unsigned thread, std::size_t i) {
+        [&](std::size_t i, unsigned thread) {
           std::unique_ptr<CloudWorker>& worker = workers_[thread];
           if (worker == nullptr) {
             worker = std::make_unique<CloudWorker>(store_, options_.level, hull_, too_long_, voids_,
@@ -210,7 +210,7 @@ class PointSampler final : public HeightSampler {
     keys_.assign(places.size(), kNone);
     constexpr std::size_t kPiece = 65536;
     parallel_for((places.size() + kPiece - 1) / kPiece, static_cast<unsigned>(workers_.size()),
-                 [&](unsigned, std::size_t piece) {
+                 [&](std::size_t piece) {
                    const std::size_t end = std::min((piece + 1) * kPiece, places.size());
                    for (std::size_t i = piece * kPiece; i < end; ++i) {
                      if (!counts(places[i])) continue;

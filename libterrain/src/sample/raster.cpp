@@ -246,7 +246,7 @@ class RasterRun {
     heights_.resize(places_.size());
     parallel_for(
         height, context_.threads,
-        [&](unsigned, std::size_t j) {
+        [&](std::size_t j) {
           const std::span<Point2> line(places_.data() + j * width_, width_);
           const auto cell = [](std::int64_t first, std::size_t i) {
             return static_cast<double>(first + static_cast<std::int64_t>(i));
@@ -271,9 +271,7 @@ class RasterRun {
     counts_.assign(block.size(), 0);
     parallel_for(
         block.size(), context_.threads,
-        [&](unsigned, std::size_t i) {
-          make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
-        },
+        [&](std::size_t i) { make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile); },
         context_.stop);
     for (std::size_t i = 0; i < block.size(); ++i) {
       outcome_.cells_with_data += counts_[i];

@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store_query.hpp>
 
 #include "base/decimal_multiples.hpp"
-#include "base/portable_math.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/region_crs.hpp"
@@ -217,7 +217,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     if (!request.cell) {
       request.to->forward(steps);
       const auto one_way = [&](std::size_t i) {
-        return portable_hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
+        return base::hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
       };
       const auto length = [&](std::size_t i) {
         const double there = one_way(i), back = one_way(i + 2);

@@ -79,7 +79,7 @@ class Answers {
     if (layout_) {
       parallel_for(
           pieces, threads_,
-          [&](unsigned, std::size_t piece) {
+          [&](std::size_t piece) {
             for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
               if (!is_place(batch, i)) continue;
               places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
@@ -105,7 +105,7 @@ class Answers {
     const AnswerText numbers(store_, layout_ ? layout_->separator : ',');
     parallel_for(
         pieces, threads_,
-        [&](unsigned, std::size_t piece) {
+        [&](std::size_t piece) {
           std::string& text = texts_[piece];
           text.clear();
           for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {

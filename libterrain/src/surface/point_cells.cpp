@@ -76,7 +76,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
       pieces.push_back({at, first, std::min(first + kClustersAtOnce, clusters)});
     }
   }
-  parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {
+  parallel_for(pieces.size(), threads, [&](std::size_t i) {
     Piece& piece = pieces[i];
     for (std::uint64_t k = piece.first; k < piece.end; ++k) {
       piece.points += store.record(stream::cluster_id(piece.level, k)).points;
@@ -90,7 +90,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
   need_all_points(store, level, count);
   const auto places = large_array<Point2>(count);
   const auto heights = large_array<double>(count);
-  parallel_for(pieces.size(), threads, [&](unsigned, std::size_t i) {
+  parallel_for(pieces.size(), threads, [&](std::size_t i) {
     Piece& piece = pieces[i];
     std::size_t at = piece.begin;
     stream::ClusterPoints cluster;
@@ -147,7 +147,7 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
   // Each thread looks at all places and takes those of its band, in their order.
   const auto in_bands = [&](const auto& take) {
     const std::uint32_t bands = std::clamp(threads, 1U, rows_);
-    parallel_for(bands, threads, [&](unsigned, std::size_t band) {
+    parallel_for(bands, threads, [&](std::size_t band) {
       const auto from = static_cast<std::uint32_t>(std::uint64_t{rows_} * band / bands);
       const auto to = static_cast<std::uint32_t>(std::uint64_t{rows_} * (band + 1) / bands);
       for (std::size_t i = 0; i < places.size(); ++i) {

@@ -165,7 +165,7 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
       // Mostly it is one of those that the corners stand for.
       for (const tri::VertexId corner : corners) {
         const auto record = control().stands_for(corner);
-        if (record && intersects(record->box, near)) return false;
+        if (record && record->box.intersects(near)) return false;
       }
       return !control().meets_collapsed(near);
     };

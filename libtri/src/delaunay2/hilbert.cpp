@@ -7,67 +7,12 @@
 #include <type_traits>
 #include <vector>
 
+#include <terrace/base/hilbert.hpp>
+
 #include "../curve_sort.hpp"
 
 namespace terrace::tri::planar {
 namespace {
-
-/// One step down the curve: by orientation of the present square (4) and quadrant (4; x above y),
-/// the quadrant's place on the curve, and the orientation of the square there.
-struct Step {
-  std::uint8_t place;
-  std::uint8_t orientation;
-};
-
-/// The curve enters each square at one corner and leaves at a neighbouring one. Orientation bit 0:
-/// x and y are swapped; bit 1: both are mirrored.
-constexpr Step single_step(unsigned orientation, unsigned x, unsigned y) {
-  if ((orientation & 2) != 0) {
-    x ^= 1;
-    y ^= 1;
-  }
-  if ((orientation & 1) != 0) std::swap(x, y);
-  // The basic square: (0,0) transposed, (0,1), (1,1), (1,0) transposed and mirrored.
-  const unsigned place = x == 0 ? y : 3 - y;
-  const unsigned turn = place == 0 ? 1u : place == 3 ? 3u : 0u;
-  return {static_cast<std::uint8_t>(place), static_cast<std::uint8_t>(orientation ^ turn)};
-}
-
-/// Four steps at once: 4 bits of x, 4 bits of y.
-struct FourSteps {
-  std::uint8_t places;
-  std::uint8_t orientation;
-};
-constexpr std::array<FourSteps, 4 * 256> make_table() {
-  std::array<FourSteps, 4 * 256> table{};
-  for (unsigned start = 0; start < 4; ++start) {
-    for (unsigned xy = 0; xy < 256; ++xy) {
-      unsigned orientation = start;
-      unsigned places = 0;
-      for (unsigned bit = 4; bit-- > 0;) {
-        const Step step = single_step(orientation, xy >> (4 + bit) & 1, xy >> bit & 1);
-        places = places << 2 | step.place;
-        orientation = step.orientation;
-      }
-      table[start * 256 + xy] = {static_cast<std::uint8_t>(places),
-                                 static_cast<std::uint8_t>(orientation)};
-    }
-  }
-  return table;
-}
-constexpr auto kTable = make_table();
-
-/// Place of a cell of a 2^16 x 2^16 raster on the curve.
-std::uint32_t hilbert_key(std::uint32_t x, std::uint32_t y) {
-  std::uint32_t key = 0;
-  std::uint32_t orientation = 0;
-  for (unsigned shift = 12;; shift -= 4) {
-    const FourSteps& step = kTable[orientation * 256 + (x >> shift & 15) * 16 + (y >> shift & 15)];
-    key = key << 8 | step.places;
-    orientation = step.orientation;
-    if (shift == 0) return key;
-  }
-}
 
 /// Maps points of a set to cells of its bounding square.
 template <class Coord>
@@ -101,7 +46,8 @@ class Cells {
   [[nodiscard]] bool single() const { return single_; }
   [[nodiscard]] std::uint32_t key(std::uint32_t number) const {
     const Point& p = points_[number];
-    return hilbert_key(cell(p[0], low_[0]), cell(p[1], low_[1]));
+    return static_cast<std::uint32_t>(
+        base::hilbert_index<16>(cell(p[0], low_[0]), cell(p[1], low_[1])));
   }
 
  private:

@@ -4,13 +4,15 @@
 #include <span>
 #include <type_traits>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "hilbert.hpp"
 #include "lattice.hpp"
 #include "mesh.hpp"
 
 namespace terrace::tri::planar {
 
-/// What the way to a point costs, see StopTicks.
+/// What the way to a point costs, see base::StopTicks.
 inline constexpr std::size_t kTicksOfWalk = 256;
 
 /// Joins a vertex, which has its slot and point but no triangle, to a triangulation with triangles.

@@ -8,10 +8,11 @@
 #include <cstdint>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "../free_slots.hpp"
 #include "../journal.hpp"
 #include "../pool.hpp"
-#include "../stop_ticks.hpp"
 
 /// The data of a triangulation and the operations that all algorithms share. No geometry here.
 
@@ -154,7 +155,7 @@ struct Mesh {
   FreeSlots free_triangles;
 
   Journal<Point, 3> journal;
-  StopTicks ticks;  ///< of building and inserting
+  base::StopTicks ticks;  ///< of building and inserting
 
   // Scratch memory, kept between calls.
   std::vector<Side> sides;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include <terrace/base/random.hpp>
+
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
@@ -46,13 +48,6 @@ void for_star(const Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t star
   } while (t != start);
 }
 
-std::uint64_t mix(std::uint64_t z) {
-  // Finaliser of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
-  z += 0x9E3779B97F4A7C15u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return z ^ (z >> 31);
-}
 template <class Coord>
 std::uint64_t bits(Coord c) {
   if constexpr (std::is_same_v<Coord, double>) {
@@ -67,7 +62,7 @@ std::uint64_t bits(Coord c) {
 template <class Point>
 std::uint64_t hash_points(std::initializer_list<Point> points) {
   std::uint64_t h = 0;
-  for (const Point& p : points) h = mix(mix(h ^ bits(p[0])) ^ bits(p[1]));
+  for (const Point& p : points) h = base::splitmix64(base::splitmix64(h ^ bits(p[0])) ^ bits(p[1]));
   return h;
 }
 

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <numeric>
 #include <type_traits>
 #include <vector>
+
+#include <terrace/base/hilbert.hpp>
 
 #include "../curve_sort.hpp"
 
@@ -14,62 +15,6 @@ namespace terrace::tri::spatial {
 namespace {
 
 constexpr unsigned kBits = 10;  ///< of a key, per axis
-
-/// One step down the curve: the octant's position on it, and the state of the cube there. A state
-/// is the corner where the curve enters and the axis along which it leaves (C. Hamilton, A.
-/// Rau-Chaplin, "Compact Hilbert indices", doi:10.1016/j.ipl.2007.08.034): 8 * axis + corner.
-struct Step {
-  std::uint8_t place;
-  std::uint8_t state;
-};
-
-constexpr unsigned rotated_left(unsigned bits, unsigned by) {
-  by %= 3;
-  return (bits << by | bits >> (3 - by)) & 7;
-}
-constexpr unsigned rotated_right(unsigned bits, unsigned by) {
-  return rotated_left(bits, 3 - by % 3);
-}
-constexpr unsigned gray(unsigned i) { return i ^ i >> 1; }
-constexpr unsigned trailing_ones(unsigned i) { return static_cast<unsigned>(std::countr_one(i)); }
-
-constexpr Step single_step(unsigned state, unsigned octant) {
-  const unsigned corner = state % 8;
-  const unsigned axis = state / 8;
-  const unsigned code = rotated_right(octant ^ corner, axis + 1);
-  unsigned place = 0;
-  while (gray(place) != code) ++place;
-  const unsigned entry = place == 0 ? 0 : gray((place - 1) / 2 * 2);
-  const unsigned along = place == 0       ? 0
-                         : place % 2 == 0 ? trailing_ones(place - 1) % 3
-                                          : trailing_ones(place) % 3;
-  const unsigned next_corner = corner ^ rotated_left(entry, axis + 1);
-  const unsigned next_axis = (axis + along + 1) % 3;
-  return {static_cast<std::uint8_t>(place), static_cast<std::uint8_t>(8 * next_axis + next_corner)};
-}
-
-constexpr std::array<Step, 24 * 8> make_table() {
-  std::array<Step, 24 * 8> table{};
-  for (unsigned state = 0; state < 24; ++state)
-    for (unsigned octant = 0; octant < 8; ++octant)
-      table[state * 8 + octant] = single_step(state, octant);
-  return table;
-}
-constexpr auto kTable = make_table();
-
-/// Position on the curve of a cell of a cube with 2^10 cells along each edge.
-std::uint32_t hilbert_key(const std::array<std::uint32_t, 3>& cell) {
-  std::uint32_t key = 0;
-  std::uint32_t state = 0;
-  for (unsigned bit = kBits; bit-- > 0;) {
-    const std::uint32_t octant =
-        (cell[0] >> bit & 1) << 2 | (cell[1] >> bit & 1) << 1 | (cell[2] >> bit & 1);
-    const Step& step = kTable[state * 8 + octant];
-    key = key << 3 | step.place;
-    state = step.state;
-  }
-  return key;
-}
 
 /// Maps points of a set to cells of its bounding cube. The points fill the cube, so that the middle
 /// of the curve is a plane that halves uniformly spread points.
@@ -103,7 +48,8 @@ class Cells {
   [[nodiscard]] bool single() const { return single_; }
   [[nodiscard]] std::uint32_t key(std::uint32_t number) const {
     const Point& p = points_[number];
-    return hilbert_key({cell(p[0], low_[0]), cell(p[1], low_[1]), cell(p[2], low_[2])});
+    return static_cast<std::uint32_t>(
+        base::hilbert_index<kBits>(cell(p[0], low_[0]), cell(p[1], low_[1]), cell(p[2], low_[2])));
   }
 
  private:

@@ -3,12 +3,14 @@
 
 #include <span>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "hilbert.hpp"
 #include "mesh.hpp"
 
 namespace terrace::tri::spatial {
 
-/// What one insertion costs, see StopTicks.
+/// What one insertion costs, see base::StopTicks.
 inline constexpr std::size_t kTicksOfInsertion = 2048;
 
 /// Joins a vertex, which has its slot and point but no tetrahedron, to a triangulation with

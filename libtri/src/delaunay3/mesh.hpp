@@ -8,9 +8,11 @@
 #include <stdexcept>
 #include <vector>
 
+#include <terrace/base/simd.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "../journal.hpp"
 #include "../pool.hpp"
-#include "../stop_ticks.hpp"
 #include "delaunay3/wrap/scan.hpp"
 #include "facet_table.hpp"
 
@@ -147,7 +149,7 @@ struct Hole {
   std::vector<double> x, y, z;
   std::vector<double> power, volume;
   std::vector<std::uint32_t> near;
-  ScanFunction scan = scan_function(best_instruction_set());
+  ScanFunction scan = scan_function(base::best_simd_path());
 
   [[nodiscard]] std::size_t bytes() const {
     return (vertex.capacity() + incident.capacity() + slots.capacity() + near.capacity() +
@@ -186,7 +188,7 @@ struct Mesh {
   std::uint32_t finite_count = 0;  ///< finite tetrahedra
 
   Journal<Point, 4> journal;
-  StopTicks ticks;  ///< of building and inserting
+  base::StopTicks ticks;  ///< of building and inserting
 
   // Scratch memory, kept between calls.
   Cavity cavity;

@@ -12,6 +12,8 @@
 #include <system_error>
 #include <thread>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "cavity_insert.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
@@ -204,7 +206,7 @@ class alignas(128) Worker {
   Cavity cavity_;
   CavityInsertion<Kernel, Part> insertion_;
   bool out_of_room_ = false;
-  StopTicks ticks_;
+  base::StopTicks ticks_;
 };
 
 template <class Kernel>

@@ -5,6 +5,8 @@
 #include <bit>
 #include <type_traits>
 
+#include <terrace/base/random.hpp>
+
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
@@ -52,13 +54,6 @@ std::uint32_t better_neighbour(const Mesh<Kernel>& mesh, const typename Kernel::
   return best;
 }
 
-std::uint64_t mix(std::uint64_t z) {
-  // Finaliser of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
-  z += 0x9E3779B97F4A7C15u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return z ^ (z >> 31);
-}
 template <class Coord>
 std::uint64_t bits(Coord c) {
   if constexpr (std::is_integral_v<Coord>) {
@@ -70,7 +65,8 @@ std::uint64_t bits(Coord c) {
 
 template <class Point>
 std::uint64_t hash_point(std::uint64_t h, const Point& p) {
-  return mix(mix(mix(h ^ bits(p[0])) ^ bits(p[1])) ^ bits(p[2]));
+  for (const auto c : p) h = base::splitmix64(h ^ bits(c));
+  return h;
 }
 
 }  // namespace

@@ -5,9 +5,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "delaunay2/double_kernel.hpp"
 #include "delaunay3/double_kernel.hpp"
-#include "portable_math.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -24,7 +25,7 @@ std::array<double, 2> direction_of(double degrees) {
     throw std::invalid_argument(
         "the angle of an ellipse is not finite: give it in degrees, counter-clockwise from +x");
   }
-  const auto [s, c] = portable::sine_cosine(degrees);
+  const auto [s, c] = base::sin_cos_degrees(degrees);
   return {c, s};
 }
 
@@ -88,11 +89,11 @@ LinearMap2 plane_map(const LinearMap3& m) {
     return map;
   }
   // Gram-Schmidt on the images of both axes.
-  const double first = portable::length(portable::length(m[0], m[3]), m[6]);
+  const double first = base::hypot(base::hypot(m[0], m[3]), m[6]);
   const double along = (m[0] / first) * m[1] + (m[3] / first) * m[4] + (m[6] / first) * m[7];
-  const double across = portable::length(
-      portable::length(m[1] - along * (m[0] / first), m[4] - along * (m[3] / first)),
-      m[7] - along * (m[6] / first));
+  const double across =
+      base::hypot(base::hypot(m[1] - along * (m[0] / first), m[4] - along * (m[3] / first)),
+                  m[7] - along * (m[6] / first));
   const LinearMap2 map{first, along, 0.0, across};
   check_metric(map, "the map of space, restricted to the plane,");
   return map;

@@ -3,6 +3,8 @@
 #include <map>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "delaunay2/elliptical_kernel.hpp"
 #include "flip_mesh.hpp"
 #include "terrace/tri/metric.hpp"
@@ -23,7 +25,7 @@ class Flips {
  public:
   template <class Triangulation>
   Flips(const Triangulation& triangulation, const MetricField2& field,
-        const TriangleFilter& takes_part, const StopCheck& check_stop)
+        const TriangleFilter& takes_part, const base::StopCheck& check_stop)
       : ticks_(check_stop),
         point_(triangulation.vertex_slots()),
         region_(triangulation.vertex_slots(), kNoRegion) {
@@ -130,7 +132,7 @@ class Flips {
     return region_[t.corner[1]] == region && region_[t.corner[2]] == region ? region : kNoRegion;
   }
 
-  StopTicks ticks_;
+  base::StopTicks ticks_;
   std::vector<Point> point_;           // by vertex slot
   std::vector<std::uint32_t> region_;  // by vertex slot: index in maps_
   FlipMesh mesh_;
@@ -146,7 +148,7 @@ template <class Triangulation>
 std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& triangulation,
                                                       const MetricField2& field,
                                                       const TriangleFilter& takes_part,
-                                                      const StopCheck& check_stop) {
+                                                      const base::StopCheck& check_stop) {
   Flips flips(triangulation, field, takes_part, check_stop);
   flips.run();
   return flips.result();
@@ -172,18 +174,18 @@ std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& trian
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<std::int32_t>&,
                                                                const MetricField2&,
                                                                const TriangleFilter&,
-                                                               const StopCheck&);
+                                                               const base::StopCheck&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<std::int32_t>&,
                                                                const MetricField2&, const Box3&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
                                                                const MetricField2&,
                                                                const TriangleFilter&,
-                                                               const StopCheck&);
+                                                               const base::StopCheck&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
                                                                const MetricField2&, const Box3&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(
     const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const TriangleFilter&,
-    const StopCheck&);
+    const base::StopCheck&);
 template std::vector<std::array<VertexId, 3>> metric_triangles(
     const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const Box3&);
 

@@ -200,9 +200,9 @@ auto MultiresolutionModel<Triangulation>::Impl::change_region(const Box3& region
   const auto judge_child = [&](ChildRef child, unsigned child_level, bool expanded) {
     if (child_level < level ? !(expanded && coarsen) : !(expanded || refine)) return Verdict::keep;
     const Box3& box = tree_.record(child).box;
-    if (!intersects(region, box)) return Verdict::keep;
+    if (!region.intersects(box)) return Verdict::keep;
     if (child_level >= level) return refine ? Verdict::expand : Verdict::visit;
-    return contains(region, box) ? Verdict::collapse : Verdict::visit;
+    return region.covers(box) ? Verdict::collapse : Verdict::visit;
   };
   return apply(tree_.plan(judge_child, take()));
 }
@@ -215,7 +215,7 @@ ClusterTree::Judge MultiresolutionModel<Triangulation>::Impl::judge(const Detail
     for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
       const Focus& focus = detail.focuses[i];
       const Box3& box = tree_.record(child).box;
-      if (child_level < focus.level || !intersects(focus.box, box)) continue;
+      if (child_level < focus.level || !focus.box.intersects(box)) continue;
       if (detail.needs && !detail.needs(i, box)) continue;
       if (child_level > focus.level) return Verdict::expand;
       verdict = Verdict::expand_alone;

@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "delaunay3/access.hpp"
 #include "free_slots.hpp"
 #include "journal.hpp"
@@ -66,7 +68,7 @@ struct DynamicSurface<Coord>::Impl {
   Pool<std::uint32_t> at_vertex;  ///< how many have it as a corner, by vertex slot
   std::size_t count = 0;
   Journal<Point, 3> journal;
-  StopCheck check_stop;
+  base::StopCheck check_stop;
   // Scratch memory.
   struct Facet {
     Corners3 corners;
@@ -324,7 +326,7 @@ std::size_t DynamicSurface<Coord>::removal_work(std::span<const VertexId> vertic
   return vertices.size() + (inside - std::min(inside, kUsual * vertices.size())) / 2;
 }
 template <class Coord>
-void DynamicSurface<Coord>::set_check_stop(StopCheck check_stop) {
+void DynamicSurface<Coord>::set_check_stop(base::StopCheck check_stop) {
   impl_->tetrahedra.set_check_stop(check_stop);
   impl_->check_stop = std::move(check_stop);
 }

@@ -7,7 +7,9 @@
 #include <span>
 #include <utility>
 
-#include "../for_blocks.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "../pool.hpp"
 #include "poles.hpp"
 
@@ -209,7 +211,8 @@ class SignedSets {
 
 class Forest {
  public:
-  Forest(const Spheres& spheres, unsigned threads, const Part& part, const StopCheck& check_stop)
+  Forest(const Spheres& spheres, unsigned threads, const Part& part,
+         const base::StopCheck& check_stop)
       : spheres_(spheres),
         check_stop_(check_stop),
         ticks_(check_stop),
@@ -257,32 +260,33 @@ class Forest {
     const std::uint32_t count = unlabelled();
     keys_.resize(4 * count);
     const auto scratch = [] { return std::vector<spatial::Side>(); };
-    for_blocks(count, kForestBlock, threads_, scratch,
-               [&](std::size_t begin, std::size_t end, std::vector<spatial::Side>& sides) {
-                 if (check_stop_) check_stop_();
-                 // First the facets alone, so that the branch is not mixed with the arithmetic.
-                 sides.resize(4 * (end - begin));
-                 std::size_t facets = 0;
-                 for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
-                   if (!spheres_.finite(t)) continue;
-                   for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
-                     sides[facets] = spatial::make_side(t, i);
-                     facets += stands(t, tetrahedra[t].mate[i]);
-                   }
-                 }
-                 const auto mate_of = [&](spatial::Side side) {
-                   return tetrahedra[spatial::tetrahedron_of(side)].mate[spatial::index_of(side)];
-                 };
-                 for (std::size_t f = 0; f < facets; ++f) {
-                   // Neighbours lie anywhere.
-                   spheres_.prefetch(
-                       spatial::tetrahedron_of(mate_of(sides[std::min(f + kAhead, facets - 1)])));
-                   const spatial::Side mate = mate_of(sides[f]);
-                   const std::uint32_t key = key_of(spheres_.facet_defect(sides[f]), false);
-                   keys_[sides[f]] = key;
-                   if (spatial::tetrahedron_of(mate) < count) keys_[mate] = key;
-                 }
-               });
+    base::parallel_blocks(
+        count, kForestBlock, threads_, scratch,
+        [&](std::size_t begin, std::size_t end, std::vector<spatial::Side>& sides) {
+          if (check_stop_) check_stop_();
+          // First the facets alone, so that the branch is not mixed with the arithmetic.
+          sides.resize(4 * (end - begin));
+          std::size_t facets = 0;
+          for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
+            if (!spheres_.finite(t)) continue;
+            for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
+              sides[facets] = spatial::make_side(t, i);
+              facets += stands(t, tetrahedra[t].mate[i]);
+            }
+          }
+          const auto mate_of = [&](spatial::Side side) {
+            return tetrahedra[spatial::tetrahedron_of(side)].mate[spatial::index_of(side)];
+          };
+          for (std::size_t f = 0; f < facets; ++f) {
+            // Neighbours lie anywhere.
+            spheres_.prefetch(
+                spatial::tetrahedron_of(mate_of(sides[std::min(f + kAhead, facets - 1)])));
+            const spatial::Side mate = mate_of(sides[f]);
+            const std::uint32_t key = key_of(spheres_.facet_defect(sides[f]), false);
+            keys_[sides[f]] = key;
+            if (spatial::tetrahedron_of(mate) < count) keys_[mate] = key;
+          }
+        });
   }
 
   /// Boruvka's first round, before there is a list: every tetrahedron is joined with another by the
@@ -427,8 +431,8 @@ class Forest {
   static constexpr std::uint64_t kNoBest = ~std::uint64_t{0};
 
   const Spheres& spheres_;
-  const StopCheck& check_stop_;
-  StopTicks ticks_;
+  const base::StopCheck& check_stop_;
+  base::StopTicks ticks_;
   unsigned threads_;
   const Part& part_;
   std::uint32_t beyond_;
@@ -443,7 +447,7 @@ class Forest {
 }  // namespace
 
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads, const Part& part,
-                                        const StopCheck& check_stop) {
+                                        const base::StopCheck& check_stop) {
   return Forest(spheres, threads, part, check_stop).labels();
 }
 

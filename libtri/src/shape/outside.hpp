@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "disjoint_sets.hpp"
+#include <terrace/base/union_find.hpp>
+
 #include "gabriel.hpp"
 #include "state.hpp"
 
@@ -73,7 +74,7 @@ ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface&
     return kNoFace;
   };
   // Corners of faces that are the same vertex, as disjoint sets.
-  DisjointSets corners(3 * faces), parts(faces);
+  base::UnionFind corners(3 * faces), parts(faces);
   const auto corner_of = [&](std::uint32_t face, std::uint32_t vertex) {
     const auto f = spatial::facet_of(mesh.tetrahedron[spatial::tetrahedron_of(sides[face])],
                                      spatial::index_of(sides[face]));
@@ -96,9 +97,9 @@ ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface&
           const std::uint32_t other = face_of(spatial::make_side(t, to));
           if (other == kNoFace) break;
           ++shared;
-          parts.join(face, other);
-          corners.join(corner_of(face, p), corner_of(other, p));
-          corners.join(corner_of(face, q), corner_of(other, q));
+          parts.unite(face, other);
+          corners.unite(corner_of(face, p), corner_of(other, p));
+          corners.unite(corner_of(face, q), corner_of(other, q));
           break;
         }
         t = spatial::tetrahedron_of(mate);
@@ -107,8 +108,8 @@ ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface&
     }
   }
   const auto edges = static_cast<std::int64_t>(3 * faces - shared / 2);
-  return {parts.count(),
-          static_cast<std::int64_t>(corners.count()) - edges + static_cast<std::int64_t>(faces)};
+  return {parts.sets(),
+          static_cast<std::int64_t>(corners.sets()) - edges + static_cast<std::int64_t>(faces)};
 }
 
 }  // namespace terrace::tri::shape

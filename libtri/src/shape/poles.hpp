@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "spheres.hpp"
 #include "state.hpp"
 
@@ -38,7 +40,8 @@ struct Part {
 ///
 /// O(n log n); memory 60 bytes per tetrahedron, freed at the end, besides the spheres.
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
-                                        const Part& part = {}, const StopCheck& check_stop = {});
+                                        const Part& part = {},
+                                        const base::StopCheck& check_stop = {});
 
 /// How many tetrahedra outside and inside every vertex has, by slot. Ghosts are outside.
 using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
@@ -55,14 +58,14 @@ using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
 ///
 /// In a part only tetrahedra between whole vertices are flipped.
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-                              const Part& part = {}, const StopCheck& check_stop = {});
+                              const Part& part = {}, const base::StopCheck& check_stop = {});
 
 /// The state of the poles rule from scratch. Vertices that are not on the surface are lost.
 /// Requires a scope of the metric.
 template <class Mesh>
 void restore_by_poles(const Mesh& mesh, State& state, unsigned threads,
-                      const StopCheck& check_stop) {
-  StopTicks ticks(check_stop);
+                      const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   std::vector<Place> places = places_of(mesh);
   ticks.look();
   const Renumbered ordered = in_order_of_vertices(

@@ -3,6 +3,8 @@
 #include <queue>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "poles.hpp"
 
 namespace terrace::tri::shape {
@@ -86,7 +88,7 @@ double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
   return terms[0] + terms[1] + terms[2] + terms[3];
 }
 
-void smooth(const Spheres& spheres, Labels& labels, StopTicks& ticks) {
+void smooth(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
   struct Candidate {
     double gain;
     Ranks corners;
@@ -121,7 +123,7 @@ void smooth(const Spheres& spheres, Labels& labels, StopTicks& ticks) {
   }
 }
 
-void sculpt(const Spheres& spheres, Labels& labels, StopTicks& ticks) {
+void sculpt(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
   struct Candidate {
     double defect;
     std::uint32_t vertex_rank;
@@ -170,8 +172,8 @@ void sculpt(const Spheres& spheres, Labels& labels, StopTicks& ticks) {
 }  // namespace
 
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-                              const Part& part, const StopCheck& check_stop) {
-  StopTicks ticks(check_stop);
+                              const Part& part, const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   Labels labels(spheres, inside, part.whole);
   smooth(spheres, labels, ticks);
   sculpt(spheres, labels, ticks);

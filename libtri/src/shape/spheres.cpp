@@ -5,7 +5,8 @@
 #include <limits>
 #include <numeric>
 
-#include "../for_blocks.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::tri::shape {
 namespace {
@@ -44,7 +45,7 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
     return spatial::make_side(result.number[other],
                               kTurns[turn[other]].to[spatial::index_of(mate)]);
   };
-  for_blocks(
+  base::parallel_blocks(
       slots, kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
         for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
@@ -56,11 +57,11 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
 }
 
 Spheres::Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
-                 unsigned threads, const StopCheck& check_stop)
+                 unsigned threads, const base::StopCheck& check_stop)
     : tetrahedra_(tetrahedra), places_(std::move(places)) {
   sphere_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
   finite_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
-  for_blocks(
+  base::parallel_blocks(
       tetrahedra.size(), kSphereBlock, threads, [] { return 0; },
       [&](std::size_t begin, std::size_t end, int) {
         if (check_stop) check_stop();

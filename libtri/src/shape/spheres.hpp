@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "../curve_sort.hpp"
 #include "../delaunay3/mesh.hpp"
 #include "../pool.hpp"
@@ -179,7 +181,7 @@ class Spheres {
   /// The tetrahedra must be turned. O(tetrahedra). The result is the same for any number of
   /// threads.
   Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
-          unsigned threads, const StopCheck& check_stop = {});
+          unsigned threads, const base::StopCheck& check_stop = {});
 
   [[nodiscard]] std::span<const spatial::Tetrahedron> tetrahedra() const { return tetrahedra_; }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "../delaunay3/mesh.hpp"
 #include "../pool.hpp"
 #include "terrace/tri/shape.hpp"
@@ -31,7 +33,7 @@ struct State {
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
   std::size_t kept_count = 0;          ///< in state kKept
   std::vector<std::uint8_t> forest;    ///< poles rule: labels of its first step, by slot
-  StopTicks ticks;                     ///< of the rules that peel
+  base::StopTicks ticks;               ///< of the rules that peel
   // Scratch memory, kept between calls.
   std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
   std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides

@@ -9,7 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "disjoint_sets.hpp"
+#include <terrace/base/union_find.hpp>
+
 #include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
@@ -39,11 +40,11 @@ std::vector<SurfaceEdge> sorted_edges(std::span<const std::array<std::uint32_t, 
 }
 
 /// Sets of faces that edges join.
-DisjointSets parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
-  DisjointSets parts(faces.size());
+base::UnionFind parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
+  base::UnionFind parts(faces.size());
   const std::vector<SurfaceEdge> edges = sorted_edges(faces);
   for (std::size_t i = 1; i < edges.size(); ++i)
-    if (edges[i].ends == edges[i - 1].ends) parts.join(edges[i].face, edges[i - 1].face);
+    if (edges[i].ends == edges[i - 1].ends) parts.unite(edges[i].face, edges[i - 1].face);
   return parts;
 }
 
@@ -107,19 +108,19 @@ SurfaceMeasures measure(const Surface& surface) {
     for (const std::uint32_t v : face) used[v] = true;
   result.vertices = static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
   const std::vector<SurfaceEdge> edges = sorted_edges(surface.faces);
-  DisjointSets parts(surface.faces.size());
+  base::UnionFind parts(surface.faces.size());
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
     std::int64_t ways = 0;
     for (; end < edges.size() && edges[end].ends == edges[begin].ends; ++end) {
       ways += edges[end].way;
-      parts.join(edges[begin].face, edges[end].face);
+      parts.unite(edges[begin].face, edges[end].face);
     }
     ++result.edges;
     result.border_edges += end - begin == 1;
     result.non_manifold_edges += end - begin > 2;
     if (ways != 0) result.closed = false;
   }
-  result.components = parts.count();
+  result.components = parts.sets();
   result.euler_characteristic = static_cast<std::int64_t>(result.vertices) -
                                 static_cast<std::int64_t>(result.edges) +
                                 static_cast<std::int64_t>(result.faces);
@@ -128,14 +129,14 @@ SurfaceMeasures measure(const Surface& surface) {
 
 void turn_outward(Surface& surface) {
   check(surface);
-  DisjointSets parts = parts_of(surface.faces);
+  base::UnionFind parts = parts_of(surface.faces);
   std::vector<double> volume(surface.faces.size());
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
-    const std::uint32_t part = parts.root(f);
+    const std::uint32_t part = parts.find(f);
     volume[part] += volume6_from(surface, surface.points[surface.faces[part][0]], f);
   }
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
-    if (volume[parts.root(f)] < 0.0) std::swap(surface.faces[f][1], surface.faces[f][2]);
+    if (volume[parts.find(f)] < 0.0) std::swap(surface.faces[f][1], surface.faces[f][2]);
 }
 
 }  // namespace terrace::tri

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
 
 namespace terrace::tri {
 namespace {
@@ -40,17 +40,16 @@ class Bracket {
     if (!few_.known) return std::min(range_, std::max(4.0 * many_.bound, 1e-4 * range_));
     if (!many_.known) {
       if (few_.bound < 1e-6 * range_) return least_;
-      const double by_power =
-          few_.bound * portable::exponential(portable::logarithm(few_.vertices / wanted_) / 1.5);
+      const double by_power = few_.bound * base::exp(base::log(few_.vertices / wanted_) / 1.5);
       return inside(
           std::clamp(by_power, few_.bound / 64.0, few_.bound / (in_a_row_ < 2 ? 1.05 : 4.0)));
     }
     if (many_.bound <= 0.0) return few_.bound / 4.0;
-    const double width = portable::logarithm(few_.bound / many_.bound);
-    const double fall = portable::logarithm(many_.vertices / few_.vertices);
+    const double width = base::log(few_.bound / many_.bound);
+    const double fall = base::log(many_.vertices / few_.vertices);
     double part = 0.5;
-    if (in_a_row_ < 3 && fall > 0.0) part = portable::logarithm(many_.vertices / wanted_) / fall;
-    return inside(many_.bound * portable::exponential(width * part));
+    if (in_a_row_ < 3 && fall > 0.0) part = base::log(many_.vertices / wanted_) / fall;
+    return inside(many_.bound * base::exp(width * part));
   }
 
   /// The nearest bound strictly between those known.

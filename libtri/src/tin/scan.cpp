@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scan.hpp"
 
+#include <terrace/base/simd.hpp>
+
 #include "scan_lanes.hpp"
 
 namespace terrace::tri::tin {
@@ -28,13 +30,13 @@ namespace terrace::tri::tin {
 constinit const Scans kScansPortable = all_scans();
 
 #ifdef TERRACE_TRI_X86
-const Scans& scans(InstructionSet set) {
-  return set == InstructionSet::kAvx512 ? kScansAvx512
-         : set == InstructionSet::kAvx2 ? kScansAvx2
-                                        : kScansPortable;
+const Scans& scans(base::SimdPath set) {
+  return set == base::SimdPath::avx512 ? kScansAvx512
+         : set == base::SimdPath::avx2 ? kScansAvx2
+                                       : kScansPortable;
 }
 #else
-const Scans& scans(InstructionSet) { return kScansPortable; }
+const Scans& scans(base::SimdPath) { return kScansPortable; }
 #endif
 
 }  // namespace terrace::tri::tin

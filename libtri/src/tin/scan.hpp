@@ -3,9 +3,10 @@
 
 #include <type_traits>
 
+#include <terrace/base/simd.hpp>
+
 #include "check/scan.hpp"
 #include "grid/scan.hpp"
-#include "instruction_set.hpp"
 #include "rows/scan.hpp"
 
 namespace terrace::tri::tin {
@@ -29,7 +30,7 @@ struct Scans {
     if constexpr (std::is_same_v<T, double>) return check_doubles;
   }
 };
-const Scans& scans(InstructionSet set);  ///< Requires a supported set.
+const Scans& scans(base::SimdPath set);  ///< Requires a supported set.
 
 extern const Scans kScansPortable, kScansAvx2, kScansAvx512;
 

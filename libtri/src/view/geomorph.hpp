@@ -11,7 +11,8 @@
 #include <tuple>
 #include <vector>
 
-#include "disjoint_sets.hpp"
+#include <terrace/base/union_find.hpp>
+
 #include "patches.hpp"
 #include "terrace/tri/geomorph.hpp"
 
@@ -159,18 +160,18 @@ struct Geomorph<Triangulation>::Scratch {
   }
   /// The number of parts.
   std::size_t join() {
-    DisjointSets sets(sites.size());
+    base::UnionFind sets(sites.size());
     for (const auto* triangles : {&before, &after}) {
       for (const auto& [a, b, c] : *triangles) {
-        sets.join(a, b);
-        sets.join(a, c);
+        sets.unite(a, b);
+        sets.unite(a, c);
       }
     }
     part.assign(sites.size(), 0);
     std::uint32_t count = 0;
     // The root of a set is its least number.
     for (std::uint32_t n = 0; n < sites.size(); ++n) {
-      const std::uint32_t root = sets.root(n);
+      const std::uint32_t root = sets.find(n);
       part[n] = root == n ? count++ : part[root];
     }
     return count;

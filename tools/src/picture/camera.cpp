@@ -4,7 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "base/units.hpp"
 #include "base/vector.hpp"
 #include "terrace/terrain/error.hpp"
@@ -23,10 +24,10 @@ ViewDirection parse_view(const std::string& text) {
 }
 
 Camera::Camera(const ViewDirection& view) {
-  const double sin_a = portable_sin_degrees(view.azimuth);
-  const double cos_a = portable_cos_degrees(view.azimuth);
-  const double sin_e = portable_sin_degrees(view.elevation);
-  const double cos_e = portable_cos_degrees(view.elevation);
+  const double sin_a = base::sin_degrees(view.azimuth);
+  const double cos_a = base::cos_degrees(view.azimuth);
+  const double sin_e = base::sin_degrees(view.elevation);
+  const double cos_e = base::cos_degrees(view.elevation);
   toward = {sin_a * cos_e, cos_a * cos_e, sin_e};
   right = {-cos_a, sin_a, 0};
   up = {toward[1] * right[2] - toward[2] * right[1], toward[2] * right[0] - toward[0] * right[2],

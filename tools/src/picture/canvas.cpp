@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "base/parallel.hpp"
-#include "base/portable_math.hpp"
 #include "base/vector.hpp"
 
 namespace terrace::tools {
@@ -47,8 +48,7 @@ std::vector<std::uint8_t> Canvas::resolve() const {
 Light Light::for_terrain(const ViewDirection& view, double relief) {
   const double azimuth = view.azimuth + 135;
   const double half = std::sqrt(0.5);
-  return {.direction = {portable_sin_degrees(azimuth) * half, portable_cos_degrees(azimuth) * half,
-                        half},
+  return {.direction = {base::sin_degrees(azimuth) * half, base::cos_degrees(azimuth) * half, half},
           .relief = relief,
           .flat = half};
 }

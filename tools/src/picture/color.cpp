@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/random.hpp>
 
 namespace terrace::tools {
 
@@ -119,7 +119,7 @@ Rgb class_colour(std::int64_t number) {
 
 Rgb cluster_colour(std::int64_t cluster) {
   if (cluster < 0) return {200, 200, 200};
-  const std::uint64_t scattered = scramble(static_cast<std::uint64_t>(cluster));
+  const std::uint64_t scattered = base::splitmix64(static_cast<std::uint64_t>(cluster));
   Rgb colour = category_colour(static_cast<std::int64_t>(scattered >> 8));
   // In five shades, so that two clusters side by side are rarely alike.
   const double shade = 0.7 + 0.12 * static_cast<double>(scattered % 5);

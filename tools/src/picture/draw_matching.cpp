@@ -4,8 +4,9 @@
 #include <numeric>
 #include <vector>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "base/parallel.hpp"
-#include "base/portable_math.hpp"
 #include "cli/interrupt.hpp"
 #include "picture/draw.hpp"
 #include "tables/matching_result.hpp"
@@ -108,7 +109,7 @@ double usual_distance(const std::vector<MatchingLine>& lines,
   std::vector<double> lengths;
   for (const MatchingLine& line : lines) {
     const auto &a = places[line.a], &b = places[line.b];
-    const double length = portable_hypot(a[0] - b[0], a[1] - b[1]);
+    const double length = base::hypot(a[0] - b[0], a[1] - b[1]);
     if (line.level == 1 && std::isfinite(length)) lengths.push_back(length);
   }
   double usual = 0.4 * std::sqrt(static_cast<double>(canvas.width()) * canvas.height() /

@@ -9,9 +9,10 @@
 #include <numbers>
 #include <vector>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "base/parallel.hpp"
 #include "base/point_spacing.hpp"
-#include "base/portable_math.hpp"
 #include "base/vector.hpp"
 #include "cli/interrupt.hpp"
 #include "picture/draw.hpp"
@@ -312,7 +313,7 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
       if (is_hidden(canvas, cx, cy, radius, depth + behind)) continue;
       for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
         for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
-          const double distance = portable_hypot(x + 0.5 - cx, y + 0.5 - cy);
+          const double distance = base::hypot(x + 0.5 - cx, y + 0.5 - cy);
           if (distance <= radius) canvas.colour(x, y) = distance <= core ? kCore : kRim;
         }
       }

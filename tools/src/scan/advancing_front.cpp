@@ -3,6 +3,7 @@
 
 #include <CGAL/Advancing_front_surface_reconstruction.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <terrace/base/stop_check.hpp>
 
 #include "scan/cgal_calls.hpp"
 
@@ -12,7 +13,7 @@ namespace {
 
 /// CGAL's own priority of a facet, after a check.
 struct CheckedPriority {
-  const tri::StopCheck* check_stop;
+  const base::StopCheck* check_stop;
 
   template <class Front, class Cell>
   double operator()(const Front& front, Cell& cell, const int& index) const {
@@ -24,7 +25,7 @@ struct CheckedPriority {
 }  // namespace
 
 std::vector<std::array<std::uint32_t, 3>> advancing_front(std::span<const tri::Point3> points,
-                                                          const tri::StopCheck& check_stop) {
+                                                          const base::StopCheck& check_stop) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   std::vector<Kernel::Point_3> of_cgal;
   of_cgal.reserve(points.size());

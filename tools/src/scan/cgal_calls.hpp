@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
 #include <terrace/tri/shape.hpp>
 
 /// CGAL's functions, each in a translation unit of its own: they take long to compile.
@@ -15,7 +16,7 @@ namespace terrace::tools {
 /// Faces between distinct points that are not all in one plane, with CGAL's defaults: a radius
 /// ratio bound of 5 and a beta of 0.52 radians. Calls check_stop for each candidate facet.
 std::vector<std::array<std::uint32_t, 3>> advancing_front(std::span<const tri::Point3> points,
-                                                          const tri::StopCheck& check_stop);
+                                                          const base::StopCheck& check_stop);
 
 /// alpha, offset > 0; at least one point.
 tri::Surface alpha_wrap(std::span<const tri::Point3> points, double alpha, double offset);

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
 #include <terrace/tri/delaunay3.hpp>
 
 #include "scan/cgal_calls.hpp"
@@ -53,7 +54,7 @@ Sides checked_box(std::span<const tri::Point3> points) {
 }  // namespace
 
 tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points,
-                                             const tri::StopCheck& check_stop) {
+                                             const base::StopCheck& check_stop) {
   if (points.empty()) return {};
   checked_box(points);
   // CGAL requires distinct points that span space.

@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include <terrace/base/stop_check.hpp>
 #include <terrace/tri/shape.hpp>
 
 /// Surfaces of points by CGAL's packages, which are GPL-3.0-or-later: the command's alone.
@@ -17,7 +18,7 @@ namespace terrace::tools {
 /// Throws std::invalid_argument as alpha_wrap_surface(), and what check_stop throws; it is not
 /// heard while CGAL triangulates. About 2 s per 100,000 points.
 tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points,
-                                             const tri::StopCheck& check_stop = {});
+                                             const base::StopCheck& check_stop = {});
 
 /// CGAL's alpha wrap (C. Portaneri et al., doi:10.1145/3528223.3530152): watertight, manifold, free
 /// of intersections, and strictly around all points at a distance of alpha / 30. Its corners are

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "base/units.hpp"
 #include "scan/cgal_surface.hpp"
 #include "terrace/terrain/error.hpp"
@@ -38,7 +40,7 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
     if (value) shape.edge_factor = *value;
   } else if (name == "alpha-wrap") {
     options.method = {
-        [alpha = value.value_or(0.0)](std::span<const tri::Point3> points, const tri::StopCheck&) {
+        [alpha = value.value_or(0.0)](std::span<const tri::Point3> points, const base::StopCheck&) {
           return tri::RestoredSurface{alpha_wrap_surface(points, alpha), {}};
         },
         kCgalBytesPerPoint};

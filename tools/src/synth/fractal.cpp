@@ -7,7 +7,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 
 namespace terrace::tools {
 
@@ -108,7 +109,7 @@ Variances variances(unsigned octave) {
 Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
   assert(options.hurst > 0 && options.hurst < 1 && options.roughness >= 0);
   // The step's variance is the sum of the lattices'; the amplitudes' common factor follows.
-  const double growth = portable_exp2(options.hurst);
+  const double growth = base::exp2(options.hurst);
   std::array<double, kOctaves> weight{};
   double step = 0, field = 0, largest = 0;
   for (unsigned octave = 0; octave < kOctaves; ++octave) {
@@ -182,8 +183,9 @@ const float* Fractal::Rows::lattice_row(unsigned octave, std::int64_t row) {
   } else {
     std::fill(values.begin(), values.end(), 0.0F);
   }
-  const std::uint64_t key = scramble(scramble(fractal_->seed_ + (std::uint64_t{octave} << 56)) ^
-                                     static_cast<std::uint64_t>(row));
+  const std::uint64_t key =
+      base::splitmix64(base::splitmix64(fractal_->seed_ + (std::uint64_t{octave} << 56)) ^
+                       static_cast<std::uint64_t>(row));
   add_noise(key, lattice.first, fractal_->amplitude_[octave], values.data(), lattice.width);
   lattice.row_of[slot] = row;
   return values.data();

@@ -6,8 +6,11 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
+
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -19,7 +22,7 @@ namespace {
 
 /// The k-th random number in [0, 1) that belongs to `n`.
 double random_unit(std::uint64_t seed, std::uint64_t n, std::uint64_t k) {
-  return unit_interval(scramble(scramble(seed ^ (k << 48)) + n));
+  return base::unit_interval(base::splitmix64(base::splitmix64(seed ^ (k << 48)) + n));
 }
 
 /// The nearest multiple of 1/units.
@@ -46,13 +49,14 @@ class CloudSurface {
     for (std::size_t i = 0; i < waves_.size(); ++i) {
       // From broad lobes to fine bumps, the finer the flatter.
       const double cycles = 1.0 + 0.8 * static_cast<double>(i * i) / 4;
-      waves_[i].direction = random_direction(scramble(seed), i);
+      waves_[i].direction = random_direction(base::splitmix64(seed), i);
       waves_[i].degrees = 57.3 * cycles;
-      waves_[i].phase = 360 * random_unit(scramble(seed), i, 9);
+      waves_[i].phase = 360 * random_unit(base::splitmix64(seed), i, 9);
       waves_[i].amplitude = 0.12 / cycles;
     }
     // Dense enough for all points; the last swath then ends a little early.
-    spacing_ = std::sqrt(4 * kPi / static_cast<double>(std::max<std::uint64_t>(points, 8)));
+    spacing_ =
+        std::sqrt(4 * std::numbers::pi / static_cast<double>(std::max<std::uint64_t>(points, 8)));
     while (lay_swaths() < points) spacing_ *= 0.999;
   }
 
@@ -69,14 +73,14 @@ class CloudSurface {
                                                static_cast<double>(swath.across));
     const double longitude =
         360 * (static_cast<double>(line) + 0.5 + jitter_b) / static_cast<double>(swath.lines);
-    const double c = portable_cos_degrees(latitude);
-    const stream::Point3 d{c * portable_cos_degrees(longitude), c * portable_sin_degrees(longitude),
-                           portable_sin_degrees(latitude)};
+    const double c = base::cos_degrees(latitude);
+    const stream::Point3 d{c * base::cos_degrees(longitude), c * base::sin_degrees(longitude),
+                           base::sin_degrees(latitude)};
     double radius = 1;
     for (const Wave& wave : waves_) {
       const double along =
           d[0] * wave.direction[0] + d[1] * wave.direction[1] + d[2] * wave.direction[2];
-      radius += wave.amplitude * portable_sin_degrees(along * wave.degrees + wave.phase);
+      radius += wave.amplitude * base::sin_degrees(along * wave.degrees + wave.phase);
     }
     radius += 0.05 * spacing_ * (random_unit(seed_, n, 3) - 0.5);  // the scanner's noise
     constexpr double kMetres = 100, kMillimetres = 1000;
@@ -98,7 +102,7 @@ class CloudSurface {
   /// Lays swaths from pole to pole; returns the number of points they have.
   std::uint64_t lay_swaths() {
     constexpr double kAcross = 500;
-    const double spacing_degrees = spacing_ / kDegree;
+    const double spacing_degrees = spacing_ / base::kRadiansPerDegree;
     const auto count = static_cast<std::uint64_t>(std::ceil(180 / (kAcross * spacing_degrees)));
     swaths_.clear();
     std::uint64_t points = 0;
@@ -109,9 +113,9 @@ class CloudSurface {
       s.north = -90 + 180 * static_cast<double>(i + 1) / static_cast<double>(count);
       s.across = static_cast<std::uint64_t>(std::ceil((s.north - s.south) / spacing_degrees));
       // The mean circumference of the swath, by the height of its zone.
-      const double circle = 2 * kPi *
-                            (portable_sin_degrees(s.north) - portable_sin_degrees(s.south)) /
-                            ((s.north - s.south) * kDegree);
+      const double circle = 2 * std::numbers::pi *
+                            (base::sin_degrees(s.north) - base::sin_degrees(s.south)) /
+                            ((s.north - s.south) * base::kRadiansPerDegree);
       s.lines = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(circle / spacing_));
       points += s.across * s.lines;
       swaths_.push_back(s);
@@ -144,14 +148,15 @@ Cloud cluster_cloud(std::uint64_t points, std::uint64_t seed) {
   const std::uint64_t per_blob = std::max<std::uint64_t>(1, (points + blobs - 1) / blobs);
   return [seed, per_blob](std::uint64_t n) {
     const std::uint64_t blob = n / per_blob;
-    const double deviation = 0.002 + 0.02 * random_unit(scramble(seed), blob, 3);
+    const double deviation = 0.002 + 0.02 * random_unit(base::splitmix64(seed), blob, 3);
     stream::Point3 p{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       // The sum of twelve uniform numbers less 6: variance 1, and within 1 % of the normal density
       // where that matters.
       double sum = -6;
       for (std::uint64_t k = 0; k < 12; ++k) sum += random_unit(seed, n, axis * 12 + k);
-      p[axis] = rounded(random_unit(scramble(seed), blob, axis) + deviation * sum, kMillionths);
+      p[axis] =
+          rounded(random_unit(base::splitmix64(seed), blob, axis) + deviation * sum, kMillionths);
     }
     return p;
   };
@@ -159,7 +164,7 @@ Cloud cluster_cloud(std::uint64_t points, std::uint64_t seed) {
 
 Permutation::Permutation(std::uint64_t size, std::uint64_t seed)
     : size_(size),
-      seed_(scramble(seed)),
+      seed_(base::splitmix64(seed)),
       half_bits_(static_cast<unsigned>(std::bit_width(std::max<std::uint64_t>(size, 2) - 1) + 1) /
                  2) {}
 
@@ -168,7 +173,7 @@ std::uint64_t Permutation::operator()(std::uint64_t n) const {
   do {
     std::uint64_t left = n >> half_bits_, right = n & mask;
     for (std::uint64_t round = 0; round < 4; ++round) {
-      const std::uint64_t mixed = left ^ (scramble(seed_ + round + (right << 3)) & mask);
+      const std::uint64_t mixed = left ^ (base::splitmix64(seed_ + round + (right << 3)) & mask);
       left = right;
       right = mixed;
     }

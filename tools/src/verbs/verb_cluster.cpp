@@ -156,7 +156,7 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
   if (request.strategy == FacilityStrategy::automatic && request.iterations.empty() &&
       request.batch == 1 && problem.channels.size() == 0 && std::isinf(problem.outlier_price) &&
       problem.points.size() < kFastPoints &&
-      cluster::linear_map(problem.metric, cluster::bounds_of(problem.points))) {
+      cluster::linear_map(problem.metric, base::box_of(problem.points))) {
     options.strategy = FacilityStrategy::fast;
   }
   FacilitySolution solution = cluster::solve(problem, options);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/base/portable_math.hpp>
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/matching/bounding_volume_hierarchy.hpp>
 #include <terrace/matching/halving.hpp>
@@ -22,7 +23,6 @@
 #include <terrace/matching/point.hpp>
 #include <terrace/matching/point_matching.hpp>
 
-#include "base/portable_math.hpp"
 #include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
@@ -317,7 +317,7 @@ class MatchCommand final : public Command {
       // A point without a partner has a number above all.
       if (b <= a || b >= outcome.mate.size()) continue;
       const stream::Point3 &p = positions_[a], &q = positions_[b];
-      const double distance = portable_hypot(portable_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+      const double distance = base::hypot(base::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
       text += std::to_string(a) + ',' + std::to_string(b) + ',' + number_text(distance) + '\n';
       ++pairs;
     }

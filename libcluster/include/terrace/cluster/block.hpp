@@ -7,9 +7,11 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/simd.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/point.hpp"
-#include "terrace/cluster/stop_check.hpp"
 
 /// Facility location on one block of points: choose representatives (facilities) among the points
 /// and assign every point to one, at low total cost
@@ -28,7 +30,7 @@ struct BlockOptions {
   Effort effort = Effort::standard;
   std::uint64_t seed = 1;  ///< only Effort::full tries random candidates
   /// For large blocks. After it has thrown, the next block is clustered as if nothing had happened.
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 /// Facilities in the order of their cluster numbers, which is that of a space-filling curve:
@@ -49,8 +51,9 @@ struct BlockClustering {
   }
 };
 
-/// Which code path runs. All paths give the same bytes.
-enum class SimdPath : std::uint8_t { automatic, portable, avx2, avx512 };
+/// The instruction sets among which a caller may choose; all give the same bytes.
+using base::best_simd_path;
+using base::SimdPath;
 
 /// Clusters blocks one after another, keeping its memory in between. One object per thread. The
 /// result depends only on the points, their order, the weights and the options: not on the machine,
@@ -78,8 +81,5 @@ class BlockClusterer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// The path that `automatic` chooses on this machine.
-SimdPath best_simd_path();
 
 }  // namespace terrace::cluster

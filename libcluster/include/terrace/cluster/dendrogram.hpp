@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "terrace/cluster/stop_check.hpp"
+#include <terrace/base/stop_check.hpp>
 
 /// Dendrograms: the result of hierarchical clustering, in the convention of SciPy's linkage matrix,
 /// and their cuts into flat clusters.
@@ -49,11 +49,11 @@ inline constexpr std::size_t kMostDendrogramPoints = std::size_t{1} << 31;
 /// points that are already in one cluster, names a point that does not exist, or has a height that
 /// is NaN or negative; the message names the link.
 [[nodiscard]] Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links,
-                                         const StopCheck& check_stop = {});
+                                         const base::StopCheck& check_stop = {});
 
 /// The same with the merges in the order of the links, whatever their heights. O(n).
 [[nodiscard]] Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> links,
-                                                  const StopCheck& check_stop = {});
+                                                  const base::StopCheck& check_stop = {});
 
 /// Flat clusters inside which no merge is higher than `height` (SciPy: fcluster with criterion
 /// 'distance'). Returns the label of each point; labels are 0, 1, .. in the order of first

@@ -10,10 +10,11 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/metric.hpp"
 #include "terrace/cluster/point.hpp"
-#include "terrace/cluster/stop_check.hpp"
 
 /// Uncapacitated facility location: open facilities are paid for, each client is connected to one,
 /// and
@@ -208,7 +209,7 @@ struct FacilityOptions {
   /// Local search: progress in candidates.
   FacilityProgress progress = {};
   /// Heard by every strategy except LP rounding.
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 /// Statistics of a local search, for figures 7.12 to 7.14.
@@ -273,7 +274,7 @@ struct LowerBoundOptions {
   std::size_t steps = 1000;  ///< subgradient steps; 0: only their starting point
   unsigned threads = 1;      ///< 0: one per core. Does not change the result.
   FacilityProgress progress = {};
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 /// A lower bound of the cost of every solution, so that a result can state its gap: a value of the

@@ -42,7 +42,7 @@ using GroundMap = LinearMap;
 /// the triangle inequality adds up, use the maps of the blocks there.
 /// the triangle inequality adds up, by the maps of the blocks there.
 struct Summary {
-  Bounds box;                     ///< of the unmapped positions
+  Box3 box;                       ///< of the unmapped positions
   double error = 0.0;             ///< ground units
   std::uint64_t descendants = 0;  ///< level-0 points
   friend bool operator==(const Summary&, const Summary&) = default;
@@ -140,7 +140,7 @@ struct HierarchyOptions {
   std::function<void(std::span<std::byte> payload)> mark_outlier;  ///< called from any thread
   /// Overrides `metric`: the metric for a block with these bounds. A field needs it if `ground`,
   /// and with it the frame of the boxes, depends on the block. Called from any thread.
-  std::function<Metric(const Bounds&)> metric_of;
+  std::function<Metric(const Box3&)> metric_of;
   PayloadChannels channels;  ///< empty: position only
   /// If more than one: blocks are clustered by the local search for entities (strategies automatic,
   /// full_scan, facilities), and the facility cost is a multiple of the diagonal of the bounding
@@ -152,7 +152,7 @@ struct HierarchyOptions {
   /// Any number gives the same hierarchy; 1 (or 0) does everything in the caller's thread.
   unsigned threads = 1;
   /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
-  std::function<GroundMap(const Bounds&)> ground;
+  std::function<GroundMap(const Box3&)> ground;
   SimdPath simd = SimdPath::automatic;
   /// Once it is requested, the local search of a block ends with what it has found so far: for work
   /// that is given up, whose sink then throws.

@@ -6,8 +6,9 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/point.hpp"
-#include "terrace/cluster/stop_check.hpp"
 
 /// k-means: k centres, not necessarily points of the input, at a low sum of squared distances
 ///     SSE = sum of weight(i) * |point i - its centre|^2.
@@ -30,7 +31,7 @@ struct KMeansOptions {
   /// bounding box. 0: when no assignment changes.
   double tolerance = 0.0;
   unsigned threads = 1;  ///< 0 counts as 1
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 struct KMeansResult {

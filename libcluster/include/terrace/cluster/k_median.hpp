@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/facility_location.hpp"
 
 /// k-median: exactly k facilities, which cost nothing, and the least sum of connection costs. As in
@@ -24,7 +26,7 @@ struct KMedianOptions {
   std::uint32_t bound_steps = 300;
   std::uint64_t seed = 1;
   unsigned threads = 1;  ///< 0: one per core. Does not change the result.
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 /// Opening costs of the problem are ignored, and 0 in the solution. Exactly k facilities are

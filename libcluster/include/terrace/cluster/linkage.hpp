@@ -11,11 +11,12 @@
 #include <string_view>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/band_matrix.hpp"
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/dendrogram.hpp"
 #include "terrace/cluster/point.hpp"
-#include "terrace/cluster/stop_check.hpp"
 
 /// Hierarchical clustering with the complete dendrogram, by the seven methods of SciPy's linkage(),
 /// of points in space or, with z = 0, in the plane, with Euclidean distances, or of things with any
@@ -46,7 +47,7 @@ struct LinkageOptions {
   /// Bytes the matrix may take, or the means of ward, centroid and median linkage; 0: no limit.
   std::uint64_t memory_limit = 0;
   SimdPath path = SimdPath::automatic;
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 /// Single linkage: the distance of two clusters is that of their nearest points. Its dendrogram is

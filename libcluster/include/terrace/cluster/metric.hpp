@@ -66,7 +66,7 @@ class Elliptical {
 class EllipticalField {
  public:
   struct Region {
-    Bounds box;  ///< closed
+    Box3 box;  ///< closed
     Elliptical metric;
   };
   /// The coordinate frame of the boxes, if it is not that of the points: map * point + offset.
@@ -87,7 +87,7 @@ class EllipticalField {
   /// within the box are symmetric and obey the triangle inequality, and a linear map of the points
   /// makes them Euclidean. With a frame a uniform box may be missed if a region's border passes
   /// close by.
-  [[nodiscard]] std::optional<LinearMap> uniform_in(const Bounds& box) const;
+  [[nodiscard]] std::optional<LinearMap> uniform_in(const Box3& box) const;
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
 
  private:
@@ -112,7 +112,7 @@ using Metric =
 [[nodiscard]] bool is_symmetric(const Metric& metric);
 [[nodiscard]] bool obeys_triangle_inequality(const Metric& metric);
 /// The map that makes all distances between points of `box` Euclidean; nullopt if there is none.
-[[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box);
+[[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Box3& box);
 /// The points as that map of their bounding box has them.
 [[nodiscard]] std::optional<std::vector<Point3>> linear_points(const Metric& metric,
                                                                std::span<const Point3> points);
@@ -128,7 +128,7 @@ void check(const Metric& metric);
 
 /// Length of the diagonal of a box in the metric, for a field in the Euclidean metric; if its four
 /// diagonals differ, the longest. The facility cost is a multiple of it. 0 for an empty box.
-[[nodiscard]] double diagonal(const Metric& metric, const Bounds& box);
+[[nodiscard]] double diagonal(const Metric& metric, const Box3& box);
 
 /// Columns of attributes besides the positions (colour, intensity, curvature), each with a weight:
 /// how many ground units a unit of the attribute is worth. They add to the distance as further

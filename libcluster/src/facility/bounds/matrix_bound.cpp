@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/bounds/dual_ascent.hpp"
 #include "facility/bounds/matrix_dual.hpp"
 #include "facility/matrix/strategies.hpp"
@@ -40,7 +42,7 @@ std::vector<double> ascended(const MatrixRows& costs) {
 }  // namespace
 
 double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
-                  const StopCheck& check_stop) {
+                  const base::StopCheck& check_stop) {
   check(problem);
   if (duals.size() != problem.clients) {
     throw std::invalid_argument("duals: " + std::to_string(duals.size()) + " for " +

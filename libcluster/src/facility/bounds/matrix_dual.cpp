@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "parallel.hpp"
+#include <terrace/base/parallel.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -30,13 +30,14 @@ double paid(const double* duals, const double* costs, std::size_t n) {
 void add_up(const CostRows& costs, std::span<const double> duals, unsigned threads,
             std::vector<double>& sums) {
   const std::size_t m = costs.facilities(), n = costs.clients();
-  parallel((m + kFacilitiesPerBlock - 1) / kFacilitiesPerBlock, threads, [&](std::size_t block) {
-    std::vector<double> scratch;
-    for (std::size_t j = block * kFacilitiesPerBlock;
-         j < std::min(m, (block + 1) * kFacilitiesPerBlock); ++j) {
-      sums[j] = paid(duals.data(), costs.row(j, scratch), n);
-    }
-  });
+  base::parallel_for((m + kFacilitiesPerBlock - 1) / kFacilitiesPerBlock, threads,
+                     [&](std::size_t block) {
+                       std::vector<double> scratch;
+                       for (std::size_t j = block * kFacilitiesPerBlock;
+                            j < std::min(m, (block + 1) * kFacilitiesPerBlock); ++j) {
+                         sums[j] = paid(duals.data(), costs.row(j, scratch), n);
+                       }
+                     });
 }
 
 void count_payers(std::span<const double> duals, const double* costs, std::span<double> slope) {

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/bounds/lagrangian.hpp"
 #include "facility/matrix/cost_rows.hpp"
 
@@ -34,7 +36,7 @@ class RowDual final : public DualFunction {
 /// clients). Throws: std::invalid_argument as check() does, if there is not one dual per client, or
 /// if one is not finite, naming it.
 [[nodiscard]] double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
-                                const StopCheck& check_stop = {});
+                                const base::StopCheck& check_stop = {});
 
 /// L of k-median: facilities cost nothing, and the k that are paid most are open,
 ///     L(v) = sum_i v_i - sum of the k greatest of sum_i max(0, v_i - c_ij).

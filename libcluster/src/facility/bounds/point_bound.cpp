@@ -11,12 +11,14 @@
 #include <type_traits>
 #include <vector>
 
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/bounds/lagrangian.hpp"
 #include "facility/bounds/matrix_dual.hpp"
 #include "facility/points/box_tree.hpp"
 #include "facility/points/fast_distances.hpp"
 #include "facility/points/point_space.hpp"
-#include "parallel.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
@@ -63,7 +65,7 @@ class PointDual final : public DualFunction {
     read_longest();
     constexpr std::size_t kBlock = 64;  // leaves
     std::atomic<std::size_t> most{0};
-    parallel((leaves_.size() + kBlock - 1) / kBlock, threads_, [&](std::size_t block) {
+    base::parallel_for((leaves_.size() + kBlock - 1) / kBlock, threads_, [&](std::size_t block) {
       Work work;
       std::size_t most_here = 0;
       const std::size_t end = std::min(leaves_.size(), (block + 1) * kBlock);
@@ -156,7 +158,7 @@ class PointDual final : public DualFunction {
   // Whether some facility of the leaf may be closer to the node's box than a payment there.
   [[nodiscard]] bool is_near(std::uint32_t leaf, std::uint32_t node) const {
     const BoxTree::Node& from = tree_->nodes()[leaf];
-    const Bounds& box = tree_->nodes()[node].box;
+    const Box3& box = tree_->nodes()[node].box;
     if constexpr (std::is_same_v<Space, FieldSpace>) {
       for (std::uint32_t j = from.first; j < from.first + from.count; ++j) {
         if (space_->box_distance(j, box) < longest_[node]) return true;
@@ -166,7 +168,7 @@ class PointDual final : public DualFunction {
       // The distance of two boxes is that of any point of the one from the other, enlarged by the
       // extent of the first around the point.
       const Point3& p = space_->points()[from.first];
-      Bounds grown = box;
+      Box3 grown = box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         grown.min[axis] -= from.box.max[axis] - p[axis];
         grown.max[axis] += p[axis] - from.box.min[axis];
@@ -209,7 +211,7 @@ class PointDual final : public DualFunction {
   std::span<const double> weights_;
   double facility_cost_, price_;
   unsigned threads_;
-  const StopCheck* check_stop_;
+  const base::StopCheck* check_stop_;
   std::vector<double> payment_;  // u
   std::vector<double> paid_;     // by facility
   std::vector<double> root_;     // sqrt(w)

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/matrix/strategies.hpp"
 #include "facility/points/point_space.hpp"
 
@@ -21,7 +23,7 @@ void check_memory(std::uint64_t n, std::uint64_t limit, const char* what) {
 }
 
 template <class Space>
-CostMatrix fill(const Space& space, const SearchFrame& frame, const StopCheck& check_stop) {
+CostMatrix fill(const Space& space, const SearchFrame& frame, const base::StopCheck& check_stop) {
   const PointRows<Space> rows(space, frame.weights, frame.outlier_price, check_stop);
   const std::size_t n = frame.weights.size();
   CostMatrix matrix;
@@ -40,7 +42,7 @@ CostMatrix fill(const Space& space, const SearchFrame& frame, const StopCheck& c
 }  // namespace
 
 CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit,
-                       const StopCheck& check_stop) {
+                       const base::StopCheck& check_stop) {
   check_memory(problem.points.size(), memory_limit, "points");
   SearchFrame frame = make_frame(problem);
   return with_space(problem, frame, problem.points,
@@ -48,7 +50,7 @@ CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit
 }
 
 CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit,
-                       const StopCheck& check_stop) {
+                       const base::StopCheck& check_stop) {
   check_memory(problem.count, memory_limit, "entities");
   return fill(space_of(problem), make_frame(problem), check_stop);
 }

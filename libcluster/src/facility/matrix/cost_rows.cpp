@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include <terrace/base/stop_check.hpp>
+
 namespace terrace::cluster {
 
-MatrixRows::MatrixRows(const FacilityMatrix& matrix, const StopCheck& check_stop)
+MatrixRows::MatrixRows(const FacilityMatrix& matrix, const base::StopCheck& check_stop)
     : CostRows(matrix.facilities, matrix.clients, check_stop),
       opening_(matrix.opening),
       connection_(matrix.connection) {

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
@@ -30,21 +32,21 @@ class CostRows {
 
  protected:
   /// check_stop: outlives this object.
-  CostRows(std::size_t facilities, std::size_t clients, const StopCheck& check_stop)
+  CostRows(std::size_t facilities, std::size_t clients, const base::StopCheck& check_stop)
       : facilities_(facilities), clients_(clients), check_stop_(&check_stop) {}
   CostRows(const CostRows&) = default;
   CostRows& operator=(const CostRows&) = default;
 
  private:
   std::size_t facilities_, clients_;
-  const StopCheck* check_stop_;
+  const base::StopCheck* check_stop_;
 };
 
 /// A matrix whose costs are at most 2^900; it is copied only if its costs must be scaled for that,
 /// or if they are all so small that they lack digits.
 class MatrixRows final : public CostRows {
  public:
-  MatrixRows(const FacilityMatrix& matrix, const StopCheck& check_stop);
+  MatrixRows(const FacilityMatrix& matrix, const base::StopCheck& check_stop);
 
   const double* row(std::size_t facility, std::vector<double>& scratch) const override;
   void gather(std::size_t facility, std::span<const std::uint32_t> clients,

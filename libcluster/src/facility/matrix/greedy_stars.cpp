@@ -10,6 +10,8 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/bounds/matrix_dual.hpp"
 #include "facility/matrix/cost_rows.hpp"
 #include "facility/matrix/strategies.hpp"
@@ -154,7 +156,7 @@ double least_divisor(const MatrixRows& costs, const std::vector<double>& duals) 
 }  // namespace
 
 FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report,
-                              const StopCheck& check_stop) {
+                              const base::StopCheck& check_stop) {
   const MatrixRows costs(problem, check_stop);
   Stars stars(costs);
   stars.run();

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "draws.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/random.hpp>
+
 #include "facility/matrix/cost_rows.hpp"
 #include "facility/matrix/matrix_search.hpp"
 #include "facility/matrix/strategies.hpp"
-#include "parallel.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -34,16 +35,16 @@ struct Found {
 // Perturbed solutions that end up worse are discarded: the search continues from the best.
 Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_t perturbations,
              std::uint32_t run, Clock::time_point start) {
-  std::mt19937_64 random(seed_of_run(options.seed, run));
+  std::mt19937_64 random(base::seed_of_run(options.seed, run));
   MatrixSearch work(costs, costs.opening());
-  const std::uint32_t seed_facility = draw_below(costs.facilities(), random);
+  const std::uint32_t seed_facility = base::draw_below(costs.facilities(), random);
   work.reset(std::span(&seed_facility, 1));
   work.descend(random);
   MatrixSearch best = work;
   const auto most = static_cast<std::uint32_t>(std::min<std::size_t>(8, costs.facilities()));
   for (std::size_t p = 0; p < perturbations; ++p) {
     if (std::chrono::duration<double>(Clock::now() - start).count() > options.seconds) break;
-    work.perturb(1 + draw_below(most, random), random);
+    work.perturb(1 + base::draw_below(most, random), random);
     work.descend(random);
     if (work.cost() <= best.cost()) {
       best = work;
@@ -71,7 +72,7 @@ FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOption
   const auto start = Clock::now();
   const MatrixRows costs(problem, options.check_stop);
   std::vector<Found> found(length.restarts);
-  parallel(length.restarts, options.threads, [&](std::size_t run) {
+  base::parallel_for(length.restarts, options.threads, [&](std::size_t run) {
     found[run] =
         search(costs, options, length.perturbations, static_cast<std::uint32_t>(run), start);
   });

@@ -3,6 +3,8 @@
 #include <functional>
 #include <queue>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/bounds/matrix_dual.hpp"
 #include "facility/matrix/client_order.hpp"
 #include "facility/matrix/strategies.hpp"
@@ -150,7 +152,7 @@ class Growth {
 }  // namespace
 
 FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report,
-                               const StopCheck& check_stop) {
+                               const base::StopCheck& check_stop) {
   const MatrixRows costs(problem, check_stop);
   const ClientOrder order(costs);
   Growth growth(costs, order);

@@ -5,7 +5,7 @@
 #include <cassert>
 #include <numeric>
 
-#include "draws.hpp"
+#include <terrace/base/random.hpp>
 
 namespace terrace::cluster {
 
@@ -106,7 +106,7 @@ bool MatrixSearch::drop() {
 
 void MatrixSearch::descend(std::mt19937_64& random) {
   drop();
-  draw_order(order_, random);
+  base::shuffle(order_, random);
   // Ends when every candidate has been rejected since the last change.
   std::size_t refused = 0;
   for (std::size_t k = 0; refused < order_.size(); k = (k + 1) % order_.size()) {
@@ -121,11 +121,11 @@ void MatrixSearch::descend(std::mt19937_64& random) {
 
 void MatrixSearch::perturb(std::uint32_t strength, std::mt19937_64& random) {
   for (std::uint32_t s = 0; s < strength; ++s) {
-    const std::uint32_t candidate = draw_below(costs_->facilities(), random);
+    const std::uint32_t candidate = base::draw_below(costs_->facilities(), random);
     if (!state_.is_open(candidate)) state_.open(candidate);
     if (state_.facilities().size() < 2) continue;
     const std::uint32_t leaving =
-        state_.facilities()[draw_below(state_.facilities().size(), random)];
+        state_.facilities()[base::draw_below(state_.facilities().size(), random)];
     if (leaving != candidate) state_.close(leaving);
   }
   update_cost();

@@ -7,9 +7,10 @@
 #include <numeric>
 #include <queue>
 
-#include "draws.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/random.hpp>
+
 #include "facility/matrix/matrix_search.hpp"
-#include "parallel.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -112,7 +113,7 @@ MedianSearch::Exchange MedianSearch::judge(std::uint32_t candidate, Work& work) 
 }
 
 void MedianSearch::descend(std::mt19937_64& random) {
-  draw_order(order_, random);
+  base::shuffle(order_, random);
   std::vector<Exchange> exchanges(kTogether);
   std::vector<std::uint32_t> batch;
   // Ends when every candidate has been rejected since the last exchange.
@@ -124,8 +125,8 @@ void MedianSearch::descend(std::mt19937_64& random) {
       const std::uint32_t candidate = order_[(at + looked++) % order_.size()];
       if (!state_.is_open(candidate)) batch.push_back(candidate);
     }
-    parallel(batch.size(), threads_,
-             [&](std::size_t b) { exchanges[b] = judge(batch[b], work_[b]); });
+    base::parallel_for(batch.size(), threads_,
+                       [&](std::size_t b) { exchanges[b] = judge(batch[b], work_[b]); });
     std::size_t best = 0;
     for (std::size_t b = 1; b < batch.size(); ++b) {
       if (exchanges[b].gain > exchanges[best].gain) best = b;
@@ -143,10 +144,10 @@ void MedianSearch::descend(std::mt19937_64& random) {
 
 void MedianSearch::replace(std::size_t count, std::mt19937_64& random) {
   for (std::size_t s = 0; s < count; ++s) {
-    const std::uint32_t candidate = draw_below(costs_->facilities(), random);
+    const std::uint32_t candidate = base::draw_below(costs_->facilities(), random);
     if (state_.is_open(candidate)) continue;
     const auto facilities = state_.facilities();
-    const std::uint32_t leaving = facilities[draw_below(facilities.size(), random)];
+    const std::uint32_t leaving = facilities[base::draw_below(facilities.size(), random)];
     state_.open(candidate);
     state_.close(leaving);
   }
@@ -186,10 +187,10 @@ std::vector<std::uint32_t> search_for_cost(const CostRows& costs, std::size_t k,
 std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
                                         const KMedianOptions& options) {
   constexpr std::size_t kAll = 1000;  // up to this many facilities, all are candidates
-  std::mt19937_64 random(seed_of_run(options.seed, 0));
+  std::mt19937_64 random(base::seed_of_run(options.seed, 0));
   std::vector<std::uint32_t> candidates(costs.facilities());
   std::iota(candidates.begin(), candidates.end(), 0u);
-  draw_order(candidates, random);
+  base::shuffle(candidates, random);
   if (candidates.size() > kAll) {
     candidates.resize(std::min(candidates.size(), std::max<std::size_t>(kAll / 2, 4 * k)));
   }
@@ -200,8 +201,8 @@ std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
 
   std::vector<double> cost(options.restarts);
   std::vector<std::vector<std::uint32_t>> found(options.restarts);
-  parallel(options.restarts, options.threads, [&](std::size_t run) {
-    std::mt19937_64 draws(seed_of_run(options.seed, run + 1));
+  base::parallel_for(options.restarts, options.threads, [&](std::size_t run) {
+    std::mt19937_64 draws(base::seed_of_run(options.seed, run + 1));
     MedianSearch search(costs, options.restarts > 1 ? 1 : options.threads);
     search.reset(start);
     if (run > 0) search.replace(std::max<std::size_t>(1, k / 2), draws);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/cluster/facility_location.hpp"
 
 /// The strategies on a matrix, see FacilityStrategy, and the matrix of other problems. Each fills
@@ -13,9 +15,9 @@ namespace terrace::cluster {
                                            const FacilityOptions& options);
 /// Throw: std::invalid_argument if the memory cannot be allocated.
 [[nodiscard]] FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report,
-                                             const StopCheck& check_stop);
+                                             const base::StopCheck& check_stop);
 [[nodiscard]] FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report,
-                                            const StopCheck& check_stop);
+                                            const base::StopCheck& check_stop);
 /// Throws: std::runtime_error if the library was built without GLPK or GLPK fails.
 [[nodiscard]] FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& report);
 
@@ -33,8 +35,8 @@ struct CostMatrix {
 /// Throws: std::invalid_argument if the 8 n^2 bytes exceed `memory_limit` (0: no limit), naming
 /// them, or if a cost overflows a double, like check() of a matrix; std::bad_alloc.
 [[nodiscard]] CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit,
-                                     const StopCheck& check_stop = {});
+                                     const base::StopCheck& check_stop = {});
 [[nodiscard]] CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit,
-                                     const StopCheck& check_stop = {});
+                                     const base::StopCheck& check_stop = {});
 
 }  // namespace terrace::cluster

@@ -19,7 +19,7 @@ BoxTree::BoxTree(Kind kind, std::span<const Point3> points)
     : order_(points.size()), leaf_(points.size()) {
   std::iota(order_.begin(), order_.end(), 0u);
   Node root;
-  root.box = bounds_of(points);
+  root.box = base::box_of(points);
   root.count = static_cast<std::uint32_t>(points.size());
   nodes_.push_back(root);
   // Children are appended, so the loop reaches them.
@@ -81,9 +81,9 @@ void BoxTree::split(std::uint32_t node, Kind kind, std::span<const Point3> point
     child.parent = node;
     child.first = ends[part];
     child.count = ends[part + 1] - ends[part];
-    child.box = kEmptyBounds;
+    child.box = Box3{};
     for (std::uint32_t k = 0; k < child.count; ++k) {
-      include(child.box, points[order_[child.first + k]]);
+      child.box.include(points[order_[child.first + k]]);
     }
     nodes_.push_back(child);
   }

@@ -23,7 +23,7 @@ class BoxTree {
   };
 
   struct Node {
-    Bounds box;
+    Box3 box;
     double longest = 0.0;
     std::uint32_t parent = 0;
     std::uint32_t first_child = 0, child_count = 0;  ///< consecutive nodes; none for a leaf

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/points/search_frame.hpp"
 #include "facility/points/space_search.hpp"
 #include "facility/points/with_space.hpp"
@@ -51,7 +53,7 @@ std::size_t ceil_log(std::size_t value, std::size_t base) {
 
 template <class Space>
 std::unique_ptr<SearchEngine> make(SearchFrame& frame, Space space, FacilityStrategy strategy,
-                                   unsigned threads, const StopCheck& check_stop,
+                                   unsigned threads, const base::StopCheck& check_stop,
                                    const std::string& what) {
   check_strategy(strategy, Space::kHasBoxes, space.has_triangles(), what);
   if (strategy == FacilityStrategy::automatic) {
@@ -66,7 +68,7 @@ std::unique_ptr<SearchEngine> make(SearchFrame& frame, Space space, FacilityStra
 }  // namespace
 
 std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, FacilityStrategy strategy,
-                                          unsigned threads, const StopCheck& check_stop) {
+                                          unsigned threads, const base::StopCheck& check_stop) {
   SearchFrame frame = make_frame(problem);
   const std::string what = "the metric \"" + name_of(problem.metric) + "\"";
   return with_space(problem, frame, problem.points,
@@ -77,7 +79,7 @@ std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, Facilit
 
 std::unique_ptr<SearchEngine> make_search(const FacilityEntities& problem,
                                           FacilityStrategy strategy, unsigned threads,
-                                          const StopCheck& check_stop) {
+                                          const base::StopCheck& check_stop) {
   SearchFrame frame = make_frame(problem);
   return make(frame, space_of(problem), strategy, threads, check_stop, "distances by a function");
 }

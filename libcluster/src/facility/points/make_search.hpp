@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <memory>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/points/search_engine.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
@@ -14,10 +16,10 @@ namespace terrace::cluster {
 /// Throws: std::invalid_argument if the problem does not admit the strategy.
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(
     const FacilityPoints& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
-    unsigned threads = 1, const StopCheck& check_stop = {});
+    unsigned threads = 1, const base::StopCheck& check_stop = {});
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(
     const FacilityEntities& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
-    unsigned threads = 1, const StopCheck& check_stop = {});
+    unsigned threads = 1, const base::StopCheck& check_stop = {});
 
 /// The number of candidates of a search over this many points; at least one, unless there are no
 /// points.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "facility/points/point_space.hpp"
 
-#include "portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -16,7 +16,7 @@ double greatest(const LinearMap& map) {
 
 // How many times longer the products that add up to a mapped vector may be than the diagonal of the
 // mapped box.
-double stretch_of(LinearMap map, const Bounds& box) {
+double stretch_of(LinearMap map, const Box3& box) {
   const double largest = greatest(map);
   for (double& m : map) m /= largest;
   // Uses halves, as the sides of a box may be infinite.
@@ -50,9 +50,9 @@ double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame
   for (const double w : frame.weights) weight += w;
   double unit = 16.0 * std::numeric_limits<double>::epsilon();
   if (const auto* minkowski = std::get_if<Minkowski>(&problem.metric)) {
-    unit = portable::power(unit, std::min(1.0, minkowski->p));
+    unit = base::pow(unit, std::min(1.0, minkowski->p));
   }
-  const Bounds box = bounds_of(problem.points);
+  const Box3 box = base::box_of(problem.points);
   double stretch = 1.0;
   if (const std::optional<LinearMap> map = linear_map(problem.metric, box)) {
     stretch = std::max(stretch, stretch_of(*map, box));

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/matrix/cost_rows.hpp"
 #include "facility/points/fast_distances.hpp"
 #include "facility/points/search_frame.hpp"
@@ -24,7 +26,7 @@ template <class Space>
 class PointRows final : public CostRows {
  public:
   PointRows(const Space& space, std::span<const double> weights, double price,
-            const StopCheck& check_stop)
+            const base::StopCheck& check_stop)
       : CostRows(weights.size(), weights.size(), check_stop),
         space_(&space),
         distances_(space),

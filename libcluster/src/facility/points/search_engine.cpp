@@ -9,8 +9,9 @@
 #include <string>
 #include <utility>
 
-#include "draws.hpp"
-#include "parallel.hpp"
+#include <terrace/base/parallel.hpp>
+#include <terrace/base/random.hpp>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::cluster {
 namespace {
@@ -22,10 +23,10 @@ namespace {
 }  // namespace
 
 SearchEngine::SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
-                           StopCheck check_stop)
+                           base::StopCheck check_stop)
     : strategy_(strategy),
       state_(frame),
-      team_(threads_for(std::numeric_limits<std::size_t>::max(), threads)),
+      team_(base::threads_for(std::numeric_limits<std::size_t>::max(), threads)),
       check_stop_(std::move(check_stop)),
       verdicts_(1) {}
 
@@ -98,7 +99,7 @@ bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std:
     const std::size_t now = std::min(batch, candidates - done);
     if (verdicts_.size() < now) verdicts_.resize(now);
     for (std::size_t k = 0; k < now; ++k) {
-      verdicts_[k].candidate = draw_below(state_.size(), random);
+      verdicts_[k].candidate = base::draw_below(state_.size(), random);
     }
     if (now == 1) {
       judge(verdicts_[0].candidate, true, verdicts_[0]);

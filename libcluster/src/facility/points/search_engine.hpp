@@ -7,9 +7,11 @@
 #include <random>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+#include <terrace/base/thread_team.hpp>
+
 #include "facility/points/search_state.hpp"
 #include "terrace/cluster/facility_location.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::cluster {
 
@@ -22,7 +24,7 @@ class SearchEngine {
   /// strategy: that of a local search, not automatic. threads: 0: one per core. check_stop: its
   /// exceptions are thrown by all that takes O(clients) or more.
   SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
-               StopCheck check_stop);
+               base::StopCheck check_stop);
   virtual ~SearchEngine() = default;
 
   /// Meyerson's initial solution (4.2.3): in random order, each client opens a facility with
@@ -67,8 +69,8 @@ class SearchEngine {
 
   const FacilityStrategy strategy_;
   SearchState state_;
-  ThreadTeam team_;
-  const StopCheck check_stop_;
+  base::ThreadTeam team_;
+  const base::StopCheck check_stop_;
 
  private:
   SearchStatistics statistics_;

@@ -6,9 +6,10 @@
 #include <limits>
 #include <variant>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "facility/points/search_norms.hpp"
 #include "ground.hpp"
-#include "portable_math.hpp"
 #include "scaling.hpp"
 
 namespace terrace::cluster {
@@ -90,7 +91,7 @@ double whole_diagonal(const Metric& metric, const Point3& extent, double positio
     return length(PowerNorm{minkowski->p});
   }
   double longest = positions;
-  for (const double range : ranges) longest = portable::length(longest, range);
+  for (const double range : ranges) longest = base::hypot(longest, range);
   return longest;
 }
 
@@ -115,7 +116,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
   int exponent = 0;
   double positions = 0.0;  // the diagonal without channels, in units of 2^exponent
   Point3 extent = scaling.extent;
-  const Bounds box = bounds_of(problem.points);
+  const Box3 box = base::box_of(problem.points);
   if (std::holds_alternative<CustomMetric>(problem.metric)) {
     positions = diagonal(problem.metric, box);
     extent = {positions, 0, 0};

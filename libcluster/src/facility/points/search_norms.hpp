@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
 
 /// Lengths of vectors of three coordinates and any number of channels, which are further axes: a
 /// and b are rows of channels, of which only the difference counts. Every norm grows with the
@@ -57,11 +57,10 @@ struct PowerNorm {
                     std::size_t channels) const {
     const double largest = MaximumNorm{}(x, y, z, a, b, channels);
     if (largest == 0.0) return 0.0;
-    using portable::power;
-    double sum = power(std::abs(x) / largest, p) + power(std::abs(y) / largest, p) +
-                 power(std::abs(z) / largest, p);
-    for (std::size_t c = 0; c < channels; ++c) sum += power(std::abs(a[c] - b[c]) / largest, p);
-    return largest * power(sum, 1.0 / p);
+    double sum = base::pow(std::abs(x) / largest, p) + base::pow(std::abs(y) / largest, p) +
+                 base::pow(std::abs(z) / largest, p);
+    for (std::size_t c = 0; c < channels; ++c) sum += base::pow(std::abs(a[c] - b[c]) / largest, p);
+    return largest * base::pow(sum, 1.0 / p);
   }
 };
 

@@ -29,7 +29,7 @@ namespace terrace::cluster {
 inline constexpr double kBelieved = 1.0 - 1e-9;
 
 /// Components of the shortest vector from a point to a box.
-inline Point3 to_box(const Point3& p, const Bounds& box) {
+inline Point3 to_box(const Point3& p, const Box3& box) {
   Point3 v{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (p[axis] < box.min[axis]) v[axis] = box.min[axis] - p[axis];
@@ -79,7 +79,7 @@ class NormSpace {
   [[nodiscard]] From from(std::uint32_t facility) const {
     return {*this, points_[facility], channels_of(facility)};
   }
-  [[nodiscard]] double box_distance(std::uint32_t facility, const Bounds& box) const {
+  [[nodiscard]] double box_distance(std::uint32_t facility, const Box3& box) const {
     const Point3 v = to_box(points_[facility], box);
     return kBelieved * norm_(v[0], v[1], v[2], nullptr, nullptr, 0);
   }
@@ -138,7 +138,7 @@ class FieldSpace {
   [[nodiscard]] From from(std::uint32_t facility) const {
     return {*this, points_[facility], *places_[facility].map, channels_of(facility)};
   }
-  [[nodiscard]] double box_distance(std::uint32_t facility, const Bounds& box) const {
+  [[nodiscard]] double box_distance(std::uint32_t facility, const Box3& box) const {
     const Point3 v = to_box(points_[facility], box);
     const Place& place = places_[facility];
     return kBelieved * place.least_scale * EuclideanNorm{}(v[0], v[1], v[2], nullptr, nullptr, 0) -

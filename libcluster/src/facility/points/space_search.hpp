@@ -11,11 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "draws.hpp"
+#include <terrace/base/random.hpp>
+#include <terrace/base/stop_check.hpp>
+
 #include "facility/points/box_tree.hpp"
 #include "facility/points/search_engine.hpp"
 #include "facility/points/search_space.hpp"
-#include "stop_ticks.hpp"
 
 namespace terrace::cluster {
 
@@ -25,7 +26,7 @@ class SpaceSearch final : public SearchEngine {
  public:
   /// strategy: one that the space admits, not automatic.
   SpaceSearch(SearchFrame& frame, Space space, FacilityStrategy strategy, unsigned threads,
-              const StopCheck& check_stop)
+              const base::StopCheck& check_stop)
       : SearchEngine(frame, strategy, threads, check_stop), space_(std::move(space)) {
     if constexpr (Space::kHasBoxes) {
       if (strategy == FacilityStrategy::quadtree) tree_.emplace(BoxTree::Kind::quadtree, points());
@@ -52,11 +53,11 @@ class SpaceSearch final : public SearchEngine {
     std::vector<std::uint32_t> order(count);
     std::iota(order.begin(), order.end(), 0u);
     for (std::uint32_t i = count; i > 1; --i) {
-      std::swap(order[i - 1], order[draw_below(i, random)]);
+      std::swap(order[i - 1], order[base::draw_below(i, random)]);
     }
     std::vector<std::uint32_t> facility(count), open;
     std::vector<double> distances(count);
-    StopTicks ticks(check_stop_);
+    base::StopTicks ticks(check_stop_);
     for (const std::uint32_t i : order) {
       ticks(8 + 2 * open.size());
       std::uint32_t nearest = kOutlier;
@@ -73,7 +74,8 @@ class SpaceSearch final : public SearchEngine {
         least = price;
         nearest = kOutlier;
       }
-      if (open.empty() || draw_unit(random) * state_.facility_cost() < state_.weight(i) * least) {
+      if (open.empty() ||
+          base::draw_unit(random) * state_.facility_cost() < state_.weight(i) * least) {
         open.push_back(i);
         nearest = i;
         least = 0.0;
@@ -111,7 +113,7 @@ class SpaceSearch final : public SearchEngine {
   // Finds open facilities that are nearer than `distances`. A facility remains its own client, at
   // 0.
   void find_nearest(std::vector<std::uint32_t>& facility, std::vector<double>& distances) const {
-    StopTicks ticks(check_stop_);
+    base::StopTicks ticks(check_stop_);
     for (const std::uint32_t j : state_.open()) {
       ticks(2 * state_.size());
       const From from = space_.from(j);

@@ -8,9 +8,10 @@
 #include <variant>
 #include <vector>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "facility/points/search_frame.hpp"
 #include "facility/points/search_space.hpp"
-#include "portable_math.hpp"
 
 namespace terrace::cluster {
 
@@ -26,7 +27,7 @@ template <class Visit>
 auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<const Point3> original,
                 const Visit& visit) {
   using Result = decltype(visit(NormSpace<EuclideanNorm, false>(frame, {}, true)));
-  if (linear_map(problem.metric, bounds_of(original))) {
+  if (linear_map(problem.metric, base::box_of(original))) {
     if (frame.channel_count == 0) return visit(NormSpace<EuclideanNorm, false>(frame, {}, true));
     return visit(NormSpace<EuclideanNorm, true>(frame, {}, true));
   }
@@ -49,7 +50,7 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
                            function = metric.distance](std::uint32_t j, std::uint32_t i) {
             double d = function(points[j], points[i]);
             for (std::size_t c = 0; c < count && d >= 0.0; ++c) {
-              d = portable::length(d, channels[j * count + c] - channels[i * count + c]);
+              d = base::hypot(d, channels[j * count + c] - channels[i * count + c]);
             }
             return d;
           };

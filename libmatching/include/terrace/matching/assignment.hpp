@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "terrace/matching/stop_check.hpp"
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::matching {
 
@@ -53,12 +53,12 @@ inline constexpr double kLargestCost = 1e300;
 /// most rows: R. Jonker and A. Volgenant, "A shortest augmenting path algorithm for dense and
 /// sparse linear assignment problems", 1987.
 Assignment assign(std::span<const double> costs, std::size_t rows, std::size_t columns,
-                  const StopCheck& check_stop = {});
+                  const base::StopCheck& check_stop = {});
 Assignment assign(std::span<const float> costs, std::size_t rows, std::size_t columns,
-                  const StopCheck& check_stop = {});
+                  const base::StopCheck& check_stop = {});
 /// Labels and cost are exact: every sum fits into 64 bits.
 IntegerAssignment assign(std::span<const std::int32_t> costs, std::size_t rows, std::size_t columns,
-                         const StopCheck& check_stop = {});
+                         const base::StopCheck& check_stop = {});
 
 /// Writes the costs of one row into `costs`, one per column. Repeated calls for a row must write
 /// the same numbers.

@@ -8,9 +8,10 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/matching.hpp"
 #include "terrace/matching/point.hpp"
-#include "terrace/matching/stop_check.hpp"
 
 /// Euclidean matching by halving: the points are repeatedly divided into two halves, which are
 /// matched at the least total distance (an assignment). Source: J. Skála, Algorithms for
@@ -44,7 +45,7 @@ struct HalvingOptions {
   /// Called by the caller's thread after each iteration (or a few) with the iterations done, their
   /// total, and the least cost so far. False ends the search.
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 struct HalvingMatching {

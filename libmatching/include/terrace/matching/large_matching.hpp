@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/point.hpp"
 #include "terrace/matching/point_matching.hpp"
 
@@ -30,7 +32,7 @@ struct LargeMatchingOptions {
   /// all rounds are needed, and the cost once there is a matching (0 before). False ends the rounds
   /// and keeps the current matching; before there is one it has no effect.
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 struct LargeMatching {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "terrace/matching/stop_check.hpp"
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::matching {
 
@@ -71,9 +71,9 @@ struct Matching {
 /// matching algorithm", 2009, but one tree at a time, each stopped at a limit that grows from pass
 /// to pass.
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const WeightedEdge> edges,
-                                     const StopCheck& check_stop = {});
+                                     const base::StopCheck& check_stop = {});
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges,
-                                     const StopCheck& check_stop = {});
+                                     const base::StopCheck& check_stop = {});
 
 /// Checks the proof that comes with a matching. Returns an empty string, or a description of the
 /// fault.

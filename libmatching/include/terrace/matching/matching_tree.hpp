@@ -7,9 +7,10 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/matching.hpp"
 #include "terrace/matching/point.hpp"
-#include "terrace/matching/stop_check.hpp"
 
 /// Binary trees from repeated matching: the points are matched, each pair becomes a point, these
 /// are matched again, and so on until one is left. Source: J. Skála, Algorithms for manipulating
@@ -55,7 +56,7 @@ struct MatchingTreeOptions {
   /// Called by the caller's thread at intervals with the rows made so far and their total. False
   /// ends the work; the tree is then empty.
   std::function<bool(std::size_t done, std::size_t total)> progress{};
-  StopCheck check_stop{};  ///< not heard by `matcher`
+  base::StopCheck check_stop{};  ///< not heard by `matcher`
   /// Replaces the library's own matcher. Called concurrently where there are several threads.
   LevelMatcher<Point> matcher{};
 };

@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/assignment.hpp"
 #include "terrace/matching/point.hpp"
 
@@ -28,9 +30,9 @@ namespace terrace::matching {
 /// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
 /// dense problems).
 Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns,
-                         const StopCheck& check_stop = {});
+                         const base::StopCheck& check_stop = {});
 Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns,
-                         const StopCheck& check_stop = {});
+                         const base::StopCheck& check_stop = {});
 
 /// As check() of assignment.hpp, on all pairs.
 ///

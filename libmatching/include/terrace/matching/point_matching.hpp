@@ -8,9 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/matching.hpp"
 #include "terrace/matching/point.hpp"
-#include "terrace/matching/stop_check.hpp"
 
 namespace terrace::matching {
 
@@ -30,7 +31,7 @@ struct PointMatchingOptions {
   /// Additional candidate edges, for instance from a Delaunay triangulation.
   std::span<const std::pair<std::uint32_t, std::uint32_t>> candidates{};
   PointMetric metric{};  ///< Euclidean where `distance` is empty
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 /// The optimal matching of points and its proof.

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <span>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -37,9 +39,9 @@ struct CostEdge {
 /// near neighbours take far less, as the trees stay small.
 /// Source: J. Skála, 4.3.1, with Dijkstra's algorithm and a heap on the pairs; optimality is proven
 /// by complementary slackness.
-Assignment assign_sparse(const SparseCosts& costs, const StopCheck& check_stop = {});
+Assignment assign_sparse(const SparseCosts& costs, const base::StopCheck& check_stop = {});
 Assignment assign_sparse(std::span<const CostEdge> edges, std::size_t rows, std::size_t columns,
-                         const StopCheck& check_stop = {});
+                         const base::StopCheck& check_stop = {});
 
 /// As check() of assignment.hpp, on the given pairs.
 ///

@@ -11,11 +11,12 @@
 #include <string_view>
 #include <vector>
 
+#include <terrace/base/thread_team.hpp>
+
 #include "format/octree.hpp"
 #include "order/point_buckets.hpp"
 #include "terrace/stream/point.hpp"
 #include "terrace/stream/schema.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::stream {
 
@@ -96,7 +97,7 @@ class OctreeBuilder {
   Point3 corner_{};
   double side_ = 1.0;
   const Write* write_ = nullptr;
-  ThreadTeam team_;
+  base::ThreadTeam team_;
 };
 
 }  // namespace terrace::stream

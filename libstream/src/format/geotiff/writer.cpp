@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/thread_team.hpp>
 #include <tiff.h>
 
 #include "format/geotiff/directory.hpp"
@@ -21,7 +22,6 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -73,7 +73,7 @@ struct GeoTiffWriter::Impl {
     std::size_t level, number;
     std::vector<std::byte> samples, coded;
   };
-  ThreadTeam team;
+  base::ThreadTeam team;
   std::deque<TileEncoder> encoders;  ///< by thread
   std::vector<Waiting> waiting;
   std::size_t waiting_count = 0;

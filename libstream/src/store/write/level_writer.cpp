@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include <terrace/base/thread_team.hpp>
+
 #include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
 
@@ -47,7 +49,7 @@ void add(const Counts& counts, Counts& to) {
 }  // namespace
 
 LevelWriter::LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
-                         Layout layout, ThreadTeam& team)
+                         Layout layout, base::ThreadTeam& team)
     : layout_(std::move(layout)),
       data_(folder / file_name(layout_.level, "clusters"), shown),
       index_(folder / file_name(layout_.level, "index"), shown),

@@ -9,11 +9,12 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/thread_team.hpp>
+
 #include "store/manifest.hpp"
 #include "store/write/block_encoder.hpp"
 #include "store/write/output_file.hpp"
 #include "store/write/raw_block.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::stream::store {
 
@@ -51,7 +52,7 @@ class LevelWriter {
  public:
   /// shown: the store in messages.
   LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
-              Layout layout, ThreadTeam& team);
+              Layout layout, base::ThreadTeam& team);
 
   /// What blocks are to be encoded with just now; null while there are no tables.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
@@ -103,7 +104,7 @@ class LevelWriter {
   /// block that was encoded with the tables of the segment before has no other order any more.
   std::optional<bool> sequence_;
   SharedTablesPtr tables_;
-  ThreadTeam& team_;
+  base::ThreadTeam& team_;
   std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster

@@ -7,10 +7,11 @@
 #include <limits>
 #include <vector>
 
-#include "store/write/hilbert.hpp"
+#include <terrace/base/hilbert.hpp>
+#include <terrace/base/thread_team.hpp>
+
 #include "store/write/raw_block.hpp"
 #include "terrace/stream/store.hpp"
-#include "thread_team.hpp"
 
 namespace terrace::stream {
 
@@ -37,7 +38,7 @@ double share_of(double value, double low, double high) {
 /// so that units and steepness do not matter; heights of rasters do not count at all.
 std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
   const std::size_t axes = store.schema().grid ? 2 : 3;
-  const unsigned bits = 62 / static_cast<unsigned>(axes);
+  const unsigned bits = axes == 2 ? 28 : 20;
   const std::uint64_t clusters = store.levels()[level].clusters;
   const Box3& bounds = store.bounds();
   const auto share = [&](double value, std::size_t axis) {
@@ -68,7 +69,9 @@ std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
       const double place = share(0.5 * box.min[axis] + 0.5 * box.max[axis], axis) * scale;
       cell[axis] = static_cast<std::uint32_t>(place * static_cast<double>((1u << bits) - 1));
     }
-    order[i] = hilbert_place(std::span(cell).first(axes), bits) >> lost << ordinal_bits | i;
+    const std::uint64_t place = axes == 2 ? base::hilbert_index<28>(cell[0], cell[1])
+                                          : base::hilbert_index<20>(cell[0], cell[1], cell[2]);
+    order[i] = place >> lost << ordinal_bits | i;
   }
   std::sort(order.begin(), order.end());
   for (std::uint64_t& place : order) place &= (std::uint64_t{1} << ordinal_bits) - 1;
@@ -95,7 +98,7 @@ void add(const Store& store, ClusterId id, const Ordinals& moved, RawBlock& bloc
 std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool replace,
                      unsigned threads) {
   StoreWriter writer(path, store.schema(), replace, threads);
-  ThreadTeam team(threads);
+  base::ThreadTeam team(threads);
   const std::uint64_t block_points = store.schema().grid ? kRasterBlock : kCloudBlock;
   Ordinals moved;
   for (unsigned level = 0; level < store.top(); ++level) {

@@ -3,6 +3,8 @@
 #include <mutex>
 #include <utility>
 
+#include <terrace/base/thread_team.hpp>
+
 #include "spares.hpp"
 #include "store/write/level_writer.hpp"
 #include "terrace/stream/atomic_file.hpp"
@@ -63,7 +65,7 @@ struct StoreWriter::Impl {
   std::uint64_t append(EncodedPtr encoded, bool root);
 
   StoreSchema schema;
-  ThreadTeam team;  ///< for training
+  base::ThreadTeam team;  ///< for training
   AtomicFolder staging;
   std::vector<std::unique_ptr<LevelWriter>> levels;
   std::uint64_t points = 0;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/shape.hpp>
 
@@ -24,7 +25,7 @@ struct SurfaceMethod {
   /// Corners that are input points are named in RestoredSurface::input; a surface without any has
   /// new points as its corners. Calls check_stop at intervals and lets its exceptions pass.
   std::function<tri::RestoredSurface(std::span<const tri::Point3>,
-                                     const tri::StopCheck& check_stop)>
+                                     const base::StopCheck& check_stop)>
       restore;
   std::uint64_t bytes_per_point = 0;  ///< peak memory
 };

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include <GeographicLib/Math.hpp>
+#include <terrace/base/portable_math.hpp>
 
-#include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/crs/crs_geo_keys.hpp"
@@ -27,7 +27,7 @@ namespace {
 std::string angle_name(double degrees) {
   if (degrees == 1) return "degree";
   if (std::abs(degrees / 0.9 - 1) < 1e-12) return "grad";
-  if (std::abs(degrees * kDegree - 1) < 1e-12) return "radian";
+  if (std::abs(degrees * base::kRadiansPerDegree - 1) < 1e-12) return "radian";
   if (std::abs(degrees * 3600 - 1) < 1e-12) return "arc-second";
   return {};
 }

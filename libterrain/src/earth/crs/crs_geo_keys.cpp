@@ -9,7 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "base/units.hpp"
 #include "earth/crs/crs_reading.hpp"
 #include "earth/crs/projection_names.hpp"
@@ -256,13 +257,13 @@ ProjObject base_of(const GeoKeyValues& keys) {
     const ProjObject known =
         required(object_of_code(code, PJ_CATEGORY_PRIME_MERIDIAN),
                  "its prime meridian EPSG:" + std::to_string(code) + " is not known");
-    double unit = kDegree;
+    double unit = base::kRadiansPerDegree;
     proj_prime_meridian_get_parameters(context, known.get(), &meridian, &unit, nullptr);
     if (meridian != 0) meridian *= degrees_of(unit);
   }
-  const ProjObject axes(proj_create_ellipsoidal_2D_cs(context, PJ_ELLPS2D_LATITUDE_LONGITUDE,
-                                                      degrees == 1 ? "degree" : "unknown",
-                                                      degrees == 1 ? 0 : degrees * kDegree));
+  const ProjObject axes(proj_create_ellipsoidal_2D_cs(
+      context, PJ_ELLPS2D_LATITUDE_LONGITUDE, degrees == 1 ? "degree" : "unknown",
+      degrees == 1 ? 0 : degrees * base::kRadiansPerDegree));
   return required(ProjObject(proj_create_geographic_crs(
                       context, name.empty() ? "unnamed" : name.c_str(),
                       datum.empty() ? "unknown" : datum.c_str(), "unnamed", major, inverse,
@@ -459,7 +460,7 @@ std::vector<stream::GeoKey> geo_keys_of(const CrsDefinition& definition) {
     if (definition.prime_meridian != 0) keys.push_back(number(2051, kUserDefined));
     keys.push_back(number(2054, definition.degrees_per_unit == 1 ? 9102 : kUserDefined));
     if (definition.degrees_per_unit != 1) {
-      keys.push_back(number(2055, definition.degrees_per_unit * kDegree));
+      keys.push_back(number(2055, definition.degrees_per_unit * base::kRadiansPerDegree));
     }
     keys.push_back(number(2056, kUserDefined));
     keys.push_back(number(2057, definition.ellipsoid.semi_major));

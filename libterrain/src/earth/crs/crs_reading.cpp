@@ -8,7 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "earth/crs/projection_names.hpp"
 
 namespace terrace::terrain {
@@ -80,7 +81,7 @@ void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
     throw CrsError("the CRS \"" + definition.name + "\" has no ellipsoid", kByCode);
   }
   const ProjObject meridian(proj_get_prime_meridian(context, crs));
-  double longitude = 0, unit = kDegree;
+  double longitude = 0, unit = base::kRadiansPerDegree;
   if (meridian != nullptr) {
     proj_prime_meridian_get_parameters(context, meridian.get(), &longitude, &unit, nullptr);
   }

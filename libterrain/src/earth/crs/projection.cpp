@@ -12,8 +12,7 @@
 #include <GeographicLib/Math.hpp>
 #include <GeographicLib/PolarStereographic.hpp>
 #include <GeographicLib/TransverseMercator.hpp>
-
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -140,7 +139,7 @@ class ConformalCone {
     library_.Forward(0, library_.OriginLatitude(), 90, x, y, turned, scale);
     if (turned != 0) {
       pole_ = turned > 0 ? 90 : -90;
-      apex_ = y + x / std::tan(turned * kDegree);
+      apex_ = y + x / std::tan(turned * base::kRadiansPerDegree);
     }
     north_ = forward(0, latitude)[1];
     if (!std::isfinite(north_)) throw std::invalid_argument("its origin is the pole at infinity");
@@ -205,10 +204,12 @@ class WebMercator {
   explicit WebMercator(double radius) : radius_(radius) {}
   [[nodiscard]] Point2 forward(double turn, double latitude) const {
     if (std::abs(latitude) == 90) return {kNowhere, kNowhere};
-    return {radius_ * turn * kDegree, radius_ * std::asinh(std::tan(latitude * kDegree))};
+    return {radius_ * turn * base::kRadiansPerDegree,
+            radius_ * std::asinh(std::tan(latitude * base::kRadiansPerDegree))};
   }
   [[nodiscard]] Point2 reverse(double x, double y) const {
-    return {x / radius_ / kDegree, std::atan(std::sinh(y / radius_)) / kDegree};
+    return {x / radius_ / base::kRadiansPerDegree,
+            std::atan(std::sinh(y / radius_)) / base::kRadiansPerDegree};
   }
 
  private:

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -154,7 +154,7 @@ std::string plain_name(std::string_view name) {
 }
 
 double degrees_of(double radians) {
-  const double degrees = radians / kDegree;
+  const double degrees = radians / base::kRadiansPerDegree;
   for (const double exact : {1.0, 0.9, 1.0 / 60, 1.0 / 3600}) {
     if (std::abs(degrees / exact - 1) < 1e-9) return exact;
   }

@@ -11,8 +11,9 @@
 #include <span>
 #include <utility>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "base/ordered_work.hpp"
-#include "base/portable_math.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -277,9 +278,9 @@ std::int64_t RasterMesher::straight_cells() const {
         }
         options_.places(std::span<Point2>(places));
         const auto& [a, m, b] = places;
-        const double cells = 2.0 * half * portable_hypot(way[0], way[1]);
-        const double off = portable_hypot(0.5 * (a[0] + b[0]) - m[0], 0.5 * (a[1] + b[1]) - m[1]);
-        const double length = portable_hypot(b[0] - a[0], b[1] - a[1]);
+        const double cells = 2.0 * half * base::hypot(way[0], way[1]);
+        const double off = base::hypot(0.5 * (a[0] + b[0]) - m[0], 0.5 * (a[1] + b[1]) - m[1]);
+        const double length = base::hypot(b[0] - a[0], b[1] - a[1]);
         // A sample without a position there is refused when it becomes a vertex.
         if (!std::isfinite(off) || !(length > 0.0)) continue;
         // In cells along this way, and as if it were no longer than along a row.
@@ -323,8 +324,8 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
   out.tin.quality = options_.quality;
   const GroundMap ground = Ground(placement_).map(store_.bounds());
   const bool mirrored = ground[0] * ground[4] - ground[1] * ground[3] < 0.0;
-  out.tin.column_step = portable_hypot(ground[0], ground[3]);
-  out.tin.row_step = (mirrored ? -1.0 : 1.0) * portable_hypot(ground[1], ground[4]);
+  out.tin.column_step = base::hypot(ground[0], ground[3]);
+  out.tin.row_step = (mirrored ? -1.0 : 1.0) * base::hypot(ground[1], ground[4]);
   if (options_.fill == Fill::flat) {
     const double lowest = bounds_.min[2];
     out.fill = [lowest](std::int64_t, std::int64_t) { return lowest; };

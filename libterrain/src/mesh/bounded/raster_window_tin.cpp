@@ -8,10 +8,10 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "base/portable_math.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
 
@@ -237,9 +237,9 @@ void WindowMesher::measure_as_read(
     read.push_back(p);
   }
   const std::array<double, 6>& m = placement_.world.xy;
-  const double cell = std::min(portable_hypot(m[0], m[3]), portable_hypot(m[1], m[4]));
+  const double cell = std::min(base::hypot(m[0], m[3]), base::hypot(m[1], m[4]));
   const double tolerance =
-      moves ? 0.0 : std::min(1.0, 2.0 * portable_hypot(moved[0], moved[1]) / cell);
+      moves ? 0.0 : std::min(1.0, 2.0 * base::hypot(moved[0], moved[1]) / cell);
   tin.check = measure(read, tolerance);
 }
 

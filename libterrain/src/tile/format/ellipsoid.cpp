@@ -5,7 +5,8 @@
 #include <cassert>
 #include <cmath>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "base/vector.hpp"
 
 namespace terrace::terrain {
@@ -37,16 +38,16 @@ double magnitude(const stream::Point3& direction, const stream::Point3& point) {
 stream::Point3 geocentric(double longitude, double latitude, double height) {
   constexpr double kSquareRatio =
       (kPolarRadius * kPolarRadius) / (kEquatorialRadius * kEquatorialRadius);
-  const double sine = portable_sin_degrees(latitude), cosine = portable_cos_degrees(latitude);
+  const double sine = base::sin_degrees(latitude), cosine = base::cos_degrees(latitude);
   const double n = kEquatorialRadius / std::sqrt(1.0 - (1.0 - kSquareRatio) * sine * sine);
   const double from_axis = (n + height) * cosine;
-  return {from_axis * portable_cos_degrees(longitude), from_axis * portable_sin_degrees(longitude),
+  return {from_axis * base::cos_degrees(longitude), from_axis * base::sin_degrees(longitude),
           (kSquareRatio * n + height) * sine};
 }
 
 LocalFrame local_frame(double longitude, double latitude) {
-  const double sin_lon = portable_sin_degrees(longitude), cos_lon = portable_cos_degrees(longitude);
-  const double sin_lat = portable_sin_degrees(latitude), cos_lat = portable_cos_degrees(latitude);
+  const double sin_lon = base::sin_degrees(longitude), cos_lon = base::cos_degrees(longitude);
+  const double sin_lat = base::sin_degrees(latitude), cos_lat = base::cos_degrees(latitude);
   return {.east = {-sin_lon, cos_lon, 0.0},
           .north = {-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat},
           .up = {cos_lat * cos_lon, cos_lat * sin_lon, sin_lat}};

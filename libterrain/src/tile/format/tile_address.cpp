@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string_view>
 #include <utility>
 
-#include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "tile/format/ellipsoid.hpp"
 
@@ -70,7 +70,7 @@ TileRange tiles_in(const GeographicBox& box, unsigned zoom) {
 }
 
 double expected_error(unsigned zoom) {
-  return kEquatorialRadius * 2.0 * kPi * 0.25 / (65.0 * 2.0) /
+  return kEquatorialRadius * 2.0 * std::numbers::pi * 0.25 / (65.0 * 2.0) /
          std::ldexp(1.0, static_cast<int>(zoom));
 }
 

@@ -16,7 +16,7 @@ CloudSamples::CloudSamples(const stream::Store& store, const StoredPlaces& place
   const std::span<const Point2> stored = cells_.places();
   samples_ = large_array<Sample>(stored.size());
   const std::size_t pieces = (stored.size() + kConvertedAtOnce - 1) / kConvertedAtOnce;
-  parallel_for(pieces, threads, [&](unsigned, std::size_t piece) {
+  parallel_for(pieces, threads, [&](std::size_t piece) {
     store.check_stop();
     const std::size_t begin = piece * kConvertedAtOnce;
     const std::size_t count = std::min(kConvertedAtOnce, stored.size() - begin);

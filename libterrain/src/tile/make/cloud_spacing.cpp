@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "base/point_spacing.hpp"
-#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -115,7 +117,7 @@ std::vector<stream::Point3> on_the_ground(const WindowPoints& points, const Stor
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) continue;
     // In one turn, so that neighbours across the line of 180 degrees are that.
     const double east = wrapped_longitude(p[0] - on_globe.front()[0]);
-    ground.push_back({east * portable_cos_degrees(p[1]), p[1], 0.0});
+    ground.push_back({east * base::cos_degrees(p[1]), p[1], 0.0});
     stored[kept++] = stored[i];
   }
   stored.resize(kept);
@@ -145,7 +147,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
     const auto rank = static_cast<unsigned>(std::min<std::size_t>(kRank, ground.size() - 1));
     const std::vector<float> found = neighbour_distances(ground, rank, 1);
     // So many points lie in a circle of the distance.
-    const auto share = static_cast<float>(std::sqrt(kPi / rank));
+    const auto share = static_cast<float>(std::sqrt(std::numbers::pi / rank));
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (found[i] > 0.0F && box.contains({stored[i][0], stored[i][1], 0.0})) {
         distances.push_back(found[i] * share);

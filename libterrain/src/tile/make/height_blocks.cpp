@@ -56,7 +56,7 @@ HeightBlocks::HeightBlocks(const stream::Store& store, unsigned threads)
   for (unsigned level = 0; level <= store.top(); ++level) {
     const std::uint64_t clusters = store.levels()[level].clusters;
     const std::uint64_t pieces = (clusters + kClustersAtOnce - 1) / kClustersAtOnce;
-    parallel_for(pieces, threads, [&](unsigned, std::size_t piece) {
+    parallel_for(pieces, threads, [&](std::size_t piece) {
       const std::uint64_t end = std::min((piece + 1) * kClustersAtOnce, clusters);
       stream::ClusterPoints cluster;
       for (std::uint64_t k = piece * kClustersAtOnce; k < end; ++k) {

@@ -7,9 +7,9 @@
 #include <limits>
 #include <utility>
 
+#include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/portable_math.hpp"
 #include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
@@ -101,7 +101,7 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
   const double margin = degrees ? kMarginDegrees : kMarginMetres / crs_.metres_per_unit();
   const std::array<double, 6>& xy = placement_.world.xy;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    margin_[axis] = margin / portable_hypot(xy[axis], xy[3 + axis]);
+    margin_[axis] = margin / base::hypot(xy[axis], xy[3 + axis]);
   }
   if (crs_.turn() > 0) {
     turn_ = crs_.turn();

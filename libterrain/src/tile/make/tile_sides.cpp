@@ -6,7 +6,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "tile/format/ellipsoid.hpp"
 #include "tile/format/quantized_mesh.hpp"
 
@@ -46,7 +47,8 @@ ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurf
   plan.max_error = std::max(max_error - 0.5 * plan.height_step, 0.5 * max_error);
   // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
   // expects of the zoom.
-  plan.longest_edge = std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / kDegree;
+  plan.longest_edge =
+      std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / base::kRadiansPerDegree;
   plan.widest_leaf = surface.widest_part();
   return plan;
 }

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+
 #include "earth/ground.hpp"
 
 namespace terrace::terrain {
@@ -16,7 +17,7 @@ double TiledStore::rim_of_outline() const {
                                                             std::abs(box.max[2] - height_beyond()));
   const GroundMap metres = Ground(schema).map(store.bounds());
   const double unit =
-      std::min(portable_hypot(metres[0], metres[3]), portable_hypot(metres[1], metres[4]));
+      std::min(base::hypot(metres[0], metres[3]), base::hypot(metres[1], metres[4]));
   const double share = unit > 0.0 ? fall / (8 * unit) : 0.0;
   const double rim = schema.grid ? std::max(1.5, share) : share;
   if (!(rim > 0.0) || !std::isfinite(rim)) return 0.0;

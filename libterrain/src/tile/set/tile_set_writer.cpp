@@ -251,7 +251,7 @@ void TileSetWriter::write_zooms() {
     for (const std::vector<Family>& stage : stages()) {
       parallel_for(
           stage.size(), static_cast<unsigned>(surfaces_.size()),
-          [&](unsigned worker, std::size_t i) { write(stage[i], *surfaces_[worker], done); },
+          [&](std::size_t i, unsigned worker) { write(stage[i], *surfaces_[worker], done); },
           context_.stop);
     }
     // Each tile is below one of the zoom above that may have data, too.

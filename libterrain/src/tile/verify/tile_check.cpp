@@ -245,7 +245,7 @@ std::vector<TileHeights> SetCheck::measure(const std::vector<TileAddress>& tiles
   std::mutex mutex;
   std::size_t finished = 0;
   ProgressReport report(context_, "regions");
-  parallel_for(regions.size(), threads_, [&](unsigned worker, std::size_t i) {
+  parallel_for(regions.size(), threads_, [&](std::size_t i, unsigned worker) {
     const Region& region = regions[i];
     const auto measure_part = [&](std::size_t number, const TileAddress& part) {
       context_.check_stop();

@@ -8,7 +8,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "base/vector.hpp"
 #include "tile/format/ellipsoid.hpp"

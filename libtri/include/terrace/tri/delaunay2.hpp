@@ -11,7 +11,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "terrace/tri/stop_check.hpp"
+#include <terrace/base/box.hpp>
+#include <terrace/base/stop_check.hpp>
 
 /// Dynamic Delaunay triangulation of the plane: exact, canonical, compact.
 ///
@@ -41,33 +42,14 @@ inline constexpr TriangleId kNoTriangle{0xFFFFFFFFu};
   return static_cast<std::uint32_t>(triangle);
 }
 
+using base::Box3;
 /// x, y and z or a height.
-using Point3 = std::array<double, 3>;
-
-/// A closed box. Empty when min > max on any axis.
-struct Box3 {
-  Point3 min{}, max{};
-  friend bool operator==(const Box3&, const Box3&) = default;
-};
+using base::Point3;
 
 /// The box of a region in the plane: any height is inside.
 constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return {{min_x, min_y, -kInfinity}, {max_x, max_y, kInfinity}};
-}
-/// Whether the boxes have a point in common; false if a bound is NaN.
-constexpr bool intersects(const Box3& a, const Box3& b) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!(a.min[i] <= b.max[i] && b.min[i] <= a.max[i])) return false;
-  }
-  return true;
-}
-/// Whether all of `inner` lies in `outer`.
-constexpr bool contains(const Box3& outer, const Box3& inner) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!(outer.min[i] <= inner.min[i] && inner.max[i] <= outer.max[i])) return false;
-  }
-  return true;
 }
 
 /// Where a point lies, see Delaunay2::locate().
@@ -203,7 +185,7 @@ class Delaunay2 {
   void reserve(std::size_t vertices);
   /// Sets what build() and insert() call at intervals. After it has thrown, the object can only be
   /// cleared or destroyed.
-  void set_check_stop(StopCheck check_stop);
+  void set_check_stop(base::StopCheck check_stop);
 
   // ---- Reading --------------------------------------------------------------------------------
 

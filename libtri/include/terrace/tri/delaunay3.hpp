@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/delaunay2.hpp"
 
 /// Dynamic Delaunay tetrahedralisation of space, the sibling of Delaunay2: exact, canonical,
@@ -112,7 +114,7 @@ class Delaunay3 {
   void reserve(std::size_t vertices);
   /// Sets what build() and insert() call at intervals, by their threads. After it has thrown, the
   /// object can only be cleared or destroyed.
-  void set_check_stop(StopCheck check_stop);
+  void set_check_stop(base::StopCheck check_stop);
 
   // ---- Reading --------------------------------------------------------------------------------
 

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/delaunay3.hpp"
 
 namespace terrace::tri {
@@ -68,7 +70,7 @@ class DynamicSurface {
   void reserve(std::size_t vertices);
   /// Sets what building, inserting and restoring call at intervals. After it has thrown, the object
   /// can only be destroyed.
-  void set_check_stop(StopCheck check_stop);
+  void set_check_stop(base::StopCheck check_stop);
 
   /// Brings the surface up to date. About 16 us per point that came or went; from scratch if most
   /// tetrahedra are new.

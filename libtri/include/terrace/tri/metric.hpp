@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
 
@@ -177,7 +179,7 @@ using TriangleFilter = std::function<bool(TriangleId)>;
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field,
-    const TriangleFilter& takes_part = {}, const StopCheck& check_stop = {});
+    const TriangleFilter& takes_part = {}, const base::StopCheck& check_stop = {});
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field, const Box3& window);

@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/metric.hpp"
 
@@ -160,7 +162,7 @@ class BasicShape3 {
   /// flood has lost.
   /// After check_stop has thrown, the shape can only be restored or destroyed.
   void restore(const Triangulation& triangulation, unsigned threads = 1,
-               const StopCheck& check_stop = {});
+               const base::StopCheck& check_stop = {});
 
   /// Updates the shape after changes of the triangulation that this object was restored from (or
   /// from its initial, empty state): the same result as restore(), at a cost that depends on the
@@ -240,7 +242,7 @@ struct RestoreOptions {
   std::optional<EllipticalMetric3> metric;
   /// 0: one per core. The result is the same for any number.
   unsigned threads = 1;
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 struct RestoredSurface {

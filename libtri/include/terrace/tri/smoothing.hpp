@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/interpolation.hpp"
 
@@ -36,7 +38,7 @@ struct SmoothingOptions {
   /// kBilateral: neighbours with at least this difference do not count, > 0, in the unit of
   /// heights.
   double edge_height = 0;
-  StopCheck check_stop = {};
+  base::StopCheck check_stop = {};
 };
 
 struct HeightChange {

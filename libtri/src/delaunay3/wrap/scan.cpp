@@ -2,6 +2,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <terrace/base/simd.hpp>
+
 namespace {
 
 constexpr std::size_t kLanes = 2;
@@ -25,13 +27,13 @@ std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
 }
 
 #ifdef TERRACE_TRI_X86
-ScanFunction scan_function(InstructionSet set) {
-  return set == InstructionSet::kAvx512 ? scan_avx512
-         : set == InstructionSet::kAvx2 ? scan_avx2
-                                        : scan_portable;
+ScanFunction scan_function(base::SimdPath set) {
+  return set == base::SimdPath::avx512 ? scan_avx512
+         : set == base::SimdPath::avx2 ? scan_avx2
+                                       : scan_portable;
 }
 #else
-ScanFunction scan_function(InstructionSet) { return scan_portable; }
+ScanFunction scan_function(base::SimdPath) { return scan_portable; }
 #endif
 
 }  // namespace terrace::tri::spatial

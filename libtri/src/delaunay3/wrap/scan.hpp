@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "instruction_set.hpp"
+#include <terrace/base/simd.hpp>
 
 /// The inner loop of filling a hole: the values of every vertex for a facet, in double.
 
@@ -40,7 +40,7 @@ using ScanFunction = std::size_t (*)(const ScanVertices& vertices, const ScanFac
                                      std::uint32_t* near);
 
 /// Requires a supported instruction set. The lists may differ where error bounds are met.
-ScanFunction scan_function(InstructionSet set);
+ScanFunction scan_function(base::SimdPath set);
 
 std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
                           std::uint32_t* near);

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "portable_math.hpp"
+#include <terrace/base/portable_math.hpp>
+#include <terrace/base/simd.hpp>
+
 #include "tin/grid/make.hpp"
 #include "window.hpp"
 
@@ -18,7 +20,7 @@ namespace {
 template <class T>
 class Checker {
  public:
-  Checker(const GridWindow<T>& window, double tolerance, InstructionSet set)
+  Checker(const GridWindow<T>& window, double tolerance, base::SimdPath set)
       : columns_(window.columns),
         rows_(window.rows),
         heights_(window.heights.data()),
@@ -35,9 +37,8 @@ class Checker {
     if (window_.tolerance > 0) {
       const Point3* const corner[4] = {&a, &b, &c, &a};
       for (int i = 0; i < 3; ++i)
-        triangle.margin[i] =
-            window_.tolerance * portable::length((*corner[i + 1])[0] - (*corner[i])[0],
-                                                 (*corner[i + 1])[1] - (*corner[i])[1]);
+        triangle.margin[i] = window_.tolerance * base::hypot((*corner[i + 1])[0] - (*corner[i])[0],
+                                                             (*corner[i + 1])[1] - (*corner[i])[1]);
     }
     if (scan_(window_, triangle, sums_)) count_missing(a, b, c);
     return area;
@@ -138,7 +139,7 @@ namespace tin {
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,
-                               double tolerance, InstructionSet set) {
+                               double tolerance, base::SimdPath set) {
   check_shape(window, "check_grid_tin");
   if (!(tolerance >= 0 && tolerance <= 1))
     throw std::invalid_argument("check_grid_tin: tolerance must be in [0, 1]");
@@ -156,10 +157,10 @@ GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Poin
 
 template GridTinCheck check_grid_tin_by(const GridWindow<float>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
-                                        InstructionSet);
+                                        base::SimdPath);
 template GridTinCheck check_grid_tin_by(const GridWindow<double>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
-                                        InstructionSet);
+                                        base::SimdPath);
 
 }  // namespace tin
 
@@ -167,7 +168,7 @@ template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
                             double tolerance) {
-  return tin::check_grid_tin_by(window, points, triangles, tolerance, best_instruction_set());
+  return tin::check_grid_tin_by(window, points, triangles, tolerance, base::best_simd_path());
 }
 
 template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<const Point3>,

@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/portable_math.hpp>
+
 #include "delaunay2/double_kernel.hpp"
-#include "portable_math.hpp"
 #include "terrace/tri/point_tin.hpp"
 
 namespace terrace::tri {
@@ -140,7 +141,7 @@ double height_at(const Point3& a, const Point3& b, const Point3& c, double x, do
   const Long wc = part(a, b);
   const Long sum = wa + wb + wc;
   if (sum > 0) return static_cast<double>((wa * a[2] + wb * b[2] + wc * c[2]) / sum);
-  const auto distance = [x, y](const Point3& p) { return portable::length(p[0] - x, p[1] - y); };
+  const auto distance = [x, y](const Point3& p) { return base::hypot(p[0] - x, p[1] - y); };
   if (distance(a) <= distance(b) && distance(a) <= distance(c)) return a[2];
   return distance(b) <= distance(c) ? b[2] : c[2];
 }

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/simd.hpp>
+
 #include "make.hpp"
 #include "samples.hpp"
 #include "tin/check/window.hpp"
@@ -121,7 +123,7 @@ GridTin result_of(const LatticeSurface<RasterSamples<T>>& surface, const GridTin
 
 template <class Real, class T>
 GridTin make(const GridWindow<T>& window, const GridSides& sides, const GridTinOptions& options,
-             InstructionSet set) {
+             base::SimdPath set) {
   RasterSamples<Real> samples(window, options, true, set);
   samples.judge_coarsely_first();
   std::vector<GridCorner<Real>> frame = frame_of(samples, sides);
@@ -134,7 +136,7 @@ GridTin make(const GridWindow<T>& window, const GridSides& sides, const GridTinO
 
 template <class T>
 GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
-                      const GridTinOptions& options, InstructionSet set) {
+                      const GridTinOptions& options, base::SimdPath set) {
   const Range range = check_window(window);
   check_options(options);
   check_side(sides.first_row, window.columns, "first_row");
@@ -150,9 +152,9 @@ GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
 }
 
 template GridTin make_grid_tin(const GridWindow<float>&, const GridSides&, const GridTinOptions&,
-                               InstructionSet);
+                               base::SimdPath);
 template GridTin make_grid_tin(const GridWindow<double>&, const GridSides&, const GridTinOptions&,
-                               InstructionSet);
+                               base::SimdPath);
 
 }  // namespace terrace::tri::tin
 
@@ -161,7 +163,7 @@ namespace terrace::tri {
 template <class T>
 GridTin grid_tin(const GridWindow<T>& window, const GridSides& sides,
                  const GridTinOptions& options) {
-  return tin::make_grid_tin(window, sides, options, best_instruction_set());
+  return tin::make_grid_tin(window, sides, options, base::best_simd_path());
 }
 
 template <class T>
@@ -172,7 +174,7 @@ GridTin grid_tin_of_points(const GridWindow<T>& window, std::size_t max_points,
   if (max_points < 4) throw std::invalid_argument("grid_tin_of_points: max_points is less than 4");
   GridTin result;
   if (window.columns > 1 && window.rows > 1 && range.data > 0) {
-    tin::RasterSamples<double> samples(window, options, false, best_instruction_set());
+    tin::RasterSamples<double> samples(window, options, false, base::best_simd_path());
     auto frame = tin::frame_of(samples, {});
     tin::LatticeSurface<tin::RasterSamples<double>> surface(std::move(samples), std::move(frame));
     surface.refine<tin::ErrorHeap>(max_points);

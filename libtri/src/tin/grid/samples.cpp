@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include <terrace/base/simd.hpp>
+
 #include "tin/lattice_surface.hpp"
 
 namespace terrace::tri::tin {
@@ -78,7 +80,7 @@ CarefulWorst careful_worst(const GridSamples<T>& samples, const GridCorner<T>& a
 template <class T>
 template <class Height>
 RasterSamples<T>::RasterSamples(const GridWindow<Height>& window, const GridTinOptions& options,
-                                bool sides_fixed, InstructionSet set)
+                                bool sides_fixed, base::SimdPath set)
     : columns_(static_cast<std::int32_t>(window.columns)),
       rows_(static_cast<std::int32_t>(window.rows)),
       bound_(options.max_error),
@@ -256,12 +258,12 @@ void RasterSamples<T>::publish(const Vertex& vertex, GridTin& tin) const {
 template class RasterSamples<float>;
 template class RasterSamples<double>;
 template RasterSamples<float>::RasterSamples(const GridWindow<float>&, const GridTinOptions&, bool,
-                                             InstructionSet);
+                                             base::SimdPath);
 template RasterSamples<float>::RasterSamples(const GridWindow<double>&, const GridTinOptions&, bool,
-                                             InstructionSet);
+                                             base::SimdPath);
 template RasterSamples<double>::RasterSamples(const GridWindow<float>&, const GridTinOptions&, bool,
-                                              InstructionSet);
+                                              base::SimdPath);
 template RasterSamples<double>::RasterSamples(const GridWindow<double>&, const GridTinOptions&,
-                                              bool, InstructionSet);
+                                              bool, base::SimdPath);
 
 }  // namespace terrace::tri::tin

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include <terrace/base/simd.hpp>
+
 #include "gaps.hpp"
 #include "scan.hpp"
 #include "terrace/tri/grid_tin.hpp"
@@ -29,7 +31,7 @@ class RasterSamples {
   /// `sides_fixed`: samples on the window's sides are not tested.
   template <class Height>
   RasterSamples(const GridWindow<Height>& window, const GridTinOptions& options, bool sides_fixed,
-                InstructionSet set);
+                base::SimdPath set);
   RasterSamples(RasterSamples&&) = default;
 
   /// From now on, in large triangles, a sample of every kGridCoarse-th column and row that is

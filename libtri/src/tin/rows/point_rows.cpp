@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/simd.hpp>
+
 #include "samples.hpp"
 #include "tin/lattice_surface.hpp"
 
@@ -64,7 +66,7 @@ namespace tin::rows {
 
 template <class Samples>
 PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
-                  const PointTinOptions& options, InstructionSet set) {
+                  const PointTinOptions& options, base::SimdPath set) {
   points::check_options(options, frame);
   check_sizes(samples);
   if (samples.z.size() > std::size_t{1} << 29)
@@ -87,20 +89,20 @@ PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
 }
 
 template PointTin make_tin(const SampleRows&, std::span<const Point3>, const PointTinOptions&,
-                           InstructionSet);
+                           base::SimdPath);
 template PointTin make_tin(const SampleGrid&, std::span<const Point3>, const PointTinOptions&,
-                           InstructionSet);
+                           base::SimdPath);
 
 }  // namespace tin::rows
 
 PointTin point_tin(const SampleRows& samples, std::span<const Point3> frame,
                    const PointTinOptions& options) {
-  return tin::rows::make_tin(samples, frame, options, best_instruction_set());
+  return tin::rows::make_tin(samples, frame, options, base::best_simd_path());
 }
 
 PointTin point_tin(const SampleGrid& samples, std::span<const Point3> frame,
                    const PointTinOptions& options) {
-  return tin::rows::make_tin(samples, frame, options, best_instruction_set());
+  return tin::rows::make_tin(samples, frame, options, base::best_simd_path());
 }
 
 }  // namespace terrace::tri

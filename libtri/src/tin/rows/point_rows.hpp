@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include <terrace/base/simd.hpp>
+
 #include "terrace/tri/point_tin.hpp"
 #include "tin/scan.hpp"
 
@@ -20,7 +22,7 @@ namespace rows {
 /// point_tin() for SampleRows or SampleGrid, with a given instruction set.
 template <class Samples>
 PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
-                  const PointTinOptions& options, InstructionSet set);
+                  const PointTinOptions& options, base::SimdPath set);
 
 }  // namespace rows
 }  // namespace terrace::tri::tin

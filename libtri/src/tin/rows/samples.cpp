@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include <terrace/base/simd.hpp>
+
 #include "tin/lattice.hpp"
 #include "tin/lattice_surface.hpp"
 
@@ -19,7 +21,7 @@ RowCorner corner(const PlacedSamples::Vertex& vertex) {
 }  // namespace
 
 PlacedSamples::PlacedSamples(PaddedSamples padded, const PointTinOptions& options,
-                             InstructionSet set)
+                             base::SimdPath set)
     : bound_(options.max_error),
       lattice_(*options.lattice),
       ground_(1, 1, static_cast<std::int64_t>(kFarthest), tangent_of(options.min_angle_degrees)),

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/simd.hpp>
+
 #include "places.hpp"
 #include "terrace/tri/point_tin.hpp"
 #include "tin/ground.hpp"
@@ -28,7 +30,7 @@ class PlacedSamples {
   static constexpr bool kBeside = true;
   static constexpr bool kThinDelaunay = true;
 
-  PlacedSamples(PaddedSamples padded, const PointTinOptions& options, InstructionSet set);
+  PlacedSamples(PaddedSamples padded, const PointTinOptions& options, base::SimdPath set);
 
   std::int32_t columns() const { return samples_.columns; }
   std::int32_t rows() const { return samples_.rows; }

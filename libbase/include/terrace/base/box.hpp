@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+/// Points and axis-aligned boxes, in a Cartesian frame and a unit chosen by the caller.
+
+namespace terrace::base {
+
+/// Standard types, so that points are the same types in every library of the workspace.
+using Point2 = std::array<double, 2>;
+using Point3 = std::array<double, 3>;
+
+/// An axis-aligned box, closed on all sides: a point on the border is inside. The default box is
+/// empty (min = +infinity, max = -infinity) and grows by include().
+template <std::size_t D>
+struct Box {
+  using Point = std::array<double, D>;
+
+  Point min = filled(std::numeric_limits<double>::infinity());
+  Point max = filled(-std::numeric_limits<double>::infinity());
+
+  /// True if no point is inside: min > max, or a bound is NaN, on some axis.
+  [[nodiscard]] constexpr bool empty() const {
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      if (!(min[axis] <= max[axis])) return true;
+    }
+    return false;
+  }
+  /// Extends the box to contain `p`. NaN coordinates leave it unchanged.
+  constexpr void include(const Point& p) {
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      // Not std::min(), whose references keep the box in memory.
+      min[axis] = p[axis] < min[axis] ? p[axis] : min[axis];
+      max[axis] = p[axis] > max[axis] ? p[axis] : max[axis];
+    }
+  }
+  /// Extends the box to contain `other`; an empty box changes nothing.
+  constexpr void include(const Box& other) {
+    if (other.empty()) return;
+    include(other.min);
+    include(other.max);
+  }
+  [[nodiscard]] constexpr bool contains(const Point& p) const {
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      if (!(min[axis] <= p[axis] && p[axis] <= max[axis])) return false;
+    }
+    return true;
+  }
+  /// True if all of `other` is inside; false if a bound is NaN.
+  [[nodiscard]] constexpr bool covers(const Box& other) const {
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      if (!(min[axis] <= other.min[axis] && other.max[axis] <= max[axis])) return false;
+    }
+    return true;
+  }
+  /// True if the boxes have a point in common; false if a bound is NaN.
+  [[nodiscard]] constexpr bool intersects(const Box& other) const {
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      if (!(min[axis] <= other.max[axis] && other.min[axis] <= max[axis])) return false;
+    }
+    return true;
+  }
+
+  friend constexpr bool operator==(const Box&, const Box&) = default;
+
+ private:
+  static constexpr Point filled(double value) {
+    Point point{};
+    point.fill(value);
+    return point;
+  }
+};
+
+using Box2 = Box<2>;
+using Box3 = Box<3>;
+
+/// The smallest box that contains all the points; empty without points.
+[[nodiscard]] constexpr Box2 box_of(std::span<const Point2> points) {
+  Box2 box;
+  for (const Point2& p : points) box.include(p);
+  return box;
+}
+[[nodiscard]] constexpr Box3 box_of(std::span<const Point3> points) {
+  Box3 box;
+  for (const Point3& p : points) box.include(p);
+  return box;
+}
+
+}  // namespace terrace::base
