@@ -14,27 +14,28 @@
 #include <terrace/base/box.hpp>
 #include <terrace/base/stop_check.hpp>
 
-/// Dynamic Delaunay triangulation of the plane: exact, canonical, compact.
+/// A dynamic Delaunay triangulation of the plane: exact, canonical, compact.
 ///
-/// The triangulation is a function of the point set alone. Ties of cocircular points are broken by
-/// a symbolic perturbation: points are lifted to the paraboloid and raised infinitesimally, the
-/// lexicographically larger (x, then y) infinitely more (O. Devillers, M. Teillaud, "Perturbations
-/// for Delaunay and weighted Delaunay 3D triangulations", doi:10.1016/j.comgeo.2010.09.010). So
-/// collapse after expand restores exactly the same triangles, in any order of operations.
+/// The triangulation is a function of the point set alone. A symbolic perturbation breaks the ties
+/// of cocircular points: all points are lifted to the paraboloid and raised infinitesimally, and
+/// lexicographically larger points (x first, then y) are raised infinitely more than smaller ones
+/// (O. Devillers, M. Teillaud, "Perturbations for Delaunay and weighted Delaunay 3D
+/// triangulations", doi:10.1016/j.comgeo.2010.09.010). A collapse after an expansion therefore
+/// restores exactly the same triangles, in whatever order the operations come.
 ///
 /// x grows to the right and y upwards; "left" and "counter-clockwise" refer to this frame.
 
 namespace terrace::tri {
 
-/// 32-bit handles: slot numbers. A vertex handle stays valid until its vertex is removed, a
-/// triangle handle until an operation removes the triangle; slots are then reused, the most
-/// recently freed blocks of 64 first. So data in plain arrays indexed by slot stays dense.
+/// Handles are 32-bit slot numbers. A vertex handle stays valid until its vertex is removed, a
+/// triangle handle until an operation removes the triangle. Freed slots are reused, the most
+/// recently freed blocks of 64 first, so plain arrays indexed by slot stay dense.
 enum class VertexId : std::uint32_t {};
 enum class TriangleId : std::uint32_t {};
 inline constexpr VertexId kNoVertex{0xFFFFFFFFu};
 inline constexpr TriangleId kNoTriangle{0xFFFFFFFFu};
 
-/// The slot of a handle, to index arrays.
+/// The slot of a handle, used as an array index.
 [[nodiscard]] constexpr std::uint32_t slot(VertexId vertex) {
   return static_cast<std::uint32_t>(vertex);
 }
@@ -46,33 +47,34 @@ using base::Box3;
 /// x, y and z or a height.
 using base::Point3;
 
-/// The box of a region in the plane: any height is inside.
+/// The box of a region in the plane; it has no limits in height.
 constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return {{min_x, min_y, -kInfinity}, {max_x, max_y, kInfinity}};
 }
 
-/// Where a point lies, see Delaunay2::locate().
+/// Position of a point relative to a triangulation, see Delaunay2::locate().
 enum class Place : std::uint8_t {
   kVertex,   ///< equal to a vertex
-  kEdge,     ///< inside an edge, hull edges included
+  kEdge,     ///< inside an edge, including hull edges
   kInside,   ///< inside a triangle
-  kOutside,  ///< outside the convex hull; anything but kVertex while there is no triangle
+  kOutside,  ///< outside the convex hull; without triangles, every point that is not a vertex
 };
 
 struct Location {
   Place place = Place::kOutside;
-  /// kVertex, kEdge, kInside: a triangle that contains the point (of two at an edge, either);
-  /// kOutside: a triangle at a hull edge that the point sees. kNoTriangle without triangles.
+  /// kVertex, kEdge, kInside: a triangle that contains the point (either of the two at an edge).
+  /// kOutside: a triangle at a hull edge that the point sees. kNoTriangle if there are no
+  /// triangles.
   TriangleId triangle = kNoTriangle;
-  /// kEdge, kOutside: the edge lies opposite to vertices(triangle)[edge].
+  /// kEdge, kOutside: the edge opposite to vertices(triangle)[edge].
   std::uint8_t edge = 0;
-  /// kVertex: that vertex. Otherwise a vertex of the triangle, useful as a hint; kNoVertex in an
-  /// empty triangulation.
+  /// kVertex: the vertex at the point. Otherwise a vertex of the triangle, useful as a hint;
+  /// kNoVertex in an empty triangulation.
   VertexId vertex = kNoVertex;
 };
 
-/// The slots in use of a triangulation as an input range, in ascending order. Any change of the
+/// The occupied slots of a triangulation as an input range, in ascending order. Any change of the
 /// triangulation invalidates it.
 template <class Triangulation, class Id>
 class AliveRange {
@@ -121,17 +123,19 @@ class AliveRange {
   std::uint32_t slots_;
 };
 
-/// The default metric of a triangulation; metric.hpp has elliptical ones.
+/// The default metric of a triangulation. Elliptical metrics are in metric.hpp.
 struct Euclidean {};
 
-/// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30); integer
-/// arithmetic only, the same on every machine. About 60 bytes per vertex.
-/// Coord = double: any finite coordinates; exact predicates, points are never moved. -0.0 and 0.0
-/// are equal. About 68 bytes per vertex.
-/// Metric = EllipticalMetric2, with doubles: see metric.hpp.
+/// A Delaunay triangulation in the plane.
 ///
-/// An empty set, one point, two, and collinear points are ordinary states without triangles.
-/// At most 2^29 - 2 vertices. Const functions may be called from several threads at once.
+/// - Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30). Uses integer
+///   arithmetic only, so results are the same on every machine. About 60 bytes per vertex.
+/// - Coord = double: any finite coordinates, with exact predicates. Points are never moved; -0.0
+///   and 0.0 are equal. About 68 bytes per vertex.
+/// - Metric = EllipticalMetric2 (with doubles): see metric.hpp.
+///
+/// Empty sets, one or two points, and collinear points are valid states without triangles. The
+/// limit is 2^29 - 2 vertices. Several threads may call const functions at once.
 template <class Coord, class Metric = Euclidean>
 class Delaunay2 {
  public:
@@ -145,7 +149,7 @@ class Delaunay2 {
   Delaunay2& operator=(Delaunay2&&) noexcept;
 
   // ---- Changing -------------------------------------------------------------------------------
-  // All throw std::invalid_argument naming the index of a coordinate that is not finite or out of
+  // All throw std::invalid_argument, naming the index, if a coordinate is not finite or out of
   // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged. After
   // std::bad_alloc the object can only be cleared or destroyed.
 
@@ -154,34 +158,35 @@ class Delaunay2 {
     bool created = false;  ///< false: `vertex` already existed, with the same coordinates
   };
 
-  /// Adds points to an empty triangulation, fast. Returns the vertex of each point, the same one
-  /// for equal points. O(n log n); besides the result 20 bytes per point for sorting, freed before
-  /// the triangles are made.
+  /// Adds points to an empty triangulation; much faster than insert(). Returns the vertex of each
+  /// point; equal points share a vertex. O(n log n). Needs 20 bytes per point for sorting besides
+  /// the result, freed before the triangles are made.
   std::vector<VertexId> build(std::span<const Point> points);
-  /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation, written
-  /// directly in canonical form: O(n), no predicates. The vertex of column i, row j is the returned
-  /// one + j * columns + i. step > 0. Doubles: x0 + i * step is computed with one rounding each for
-  /// product and sum; if these are not exact, std::invalid_argument (use build()). Euclidean metric
-  /// only.
+  /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation. Writes
+  /// the canonical triangles directly, in O(n) and without predicates. Returns the first vertex;
+  /// the vertex of column i, row j is that plus j * columns + i. Requires step > 0 and the
+  /// Euclidean metric. With doubles, product and sum in x0 + i * step are each rounded once; throws
+  /// std::invalid_argument if a result is not exact (use build() then).
   VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
                       std::uint32_t rows) requires std::is_same_v<Metric, Euclidean>;
-  /// hint: a vertex near the point, where the walk starts; kNoVertex: the last vertex used.
+  /// hint: a vertex near the point, where the walk starts, or kNoVertex for the last vertex used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
-  /// Inserts a set near the hint, in any order (it is sorted internally). results: one per point,
-  /// in the same order, or empty. Of equal points only one counts as created. If any point is
-  /// invalid, nothing is inserted.
+  /// Inserts a set of points near the hint, in any order (it is sorted internally). `results` is
+  /// empty or has one entry per point, in the same order. Only one of several equal points counts
+  /// as created. Inserts nothing if any point is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(VertexId vertex);
-  /// Removes a set (all different) as one hole (J. Skala, thesis, section 8.1); faster than
-  /// removing them one by one if the set is compact. Falls back to one by one if the hole cannot be
-  /// filled as a whole.
+  /// Removes a set of different vertices as one hole (J. Skala, thesis, section 8.1), which is
+  /// faster than removing them one by one if the set is compact. Removes them one by one if the
+  /// hole cannot be filled as a whole.
   void remove(std::span<const VertexId> vertices);
-  /// Removes everything and releases the memory; a journal continues.
+  /// Removes everything and releases the memory. A journal goes on recording.
   void clear();
-  /// Removes everything, keeps the memory and stops a journal: for one triangulation after another.
+  /// Removes everything, keeps the memory and stops a journal. Use it to build one triangulation
+  /// after another.
   void restart();
-  /// Reserves room for this many vertices without moving memory.
+  /// Reserves room for this many vertices, so that nothing is reallocated until then.
   void reserve(std::size_t vertices);
   /// Sets what build() and insert() call at intervals. After it has thrown, the object can only be
   /// cleared or destroyed.
@@ -191,22 +196,22 @@ class Delaunay2 {
 
   [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
-  /// Number of finite triangles: 0 while all points are collinear.
+  /// Number of finite triangles, 0 while all points are collinear.
   [[nodiscard]] std::size_t triangle_count() const;
   [[nodiscard]] Point point(VertexId vertex) const;
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;  ///< counter-clockwise
-  /// Neighbour opposite to vertices()[i]; kNoTriangle beyond the hull.
+  /// The neighbour opposite to vertices()[i], kNoTriangle beyond the hull.
   [[nodiscard]] std::array<TriangleId, 3> neighbours(TriangleId triangle) const;
-  /// A triangle at the vertex; kNoTriangle while there are no triangles. O(1).
+  /// A triangle at the vertex, kNoTriangle while there are no triangles. O(1).
   [[nodiscard]] TriangleId triangle_at(VertexId vertex) const;
-  /// Vertices joined to this one by an edge, counter-clockwise; for a hull vertex from its
-  /// successor on the hull to its predecessor. While all points are collinear: its neighbours on
-  /// the line.
+  /// Replaces `result` with the vertices that share an edge with this one, counter-clockwise. For a
+  /// hull vertex they run from its successor on the hull to its predecessor; while all points are
+  /// collinear they are its neighbours on the line.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
 
-  /// Upper bounds of vertex and triangle handles; they shrink only by clear() and when an empty
-  /// triangulation is built. Not every slot below is in use: some are free, and some belong to the
-  /// structure itself.
+  /// Upper bounds of vertex and triangle handles. They shrink only in clear() and when an empty
+  /// triangulation is built. Some slots below them are free, and some belong to the structure
+  /// itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t triangle_slots() const;
   [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle; false for kNoVertex
@@ -221,22 +226,22 @@ class Delaunay2 {
 
   /// Finds a point by a remembering stochastic walk (O. Devillers, S. Pion, M. Teillaud, "Walking
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
-  /// for insert(). About sqrt(n) steps from afar, a few from nearby.
+  /// for insert(). Takes about sqrt(n) steps from a distant hint, a few from a near one.
   [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point, the lexicographically smallest on ties; kNoVertex if empty.
-  /// Exact. Costs a walk.
+  /// The vertex nearest to the point; of equally near vertices the lexicographically smallest;
+  /// kNoVertex if empty. Exact. Costs a walk.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
-  /// A hash of the set of triangles by coordinates, or of the points while there are no triangles:
-  /// equal for equal point sets whatever their history. O(n).
+  /// A hash of the set of triangles by coordinates, or of the points while there are no triangles.
+  /// Equal point sets have equal hashes, whatever their history. O(n).
   [[nodiscard]] std::uint64_t hash() const;
-  /// Bytes of memory held, including unused capacity.
+  /// Allocated memory in bytes, including unused capacity.
   [[nodiscard]] std::size_t memory_bytes() const;
 
   // ---- Observing ------------------------------------------------------------------------------
 
-  /// The net difference between two moments: what existed at the first and not at the second, and
-  /// vice versa. A reused slot appears on both sides: apply removals first.
+  /// The net difference between two moments: what was removed and what was added in between. A
+  /// reused slot appears on both sides, so apply removals first.
   struct Changes {
     std::vector<VertexId> removed_vertices;
     std::vector<Point> removed_points;  ///< positions of removed_vertices, in parallel
@@ -248,12 +253,12 @@ class Delaunay2 {
     void clear();
   };
 
-  /// Starts recording and drops earlier records. While recording, a change costs some nanoseconds
-  /// per triangle; the journal holds 2 bits per vertex besides the records.
+  /// Starts recording and drops earlier records. While recording, a change costs a few nanoseconds
+  /// more per triangle; the journal needs 2 bits per vertex besides the records.
   void start_journal();
   void stop_journal();
-  /// The changes since start_journal() or the last call; recording continues. `changes` is
-  /// overwritten and its capacity reused. Requires a started journal. O(number of slots touched).
+  /// Replaces `changes` with the changes since start_journal() or the last call, reusing its
+  /// capacity. Recording continues. Requires a started journal. O(number of slots touched).
   void take_changes(Changes& changes);
 
  private:

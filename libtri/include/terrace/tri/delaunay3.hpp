@@ -12,17 +12,18 @@
 
 #include "terrace/tri/delaunay2.hpp"
 
-/// Dynamic Delaunay tetrahedralisation of space, the sibling of Delaunay2: exact, canonical,
+/// A dynamic Delaunay tetrahedralisation of space, the counterpart of Delaunay2: exact, canonical,
 /// compact.
 ///
-/// The tetrahedra are a function of the point set alone. Ties of cospherical points are broken by a
-/// symbolic perturbation: points are lifted to the paraboloid and raised infinitesimally, the
-/// lexicographically larger (x, then y, then z) infinitely more (O. Devillers, M. Teillaud,
-/// "Perturbations for Delaunay and weighted Delaunay 3D triangulations",
-/// doi:10.1016/j.comgeo.2010.09.010); flat tetrahedra do not arise. So removal after insertion
-/// restores exactly the same tetrahedra, in any order of operations.
+/// The tetrahedra are a function of the point set alone. A symbolic perturbation breaks the ties of
+/// cospherical points: all points are lifted to the paraboloid and raised infinitesimally, and
+/// lexicographically larger points (x first, then y, then z) are raised infinitely more than
+/// smaller ones (O. Devillers, M. Teillaud, "Perturbations for Delaunay and weighted Delaunay 3D
+/// triangulations", doi:10.1016/j.comgeo.2010.09.010). Flat tetrahedra do not arise. A removal
+/// after an insertion therefore restores exactly the same tetrahedra, in whatever order the
+/// operations come.
 ///
-/// Four corners a, b, c, d are in order if det(b - a, c - a, d - a) > 0: seen from d, the corners
+/// Four corners a, b, c, d are "in order" if det(b - a, c - a, d - a) > 0: seen from d, the corners
 /// a, b, c turn counter-clockwise in a right-handed frame.
 
 namespace terrace::tri {
@@ -35,37 +36,39 @@ inline constexpr TetrahedronId kNoTetrahedron{0xFFFFFFFFu};
   return static_cast<std::uint32_t>(tetrahedron);
 }
 
-/// Where a point lies, see Delaunay3::locate().
+/// Position of a point relative to the tetrahedra, see Delaunay3::locate().
 enum class Place3 : std::uint8_t {
   kVertex,   ///< equal to a vertex
-  kEdge,     ///< inside an edge, including those of the hull
-  kFacet,    ///< inside a facet, including those of the hull
+  kEdge,     ///< inside an edge, including hull edges
+  kFacet,    ///< inside a facet, including hull facets
   kInside,   ///< inside a tetrahedron
-  kOutside,  ///< outside the convex hull; anything but kVertex while there is no tetrahedron
+  kOutside,  ///< outside the convex hull; without tetrahedra, every point that is not a vertex
 };
 
 struct Location3 {
   Place3 place = Place3::kOutside;
-  /// kVertex, kEdge, kFacet, kInside: a tetrahedron that contains the point (of several, any);
-  /// kOutside: one at a hull facet that the point sees. kNoTetrahedron if there are none.
+  /// kVertex, kEdge, kFacet, kInside: a tetrahedron that contains the point (any of several).
+  /// kOutside: a tetrahedron at a hull facet that the point sees. kNoTetrahedron if there are none.
   TetrahedronId tetrahedron = kNoTetrahedron;
-  /// kFacet, kOutside: the facet lies opposite to vertices(tetrahedron)[corner[0]]; kEdge: the edge
+  /// kFacet, kOutside: the facet opposite to vertices(tetrahedron)[corner[0]]. kEdge: the edge
   /// joins the two corners other than corner[0] and corner[1].
   std::array<std::uint8_t, 2> corner = {0, 0};
-  /// kVertex: that vertex. Otherwise a vertex of the tetrahedron, useful as a hint; kNoVertex in an
-  /// empty triangulation.
+  /// kVertex: the vertex at the point. Otherwise a vertex of the tetrahedron, useful as a hint;
+  /// kNoVertex in an empty triangulation.
   VertexId vertex = kNoVertex;
 };
 
-/// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30).
-/// Coord = double: any finite coordinates; exact predicates, points are never moved. -0.0 and 0.0
-/// are equal.
-/// Metric = EllipticalMetric3, with doubles: see metric.hpp.
+/// A Delaunay triangulation in space.
 ///
-/// An empty set, one point, two, and collinear or coplanar points are ordinary states without
-/// tetrahedra. In these an insertion or removal of one vertex costs O(n) moves of 4 bytes.
-/// At most 2^29 - 2 vertices and 2^30 - 2 tetrahedra, including those that belong to the structure
-/// itself. Const functions may be called from several threads at once.
+/// - Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30).
+/// - Coord = double: any finite coordinates, with exact predicates. Points are never moved; -0.0
+///   and 0.0 are equal.
+/// - Metric = EllipticalMetric3 (with doubles): see metric.hpp.
+///
+/// Empty sets, one or two points, and collinear or coplanar points are valid states without
+/// tetrahedra; in these, inserting or removing one vertex moves O(n) entries of 4 bytes. The limits
+/// are 2^29 - 2 vertices and 2^30 - 2 tetrahedra, including those that belong to the structure
+/// itself. Several threads may call const functions at once.
 template <class Coord, class Metric = Euclidean>
 class Delaunay3 {
  public:
@@ -79,9 +82,9 @@ class Delaunay3 {
   Delaunay3& operator=(Delaunay3&&) noexcept;
 
   // ---- Changing -------------------------------------------------------------------------------
-  // All throw std::invalid_argument naming the index of a coordinate that is not finite or out of
+  // All throw std::invalid_argument, naming the index, if a coordinate is not finite or out of
   // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged. After
-  // std::bad_alloc, and std::length_error beyond 2^30 - 2 tetrahedra (which many vertices on two
+  // std::bad_alloc, or std::length_error beyond 2^30 - 2 tetrahedra (which many vertices on two
   // curves can make), the object can only be cleared or destroyed.
 
   struct Insertion {
@@ -89,28 +92,31 @@ class Delaunay3 {
     bool created = false;  ///< false: `vertex` already existed, with the same coordinates
   };
 
-  /// Adds points to an empty triangulation, fast. Returns the vertex of each point, the same one
-  /// for equal points. O(n log n) for points spread like those of a volume or a surface; besides
-  /// the result 20 bytes per point for sorting, freed before the tetrahedra are made. More than two
-  /// threads do not help; the result, handles included, is the same for any number.
+  /// Adds points to an empty triangulation; much faster than insert(). Returns the vertex of each
+  /// point; equal points share a vertex. O(n log n) for points that fill a volume or a surface.
+  /// Needs 20 bytes per point for sorting besides the result, freed before the tetrahedra are made.
+  /// More than two threads do not help; the result, handles included, does not depend on their
+  /// number.
   std::vector<VertexId> build(std::span<const Point> points, unsigned threads = 1);
-  /// hint: a vertex near the point, where the walk starts; kNoVertex: the last vertex used.
+  /// hint: a vertex near the point, where the walk starts, or kNoVertex for the last vertex used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
-  /// Inserts a set near the hint, in any order (it is sorted internally). results: one per point,
-  /// in the same order, or empty. Of equal points only one counts as created. If any point is
-  /// invalid, nothing is inserted.
+  /// Inserts a set of points near the hint, in any order (it is sorted internally). `results` is
+  /// empty or has one entry per point, in the same order. Only one of several equal points counts
+  /// as created. Inserts nothing if any point is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
-  /// Usually changes only the tetrahedra at the vertex. But if the hole left by it (or by a very
-  /// large set) has so many vertices that filling it would cost more than a rebuild, all tetrahedra
-  /// are rebuilt: vertices keep their handles, tetrahedra do not.
+  /// Usually changes only the tetrahedra at the vertex. If the hole that the vertex (or a very
+  /// large set) leaves has so many vertices that filling it would cost more than a rebuild, all
+  /// tetrahedra are rebuilt; vertices then keep their handles and tetrahedra do not.
   void remove(VertexId vertex);
-  /// Removes a set (all different): the space of its tetrahedra is filled as a whole, around any
-  /// other vertices inside it. Two to five times as fast as one by one if the set is compact.
+  /// Removes a set of different vertices. Fills the space of their tetrahedra as a whole, around
+  /// any other vertices inside it. Two to five times as fast as removing them one by one if the set
+  /// is compact.
   void remove(std::span<const VertexId> vertices);
-  /// Removes everything and releases the memory; a journal continues.
+  /// Removes everything and releases the memory. A journal goes on recording.
   void clear();
-  /// Reserves room for this many vertices, spread in space, without moving memory.
+  /// Reserves room for this many vertices, distributed in space, so that nothing is reallocated
+  /// until then.
   void reserve(std::size_t vertices);
   /// Sets what build() and insert() call at intervals, by their threads. After it has thrown, the
   /// object can only be cleared or destroyed.
@@ -120,23 +126,25 @@ class Delaunay3 {
 
   [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
-  /// Number of finite tetrahedra: 0 while all points are coplanar. O(1).
+  /// Number of finite tetrahedra, 0 while all points are coplanar. O(1).
   [[nodiscard]] std::size_t tetrahedron_count() const;
   [[nodiscard]] Point point(VertexId vertex) const;
-  /// In order, as defined above.
+  /// The corners in order, as defined above.
   [[nodiscard]] std::array<VertexId, 4> vertices(TetrahedronId tetrahedron) const;
-  /// Neighbour opposite to vertices()[i]; kNoTetrahedron beyond the hull.
+  /// The neighbour opposite to vertices()[i], kNoTetrahedron beyond the hull.
   [[nodiscard]] std::array<TetrahedronId, 4> neighbours(TetrahedronId tetrahedron) const;
-  /// A tetrahedron at the vertex; kNoTetrahedron while there are no tetrahedra. O(1).
+  /// A tetrahedron at the vertex, kNoTetrahedron while there are no tetrahedra. O(1).
   [[nodiscard]] TetrahedronId tetrahedron_at(VertexId vertex) const;
-  /// Vertices joined to this one by an edge, by slot. Empty while all points are coplanar.
+  /// Replaces `result` with the vertices that share an edge with this one, sorted by slot. Empty
+  /// while all points are coplanar.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
-  /// Tetrahedra that have this corner, by slot. Empty while all points are coplanar.
+  /// Replaces `result` with the tetrahedra that have this corner, sorted by slot. Empty while all
+  /// points are coplanar.
   void tetrahedra_at(VertexId vertex, std::vector<TetrahedronId>& result) const;
 
-  /// Upper bounds of vertex and tetrahedron handles; they shrink only by clear() and when an empty
-  /// triangulation is built. Not every slot below is in use: some are free, and some belong to the
-  /// structure itself.
+  /// Upper bounds of vertex and tetrahedron handles. They shrink only in clear() and when an empty
+  /// triangulation is built. Some slots below them are free, and some belong to the structure
+  /// itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t tetrahedron_slots() const;
   [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle; false for kNoVertex
@@ -151,22 +159,22 @@ class Delaunay3 {
 
   /// Finds a point by a remembering visibility walk (O. Devillers, S. Pion, M. Teillaud, "Walking
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
-  /// for insert(). About the cube root of n steps from afar, a few from nearby.
+  /// for insert(). Takes about the cube root of n steps from a distant hint, a few from a near one.
   [[nodiscard]] Location3 locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point, the lexicographically smallest on ties; kNoVertex if empty.
-  /// Exact. Costs a walk; O(n) while all points are coplanar.
+  /// The vertex nearest to the point; of equally near vertices the lexicographically smallest;
+  /// kNoVertex if empty. Exact. Costs a walk, or O(n) while all points are coplanar.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
   /// A hash of the set of tetrahedra by coordinates, or of the points while there are no
-  /// tetrahedra: equal for equal point sets whatever their history. O(n).
+  /// tetrahedra. Equal point sets have equal hashes, whatever their history. O(n).
   [[nodiscard]] std::uint64_t hash() const;
-  /// Bytes of memory held, including unused capacity.
+  /// Allocated memory in bytes, including unused capacity.
   [[nodiscard]] std::size_t memory_bytes() const;
 
   // ---- Observing ------------------------------------------------------------------------------
 
-  /// The net difference between two moments: what existed at the first and not at the second, and
-  /// vice versa. A reused slot appears on both sides: apply removals first.
+  /// The net difference between two moments: what was removed and what was added in between. A
+  /// reused slot appears on both sides, so apply removals first.
   struct Changes {
     std::vector<VertexId> removed_vertices;
     std::vector<Point> removed_points;  ///< positions of removed_vertices, in parallel
@@ -178,12 +186,12 @@ class Delaunay3 {
     void clear();
   };
 
-  /// Starts recording and drops earlier records. While recording, a change costs some nanoseconds
-  /// per tetrahedron; the journal holds a bit per slot besides the records.
+  /// Starts recording and drops earlier records. While recording, a change costs a few nanoseconds
+  /// more per tetrahedron; the journal needs one bit per slot besides the records.
   void start_journal();
   void stop_journal();
-  /// The changes since start_journal() or the last call; recording continues. `changes` is
-  /// overwritten and its capacity reused. Requires a started journal. O(number of slots touched).
+  /// Replaces `changes` with the changes since start_journal() or the last call, reusing its
+  /// capacity. Recording continues. Requires a started journal. O(number of slots touched).
   void take_changes(Changes& changes);
 
  private:

@@ -12,7 +12,7 @@
 
 namespace terrace::tri {
 
-/// Vertices that slide, as columns: vertices[i] goes from start[i] to end[i].
+/// Sliding vertices, in columns: vertices[i] moves from start[i] to end[i].
 struct Slides {
   std::vector<VertexId> vertices;
   std::vector<Point3> start, end;
@@ -30,32 +30,33 @@ struct Slides {
   }
 };
 
-/// A place that has gone from the surface and slides onto it: `end` is on the triangle `on`;
-/// kNoTriangle: on none, for good.
+/// A position that has left the surface and slides onto it. `end` is on the triangle `on`; with
+/// kNoTriangle it is on none and stays so.
 struct Anchor {
   Point3 place{}, end{};
   TriangleId on = kNoTriangle;
   bool moved = false;  ///< by the last step
 };
 
-/// How a surface slides over a step instead of popping: start and end positions of each vertex that
-/// came or went or whose height changed.
+/// The slides that turn a step into a smooth transition instead of a pop: start and end positions
+/// of each vertex that was added or removed or whose height changed.
 ///
-/// A new vertex starts on the surface before the step and ends at its own place: draw the new
-/// triangles with `added` and `reassigned` going from start to end. A removed vertex goes from its
-/// place to the surface after the step: a renderer that draws the old triangles until the slide is
-/// over moves `removed`, and `reassigned`, in the same way. Collapse mirrors expand: a step and its
-/// inverse give the same slides with start and end exchanged.
+/// A new vertex starts on the surface before the step and ends at its own position: draw the new
+/// triangles while `added` and `reassigned` move from start to end. A removed vertex moves from its
+/// position to the surface after the step: a renderer that draws the old triangles until the end of
+/// the slide moves `removed` and `reassigned` in the same way. A collapse mirrors an expansion: a
+/// step and its inverse give the same slides with start and end exchanged.
 ///
-/// Over the plane (Delaunay2) x and y do not change; a vertex outside the other surface (the hull
-/// grew, or there were no triangles) stays at its own height.
+/// Over the plane (Delaunay2) x and y do not change. A vertex outside the other surface (because
+/// the hull grew, or because there were no triangles) keeps its own height.
 ///
-/// In space (DynamicSurface) it goes to the nearest place on the triangles that the step has
-/// exchanged, of the connected part that it is in, so that it does not cross to the other side of a
-/// thin body; it stays at its own place if there are none. `added` and `removed` are the vertices
-/// that came to the surface and left it: a few of these are in the tetrahedra before and after.
-/// `reassigned` is empty: places do not change. The law of the inverse holds as far as the surface
-/// follows it, which in a few pockets depends on how its points came.
+/// In space (DynamicSurface) a vertex moves to the nearest point on the triangles that the step
+/// exchanged within the vertex's own connected part, so it does not cross to the other side of a
+/// thin body. Without such triangles it keeps its position. `added` and `removed` are the vertices
+/// that joined and left the surface; a few of these have tetrahedra before and after. `reassigned`
+/// is empty because positions do not change. The slides of an inverse step mirror those of the step
+/// wherever the surface itself returns; in a few pockets it depends on the order in which its
+/// points came.
 template <class Triangulation>
 class Geomorph {
  public:
@@ -66,23 +67,25 @@ class Geomorph {
 
   Slides added, removed, reassigned;
 
-  /// The connected parts of the step: what a part exchanges can be drawn as before while others are
-  /// drawn as after. The number of the part, less than `count`, that each of the delta's triangles
-  /// and each vertex of `added` and `removed` belongs to.
+  /// The connected parts of the step. The triangles that a part exchanges may be drawn as before
+  /// the step while those of other parts are drawn as after it. The arrays hold the number of the
+  /// part, less than `count`, that each of the delta's triangles and each vertex of `added` and
+  /// `removed` belongs to.
   struct Parts {
     std::size_t count = 0;
     std::vector<std::uint32_t> removed_triangles, added_triangles, removed, added;
   };
-  /// Empty without with_removed, as is the triangle that each of `removed` goes to.
+  /// Empty without with_removed, as is the list of triangles to which the vertices of `removed`
+  /// move.
   Parts parts;
   std::vector<TriangleId> removed_on;
 
-  /// delta: of the model's last step, which over the plane needs ModelOptions::old_heights.
-  /// Replaces slides and parts. with_removed: false leaves `removed` empty, for renderers that do
-  /// not draw what has gone. anchors: of earlier steps; those whose triangle has gone are moved to
-  /// what replaces it, where their place is projected likewise. O(n log n) in the size of the
-  /// delta, 0.7 us per vertex in space. Throws std::invalid_argument for a delta over the plane
-  /// without heights.
+  /// Replaces slides and parts by those of the model's last step, `delta`, which over the plane
+  /// needs ModelOptions::old_heights. with_removed: false leaves `removed` empty, for renderers
+  /// that do not draw removed triangles. anchors: the anchors of earlier steps; those whose
+  /// triangle was removed move to the triangles that replace it and are projected onto them in the
+  /// same way. O(n log n) in the size of the delta, 0.7 us per vertex in space. Throws
+  /// std::invalid_argument for a delta over the plane without heights.
   void make(const Model& model, const typename Model::Delta& delta, bool with_removed = true,
             std::span<Anchor> anchors = {});
 

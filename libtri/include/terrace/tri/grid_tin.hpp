@@ -7,26 +7,26 @@
 #include <span>
 #include <vector>
 
-/// TINs of raster windows, within an error bound at every sample.
+/// Builds TINs of raster windows, within an error bound at every sample.
 ///
-/// M. Garland, P. S. Heckbert, "Fast polygonal approximation of terrains and height fields",
-/// CMU-CS-95-181 (greedy insertion), followed by the removal of vertices that later ones made
-/// superfluous.
+/// Vertices are inserted greedily (M. Garland, P. S. Heckbert, "Fast polygonal approximation of
+/// terrains and height fields", CMU-CS-95-181); vertices that later ones made superfluous are then
+/// removed.
 ///
-/// A large raster is cut into windows that share their sides: the last column of one is the first
-/// column of the next. The vertices on a side depend only on the samples near that side
+/// Cut a large raster into windows that share their sides: the last column of one window is the
+/// first column of the next. The vertices on a side depend only on the samples near that side
 /// (settle_side()), so windows fit together without cracks and may be made in any order, each in
-/// its own thread. Nothing here keeps state or starts threads.
+/// its own thread. These functions keep no state and start no threads.
 ///
-/// No triangle contains a sample without data, and every sample with data lies in a triangle if its
-/// 8 neighbours (as far as they are in the window) have data too. In between, the boundary may run
-/// anywhere: land less than three samples wide can vanish.
+/// No triangle contains a sample without data. Every sample with data is in a triangle if its 8
+/// neighbours (those within the window) have data too. Elsewhere the boundary is arbitrary: land
+/// less than three samples wide can vanish.
 
 namespace terrace::tri {
 
 using Point3 = std::array<double, 3>;
 
-/// Samples on a lattice, row by row. A height that is not finite means that there is no data.
+/// Samples on a lattice, row by row. A height that is not finite marks missing data.
 template <class T>
 struct GridWindow {
   std::uint32_t columns = 0;
@@ -41,22 +41,22 @@ struct GridTinCheck {
   std::size_t covered = 0;                  ///< samples with data in a triangle
   std::size_t uncovered = 0;                ///< samples with data outside all triangles
   std::vector<std::uint32_t> uncovered_at;  ///< uncovered samples, numbered row by row
-  /// Uncovered samples whose 8 neighbours (as far as they are in the window) have data.
+  /// Uncovered samples whose 8 neighbours (those within the window) have data.
   std::size_t uncovered_inner = 0;
   std::size_t nodata_covered = 0;  ///< samples without data in a triangle
   std::size_t turned = 0;  ///< triangles without area, or oriented opposite to the first one
 };
 
 /// Measures every sample in every triangle, including its sides and corners, in double. Points are
-/// column, row and height, not necessarily on the lattice: the values read back from a file, which
-/// may have been rounded. `tolerance`, in cells, is how far they may have moved: a sample no
-/// farther than this outside a triangle counts as covered by it and is measured against its plane;
-/// samples without data count only inside. Time O(samples + triangles + points); memory: one byte
+/// column, row and height; they need not be on the lattice, as values read back from a file may
+/// have been rounded. `tolerance` is how far they may have moved, in cells: a sample within this
+/// distance outside a triangle counts as covered by it and is measured against its plane. Samples
+/// without data count only inside triangles. Time O(samples + triangles + points); memory: one byte
 /// per sample and four per uncovered sample.
 ///
-/// Throws std::invalid_argument for `heights` of the wrong length, a corner that is not a point's
-/// number, a point that is not finite or whose column or row is more than 2^20 outside the window,
-/// and a tolerance that is not in [0, 1].
+/// Throws std::invalid_argument if `heights` has the wrong length, if a corner is not the number of
+/// a point, if a point is not finite or its column or row is more than 2^20 outside the window, and
+/// if the tolerance is not in [0, 1].
 template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
@@ -67,26 +67,25 @@ extern template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<
 extern template GridTinCheck check_grid_tin(const GridWindow<double>&, std::span<const Point3>,
                                             std::span<const std::array<std::uint32_t, 3>>, double);
 
-/// How much effort to spend on fewer triangles.
+/// How much work to spend on reducing the number of triangles.
 enum class TinQuality : std::uint8_t {
   kGreedy,   ///< insertion only: a Delaunay triangulation of its vertices, except at settled sides
   kRemoval,  ///< then one pass of removals within the bound: about 0.6 of the triangles
-  kFitted,   ///< then heights are moved within the bound, which allows a second pass to remove more
+  kFitted,   ///< then moves heights within the bound, so that a second pass can remove more
 };
 
 struct GridTinOptions {
-  /// The bound, >= 0, in the unit of heights. Bounds below about 2^-45 of the range of heights
+  /// The error bound, >= 0, in the unit of heights. Bounds below about 2^-45 of the height range
   /// cannot be distinguished from 0; see `max_error` of the result.
   double max_error = 0;
   TinQuality quality = TinQuality::kRemoval;
-  /// Signed distance on the ground from one column and one row to the next, in the same unit and
-  /// not 0: east and north are positive, so row_step is negative if the first row is the
-  /// northernmost. Angles and empty circles are those on the ground, with the squares of steps
-  /// rounded to 1 / 1024 of the larger one. Triangles are counter-clockwise on the ground, seen
-  /// from above.
+  /// Signed distance on the ground from one column and one row to the next, in the same unit, not
+  /// 0. East and north are positive, so row_step is negative if the first row is the northernmost.
+  /// Angles and empty circles are measured on the ground, with the squares of the steps rounded to
+  /// 1 / 1024 of the larger one. Triangles are counter-clockwise on the ground, seen from above.
   double column_step = 1;
   double row_step = -1;
-  /// Measures the errors of the result. Unnecessary if the caller checks the written file.
+  /// Measures the errors of the result. Not needed if the caller checks the written file.
   bool measure = true;
 };
 
@@ -101,7 +100,7 @@ struct GridSides {
 struct GridVertex {
   std::uint32_t column = 0;
   std::uint32_t row = 0;
-  double height = 0;  ///< the sample's, exact for T = float; with kFitted, a value of type T
+  double height = 0;  ///< the sample's height, exact for T = float; with kFitted, a value of type T
 
   bool operator==(const GridVertex&) const = default;
 };
@@ -109,47 +108,48 @@ struct GridVertex {
 struct GridTin {
   std::vector<GridVertex> vertices;  ///< each in at least one triangle
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  /// From check_grid_tin(); without `measure` only the number of samples with data is set.
+  /// The result of check_grid_tin(). Without `measure`, only the number of samples with data is
+  /// set.
   GridTinCheck check;
 };
 
-/// The vertices on a side of a window, or on any line of samples. The line is simplified to within
-/// slightly less than `max_error`, greatest error first; both ends are vertices. `beside` and
-/// `other_beside` are the adjacent lines on either side, equally long, or empty where the raster
-/// ends (or has data everywhere): a sample with data is a vertex if a neighbour on any of the three
-/// lines has no data. Both windows at a side must pass the same three lines; the order of the last
-/// two does not matter. Usually O(n log n).
+/// Chooses the vertices on a side of a window, or on any line of samples. Simplifies the line to
+/// within slightly less than `max_error`, greatest error first; both ends are vertices. `beside`
+/// and `other_beside` are the adjacent lines on either side. They have the same length, or are
+/// empty where the raster ends (or has data everywhere). A sample with data is a vertex if a
+/// neighbour on any of the three lines has no data. Both windows that share a side must pass the
+/// same three lines; the order of the last two does not matter. Usually O(n log n).
 ///
-/// Throws std::invalid_argument for lines of different lengths, heights beyond 1e150 and a bound
+/// Throws std::invalid_argument for lines of different lengths, heights beyond 1e150, and a bound
 /// that is negative or NaN.
 template <class T>
 std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> beside,
                                        std::span<const T> other_beside, double max_error);
 
-/// The vertices on all four sides of a window without neighbours.
+/// Chooses the vertices on all four sides of a window without neighbours.
 template <class T>
 GridSides settle_sides(const GridWindow<T>& window, double max_error);
 
-/// A TIN with the vertices `sides` on its sides, within the bound at every sample that it covers. T
-/// is float (which also holds integers of 24 bits) or double. A window of one row or column has no
-/// triangles. About a microsecond per vertex inserted (a third less with kGreedy, half as much
-/// again with kFitted); about twice as many are inserted as remain. Memory: about 190 bytes per
-/// vertex inserted, and 4 or 8 per sample (7 or 11 if data is missing).
+/// Builds a TIN with the vertices `sides` on its sides, within the bound at every sample that it
+/// covers. T is float (which also holds integers of 24 bits) or double. A window of one row or
+/// column has no triangles. Takes about a microsecond per vertex inserted (a third less with
+/// kGreedy, half as much again with kFitted); about twice as many vertices are inserted as remain.
+/// Memory: about 190 bytes per vertex inserted, and 4 or 8 per sample (7 or 11 if data is missing).
 ///
-/// Deterministic: the same bytes on every processor.
+/// Deterministic: gives the same bytes on every processor.
 ///
-/// Throws std::invalid_argument for a window without samples or of more than 65,535 columns or
-/// rows, for `heights` of the wrong length, heights beyond 1e150, sides that are not ascending from
-/// end to end, and options out of range.
+/// Throws std::invalid_argument for a window without samples or with more than 65,535 columns or
+/// rows, for `heights` of the wrong length, heights beyond 1e150, sides that do not ascend from end
+/// to end, and options out of range.
 template <class T>
 GridTin grid_tin(const GridWindow<T>& window, const GridSides& sides,
                  const GridTinOptions& options);
 
-/// A TIN of at most `max_points` vertices, including the 4 corners: each is inserted where the
-/// error is greatest. Its error is `check.max_error` (with options.measure). Insertion stops early
-/// if options.max_error is reached; options.quality is ignored. With too few points to separate
-/// data from missing data, samples with data remain uncovered (check.uncovered_inner). Throws as
-/// grid_tin() does, and for max_points < 4.
+/// Builds a TIN of at most `max_points` vertices, including the 4 corners, by inserting each vertex
+/// where the error is greatest. The resulting error is `check.max_error` (with options.measure).
+/// Insertion stops early once options.max_error is reached; options.quality is ignored. If there
+/// are too few points to separate data from missing data, some samples with data remain uncovered
+/// (check.uncovered_inner). Throws as grid_tin() does, and for max_points < 4.
 template <class T>
 GridTin grid_tin_of_points(const GridWindow<T>& window, std::size_t max_points,
                            const GridTinOptions& options);

@@ -13,7 +13,8 @@
 
 #include "terrace/tri/delaunay2.hpp"
 
-/// Heights, slopes and aspects anywhere on a triangulation. x grows to the east and y to the north.
+/// Heights, slopes and aspects at any position on a triangulation. x grows to the east and y to the
+/// north.
 
 namespace terrace::tri {
 
@@ -25,12 +26,12 @@ concept HasHeights = requires(const T& t, VertexId vertex) {
   { t.height(vertex) } -> std::convertible_to<double>;
 };
 
-/// A function from vertex to height.
+/// A function that returns the height of a vertex.
 template <class T>
 concept HeightFunction = std::is_invocable_r_v<double, const T&, VertexId>;
 
 /// The heights of vertices: an array indexed by slot(vertex), a function, or an object with a
-/// member function height(VertexId). Like std::span it refers to its argument, so use it for
+/// member function height(VertexId). It refers to its argument as std::span does, so use it for
 /// parameters only. With several threads the function is called concurrently.
 class Heights {
  public:
@@ -53,7 +54,7 @@ class Heights {
   double operator()(VertexId vertex) const {
     return call_ == nullptr ? values_[slot(vertex)] : call_(object_, vertex);
   }
-  /// The length of the array; no limit for functions.
+  /// The length of the array; unlimited for functions.
   [[nodiscard]] std::size_t slots() const { return slots_; }
 
  private:
@@ -64,12 +65,13 @@ class Heights {
 };
 
 enum class Interpolation : std::uint8_t {
-  /// The nearest vertex, also outside the hull; the lexicographically smallest on ties.
+  /// The nearest vertex, also outside the hull; of equally near vertices the lexicographically
+  /// smallest.
   kNearest,
   /// Barycentric coordinates in the triangle.
   kLinear,
-  /// R. Sibson, "A vector identity for the Dirichlet tessellation", doi:10.1017/S0305004100056589:
-  /// the areas that the query's Voronoi cell would take from the cells of its neighbours.
+  /// The areas that the query's Voronoi cell would take from the cells of its neighbours (R.
+  /// Sibson, "A vector identity for the Dirichlet tessellation", doi:10.1017/S0305004100056589).
   /// Continuous, smooth except at vertices, and independent of how cocircular points are
   /// triangulated.
   kNaturalNeighbour,
@@ -80,17 +82,18 @@ struct VertexWeight {
   double weight = 0;
 };
 
-/// The weights of the vertices that interpolate at a query: they are >= 0, their sum is 1, and
-/// (except with kNearest) the weighted mean of the vertices is the query. Empty outside the hull
-/// (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as inside, decided
-/// exactly; if all points are on one line, it is the segment between the outermost. On a vertex
-/// only that vertex has a weight, on a hull edge only its two ends.
+/// Computes the weights of the vertices that interpolate at a query. They are >= 0, their sum is 1,
+/// and (except with kNearest) the weighted mean of the vertices is the query. There are none
+/// outside the hull (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as
+/// inside, decided exactly; if all points are collinear, the hull is the segment between the
+/// outermost ones. On a vertex only that vertex has a weight; on a hull edge only its two ends have
+/// one.
 ///
-/// The triangles that a query affects are found exactly. The weights are computed in double; if the
+/// The triangles that a query affects are found exactly. Weights are computed in double. If the
 /// estimated error is above 1e-11 (needles, queries close to the hull, coordinates near the ends of
-/// the range) they are recomputed with rational numbers, about a hundred times as slow; with more
-/// than 32 neighbours these are kept to 512 bits, so the time grows with the number of neighbours
-/// alone.
+/// the range) they are recomputed with rational numbers, about a hundred times as slow. With more
+/// than 32 neighbours these numbers are limited to 512 bits, so that the time grows only with the
+/// number of neighbours.
 ///
 /// Replaces the contents of `weights`. hint: a vertex near the query, where the walk starts. Throws
 /// std::invalid_argument for a query that is not finite.
@@ -98,19 +101,20 @@ template <class Coord>
 void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Interpolation method,
                 std::vector<VertexWeight>& weights, VertexId hint = kNoVertex);
 
-/// Heights at many queries, in their order; NaN if there are no weights or a vertex with a weight
-/// has the height NaN. Queries are sorted along a Hilbert curve internally, so pass many at once:
-/// about 0.4 us each on one core. threads: 0 for one per core; the result does not depend on it.
-/// Memory: 16 bytes per query, for at most 2^24 queries at a time.
+/// Returns the heights at many queries, in their order. A height is NaN if there are no weights or
+/// if a vertex with a weight has the height NaN. Queries are sorted along a Hilbert curve
+/// internally, so pass many at once: they take about 0.4 us each on one core. threads: 0 for one
+/// per core; the result does not depend on it. Memory: 16 bytes per query, for at most 2^24 queries
+/// at a time.
 ///
-/// Throws std::invalid_argument naming the index of a query that is not finite, or if an array of
-/// heights is shorter than vertex_slots().
+/// Throws std::invalid_argument, naming the index, for a query that is not finite, and if an array
+/// of heights is shorter than vertex_slots().
 template <class Coord>
 std::vector<double> heights_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                std::span<const Point2> queries, Interpolation method,
                                unsigned threads = 0);
 
-/// Height gained per unit of length to the east and to the north. NaN if undefined.
+/// Change in height per unit of length to the east and to the north, NaN if undefined.
 struct Gradient {
   double x = std::numeric_limits<double>::quiet_NaN();
   double y = std::numeric_limits<double>::quiet_NaN();
@@ -126,8 +130,8 @@ enum class GradientFrom : std::uint8_t {
   kNaturalNeighbours,
 };
 
-/// Gradients at many queries, otherwise like heights_at(). They are undefined outside the hull, and
-/// everywhere if all points are on one line.
+/// Returns the gradients at many queries; otherwise like heights_at(). Gradients are undefined
+/// outside the hull, and everywhere if all points are collinear.
 template <class Coord>
 std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                    std::span<const Point2> queries, GradientFrom from,
@@ -137,7 +141,7 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
 /// must have the same unit.
 [[nodiscard]] double slope_degrees(const Gradient& gradient);
 
-/// The direction of steepest descent, in degrees clockwise from north (+y): 90 is east (+x). 0 <=
+/// The direction of steepest descent in degrees clockwise from north (+y), so east (+x) is 90. 0 <=
 /// aspect < 360; NaN if the surface is level.
 [[nodiscard]] double aspect_degrees(const Gradient& gradient);
 

@@ -6,23 +6,24 @@
 
 namespace terrace::tri {
 
-/// How many vertices a mesh with this bound has. It falls, or nearly so, as the bound grows.
+/// Number of vertices of a mesh with this bound. It decreases, at least nearly, as the bound grows.
 using VertexCount = std::function<double(double bound)>;
 
 struct LeastErrorSearch {
-  std::uint64_t most = 0;  ///< vertices
-  double least = 0.0;      ///< no smaller bound is tried
-  double range = 0.0;      ///< of heights, >= least: a greater bound makes no difference
-  /// A quick estimate, which may be wrong by a factor as long as that varies little. Optional.
+  std::uint64_t most = 0;  ///< upper limit of vertices
+  double least = 0.0;      ///< smallest bound that is tried
+  double range = 0.0;      ///< of heights, >= least; greater bounds make no difference
+  /// A quick estimate. It may be wrong by a factor, as long as that factor varies little. Optional.
   VertexCount estimate;
-  /// Makes the mesh. Beyond `most` it may stop and return an estimate.
+  /// Makes the mesh. May stop and return an estimate once there are more than `most` vertices.
   VertexCount run;
 };
 
-/// Searches the least error bound whose mesh has at most `most` vertices. The last call of run() is
-/// that of the bound found: the mesh has at least 98 % of `most`, or the next smaller bound that
-/// was tried, by 0.2 % at most, has more than `most`. Usually two or three runs with a good
-/// estimate, else about six. Returns false if even the flattest mesh has more.
+/// Searches for the least error bound whose mesh has at most `most` vertices. The last call of
+/// run() uses the bound that was found. Its mesh has at least 98 % of `most` vertices, or the
+/// search has tried a bound at most 0.2 % smaller that gave more than `most`. Usually takes two or
+/// three runs with a good estimate, about six without. Returns false if even the flattest mesh has
+/// too many vertices.
 bool least_error(const LeastErrorSearch& search);
 
 }  // namespace terrace::tri

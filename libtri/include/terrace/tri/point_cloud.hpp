@@ -11,9 +11,9 @@
 
 namespace terrace::tri {
 
-/// Points in space and nothing between them: what stands in a multiresolution model in place of a
-/// triangulation where only the points are wanted, as of a laser cloud on a screen. Equal points
-/// are vertices of their own. About 30 bytes per point.
+/// Points in space without connections. Replaces the triangulation in a multiresolution model that
+/// needs only the points, such as a laser cloud on a screen. Equal points are separate vertices.
+/// About 30 bytes per point.
 ///
 /// Handles are as in Delaunay2; members of the same name do the same.
 class PointCloud {
@@ -35,8 +35,8 @@ class PointCloud {
   PointCloud(PointCloud&&) noexcept;
   PointCloud& operator=(PointCloud&&) noexcept;
 
-  /// All throw std::invalid_argument naming the index of a coordinate that is not finite, and
-  /// std::length_error beyond 2^29 - 2 points; the object is then unchanged.
+  /// build() and insert() throw std::invalid_argument, naming the index, if a coordinate is not
+  /// finite, and std::length_error beyond 2^29 - 2 points; the object is then unchanged.
   std::vector<VertexId> build(std::span<const Point> points);
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
@@ -50,12 +50,13 @@ class PointCloud {
   [[nodiscard]] AliveRange<PointCloud, VertexId> all_vertices() const {
     return {*this, vertex_slots()};
   }
-  /// The same for equal sets of points whatever their history. O(n).
+  /// A hash that is the same for equal sets of points, whatever their history. O(n).
   [[nodiscard]] std::uint64_t hash() const;
   [[nodiscard]] std::size_t memory_bytes() const;
 
   void start_journal();
-  /// A point that came and went between two calls is in neither list; a reused slot is in both.
+  /// A point that was added and removed between two calls is in neither list; a reused slot is in
+  /// both.
   void take_changes(Changes& changes);
 
  private:

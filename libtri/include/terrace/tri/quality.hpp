@@ -10,7 +10,7 @@
 #include "terrace/tri/interpolation.hpp"
 
 /// Quality measures of a triangulation and of the surface on it. Angles, aspects and edges are
-/// those in the plane, where the triangulation is Delaunay. Computed in double: lengths whose
+/// measured in the plane, where the triangulation is Delaunay. Computed in double; lengths whose
 /// squares overflow give infinities.
 
 namespace terrace::tri {
@@ -24,10 +24,11 @@ struct TriangleQuality {
   double area = 0;                ///< in the plane
   double surface_area = 0;        ///< of the sloping triangle; NaN if a height is NaN
   double volume_above = 0;        ///< below the surface and above the datum; NaN if a height is NaN
-  double volume_below = 0;        ///< above the surface and below the datum, >= 0; NaN likewise
+  double volume_below = 0;        ///< above the surface and below the datum, >= 0; NaN if a height
+                                  ///< is NaN
 };
 
-/// Requires a triangle of the triangulation. datum: the height that volumes refer to.
+/// Requires a triangle of the triangulation. datum: the height to which volumes refer.
 template <class Coord>
 TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                  TriangleId triangle, double datum = 0);
@@ -55,15 +56,15 @@ struct MeshQuality {
   [[nodiscard]] double volume() const { return volume_above - volume_below; }
 };
 
-/// Over all triangles. O(n). Throws std::invalid_argument if an array of heights is shorter than
-/// vertex_slots(), or if the number of bins is 0.
+/// Measures all triangles. O(n). Throws std::invalid_argument if an array of heights is shorter
+/// than vertex_slots(), or if the number of bins is 0.
 template <class Coord>
 MeshQuality mesh_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
                          double datum = 0, std::size_t histogram_bins = 16);
 
 struct VerticalDistances {
   std::size_t count = 0;  ///< points measured
-  /// Points that are not measured: outside the hull, or where a height is NaN.
+  /// Points that are not measured because they are outside the hull or a height is NaN.
   std::size_t outside = 0;
   double max = 0;   ///< of the distances' absolute values
   double mean = 0;  ///< of the distances' absolute values
@@ -72,8 +73,9 @@ struct VerticalDistances {
   std::size_t worst = 0;  ///< index of the first point at the distance `max`
 };
 
-/// How far points that are not in the triangulation lie above or below its surface. Threads and
-/// errors are those of heights_at(); the result does not depend on the number of threads.
+/// Measures how far points that are not in the triangulation are above or below its surface.
+/// `threads` and errors are as in heights_at(); the result does not depend on the number of
+/// threads.
 template <class Coord>
 VerticalDistances vertical_distances(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                      std::span<const Point3> points,

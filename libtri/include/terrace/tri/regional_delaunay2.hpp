@@ -12,22 +12,24 @@
 
 namespace terrace::tri {
 
-/// The triangles of a changing set of points by a field of metrics: those of metric_triangles(),
-/// with all their guarantees, kept up to date as points come and go, and read like a Delaunay2. In
-/// a multiresolution model, and under the control of a view, it takes the place of a triangulation:
+/// The triangles of a changing set of points in a field of metrics. They are those of
+/// metric_triangles(), with all its guarantees, are kept up to date as points come and go, and are
+/// read like a Delaunay2. It takes the place of a triangulation in a multiresolution model and in a
+/// view control:
 ///
 ///   MultiresolutionModel<RegionalDelaunay2<double>> model(source, {}, {}, field);
 ///
-/// Points come and go at once in the Euclidean triangulation, plain(); the triangles follow in
-/// follow(). They are a function of the points and the field alone, whatever the history.
+/// Points are inserted into and removed from the Euclidean triangulation, plain(), immediately;
+/// follow() then updates the triangles. They are a function of the points and the field alone,
+/// whatever the history.
 ///
-/// How it follows: where triangles of plain() go, the triangles over them are flipped back to it,
-/// exchanged, and flipped as the metric of their region asks. Only what lies around a change is
-/// looked at; flips are few unless ellipses are extreme.
+/// follow() works as follows. Where plain() loses triangles, the triangles over them are flipped
+/// back to those of plain(), exchanged, and flipped as the metric of their region requires. It
+/// examines only the surroundings of a change; flips are few unless ellipses are extreme.
 ///
-/// Handles of vertices are those of plain(). A triangle that is there before and after a call of
-/// follow() keeps its handle; they are other handles than those of plain(). Memory: 90 bytes per
-/// vertex beside plain().
+/// Vertex handles are those of plain(). A triangle that exists before and after a call of follow()
+/// keeps its handle; triangle handles differ from those of plain(). Memory: 90 bytes per vertex
+/// besides plain().
 ///
 /// Coord: as in Delaunay2.
 template <class Coord>
@@ -37,38 +39,37 @@ class RegionalDelaunay2 {
   using Insertion = typename Delaunay2<Coord>::Insertion;
   using Changes = typename Delaunay2<Coord>::Changes;
 
-  /// Not explicit: a field converts to an empty triangulation. Without a field it is Euclidean.
+  /// Not explicit, so that a field converts to an empty triangulation. Euclidean without a field.
   RegionalDelaunay2(MetricField2 field = MetricField2(std::vector<MetricField2::Region>{}));
   ~RegionalDelaunay2();
   /// A moved-from triangulation can only be destroyed or assigned to.
   RegionalDelaunay2(RegionalDelaunay2&&) noexcept;
   RegionalDelaunay2& operator=(RegionalDelaunay2&&) noexcept;
 
-  /// As in Delaunay2; the triangles of these points are there at once. These and insert() also
-  /// throw std::invalid_argument if the field gives a map at a point that is not a metric, and
-  /// whatever the field throws; the object is then unchanged. The field is evaluated once per
-  /// point.
+  /// As in Delaunay2; the triangles are up to date on return. build() and insert() also throw
+  /// std::invalid_argument if the field returns a map at a point that is not a metric, and whatever
+  /// the field throws; the object is then unchanged. The field is evaluated once per point.
   std::vector<VertexId> build(std::span<const Point> points);
-  /// As in Delaunay2. Until follow() the triangles are those of before, and may have corners that
-  /// are gone.
+  /// As in Delaunay2. Until follow() is called the triangles stay as they were, and may have
+  /// corners that no longer exist.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(std::span<const VertexId> vertices);
   void reserve(std::size_t vertices);
 
-  /// Brings the triangles up to date. O(triangles around the change) besides the flips.
+  /// Brings the triangles up to date. O(triangles around the change) plus the flips.
   void follow();
 
   /// Starts recording and drops earlier records.
   void start_journal();
-  /// Brings the triangles up to date, and tells the changes since start_journal() or the last call,
-  /// see Delaunay2. Requires a started journal.
+  /// Brings the triangles up to date and replaces `changes` with the changes since start_journal()
+  /// or the last call, see Delaunay2. Requires a started journal.
   void take_changes(Changes& changes);
 
   [[nodiscard]] std::size_t vertex_count() const;
   [[nodiscard]] std::size_t triangle_count() const;
   [[nodiscard]] Point point(VertexId vertex) const;
-  /// Counter-clockwise, the smallest handle first.
+  /// The corners counter-clockwise, starting with the smallest handle.
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;
 
   [[nodiscard]] std::uint32_t vertex_slots() const;
