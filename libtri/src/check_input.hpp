@@ -11,10 +11,10 @@
 
 namespace terrace::tri {
 
-/// Upper limit of the vertices of a triangulation, in the plane or in space.
+/// Maximum number of vertices of a triangulation, in the plane or in space.
 inline constexpr std::uint32_t kMaxVertices = (std::uint32_t{1} << 29) - 2;
 
-/// Throws: std::invalid_argument naming the first point that the kernel cannot accept.
+/// Throws std::invalid_argument naming the first point that the kernel cannot accept.
 template <class Kernel, class Coord, std::size_t kDimension>
 void check_points(std::span<const std::array<Coord, kDimension>> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -29,7 +29,7 @@ void check_points(std::span<const std::array<Coord, kDimension>> points) {
   }
 }
 
-/// Throws: std::length_error if there would be too many vertices.
+/// Throws std::length_error if there would be too many vertices.
 inline void check_count(std::size_t present, std::size_t added) {
   if (added <= kMaxVertices - present) return;
   throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +

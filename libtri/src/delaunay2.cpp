@@ -20,7 +20,7 @@ namespace {
 
 using planar::kNone;
 
-/// The coordinates of a grid's lines; throws if they would be rounded or out of range.
+/// Returns the coordinates of a grid's lines; throws if they would be rounded or out of range.
 template <class Kernel, class Coord>
 std::vector<Coord> grid_lines(Coord begin, Coord step, std::uint32_t count, const char* axis) {
   std::vector<Coord> lines(count);
@@ -75,7 +75,7 @@ VertexId Delaunay2<Coord, Metric>::build_grid(
   if (rows > 0 && columns > kMaxVertices / rows) check_count(0, std::size_t{columns} * rows);
   const std::vector<Coord> xs = grid_lines<Kernel>(x0, step, columns, "x");
   const std::vector<Coord> ys = grid_lines<Kernel>(y0, step, rows, "y");
-  // Clang 14 instantiates members whose constraints are not met, too.
+  // Clang 14 also instantiates members whose constraints are not met.
   if constexpr (std::is_same_v<Metric, Euclidean>) {
     return VertexId{planar::build_grid<Kernel>(impl_->mesh, xs, ys)};
   } else {
@@ -163,7 +163,7 @@ template <class Coord, class Metric>
 std::size_t Delaunay2<Coord, Metric>::triangle_count() const {
   const auto& mesh = impl_->mesh;
   if (mesh.flat) return 0;
-  // Of 2 n - 2 triangles, the ghosts are as many as the hull edges.
+  // There are 2 n - 2 triangles, of which one per hull edge is a ghost.
   return 2 * std::size_t{mesh.vertex_count} - 2 - planar::degree(mesh, planar::kGhost);
 }
 

@@ -15,8 +15,8 @@
 namespace terrace::tri {
 namespace planar {
 
-/// The computation in a metric: the kernel, the form of the metric that its predicates take, and
-/// the scope that passes it to them for the duration of a call.
+/// Types for computing in a metric: the kernel, the form of the metric that its predicates take,
+/// and the scope that passes this form to them for the duration of a call.
 template <class Coord, class Metric>
 struct InMetric;
 
@@ -63,7 +63,7 @@ struct Delaunay2Access {
   }
 };
 
-/// Full check of a triangulation: counts, free lists, links, orientation, the perturbed empty
+/// Checks a triangulation completely: counts, free lists, links, orientation, the perturbed empty
 /// circle across every edge, the hull, and the sorted line while there are no triangles. Returns a
 /// description of the first fault, or an empty string. O(n).
 template <class Coord, class Metric>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
-// the one before. Pure Hilbert order makes the curve's front a fan of long triangles; so a coarse
-// sample, every 32nd vertex, goes first (and of that every 32nd, and so on), which halves the work
-// (after N. Amenta, S. Choi, G. Rote, "Incremental constructions con BRIO",
+// Bulk construction numbers vertices along a Hilbert curve and inserts them one by one, each near
+// the one before. In pure Hilbert order the front of the curve would be a fan of long triangles, so
+// coarse samples go first: every 32nd vertex, before that every 32nd of these, and so on. This
+// halves the work (after N. Amenta, S. Choi, G. Rote, "Incremental constructions con BRIO",
 // doi:10.1145/777792.777824, with fixed samples in place of random ones).
 #include "build.hpp"
 
@@ -42,8 +42,8 @@ std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
   return vertex_of;
 }
 
-/// Which vertex stands for one whose point was there already, as long as the slots are not yet
-/// free: its number with a bit in Mesh::incident.
+/// Set in Mesh::incident while the slots of duplicates are not yet free. The other bits are the
+/// vertex that represents the duplicate.
 constexpr std::uint32_t kAlias = kFreeVertexBit;
 
 template <class Kernel>
@@ -62,7 +62,7 @@ void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   mesh.last_vertex = vertex;
 }
 
-/// The flat state of all slots from begin on, the triangles to come.
+/// Sorts the vertices of all slots into mesh.line, the flat state; duplicates become aliases.
 template <class Kernel>
 void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   std::vector<std::uint32_t>& line = mesh.line;
@@ -84,8 +84,8 @@ void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   mesh.last_vertex = line.front();
 }
 
-/// The first vertex not on one line with the ones before, or kNone; `second`: the first that
-/// differs from vertex begin.
+/// The first vertex not collinear with the ones before, or kNone. `second`: the first vertex that
+/// differs from vertex `begin`.
 template <class Kernel>
 std::uint32_t first_off_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
                              std::uint32_t& second) {
@@ -98,7 +98,7 @@ std::uint32_t first_off_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint3
   return kNone;
 }
 
-/// Frees the slots of equal points and makes vertex_of tell who stands for them.
+/// Frees the slots of duplicates and sets vertex_of to the vertices that represent them.
 template <class Kernel>
 void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::uint32_t begin,
                      std::uint32_t end) {

@@ -9,12 +9,12 @@
 
 namespace terrace::tri::planar {
 
-/// Bulk construction in an empty mesh, see build.cpp. Returns the vertex of each point.
+/// Builds a triangulation in an empty mesh, see build.cpp. Returns the vertex of each point.
 template <class Kernel>
 std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points);
 
-/// Writes a complete grid into an empty mesh. xs, ys: coordinates of columns and rows, increasing
-/// by the same step. Returns the first vertex.
+/// Writes a complete grid into an empty mesh. xs, ys: coordinates of columns and rows, ascending by
+/// the same step. Returns the first vertex.
 template <class Kernel>
 std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Coord> xs,
                          std::span<const typename Kernel::Coord> ys);

@@ -16,12 +16,13 @@ using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 Epick::Point_2 cgal(const DoubleKernel::Point& p) { return {p[0], p[1]}; }
 
-// Converts to integers that IntKernel can take, counted from the least of them: with them ties,
-// which are frequent on rasters and scans, are cheap. The predicates depend on differences alone.
+// Converts to integers that IntKernel accepts, counted from the least of them. Ties, which are
+// frequent on rasters and scans, are cheap with integers. The predicates depend only on
+// differences.
 template <std::size_t N>
 bool to_integers(const std::array<const DoubleKernel::Point*, N>& points,
                  std::array<IntKernel::Point, N>& result) {
-  constexpr double kWhole = 0x1p52;  ///< below it differences of integers are exact
+  constexpr double kWhole = 0x1p52;  ///< below this, differences of integers are exact
   for (std::size_t k = 0; k < 2; ++k) {
     double least = kWhole;
     for (const DoubleKernel::Point* p : points) {

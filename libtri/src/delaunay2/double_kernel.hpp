@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-/// Exact predicates on doubles: one evaluation in double with an error bound nearly always decides;
-/// the remaining cases go to integers if the coordinates are integers, otherwise to CGAL.
+/// Exact predicates on doubles. One evaluation in double with an error bound nearly always decides;
+/// the remaining cases use integers if the coordinates are integers, otherwise CGAL.
 
 namespace terrace::tri::planar {
 
@@ -37,22 +37,22 @@ struct DoubleKernel {
     // geometric predicates", doi:10.1007/PL00009321, rounded up; the last term covers products
     // that underflow.
     const double bound = 0x1.9p-52 * (std::abs(left) + std::abs(right)) + 0x1p-1000;
-    // False for infinities and NaN, when something overflowed.
+    // This is false for infinities and NaN, which result from overflow.
     if (std::abs(cross) > bound && bound < 0x1p1000) return cross > 0 ? 1 : -1;
     return orientation_exact(a, b, c);
   }
 
-  /// > 0 if p lies inside the circle through the counter-clockwise a, b, c; 0 if on it. Same form
-  /// as IntKernel::in_circle().
+  /// > 0 if p is inside the circle through the counter-clockwise a, b, c; 0 if on it. Uses the same
+  /// formula as IntKernel::in_circle().
   static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
     const Sized at_a = sized_angle(a, b, c);
     const Sized at_p = sized_angle(p, c, b);
     const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
     // Each term is a product of two rounded sums of two products of differences. Relative errors of
     // u = 2^-53 come from the differences (2 + 2), products (1 + 1), sums (1 + 1), the product and
-    // the last sum: 10 u of the sum of absolute values, which are themselves rounded: 12 u is safe.
-    // Sizes below 2^-200 or above 2^200 (close to underflow or overflow) are left to the exact
-    // test.
+    // the last sum: 10 u of the sum of absolute values. That sum is itself rounded, so 12 u is
+    // safe. Sizes below 2^-200 or above 2^200 (close to underflow or overflow) are left to the
+    // exact test.
     const double size = at_a.cross_size * at_p.dot_size + at_p.cross_size * at_a.dot_size;
     const double largest = at_a.dot_size + at_p.dot_size + at_a.cross_size + at_p.cross_size;
     if (std::abs(sine) > 12 * 0x1p-53 * size + 0x1p-400 && largest < 0x1p200)

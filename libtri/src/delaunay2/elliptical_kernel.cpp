@@ -10,7 +10,8 @@
 namespace terrace::tri::planar {
 namespace {
 
-// Only sums and products: the ring of binary fractions suffices, and is far faster than rationals.
+// Only sums and products are needed, so the ring of binary fractions suffices. It is far faster
+// than rationals.
 #ifdef CGAL_HAS_MPZF
 using Number = CGAL::Mpzf;
 #else

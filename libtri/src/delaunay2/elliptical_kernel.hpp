@@ -8,11 +8,11 @@
 
 /// Exact predicates in an elliptical metric, on the original points: nothing is mapped, so nothing
 /// is rounded. Orientation and betweenness are the same in all linear metrics; only circles become
-/// ellipses and distances the lengths of mapped vectors.
+/// ellipses, and distances become lengths of mapped vectors.
 
 namespace terrace::tri::planar {
 
-/// A metric prepared for the predicates, which need its map M only as Q = M^T M.
+/// A metric prepared for the predicates, which use its map M only as Q = M^T M.
 class QuadraticForm {
  public:
   explicit QuadraticForm(const EllipticalMetric2& metric);
@@ -20,13 +20,13 @@ class QuadraticForm {
  private:
   friend class EllipticalKernel;
   struct Exact;
-  // Q times a power of two such that its largest entry is near 1, each entry with a relative error
+  // Q times a power of two such that its largest entry is near 1. Each entry has a relative error
   // of at most 2^-52.
   double xx_, xy_, yy_;
   std::shared_ptr<const Exact> exact_;
 };
 
-/// The algorithms call kernels statically, so the metric is set per thread, by a Scope, for the
+/// The algorithms call kernels statically, so a Scope sets the metric of the thread for the
 /// duration of a call.
 class EllipticalKernel : public DoubleKernel {
  public:
@@ -41,9 +41,10 @@ class EllipticalKernel : public DoubleKernel {
     const QuadraticForm* before_;
   };
 
-  /// > 0 if p lies inside the metric's ellipse through the counter-clockwise a, b, c; 0 if on it.
-  /// As DoubleKernel::in_circle(): the cross products of mapped vectors are those of the vectors
-  /// times the determinant of M, which changes no sign; their dot products are d^T Q e.
+  /// > 0 if p is inside the metric's ellipse through the counter-clockwise a, b, c; 0 if on it. As
+  /// in DoubleKernel::in_circle(), with two changes. The cross products of mapped vectors are those
+  /// of the vectors times the determinant of M, which does not change their signs. The dot products
+  /// are d^T Q e.
   static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
     const Sized at_a = sized_angle(a, b, c);
     const Sized at_p = sized_angle(p, c, b);
@@ -51,8 +52,8 @@ class EllipticalKernel : public DoubleKernel {
     const double size = at_a.cross_size * at_p.dot_size + at_p.cross_size * at_a.dot_size;
     // In units of u = 2^-53: differences 2 + 2; for the dot products: products 1, sum of two 1,
     // entries of Q 2, products with them 1, sums 2; for the cross products: products 1, sum 1; then
-    // product 1 and sum 1: 15 u of the sum of absolute values, itself rounded: 18 u is safe.
-    // Otherwise as in DoubleKernel.
+    // product 1 and sum 1. The total is 15 u of the sum of absolute values, which is itself
+    // rounded, so 18 u is safe. Otherwise as in DoubleKernel.
     const double largest = at_a.dot_size + at_p.dot_size + at_a.cross_size + at_p.cross_size;
     if (std::abs(sine) > 18 * 0x1p-53 * size + 0x1p-400 && largest < 0x1p200)
       return sine < 0 ? 1 : -1;

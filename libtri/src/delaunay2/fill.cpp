@@ -11,8 +11,8 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// Chooses the apex of the triangle at the base from vertex[last] to vertex[first], which has the
-/// part (first, ..., last) of the polygon on its left.
+/// Chooses the apex of the triangle at the base from vertex[last] to vertex[first], to the left of
+/// which is the part (first, ..., last) of the polygon.
 template <class Kernel>
 class ApexChoice {
  public:
@@ -35,7 +35,7 @@ class ApexChoice {
   }
 
  private:
-  // The candidate that is beaten by no other.
+  // The candidate that no other candidate beats.
   template <class Beaten>
   std::uint32_t best(std::uint32_t first, std::uint32_t last, Beaten beaten) const {
     std::uint32_t result = first + 1;
@@ -68,12 +68,12 @@ class ApexChoice {
     return result != kNone ? result : ghost;
   }
 
-  // Whether candidate m is inside the circle of the base and the best candidate so far.
+  // True if candidate m is inside the circle of the base and the best candidate so far.
   bool beats(double cotangent, double least, std::uint32_t m, std::uint32_t so_far, const Point& b,
              const Point& c) const {
     if constexpr (std::is_same_v<Kernel, IntKernel>) {
-      // Both quotients are of exact integers: three roundings each. (This is the only place where
-      // integers meet floating point; undecided cases are decided exactly.)
+      // Both quotients are of exact integers, with three roundings each. (Integers meet floating
+      // point only here; undecided cases are decided exactly.)
       const double margin = 0x1p-50 * (std::abs(cotangent) + std::abs(least));
       if (std::abs(cotangent - least) > margin) return cotangent < least;
     }

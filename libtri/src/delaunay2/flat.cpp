@@ -10,7 +10,7 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// The position that p has or would have among the vertices of the line.
+/// The position of p in the sorted line, or where it would be.
 template <class Kernel>
 std::vector<std::uint32_t>::iterator find_on_line(Mesh<Kernel>& mesh,
                                                   const typename Kernel::Point& p) {
@@ -45,8 +45,8 @@ void make_fan(Mesh<Kernel>& mesh, std::uint32_t apex) {
   if (Kernel::orientation(mesh.point[line.front()], mesh.point[line.back()], mesh.point[apex]) < 0)
     std::reverse(line.begin(), line.end());
 
-  // edges finite triangles (apex, line[i], line[i + 1]), the ghosts (ghost, line[i + 1], line[i])
-  // beyond them, and two ghosts at the ends of the fan.
+  // The fan has `edges` finite triangles (apex, line[i], line[i + 1]), the ghosts (ghost, line[i +
+  // 1], line[i]) beyond them, and two ghosts at its ends.
   const auto edges = static_cast<std::uint32_t>(line.size()) - 1;
   std::vector<std::uint32_t> slots(2 * edges + 2);
   for (std::uint32_t& t : slots) t = mesh.new_triangle();

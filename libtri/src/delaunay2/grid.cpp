@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the complete grid directly. All corners of a cell are cocircular; the perturbation gives
-// every cell the diagonal from lower right to upper left: of the four corners the upper right one
-// is raised most, so the circle through the other three does not contain it.
+// Writes the complete grid directly. All corners of a cell are cocircular, and the perturbation
+// gives every cell the diagonal from lower right to upper left: of the four corners the upper right
+// one is raised most, so the circle through the other three does not contain it.
 #include "build.hpp"
 #include "double_kernel.hpp"
 #include "int_kernel.hpp"
@@ -18,14 +18,14 @@ struct GridNumbers {
   [[nodiscard]] std::uint32_t vertex(std::uint32_t i, std::uint32_t j) const {
     return first_vertex + j * columns + i;
   }
-  /// The triangle at the lower left of cell (i, j); the one at its upper right follows.
+  /// The triangle at the lower left of cell (i, j). The one at its upper right follows.
   [[nodiscard]] std::uint32_t lower(std::uint32_t i, std::uint32_t j) const {
     return 2 * (j * (columns - 1) + i);
   }
   [[nodiscard]] std::uint32_t upper(std::uint32_t i, std::uint32_t j) const {
     return lower(i, j) + 1;
   }
-  // Ghosts beyond the hull edges, numbered counter-clockwise from the lower left corner.
+  // Number of ghosts beyond the hull edges, numbered counter-clockwise from the lower left corner.
   [[nodiscard]] std::uint32_t ghosts() const { return 2 * (columns - 1) + 2 * (rows - 1); }
   [[nodiscard]] std::uint32_t ghost(std::uint32_t number) const {
     return 2 * (columns - 1) * (rows - 1) + number;
@@ -40,8 +40,8 @@ struct GridNumbers {
   }
 };
 
-// With the cell's corners a (lower left), b, c, d counter-clockwise, the triangles are (a, b, d)
-// and (c, d, b); so the corners opposite to the diagonal d-b are a and c, both with index 0.
+// Let the cell's corners be a (lower left), b, c, d, counter-clockwise. The triangles are then (a,
+// b, d) and (c, d, b), so the corners opposite to the diagonal d-b are a and c, both with index 0.
 void write_cells(const GridNumbers& grid, Triangle* triangle) {
   const std::uint32_t last_i = grid.columns - 2;
   const std::uint32_t last_j = grid.rows - 2;
@@ -74,7 +74,8 @@ void write_cells(const GridNumbers& grid, Triangle* triangle) {
 void write_ghosts(const GridNumbers& grid, Triangle* triangle) {
   const std::uint32_t count = grid.ghosts();
   std::uint32_t number = 0;
-  // Writes the ghost beyond the counter-clockwise hull edge from a to b, whose inner side is given.
+  // Writes the ghost beyond the counter-clockwise hull edge from a to b. `inner`: the inner side of
+  // that edge.
   const auto write = [&](std::uint32_t a, std::uint32_t b, Side inner) {
     const std::uint32_t t = grid.ghost(number);
     const std::uint32_t before = grid.ghost(number == 0 ? count - 1 : number - 1);
@@ -131,7 +132,7 @@ std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Co
   mesh.vertex_count = count;
   mesh.last_vertex = first;
   if (columns == 1 || rows == 1) {
-    // Increasing coordinates are already in lexicographic order.
+    // Ascending coordinates are already in lexicographic order.
     for (std::uint32_t v = first; v < first + count; ++v) {
       mesh.incident[v] = kNoIncident;
       mesh.line.push_back(v);

@@ -13,8 +13,8 @@ namespace terrace::tri::planar {
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict) {
   const typename Kernel::Point p = mesh.point[vertex];
-  // Sides still to be crossed, and slots of cavity triangles, which are used again at once. A
-  // cavity of k triangles has k + 2 edges, so neither ever holds more than k + 2.
+  // Sides still to be crossed, and slots of cavity triangles, which are reused at once. A cavity of
+  // k triangles has k + 2 edges, so neither list ever holds more than k + 2.
   const std::uint32_t spare_first = mesh.new_triangle();
   const std::uint32_t spare_second = mesh.new_triangle();
   constexpr std::size_t kSpares = 2;
@@ -27,7 +27,7 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
   spare[0] = spare_first;
   spare[1] = spare_second;
   std::size_t most_removed = mesh.sides.size() - kSpares;
-  // No triangle or vertex is added to the pools from here on.
+  // The pools do not grow from here on.
   Triangle* const triangle = mesh.triangle.data();
   const auto* const point = mesh.point.data();
   std::uint32_t* const incident = mesh.incident.data();

@@ -18,20 +18,21 @@ inline constexpr std::size_t kTicksOfWalk = 256;
 /// Joins a vertex, which has its slot and point but no triangle, to a triangulation with triangles.
 /// `conflict`: a triangle in conflict with it, as found by walk() if no corner equals the point.
 ///
-/// Bowyer and Watson's cavity, traversed depth-first across edges. It contains no vertex, so the
-/// traversal is a tree and needs no marks, and it meets the cavity's boundary in counter-clockwise
-/// order, so each new triangle is linked to the previous one. About 4.2 triangles are replaced.
+/// Traverses the cavity of Bowyer and Watson depth-first across edges. The cavity contains no
+/// vertex, so the traversal is a tree and needs no marks. It meets the cavity's boundary in
+/// counter-clockwise order, so each new triangle is linked to the previous one. About 4.2 triangles
+/// are replaced.
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict);
 
-/// Inserts a point, or finds the vertex that equals it. `hint`: a living vertex, or kNone.
+/// Inserts a point, or finds the vertex that equals it. `hint`: an existing vertex, or kNone.
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 
-/// In each group of so many points one goes first.
+/// One point in each group of this size is inserted first.
 inline constexpr std::uint32_t kSampleEvery = 8;
 
-/// insert_points() of those that find_lattice() has found.
+/// insert_points() for the points that find_lattice() has found.
 template <class Kernel, class Done>
 void insert_on_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                        std::uint32_t hint, Done done) {
@@ -53,13 +54,13 @@ void insert_on_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Poin
   }
 }
 
-/// Inserts points in an order of its own. Calls done(number, inserted) for each. `hint`: where they
-/// are; of a cluster its head.
+/// Inserts points in an order that it chooses. Calls done(number, inserted) for each. `hint`: a
+/// vertex near the points; for a cluster, its head.
 ///
-/// The hint of a point is the previous one on a Hilbert curve. As in bulk construction a coarse
-/// sample goes first: it saves a quarter of the temporary triangles. Of integer points that lie
-/// side by side those with all their lattice neighbours go last and together, see fill_lattice();
-/// the hint of the others is a lattice neighbour.
+/// The hint of a point is the previous one on a Hilbert curve. As in bulk construction, a coarse
+/// sample goes first, which saves a quarter of the temporary triangles. Integer points with all
+/// eight lattice neighbours go last and together, see fill_lattice(); the hint of the others is a
+/// lattice neighbour.
 template <class Kernel, class Done>
 void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                    std::uint32_t hint, Done done) {

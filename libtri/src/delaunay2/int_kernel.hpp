@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdint>
 
-/// Exact predicates on 30-bit integers, without floating point and filters: differences have 31
-/// bits with sign, their products fit into 64 bits and the products of those into 128.
+/// Exact predicates on 30-bit integers, without floating point and filters. Differences have 31
+/// bits with sign, their products fit into 64 bits, and the products of those into 128.
 
 namespace terrace::tri::planar {
 
@@ -37,15 +37,15 @@ struct IntKernel {
   /// > 0 if a, b, c turn left, 0 if they are collinear.
   static int orientation(Point a, Point b, Point c) { return sign(angle(a, b, c).cross); }
 
-  /// > 0 if p lies inside the circle through the counter-clockwise a, b, c; 0 if on it.
+  /// > 0 if p is inside the circle through the counter-clockwise a, b, c; 0 if on it.
   ///
-  /// p is inside if the angles at a and at p over the chord bc add up to more than 180 degrees;
-  /// this is the sign of sin(A + P), for which 10 multiplications of short numbers suffice. Not
-  /// inlined on purpose: inlining takes registers from its callers and is slower.
+  /// p is inside if the angles at a and at p over the chord bc add up to more than 180 degrees.
+  /// That is the sign of sin(A + P), which takes 10 multiplications of short numbers. Deliberately
+  /// not inlined: inlining takes registers from its callers and is slower.
   [[gnu::noinline]] static int in_circle(Point a, Point b, Point c, Point p) {
     const Angle at_a = angle(a, b, c);
     const Angle at_p = angle(p, c, b);
-    // Near by, 64 bits are enough; WebAssembly has no wider products.
+    // 64 bits suffice for nearby points; WebAssembly has no wider products.
     const auto raised = [](std::int64_t value) {
       return static_cast<std::uint64_t>(value + kNear);
     };

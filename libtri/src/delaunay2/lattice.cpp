@@ -9,23 +9,23 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// Fewer points are not looked at.
+/// The smallest set of points that is searched for a lattice.
 constexpr std::size_t kFewestOnLattice = 24;
-/// Nor those whose box has so many more nodes than that.
+/// Sets whose box has more than this many times as many nodes as points are not searched.
 constexpr std::int64_t kMostSparse = 8;
 /// At least one point in this many must have all eight neighbours.
 constexpr std::size_t kLeastInside = 4;
 
-/// In Triangle::corner[0], while squares are cut out.
+/// Set in Triangle::corner[0] while squares are cut out.
 constexpr std::uint32_t kCutOut = 0x80000000u;
 
 /// Sides of a square.
 enum SquareSide : std::uint32_t { kLeft, kRight, kBelow, kAbove };
 
-/// A side of length 1 as the inner one of two squares sees it.
+/// A side of length 1 as seen from the inner one of its two squares.
 struct UnitSide {
   std::size_t inner, outer;  ///< squares
-  SquareSide side;           ///< of the inner one
+  SquareSide side;           ///< side of the inner square
 };
 
 template <class Kernel>
@@ -79,7 +79,7 @@ class LatticeFill {
     }
   }
 
-  /// The squares at an edge of length 1, of which the first is on the left.
+  /// The squares at an edge of length 1. The first is on the left.
   [[nodiscard]] UnitSide squares_at(const Point& from, const Point& to) const {
     const std::size_t node = lattice_.node({std::min(from[0], to[0]), std::min(from[1], to[1])});
     if (from[1] == to[1]) {
@@ -89,7 +89,7 @@ class LatticeFill {
     return to[1] > from[1] ? UnitSide{node - 1, node, kRight} : UnitSide{node, node - 1, kLeft};
   }
 
-  /// Takes the triangles out that are connected with this one and in squares to be filled.
+  /// Takes out the triangles that are connected with this one and in squares to be filled.
   void cut_out(std::uint32_t first) {
     const auto mark = [&](std::uint32_t t) {
       mesh_.record(t);
@@ -104,7 +104,7 @@ class LatticeFill {
       for (std::uint32_t i = 0; i < 3; ++i) {
         const Point &from = mesh_.point[corner[next_index(i)]],
                     &to = mesh_.point[corner[previous_index(i)]];
-        // A point inside may have been there before.
+        // A point inside may already have had a vertex.
         lattice_.vertex[lattice_.node(from)] = corner[next_index(i)];
         if (std::abs(to[0] - from[0]) + std::abs(to[1] - from[1]) == 1) {
           const UnitSide unit = squares_at(from, to);
@@ -133,7 +133,7 @@ class LatticeFill {
     Triangle* const triangle = mesh_.triangle.data();
     const std::size_t up = lattice_.columns;
     for (const std::uint32_t square : lattice_.squares) {
-      // Side i of the triangle `own`; the same index is that of its mate in the next square.
+      // The mate of side i of the triangle `own`; a mate in the next square has the same index.
       const auto mate = [&](SquareSide side, std::size_t next, std::uint32_t own, std::uint32_t i) {
         if (lattice_.filled[next] != 0) {
           return make_side(side == kLeft || side == kBelow ? upper(next) : lower(next), i);
@@ -180,15 +180,15 @@ bool find_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> po
   const std::int64_t height = std::int64_t{high[1]} - low[1] + 1;
   if (height > kMostSparse * static_cast<std::int64_t>(points.size()) / width) return false;
 
-  // With a frame of one node, so that every node has neighbours.
+  // A frame one node wide gives every node neighbours.
   lattice.low = {low[0] - 1, low[1] - 1};
   lattice.columns = static_cast<std::uint32_t>(width + 2);
   const std::size_t nodes = std::size_t{lattice.columns} * static_cast<std::size_t>(height + 2);
-  // Until they are inserted: the numbers of the points.
+  // Holds the numbers of the points until they are inserted.
   lattice.vertex.assign(nodes, kNone);
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     std::uint32_t& number = lattice.vertex[lattice.node(points[i])];
-    if (number != kNone) return false;  // twice
+    if (number != kNone) return false;  // found twice
     number = i;
   }
   if (head != kNone) {

@@ -14,13 +14,13 @@
 #include "../journal.hpp"
 #include "../pool.hpp"
 
-/// The data of a triangulation and the operations that all algorithms share. No geometry here.
+/// The data of a triangulation and the operations that all algorithms share. Contains no geometry.
 
 namespace terrace::tri::planar {
 
-/// Beyond each hull edge lies a ghost triangle that joins it to this vertex "at infinity"; so every
-/// edge has two triangles and the whole is a sphere: n vertices have 2 n - 2 triangles, including
-/// ghosts.
+/// Beyond each hull edge is a ghost triangle that joins it to this vertex "at infinity". Every edge
+/// therefore has two triangles, and the whole is a sphere: n vertices have 2 n - 2 triangles,
+/// including ghosts.
 inline constexpr std::uint32_t kGhost = 0;
 inline constexpr std::uint32_t kFreeCorner = 0xFFFFFFFFu;
 
@@ -35,29 +35,29 @@ constexpr Side make_side(std::uint32_t triangle, std::uint32_t index) {
 constexpr std::uint32_t triangle_of(Side side) { return side >> 2; }
 constexpr std::uint32_t index_of(Side side) { return side & 3; }
 
-/// Next and previous index of 0, 1, 2 counter-clockwise: from a table in a constant.
+/// Next and previous index of 0, 1, 2 counter-clockwise, looked up in a constant.
 constexpr std::uint32_t next_index(std::uint32_t i) { return 0b001001u >> (2 * i) & 3; }
 constexpr std::uint32_t previous_index(std::uint32_t i) { return 0b010010u >> (2 * i) & 3; }
 
 struct Triangle {
-  /// Counter-clockwise. A free slot has kFreeCorner first.
+  /// Counter-clockwise. In a free slot the first corner is kFreeCorner.
   std::array<std::uint32_t, 3> corner;
-  /// mate[i]: the edge opposite to corner[i], as a side of the neighbour. So the neighbour's corner
-  /// beyond it is found without a search.
+  /// mate[i]: the edge opposite to corner[i], as a side of the neighbour, so that the neighbour's
+  /// corner beyond it is found without a search.
   std::array<Side, 3> mate;
 };
 static_assert(sizeof(Triangle) == 24);
 
 constexpr bool has_ghost(const std::array<std::uint32_t, 3>& corner) {
-  // One branch instead of three: the least is zero.
+  // One branch instead of three: a ghost's smallest corner is zero.
   return std::min(corner[0], std::min(corner[1], corner[2])) == kGhost;
 }
-/// A finite triangle in use.
+/// True for a finite triangle in use.
 constexpr bool is_finite(const std::array<std::uint32_t, 3>& corner) {
   return corner[0] != kFreeCorner && !has_ghost(corner);
 }
 
-/// In Mesh::incident: a living vertex without triangles (all points are collinear).
+/// In Mesh::incident: an existing vertex without triangles (all points are collinear).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
 /// In Mesh::incident: the slot is free.
 inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
@@ -66,7 +66,7 @@ inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
 template <class Point>
 struct Hole {
   std::vector<std::uint32_t> vertex;  ///< counter-clockwise; may contain the ghost
-  std::vector<Point> point;           ///< of vertex, in parallel
+  std::vector<Point> point;           ///< points of `vertex`, in parallel
   /// outer[i]: the side beyond the edge from vertex[i] to the next vertex.
   std::vector<Side> outer;
   std::vector<std::uint32_t> slots;  ///< triangle slots to fill, more than enough
@@ -78,7 +78,8 @@ struct Hole {
   std::vector<Part> parts;
 };
 
-/// What the removal of a set of vertices takes out, see remove_set.cpp; scratch memory.
+/// The triangles that the removal of a set of vertices takes out, see remove_set.cpp; scratch
+/// memory.
 struct Region {
   struct Edge {
     std::uint32_t from;
@@ -86,36 +87,36 @@ struct Region {
     Side outer;
   };
   std::vector<std::uint32_t> removed;  ///< vertices
-  Pool<std::uint32_t> triangles;       ///< with a removed vertex
-  Pool<std::uint32_t> mixed;           ///< those of them that also have a kept vertex
-  std::vector<Edge> boundary;          ///< with the region to the left, in any order
+  Pool<std::uint32_t> triangles;       ///< those with a removed vertex
+  Pool<std::uint32_t> mixed;           ///< those that also have a kept vertex
+  std::vector<Edge> boundary;          ///< with the region on the left, in any order
   Pool<Side> rim;                      ///< edges that may be on the boundary
   Pool<Side> queue;
-  // The boundary by loops: edge numbers, and where each loop ends among these.
+  // The boundary by loops: edge numbers, and the end of each loop among these.
   std::vector<std::uint32_t> ordered;
   std::vector<std::size_t> loop_ends;
   std::vector<std::uint8_t> visited;  ///< by edge number
   std::vector<std::uint32_t> pinches;
 };
 
-/// What insert_point() did: a new vertex, or the one that equals the point.
+/// The result of insert_point(): a new vertex, or the one that equals the point.
 struct Inserted {
   std::uint32_t vertex;
   bool created;
 };
 
 /// A window of the integer lattice, see lattice.hpp; scratch memory. A node is the lower left
-/// corner of a square; both have its number.
+/// corner of a square and has the same number.
 struct Lattice {
   std::array<std::int32_t, 2> low{};  ///< of node 0
   std::uint32_t columns = 0;
-  std::vector<std::uint32_t> vertex;           ///< by node; kNone: none yet
+  std::vector<std::uint32_t> vertex;           ///< by node; kNone: no vertex yet
   std::vector<std::uint32_t> filled;           ///< by square: 0, or its number in `squares` plus 1
-  std::vector<std::uint32_t> squares;          ///< those to be filled
+  std::vector<std::uint32_t> squares;          ///< the squares to be filled
   std::vector<std::uint32_t> inside, outside;  ///< numbers of points
   std::vector<Inserted> inserted;              ///< for each of `inside`
   std::vector<std::uint32_t> slots;            ///< of triangles, two for each of `squares`
-  std::vector<Side> beyond;                    ///< four for each square: what lies beyond its sides
+  std::vector<Side> beyond;                    ///< four for each square: the sides beyond its sides
 
   [[nodiscard]] std::size_t node(const std::array<std::int32_t, 2>& p) const {
     return static_cast<std::size_t>(p[1] - low[1]) * columns +
@@ -139,8 +140,8 @@ struct Mesh {
 
   // By vertex slot. Slot 0 is the ghost.
   Pool<Point> point;
-  Pool<std::uint32_t> incident;  ///< a triangle at the vertex, or kNoIncident, or free
-  /// Set removal marks its vertices here; empty before the first one, zero in between.
+  Pool<std::uint32_t> incident;  ///< a triangle at the vertex, kNoIncident or free
+  /// Marks of set removal: empty before the first one, zero between removals.
   Pool<std::uint8_t> mark;
   // By triangle slot. Empty while all points are collinear ("flat").
   Pool<Triangle> triangle;
@@ -150,7 +151,7 @@ struct Mesh {
   bool flat = true;
 
   std::uint32_t vertex_count = 0;
-  std::uint32_t last_vertex = kNone;  ///< a living vertex, if there is any
+  std::uint32_t last_vertex = kNone;  ///< an existing vertex, if there is one
   FreeSlots free_vertices;
   FreeSlots free_triangles;
 
@@ -179,7 +180,7 @@ struct Mesh {
     free_vertices.clear();
     free_triangles.clear();
   }
-  /// Removes everything and releases the memory; the journal continues.
+  /// Removes everything and releases the memory. The journal goes on recording.
   void clear() {
     if (journal.on()) {
       for (std::uint32_t v = 1; v < point.size(); ++v)
@@ -192,7 +193,7 @@ struct Mesh {
     *this = std::move(empty);
   }
 
-  /// Removes everything and keeps the memory; the journal stops.
+  /// Removes everything and keeps the memory. The journal stops.
   void restart() {
     journal.stop();
     line.clear();
@@ -209,7 +210,7 @@ struct Mesh {
     return t < triangle.size() && is_finite(triangle[t].corner);
   }
 
-  /// Allocates a slot with the point and without triangles.
+  /// Allocates a slot for the point, without triangles.
   std::uint32_t new_vertex(const Point& p) {
     std::uint32_t v = 0;
     if (!free_vertices.empty()) {
@@ -246,14 +247,14 @@ struct Mesh {
     if (journal.on()) journal.touch_cell(t, triangle[t].corner);
     return t;
   }
-  /// The next free slots are needed soon and were not touched for long.
+  /// The next free slots are needed soon and have not been touched for a while.
   void prefetch_free_triangle() const {
     if (free_triangles.empty()) return;
     const std::uint32_t next = free_triangles.next();
     __builtin_prefetch(&triangle[next], 1);
     if (next + 8 < triangle.size()) __builtin_prefetch(&triangle[next + 8], 1);
   }
-  /// To be called before an algorithm overwrites or frees a triangle in use.
+  /// Must be called before an algorithm overwrites or frees a triangle in use.
   void record(std::uint32_t t) {
     if (journal.on()) [[unlikely]]
       journal.touch_cell(t, triangle[t].corner);
@@ -269,7 +270,7 @@ struct Mesh {
     triangle[triangle_of(b)].mate[index_of(b)] = a;
   }
 
-  /// The finite triangle on the other side of a ghost, or t itself.
+  /// The finite triangle across the hull edge of a ghost, or t itself if it is finite.
   [[nodiscard]] std::uint32_t finite_side(std::uint32_t t) const {
     const Triangle& at = triangle[t];
     for (std::uint32_t i = 0; i < 3; ++i)
@@ -291,13 +292,13 @@ struct Mesh {
   }
 };
 
-/// operator== of std::array calls memcmp, which is slow for so little.
+/// operator== of std::array calls memcmp, which is slow for so few bytes.
 template <class Point>
 bool same_point(const Point& a, const Point& b) {
   return a[0] == b[0] && a[1] == b[1];
 }
 
-/// Lexicographic order: that of the perturbation, and that along any line.
+/// Lexicographic order, which the perturbation uses and which is the order along any line.
 template <class Point>
 bool lexicographically_less(const Point& a, const Point& b) {
   return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);

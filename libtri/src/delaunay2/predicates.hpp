@@ -3,11 +3,11 @@
 
 #include "mesh.hpp"
 
-/// The kernel's predicates made strict (by symbolic perturbation) and extended to ghost triangles.
+/// The kernel's predicates, made strict by symbolic perturbation and extended to ghost triangles.
 
 namespace terrace::tri::planar {
 
-/// inside_circle() if the four are cocircular. Not inlined, as it is rare.
+/// inside_circle() for four cocircular points. Not inlined, as it is rarely called.
 template <class Kernel>
 [[gnu::noinline]] bool inside_perturbed_circle(typename Kernel::Point a, typename Kernel::Point b,
                                                typename Kernel::Point c, typename Kernel::Point p) {
@@ -21,10 +21,10 @@ template <class Kernel>
   return lexicographically_less(p, a) && Kernel::orientation(b, c, p) > 0;
 }
 
-/// Whether p, different from a, b and c, lies inside the circle through the counter-clockwise a, b,
-/// c after the perturbation: every lifted point is raised infinitesimally, the lexicographically
-/// larger infinitely more. Of four cocircular points only the largest counts: if it is p, p is
-/// outside; if it is another one, the lifted plane tilts about the other two, and p is below it on
+/// True if p, different from a, b and c, is inside the circle through the counter-clockwise a, b, c
+/// after the perturbation: every lifted point is raised infinitesimally, the lexicographically
+/// larger infinitely more. Of four cocircular points only the largest counts. If it is p, p is
+/// outside. If it is another one, the lifted plane tilts about the other two, and p is below it on
 /// the side of the raised one. No three of the four are collinear, so the answer is never zero.
 template <class Kernel>
 [[gnu::always_inline]] inline bool inside_circle(const typename Kernel::Point& a,
@@ -37,7 +37,7 @@ template <class Kernel>
   return inside_perturbed_circle<Kernel>(a, b, c, p);
 }
 
-/// Whether p, collinear with a and b, lies strictly between them.
+/// True if p, collinear with a and b, is strictly between them.
 template <class Point>
 bool between(const Point& a, const Point& p, const Point& b) {
   return lexicographically_less(a, b)
@@ -45,8 +45,8 @@ bool between(const Point& a, const Point& p, const Point& b) {
              : lexicographically_less(b, p) && lexicographically_less(p, a);
 }
 
-/// Whether p is in conflict with the ghost triangle beyond the hull edge a -> b that has the
-/// outside on its left: strictly outside, or inside the open edge.
+/// True if p is in conflict with the ghost triangle beyond the hull edge a -> b that has the
+/// outside on its left: if it is strictly outside, or inside the open edge.
 template <class Kernel>
 bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point& b,
                   const typename Kernel::Point& p) {
@@ -54,7 +54,7 @@ bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point&
   return side > 0 || (side == 0 && between(a, p, b));
 }
 
-/// Whether p, which is not a corner, is in conflict with a triangle, ghost or not; `point`: the
+/// True if p, which is not a corner, is in conflict with a triangle, ghost or not. `point`: the
 /// points of the vertices.
 template <class Kernel>
 [[gnu::always_inline]] inline bool in_conflict(const typename Kernel::Point* point,

@@ -28,7 +28,7 @@ Location locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p) 
   return result;
 }
 
-/// Whether a is preferred to b as the vertex nearest to p.
+/// True if a is preferred to b as the vertex nearest to p.
 template <class Kernel>
 bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t a,
             std::uint32_t b) {
@@ -36,8 +36,8 @@ bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint
   return order < 0 || (order == 0 && lexicographically_less(mesh.point[a], mesh.point[b]));
 }
 
-/// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts, where
-/// corner i of t is the vertex, starting from triangle `start`.
+/// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts,
+/// starting from triangle `start`. Corner i of t is the vertex.
 template <class Kernel, class Visit>
 void for_star(const Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t start, Visit visit) {
   std::uint32_t t = start;
@@ -103,9 +103,9 @@ Location locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
   return result;
 }
 
-// A vertex that is not nearest has a neighbour that is nearer, and the nearest vertices, all on one
-// empty circle about p, are the corners of a convex polygon whose edges exist: so moving to better
-// neighbours ends at the best vertex.
+// A vertex that is not nearest has a neighbour that is nearer. The nearest vertices are all on one
+// empty circle about p and are the corners of a convex polygon whose edges exist. Moving to better
+// neighbours therefore ends at the best vertex.
 template <class Kernel>
 std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
                       std::uint32_t hint) {
@@ -138,7 +138,7 @@ void adjacent(const Mesh<Kernel>& mesh, std::uint32_t vertex, std::vector<Vertex
     if (at + 1 != mesh.line.end()) result.push_back(VertexId{*(at + 1)});
     return;
   }
-  // A hull vertex has one triangle whose next corner is the ghost; its successor on the hull
+  // A hull vertex has one triangle whose next corner is the ghost. Its successor on the hull
   // follows.
   std::uint32_t start = mesh.incident[vertex];
   for_star(mesh, vertex, mesh.incident[vertex], [&](std::uint32_t t, std::uint32_t i) {

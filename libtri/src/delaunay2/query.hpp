@@ -8,7 +8,7 @@
 
 namespace terrace::tri::planar {
 
-/// See Delaunay2::locate(), nearest(), adjacent() and hash().
+/// Implements Delaunay2::locate(), nearest(), adjacent() and hash().
 template <class Kernel>
 Location locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 template <class Kernel>

@@ -12,7 +12,7 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// Makes a hole of the triangles around a vertex.
+/// Turns the triangles around a vertex into a hole.
 template <class Kernel>
 void open_star(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   auto& hole = mesh.hole;
@@ -73,7 +73,7 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   }
   open_star(mesh, vertex);
   auto& hole = mesh.hole;
-  // A vertex whose removal leaves a line was joined to all of it.
+  // If removing a vertex leaves a line, the vertex was joined to all of it.
   if (hole.vertex.size() + 1 >= mesh.vertex_count) [[unlikely]] {
     std::vector<std::uint32_t> survivors;
     for (const std::uint32_t v : hole.vertex)

@@ -7,7 +7,7 @@
 
 namespace terrace::tri::planar {
 
-/// Removes a vertex: the hole of its triangles is filled again.
+/// Removes a vertex and fills the hole of its triangles.
 template <class Kernel>
 void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex);
 
@@ -15,7 +15,7 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex);
 template <class Kernel>
 void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 
-/// Whether finite vertices (a ghost among them is skipped) lie on one line.
+/// True if the finite vertices are collinear; a ghost among them is skipped.
 template <class Kernel>
 bool collinear(const Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removal of a set of vertices as one hole, after J. Skala, thesis, section 8.1, but set-wise: all
+// Removes a set of vertices as one hole, after J. Skala, thesis, section 8.1, but by sets: all
 // triangles at the vertices are taken out first. If they leave a simple disc (or several), it is
-// filled at once. The thesis's rules that a vertex must lie on the hole's boundary, and that no
-// boundary vertex may occur twice, become one count (Euler's formula) and one comparison.
-//
-// Vertices that stay but lie inside the hole (islands) or touch its boundary twice (pinches) are
+// filled at once. The thesis requires that a vertex is on the hole's boundary and that no boundary
+// vertex occurs twice; here these rules become one count (Euler's formula) and one comparison.
+// Vertices that stay but are inside the hole (islands) or touch its boundary twice (pinches) are
 // absorbed: taken out as well and reinserted into the filled hole.
 #include <algorithm>
 
@@ -19,9 +18,9 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// Sets below this size are removed one by one.
+/// Smaller sets are removed one by one.
 constexpr std::size_t kMinSet = 4;
-/// Filling is quadratic at worst: longer boundaries are not attempted.
+/// Filling is quadratic at worst, so longer boundaries are not attempted.
 constexpr std::size_t kMaxBoundary = 4096;
 /// Scratch memory beyond this is released.
 constexpr std::size_t kMostScratch = std::size_t{1} << 20;
@@ -31,14 +30,14 @@ constexpr std::uint8_t kKept = 0;
 constexpr std::uint8_t kRemoved = 1;
 constexpr std::uint8_t kOnBoundary = 2;
 
-/// In Triangle::corner[0], between flood() and dry(): the triangle is part of the region.
+/// Set in Triangle::corner[0], between flood() and dry(), for triangles of the region.
 constexpr std::uint32_t kInRegion = 0x80000000u;
 
-/// In a queue's entry, instead of the side through which it was entered.
+/// In an entry of the queue, in place of the side through which the triangle was entered.
 constexpr std::uint32_t kNoSide = 3;
 
-/// Arrays of the flood; each triangle adds at most three entries to the queue and one to the
-/// others.
+/// Arrays of the flood. Each triangle adds at most three entries to the queue and one to each of
+/// the others.
 struct Output {
   explicit Output(Region& region) : region_(region) {}
   void make_room(std::size_t entries) {
@@ -69,10 +68,10 @@ struct Output {
 };
 
 /// Finds the region left by removed vertices: all triangles at them, and the edges around these.
-/// region.removed: the vertices; Mesh::mark is kRemoved for them and kKept for all others. Fills
-/// region.triangles, .mixed and .boundary; the triangles bear kInRegion.
+/// Input: the vertices in region.removed, and Mesh::mark, which is kRemoved for them and kKept for
+/// all others. Fills region.triangles, .mixed and .boundary; marks the triangles with kInRegion.
 ///
-/// The region is flooded across edges breadth-first, so that a triangle is fetched from memory long
+/// Floods the region across edges breadth-first, so that a triangle is fetched from memory long
 /// before its turn comes, and almost without branches, which could not be predicted. (Walking
 /// around each vertex would visit each triangle three times in succession.) O(triangles).
 template <class Kernel>
@@ -89,7 +88,7 @@ void flood(Mesh<Kernel>& mesh) {
     tail += really ? 1 : 0;
     __builtin_prefetch(&triangle[triangle_of(side)], 1);
   };
-  // Starts from a triangle of every vertex: the set need not be connected.
+  // Starts from a triangle of every vertex, as the set need not be connected.
   for (const std::uint32_t v : region.removed) push(make_side(incident[v], kNoSide), true);
 
   std::uint32_t triangles = 0;
@@ -120,7 +119,7 @@ void flood(Mesh<Kernel>& mesh) {
   region.triangles.resize(triangles);
   region.mixed.resize(mixed);
 
-  // The boundary: edges between kept vertices that have the region on one side only.
+  // The boundary consists of edges between kept vertices that have the region on one side only.
   region.boundary.clear();
   for (std::uint32_t k = 0; k < rim; ++k) {
     const Triangle& at = triangle[triangle_of(out.rim[k])];
@@ -158,7 +157,7 @@ class SetRemoval {
   SetRemoval(const SetRemoval&) = delete;
   SetRemoval& operator=(const SetRemoval&) = delete;
 
-  /// Whether removal by holes was possible; if not, nothing has changed.
+  /// Returns false, having changed nothing, if removal by holes was not possible.
   bool run() {
     flood(mesh_);
     if (region_.boundary.size() > kMaxBoundary) {
@@ -183,7 +182,7 @@ class SetRemoval {
   }
 
  private:
-  /// Whether every hole is a disc whose boundary vertices are different. Sets Mesh::incident of
+  /// True if every hole is a disc whose boundary vertices are different. Sets Mesh::incident of
   /// these to the number of the edge that starts there.
   bool is_simple() {
     const auto& boundary = region_.boundary;
@@ -219,8 +218,8 @@ class SetRemoval {
       mesh_.incident[edge.from] = triangle_of(edge.outer);
   }
 
-  /// Adds islands and pinches to the removed vertices; false if there are too many or none, or the
-  /// ghost is among them.
+  /// Adds islands and pinches to the removed vertices. Returns false if there are too many or none,
+  /// or if the ghost is among them.
   bool absorb() {
     auto& removed = region_.removed;
     auto& pinches = region_.pinches;
@@ -239,7 +238,7 @@ class SetRemoval {
     for (const Region::Edge& edge : region_.boundary)
       if (mesh_.mark[edge.from] == kOnBoundary) mesh_.mark[edge.from] = kKept;
     if (!possible || removed.size() == before) return false;
-    // An island's triangles are all listed already; only pinches add new ones.
+    // All triangles of an island are already listed; only pinches add new ones.
     if (!pinches.empty()) {
       dry(mesh_);
       flood(mesh_);
@@ -274,7 +273,7 @@ class SetRemoval {
     if (mesh_.journal.on())
       for (const std::uint32_t t : span_of(region_.triangles)) mesh_.record(t);
     const auto triangles = span_of(region_.triangles);
-    // Filling takes its slots from the end.
+    // Filling takes slots from the end.
     std::uint32_t used = 0;
     std::size_t begin = 0;
     for (const std::size_t end : region_.loop_ends) {
@@ -311,7 +310,7 @@ class SetRemoval {
   }
 
   Mesh<Kernel>& mesh_;
-  Region& region_;  ///< removed: the requested ones first, then the absorbed ones
+  Region& region_;  ///< region_.removed: the requested vertices, then the absorbed ones
   std::size_t requested_;
 };
 

@@ -5,7 +5,7 @@
 
 namespace terrace::tri::planar {
 
-/// Where a walk ended.
+/// The end of a walk.
 struct WalkEnd {
   /// The finite triangle that contains the point, including its boundary, or the ghost beyond a
   /// hull edge that the point sees.
@@ -13,10 +13,10 @@ struct WalkEnd {
   bool outside = false;
 };
 
-/// Remembering stochastic walk (Devillers, Pion, Teillaud, doi:10.1142/S0129054102001047): from
-/// triangle to triangle through an edge that separates the current one from p, never testing the
-/// edge just crossed. Which of the other two is tried first is drawn by a small generator with a
-/// fixed seed. In a Delaunay triangulation the walk cannot cycle. `start` may be a ghost.
+/// Remembering stochastic walk (Devillers, Pion, Teillaud, doi:10.1142/S0129054102001047). Goes
+/// from triangle to triangle through an edge that separates the current one from p, and never tests
+/// the edge just crossed. A small generator with a fixed seed chooses which of the other two is
+/// tried first. The walk cannot cycle in a Delaunay triangulation. `start` may be a ghost.
 template <class Kernel>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start) {
   using Point = typename Kernel::Point;
