@@ -15,8 +15,8 @@
 namespace terrace::tri {
 namespace spatial {
 
-/// The computation in a metric: the kernel, the form of the metric that its predicates take, and
-/// the scope that passes it to them for the duration of a call.
+/// Types for computing in a metric: the kernel, the form of the metric that its predicates take,
+/// and the scope that passes this form to them for the duration of a call.
 template <class Coord, class Metric>
 struct InMetric;
 
@@ -67,7 +67,7 @@ struct Delaunay3Access {
   }
 };
 
-/// Full check of a triangulation: counts, free lists, links, orientation, the perturbed empty
+/// Checks a triangulation completely: counts, free lists, links, orientation, the perturbed empty
 /// sphere across every facet, the hull, and the sorted list while there are no tetrahedra. Returns
 /// a description of the first fault, or an empty string. O(n).
 template <class Coord, class Metric>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
-// the previous one, coarse samples first. Fine samples are inserted by two threads, see
+// Bulk construction numbers vertices along a Hilbert curve and inserts them one by one, each near
+// the previous one, coarse samples first. Two threads insert the fine samples, see
 // parts_insert.cpp.
 #include "build.hpp"
 
@@ -19,7 +19,7 @@
 namespace terrace::tri::spatial {
 namespace {
 
-/// Passes over fewer points than this are not divided into parts.
+/// Passes over fewer points are not divided into parts.
 constexpr std::uint32_t kInParts = 8192;
 
 /// Puts points into slots begin, begin + 1, ... in Hilbert order. Returns the slot of each.
@@ -43,7 +43,7 @@ std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
   return vertex_of;
 }
 
-/// Sets up the flat state of all slots from begin on; mesh.basis spans their plane.
+/// Puts all slots from `begin` on into the flat state; mesh.basis spans their plane.
 template <class Kernel>
 void wait_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   std::vector<std::uint32_t>& waiting = mesh.waiting;
@@ -85,8 +85,8 @@ void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::
   }
 }
 
-/// Inserts all except the four of the first tetrahedron: every fourth, before that every fourth of
-/// these, and so on.
+/// Inserts all vertices except the four of the first tetrahedron: every fourth vertex, before that
+/// every fourth of these, and so on.
 template <class Kernel>
 void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
                 const std::array<std::uint32_t, 4>& first, unsigned threads) {
@@ -103,7 +103,7 @@ void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
       if (std::find(first.begin(), first.end(), begin + k) == first.end())
         going.push_back(begin + k);
     }
-    // With fewer points nearly all of space is close to the border of the parts.
+    // With fewer points nearly all of space is close to the border between the parts.
     if (count / step < kInParts) {
       for (const std::uint32_t v : going) insert_slot(mesh, v, mesh.last_vertex);
     } else {
@@ -128,12 +128,13 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   if (apex == end) {
     wait_all(mesh, begin, end);
   } else {
-    // Uniform points have 6.77 tetrahedra each, including ghosts.
+    // Uniformly distributed points have 6.77 tetrahedra each, including ghosts.
     const std::size_t usual = 7 * std::size_t{mesh.vertex_count};
     mesh.tetrahedron.reserve(usual);
     mesh.mark.reserve(usual);
     const std::array<std::uint32_t, 4> first = {mesh.basis[0], mesh.basis[1], mesh.basis[2], apex};
-    // Several threads cannot record; all slots were free before.
+    // Several threads cannot record. The journal is filled afterwards, as all slots were free
+    // before.
     Journal<typename Kernel::Point, 4> journal;
     std::swap(journal, mesh.journal);
     make_first(mesh, apex);

@@ -9,7 +9,7 @@
 
 namespace terrace::tri::spatial {
 
-/// Bulk construction in an empty mesh, see build.cpp. Returns the vertex of each point.
+/// Builds a triangulation in an empty mesh, see build.cpp. Returns the vertex of each point.
 template <class Kernel>
 std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                             unsigned threads);

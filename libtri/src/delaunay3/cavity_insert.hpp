@@ -5,10 +5,10 @@
 
 #include "walk.hpp"
 
-/// Insertion of one vertex: Bowyer and Watson's cavity, breadth-first. Each tetrahedron is tested
-/// once, as those tested and kept are marked too; a tetrahedron's neighbours are all tested before
-/// any result is used, so that mispredicted branches do not wait for arithmetic. About 20
-/// tetrahedra are replaced by 26.
+/// Inserts one vertex into the cavity of Bowyer and Watson, found breadth-first. Each tetrahedron
+/// is tested only once because the tested and kept ones are marked too. All neighbours of a
+/// tetrahedron are tested before any result is used, so that mispredicted branches do not wait for
+/// arithmetic. About 20 tetrahedra are replaced by 26.
 
 namespace terrace::tri::spatial {
 
@@ -18,8 +18,8 @@ class CavityInsertion {
   CavityInsertion(Mesh<Kernel>& mesh, Cavity& cavity, Part& part)
       : mesh_(mesh), cavity_(cavity), part_(part) {}
 
-  /// False if the cavity meets tetrahedra outside the part or the part is out of room; then nothing
-  /// has changed.
+  /// Returns false, having changed nothing, if the cavity meets tetrahedra outside the part or the
+  /// part is out of room.
   bool run(std::uint32_t vertex, std::uint32_t conflict) {
     bool possible = collect(mesh_.vertex[vertex].point, conflict);
     if constexpr (!Part::kWhole) {
@@ -65,7 +65,7 @@ class CavityInsertion {
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
         if constexpr (!Part::kWhole) {
-          // The other corners are those of t, which is owned.
+          // The other corners belong to t, which the part owns.
           if (!part_.owns(tetrahedron[other].corner[index_of(t.mate[i])])) return false;
         }
         filtered[i] =
@@ -73,7 +73,7 @@ class CavityInsertion {
       }
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
-        // Read again: a neighbour may occur twice.
+        // Reads the mark again, as a neighbour may occur twice.
         if (mark[other] == kUnknown) {
           const Tetrahedron& tested = tetrahedron[other];
           if (filtered[i] == Verdict::kIn ||
@@ -122,8 +122,8 @@ class CavityInsertion {
         make_side(facet.slot, 0);
   }
 
-  /// Two passes over the facets: each writes its edges into a table, then finds those of its
-  /// neighbours there, in the opposite direction.
+  /// Passes over the facets twice: the first pass writes the edges of each into a table, the second
+  /// finds its neighbours' edges there, in the opposite direction.
   void fill_small(std::uint32_t vertex) {
     constexpr std::uint32_t kStride = Cavity::kStride;
     Side* const by_edge = cavity_.by_edge.data();
@@ -202,7 +202,7 @@ class CavityInsertion {
   bool out_of_room_ = false;
 };
 
-/// The whole mesh as one part.
+/// The whole mesh as a single part.
 struct WholeMesh : Everywhere {
   template <class Mesh>
   static std::uint32_t new_tetrahedron(Mesh& mesh) {

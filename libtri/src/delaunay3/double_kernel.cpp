@@ -15,8 +15,8 @@ using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 Epick::Point_3 cgal(const DoubleKernel::Point& p) { return {p[0], p[1], p[2]}; }
 
-// Converts to integers whose differences IntKernel can take: with them ties, which are frequent on
-// grids, are cheap.
+// Converts to integers whose differences IntKernel accepts. Ties, which are frequent on grids, are
+// cheap with integers.
 bool to_integers(const DoubleKernel::Point& p, IntKernel::Point& result) {
   constexpr double kLimit = 0x1p29;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -45,7 +45,7 @@ void DoubleKernel::Lattice::add(double c) {
   const int lowest = biased - 1075 + std::countr_zero(fraction | std::uint64_t{1} << 52);
   if (lowest >= exponent_) return;
   exponent_ = lowest;
-  // Then all powers of the differences are far from underflow and overflow.
+  // All powers of the differences are then far from underflow and overflow.
   exact_fifth_ = exponent_ < kLeast ? 0 : std::ldexp(kExactFifth, 10 * exponent_);
 }
 
@@ -58,7 +58,7 @@ int DoubleKernel::orientation_exact(const Point& a, const Point& b, const Point&
 }
 
 bool DoubleKernel::collinear(const Point& a, const Point& b, const Point& c) {
-  // Collinear if and only if all three projections are.
+  // The points are collinear if and only if all three projections are.
   using Planar = planar::DoubleKernel;
   return Planar::orientation({a[0], a[1]}, {b[0], b[1]}, {c[0], c[1]}) == 0 &&
          Planar::orientation({a[1], a[2]}, {b[1], b[2]}, {c[1], c[2]}) == 0 &&

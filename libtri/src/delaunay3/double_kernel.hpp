@@ -7,8 +7,8 @@
 
 #include "in_sphere.hpp"
 
-/// Exact predicates on doubles: one evaluation in double with an error bound nearly always decides;
-/// the remaining cases go to integers if the coordinates are integers, otherwise to CGAL.
+/// Exact predicates on doubles. One evaluation in double with an error bound nearly always decides;
+/// the remaining cases use integers if the coordinates are integers, otherwise CGAL.
 
 namespace terrace::tri::spatial {
 
@@ -32,19 +32,20 @@ struct DoubleKernel {
     const Vector w = difference(d, a);
     const double det = (u.y * v.z - u.z * v.y) * w.x + (u.z * v.x - u.x * v.z) * w.y +
                        (u.x * v.y - u.y * v.x) * w.z;
-    // The product of the three lengths bounds each of three sums of products; 8 relative errors of
-    // u = 2^-53 enter (3 in differences, 2 in minors, 1 and 2 in the last step): 24 u times the
-    // product of lengths, here squared and rounded up. Extreme sizes are left to the exact test.
+    // The product of the three lengths bounds each of three sums of products. 8 relative errors of
+    // u = 2^-53 enter (3 in differences, 2 in minors, 1 and 2 in the last step), so the bound is 24
+    // u times the product of lengths, here squared and rounded up. Extreme sizes are left to the
+    // exact test.
     const double size = u.square() * v.square() * w.square();
     if (det * det > 7.5e-30 * size && size > 0x1p-900 && size < 0x1p900) [[likely]]
       return det > 0 ? 1 : -1;
     return orientation_exact(a, b, c, d);
   }
-  /// Whether a, b, c lie on one line.
+  /// True if a, b, c are collinear.
   static bool collinear(const Point& a, const Point& b, const Point& c);
 
-  /// The common property of all points of a mesh: all coordinates are integer multiples of 2^k,
-  /// with the largest such k. On a grid differences are then small multiples, for which doubles are
+  /// The property that all points of a mesh share: all coordinates are integer multiples of 2^k,
+  /// with the largest such k. Differences on a grid are then small multiples, for which doubles are
   /// exact.
   class Lattice {
    public:
@@ -63,7 +64,7 @@ struct DoubleKernel {
     double exact_fifth_ = kExactFifth * 0x1p800;
   };
 
-  /// A point to be tested against many spheres.
+  /// A point that is tested against many spheres.
   class Probe {
    public:
     Probe(const Point& p, const Lattice& lattice)
@@ -96,7 +97,7 @@ struct DoubleKernel {
     double exact_fifth_;
   };
 
-  /// > 0 if p lies inside the sphere through a, b, c, d, which are in order; 0 if on it.
+  /// > 0 if p is inside the sphere through a, b, c, d, which are in order; 0 if on it.
   static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                        const Point& p);
 

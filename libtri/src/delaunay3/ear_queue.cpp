@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fills the hole of one vertex by cutting ears, after J. Skala, thesis, section 8.2, and O.
 // Devillers, "On deletion in Delaunay triangulations", doi:10.1142/S0218195902000815. An ear is the
-// tetrahedron of two neighbouring facets. Ears wait in a priority queue; first comes the one whose
-// sphere contains the removed vertex least, measured by its power, in-sphere test / orientation.
+// tetrahedron of two neighbouring facets. Ears wait in a priority queue. The first is the one whose
+// sphere contains the removed vertex least, measured by its power, which is the in-sphere test
+// divided by the orientation.
 //
 // The powers are rounded, so the order is only approximate, and arbitrary among equal powers.
 // Before an ear is cut, exact perturbed tests check that its sphere contains none of the hole's
-// vertices: such a tetrahedron belongs to the result whenever it is made. So the result is exact,
+// vertices. Such a tetrahedron belongs to the result whenever it is made, so the result is exact,
 // ties included. An ear that fails will always fail and is dropped. If no ear is left before the
 // hole is full (possible with ties and at the hull), the rest is wrapped.
 #include "ear_queue.hpp"
@@ -63,7 +64,7 @@ class EarQueue {
     return a.facet != b.facet ? a.facet > b.facet : a.apex > b.apex;
   }
 
-  /// Lists the edges of facets from index `first` on, and their ears.
+  /// Lists the edges of facets from index `first` on, and the ears at these edges.
   void add_facets(std::uint32_t first) {
     const auto count = static_cast<std::uint32_t>(hole_.facets.size());
     const auto before = static_cast<std::ptrdiff_t>(edges_.size());
@@ -81,7 +82,7 @@ class EarQueue {
         const std::uint64_t back = ends(corner[(k + 2) % 3], corner[(k + 1) % 3]);
         for (auto at = std::lower_bound(edges_.begin(), edges_.end(), Edge{back, 0});
              at != edges_.end() && at->ends == back; ++at) {
-          // Each pair once.
+          // Takes each pair once.
           if (at->facet < i && filling_.is_open(at->facet)) add_ear(i, at->facet);
         }
       }
@@ -91,7 +92,7 @@ class EarQueue {
     return std::uint64_t{from} << 32 | to;
   }
 
-  /// The tetrahedron of a facet and the corner of another facet that is not in it.
+  /// Adds the tetrahedron of a facet and the corner of another facet that is not in it.
   void add_ear(std::uint32_t facet, std::uint32_t other) {
     const auto [a, b, c] = hole_.facets[facet].corner;
     for (const std::uint32_t d : hole_.facets[other].corner) {
@@ -103,7 +104,7 @@ class EarQueue {
     }
   }
 
-  /// Rounded; ordered last if it overflows.
+  /// Rounded; comes last if it overflows.
   [[nodiscard]] double power(std::uint32_t d, std::uint32_t a, std::uint32_t b,
                              std::uint32_t c) const {
     std::array<std::array<double, 3>, 4> r;

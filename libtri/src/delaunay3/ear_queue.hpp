@@ -5,7 +5,7 @@
 
 namespace terrace::tri::spatial {
 
-/// Fills mesh.hole, left by one vertex at `removed`, by cutting ears, see ear_queue.cpp.
+/// Fills mesh.hole, which one vertex at `removed` has left, by cutting ears, see ear_queue.cpp.
 template <class Kernel>
 void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed);
 

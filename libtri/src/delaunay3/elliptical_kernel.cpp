@@ -14,7 +14,8 @@
 namespace terrace::tri::spatial {
 namespace {
 
-// Only sums and products: the ring of binary fractions suffices, and is far faster than rationals.
+// Only sums and products are needed, so the ring of binary fractions suffices. It is far faster
+// than rationals.
 #ifdef CGAL_HAS_MPZF
 using Number = CGAL::Mpzf;
 #else
@@ -52,7 +53,8 @@ std::array<T, 6> square_of(const LinearMap3& m) {
   return result;
 }
 
-/// Differences of integers, small enough for everything computed from them to fit into 128 bits.
+/// Differences of integers that are small enough for everything computed from them to fit into 128
+/// bits.
 bool small_difference(const Point& from, const Point& to, Triple<Int128>& result) {
   constexpr double kLimit = 0x1p23;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -84,7 +86,7 @@ struct QuadraticForm::Exact {
     return sum;
   }
 
-  /// The sign of the sum of q times integers, component by component; 2 if unknown.
+  /// The sign of the sum of q times the integers, component by component; 2 if unknown.
   [[nodiscard]] int sign_of_sum(const std::array<Int128, 6>& whole) const {
     double sum = 0, size = 0;
     bool zero = true;
@@ -97,7 +99,7 @@ struct QuadraticForm::Exact {
       size += std::abs(term);
     }
     if (zero) return 0;
-    // Factors 2 u and u, product u, six sums, themselves rounded.
+    // Errors: factors 2 u and u, product u, and six sums, which are themselves rounded.
     if (std::abs(sum) > 16 * 0x1p-53 * size) return sum > 0 ? 1 : -1;
     return 2;
   }
@@ -124,7 +126,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   }
   exact_ = std::make_shared<const Exact>(std::move(exact));
 
-  // Cholesky factor with exact remainders: no entry suffers from cancellation.
+  // The Cholesky factor with exact remainders, so that no entry suffers from cancellation.
   spread_ = filter2_ = std::numeric_limits<double>::infinity();
   const auto root = [](const Rational& square) { return std::sqrt(CGAL::to_double(square)); };
   if (CGAL::sign(q[0]) != CGAL::POSITIVE) return;
@@ -137,7 +139,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   r11_ = root(s11);
   r12_ = CGAL::to_double(s12) / r11_;
   r22_ = root(Rational(s22 - s12 * s12 / s11));
-  // Beyond this underflow would matter, and filters decide little anyway.
+  // Below this underflow would matter, and filters decide little anyway.
   constexpr double kLeast = 0x1p-28;
   if (!(std::min({r00_, r11_, r22_}) > kLeast)) {
     r00_ = r01_ = r02_ = r11_ = r12_ = r22_ = 0;
@@ -152,7 +154,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   const double by_rows = std::max(1 + p01 + p02, 1 + p12);
   const double by_columns = std::max(1 + p01, 1 + p02 + p12);
   spread_ = std::sqrt(by_rows * by_columns) * (1 + 0x1p-40);
-  // Otherwise second-order errors would matter.
+  // Second-order errors would matter otherwise.
   if (!(spread_ < 0x1p28)) return;
   const double bound = (160 + 200 * spread_) * 0x1p-53;
   filter2_ = bound * bound * 1.01;
@@ -162,8 +164,8 @@ int EllipticalKernel::in_sphere(const Point& a, const Point& b, const Point& c, 
                                 const Point& p) {
   const std::array<const Point*, 4> corner = {&a, &b, &c, &d};
   const QuadraticForm::Exact& q = *form_->exact_;
-  // Grids, where ties are frequent and must be cheap: the value is a sum over the entries of Q
-  // times integers. At a tie most of these vanish one by one.
+  // Ties are frequent on grids and must be cheap there. The value is a sum over the entries of Q
+  // times integers. At a tie most of these integers vanish one by one.
   std::array<Triple<Int128>, 4> whole;
   bool is_whole = true;
   for (std::size_t i = 0; i < 4 && is_whole; ++i)
@@ -210,11 +212,11 @@ int EllipticalKernel::angle(const Point& from, const Point& a, const Point& b) {
 
 bool EllipticalKernel::in_smallest_sphere(const Point& a, const Point& b, const Point& c,
                                           const Point& d) {
-  // On the edge opposite to an angle that is not acute; at a right angle both cases coincide.
+  // d is on the edge opposite to an angle that is not acute; at a right angle both cases coincide.
   if (angle(a, b, c) <= 0) return angle(d, b, c) < 0;
   if (angle(b, a, c) <= 0) return angle(d, a, c) < 0;
   if (angle(c, a, b) <= 0) return angle(d, a, b) < 0;
-  // The centre is (f e + g f) / (2 n), with e and f the edges from a; only scalar products are
+  // The centre is (f e + g f) / (2 n), where e and f are the edges from a. Only scalar products are
   // needed.
   const QuadraticForm::Exact& q = *form_->exact_;
   const Triple<Number> e = exactly(a, b), f = exactly(a, c), v = exactly(a, d);

@@ -6,25 +6,25 @@
 #include "double_kernel.hpp"
 #include "terrace/tri/metric.hpp"
 
-/// Exact predicates in an elliptical metric, on the original points: only differences are mapped,
-/// inside the filters. Orientation is the same in all linear metrics; only spheres become
-/// ellipsoids and distances the lengths of mapped vectors.
+/// Exact predicates in an elliptical metric, on the original points: only the filters map
+/// differences. Orientation is the same in all linear metrics; only spheres become ellipsoids, and
+/// distances become lengths of mapped vectors.
 
 namespace terrace::tri::spatial {
 
-/// A metric prepared for the predicates, which need its map M only as Q = M^T M.
+/// A metric prepared for the predicates, which use its map M only as Q = M^T M.
 ///
 /// Filters use the upper triangular R with R^T R = Q (times a power of two) and a positive
-/// diagonal: it differs from M by a rotation or reflection, so it preserves lengths and
+/// diagonal. It differs from M by a rotation or reflection, so it preserves lengths and
 /// orientation. Each of its entries is rounded from an exact one, with a relative error of at most
 /// 5 u, u = 2^-53. The error of a difference mapped by it is then 9 u |R| |d|, component by
-/// component (difference 1, entry 5, product 1, sums 2); as d = R^-1 m, that is 9 u spread() times
+/// component (difference 1, entry 5, product 1, sums 2). As d = R^-1 m, that is 9 u spread() times
 /// the length of the mapped difference m.
 class QuadraticForm {
  public:
   explicit QuadraticForm(const EllipticalMetric3& metric);
 
-  /// A bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates; otherwise it
+  /// Upper bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates; otherwise it
   /// grows with the ratio of the longest semi-axis to the shortest. May be infinite.
   [[nodiscard]] double spread() const { return spread_; }
 
@@ -38,7 +38,7 @@ class QuadraticForm {
   std::shared_ptr<const Exact> exact_;
 };
 
-/// The algorithms call kernels statically, so the metric is set per thread, by a Scope, for the
+/// The algorithms call kernels statically, so a Scope sets the metric of the thread for the
 /// duration of a call.
 class EllipticalKernel : public DoubleKernel {
  public:
@@ -52,15 +52,16 @@ class EllipticalKernel : public DoubleKernel {
    private:
     const QuadraticForm* before_;
   };
-  /// The form of the current scope, to be set in other threads too.
+  /// The form of the current scope, for setting it in other threads too.
   static const QuadraticForm& form() { return *form_; }
 
-  /// A common property of the points would not help: the metric's own numbers are arbitrary.
+  /// A property shared by the points would not help, because the numbers of the metric are
+  /// arbitrary.
   struct Lattice {
     void add(const Point&) {}
   };
 
-  /// A point to be tested against many ellipsoids.
+  /// A point that is tested against many ellipsoids.
   class Probe {
    public:
     Probe(const Point& p, Lattice) : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]} {
@@ -84,10 +85,10 @@ class EllipticalKernel : public DoubleKernel {
           {r00_ * x01 + r01_ * y01 + r02_ * z01, r00_ * x23 + r01_ * y23 + r02_ * z23,
            r11_ * y01 + r12_ * z01, r11_ * y23 + r12_ * z23, r22_ * z01, r22_ * z23});
       // Let L be the largest squared length of a mapped row. As in IntKernel the operations cause
-      // an error of 132 u L^2.5. By Hadamard a 3 x 3 minor is at most L^1.5; if each row has an
-      // error of e, minors have 3 e L, squares 2 e L^0.5 and the four products 20 e L^2, where e is
-      // 9 u spread L^0.5. So (160 + 200 spread) u L^2.5 bounds the total. Sizes near underflow and
-      // overflow are left to the exact test.
+      // an error of 132 u L^2.5. By Hadamard a 3 x 3 minor is at most L^1.5. If each row has an
+      // error of e, minors have an error of 3 e L, squares of 2 e L^0.5 and the four products of 20
+      // e L^2, where e is 9 u spread L^0.5. So (160 + 200 spread) u L^2.5 bounds the total. Sizes
+      // near underflow and overflow are left to the exact test.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (test.value * test.value > filter2_ * fifth && fifth > 0x1p-900 && fifth < 0x1p900)
           [[likely]]
@@ -102,20 +103,19 @@ class EllipticalKernel : public DoubleKernel {
     double filter2_;
   };
 
-  /// > 0 if p lies inside the metric's ellipsoid through a, b, c, d, which are in order; 0 if on
-  /// it.
+  /// > 0 if p is inside the metric's ellipsoid through a, b, c, d, which are in order; 0 if on it.
   static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                        const Point& p);
 
   /// < 0 if a is nearer to p than b.
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
-  /// The sign of q(u, v), with u from `from` to a and v from `from` to b: > 0 if the angle is acute
-  /// in the metric.
+  /// The sign of q(u, v), where u goes from `from` to a and v from `from` to b: > 0 if the angle is
+  /// acute in the metric.
   static int angle(const Point& from, const Point& a, const Point& b);
 
-  /// Whether d lies inside the metric's smallest ellipsoid that contains the triangle a, b, c,
-  /// which is not degenerate; d is different from its corners. Exact.
+  /// True if d is inside the metric's smallest ellipsoid that contains the triangle a, b, c, which
+  /// is not degenerate; d differs from its corners. Exact.
   static bool in_smallest_sphere(const Point& a, const Point& b, const Point& c, const Point& d);
 
   /// The difference p - origin mapped by M, rounded; the same on every machine.

@@ -10,8 +10,8 @@
 
 namespace terrace::tri::spatial {
 
-/// Facets by their three corners (small numbers, in any order). Open addressing; every facet is
-/// looked up at most twice, so entries are never removed.
+/// A table of facets by their three corners (small numbers, in any order). Open addressing; every
+/// facet is looked up at most twice, so entries are never removed.
 struct FacetEntry {
   std::uint64_t key;
   std::uint32_t facet;
@@ -28,7 +28,7 @@ class FacetTable {
     count_ = 0;
   }
 
-  /// The facet with these corners; if there is none yet, `facet` is added.
+  /// Returns the facet with these corners. If there is none yet, adds `facet`.
   std::uint32_t find_or_add(const std::array<std::uint32_t, 3>& corner, std::uint32_t facet) {
     if (2 * count_ >= size_) [[unlikely]]
       grow();
@@ -42,7 +42,7 @@ class FacetTable {
   }
 
  private:
-  /// Never 0, as at most one of the corners is 0.
+  /// Never 0, because at most one of the corners is 0.
   static std::uint64_t key_of(const std::array<std::uint32_t, 3>& corner) {
     const auto [low, high] = std::minmax(corner[0], corner[1]);
     const std::uint64_t least = std::min(low, corner[2]);

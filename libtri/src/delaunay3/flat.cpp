@@ -19,7 +19,7 @@ auto by_point(const Mesh<Kernel>& mesh) {
   };
 }
 
-/// Finds the basis of the waiting vertices; returns the first one off their plane, or kNone.
+/// Finds the basis of the waiting vertices. Returns the first one off their plane, or kNone.
 template <class Kernel>
 std::uint32_t find_basis(Mesh<Kernel>& mesh) {
   mesh.basis.clear();
@@ -28,7 +28,7 @@ std::uint32_t find_basis(Mesh<Kernel>& mesh) {
   return kNone;
 }
 
-/// Inserts all waiting vertices; apex, one of them, is off the plane of the basis.
+/// Inserts all waiting vertices. `apex`, one of them, is off the plane of the basis.
 template <class Kernel>
 void leave_flat(Mesh<Kernel>& mesh, std::uint32_t apex) {
   const std::vector<std::uint32_t> waiting = std::move(mesh.waiting);

@@ -6,7 +6,7 @@
 #include "insert.hpp"
 #include "mesh.hpp"
 
-/// The states without tetrahedra: no point, or any number on a line or plane. Then the vertices
+/// The states without tetrahedra: no point, or any number on a line or plane. The vertices then
 /// wait in a sorted list, and the first point off their plane causes all of them to be inserted.
 
 namespace terrace::tri::spatial {
@@ -20,17 +20,17 @@ template <class Kernel>
 void remove_flat(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 
 /// Drops all tetrahedra and rebuilds those of the survivors, which are all remaining vertices, from
-/// scratch; flat if they are coplanar.
+/// scratch. The mesh becomes flat if they are coplanar.
 template <class Kernel>
 void restart(Mesh<Kernel>& mesh, std::vector<std::uint32_t> survivors);
 
-/// Whether vertices (a ghost among them is skipped) lie in one plane.
+/// True if the vertices are coplanar; a ghost among them is skipped.
 template <class Kernel>
 bool coplanar(const Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 
-/// Adds p's vertex to the at most three that span a point, line or plane, if it is not in that
-/// span. Returns false, and adds nothing, if the basis spans a plane and p is off it: the four of
-/// them span space.
+/// Adds p's vertex to the basis, the at most three vertices that span a point, line or plane, if it
+/// is not in that span. Returns false, and adds nothing, if the basis spans a plane and p is off
+/// it: the four of them then span space.
 template <class Kernel>
 bool extend_basis(const Mesh<Kernel>& mesh, std::vector<std::uint32_t>& basis,
                   std::uint32_t vertex) {
@@ -52,7 +52,7 @@ bool extend_basis(const Mesh<Kernel>& mesh, std::vector<std::uint32_t>& basis,
 }
 
 /// Makes the first tetrahedron and its ghosts from the three vertices of the basis and one off
-/// their plane. Afterwards the basis is empty and the mesh no longer flat.
+/// their plane. Afterwards the basis is empty and the mesh is no longer flat.
 template <class Kernel>
 void make_first(Mesh<Kernel>& mesh, std::uint32_t apex);
 

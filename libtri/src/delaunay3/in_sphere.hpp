@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The determinant of the sphere test in double, two lanes wide: SSE2 and NEON both have them, so
-/// every machine executes the same operations in the same order.
+/// The determinant of the sphere test in double, two lanes wide. SSE2 and NEON both have such
+/// lanes, so every machine executes the same operations in the same order.
 
 namespace terrace::tri::spatial {
 
@@ -16,21 +16,21 @@ using Pair = double __attribute__((vector_size(16)));
 /// A filter's verdict on the position of a point relative to a sphere.
 enum class Verdict : std::uint8_t { kOut, kIn, kOpen };  ///< kOpen: needs an exact test
 
-/// Four vectors from the tested point to the corners a, b, c, d: coordinates of a and b, and of c
-/// and d.
+/// Four vectors from the tested point to the corners a, b, c, d: the coordinates of a and b, then
+/// those of c and d.
 struct Rows {
   Pair x01, x23, y01, y23, z01, z23;
 };
 
 struct InSphere {
   double value;    ///< > 0 inside, up to rounding
-  double largest;  ///< the largest square of the length of a row
+  double largest;  ///< the largest squared length of a row
 };
 
 inline Pair cross_lanes(Pair low, Pair high) { return __builtin_shufflevector(low, high, 1, 2); }
 
-/// The four 3 x 3 minors are cyclic permutations of one expression, so two lanes do the work of two
-/// rows (after J. R. Shewchuk's insphere(), doi:10.1007/PL00009321).
+/// The four 3 x 3 minors are cyclic permutations of one expression, so two lanes compute two of
+/// them at a time (after J. R. Shewchuk's insphere(), doi:10.1007/PL00009321).
 struct Minors {
   Pair c01, c23;  ///< of rows abc and bcd, cda and dab
 };
@@ -55,14 +55,14 @@ struct Minors {
   return {sum[1] - sum[0], more[0] > more[1] ? more[0] : more[1]};
 }
 
-/// in_sphere_value() of integers is exact if largest^5 is below this: with L for `largest`, a 2 x 2
+/// in_sphere_value() of integers is exact if largest^5 is below this. With L for `largest`, a 2 x 2
 /// minor is at most L, summed over its products, a 3 x 3 minor 3 L^1.5 and the value 12 L^2.5 <
 /// 2^53. Coordinates of a row are then below 2^10.
 inline constexpr double kExactFifth = 5.6e29;
 
 /// inside_perturbed_sphere() for integers (or integer multiples of a power of two) of that size.
-/// Signs of 3 x 3 minors are orientations with the tested point in place of a corner, and each row
-/// packs into one number in lexicographic order, that of the tested point being 0.
+/// Signs of 3 x 3 minors are orientations with the tested point in place of a corner. Each row
+/// packs into one number in lexicographic order, which is 0 for the tested point.
 [[gnu::noinline]] inline bool inside_small_perturbed_sphere(const Rows& r) {
   constexpr double kShift = 2048;
   const Pair key01 = (r.x01 * kShift + r.y01) * kShift + r.z01;

@@ -19,7 +19,7 @@ inline constexpr std::size_t kTicksOfInsertion = 2048;
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict);
 
-/// Inserts a point, or finds the vertex that equals it. `hint`: a living vertex, or kNone.
+/// Inserts a point, or finds the vertex that equals it. `hint`: an existing vertex, or kNone.
 struct Inserted {
   std::uint32_t vertex;
   bool created;
@@ -27,9 +27,9 @@ struct Inserted {
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 
-/// Calls visit(k) for all k below count, first every fourth of them, before that every fourth of
-/// these, and so on from the coarsest: points of a curve inserted in this way make half of the
-/// temporary tetrahedra that they would make in order (after N. Amenta, S. Choi, G. Rote,
+/// Calls visit(k) for all k below count: every fourth of them, before that every fourth of these,
+/// and so on from the coarsest. Points of a curve inserted in this order make half as many
+/// temporary tetrahedra as in the order of the curve (after N. Amenta, S. Choi, G. Rote,
 /// "Incremental constructions con BRIO", doi:10.1145/777792.777824, with fixed samples instead of
 /// random ones).
 template <class Visit>

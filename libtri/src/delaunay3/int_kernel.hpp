@@ -11,8 +11,8 @@
 
 #include "in_sphere.hpp"
 
-/// Exact predicates on 30-bit integers: orientation in integers only; the sphere test by a filter
-/// in double, as differences of such integers are exact there, and by 192-bit integers.
+/// Exact predicates on 30-bit integers. Orientation uses integers only. The sphere test uses a
+/// filter in double, where differences of such integers are exact, and then 192-bit integers.
 
 namespace terrace::tri::spatial {
 
@@ -44,19 +44,19 @@ struct IntKernel {
                        Int128{u.x * v.y - u.y * v.x} * w.z;
     return (det > 0) - (det < 0);
   }
-  /// Whether a, b, c lie on one line.
+  /// True if a, b, c are collinear.
   static bool collinear(const Point& a, const Point& b, const Point& c) {
     const Vector u = difference(b, a);
     const Vector v = difference(c, a);
     return u.y * v.z == u.z * v.y && u.z * v.x == u.x * v.z && u.x * v.y == u.y * v.x;
   }
 
-  /// The common property of all points of a mesh: integers need none.
+  /// The property that all points of a mesh share; integers need none.
   struct Lattice {
     static void add(const Point&) {}
   };
 
-  /// A point to be tested against many spheres.
+  /// A point that is tested against many spheres.
   class Probe {
    public:
     Probe(const Point& p, Lattice) : at_{p[0], p[1], p[2], 0} {}
@@ -75,7 +75,7 @@ struct IntKernel {
       // Let L be the largest squared length of a row. A 2 x 2 minor is at most L in absolute value,
       // summed over its products, a 3 x 3 minor 3 L^1.5, the value 12 L^2.5. Relative errors of u =
       // 2^-53: 2 in a minor, 3 more in the next one, 3 in a square, 1 in the product, 2 in the
-      // sums: 11 * 12 u < 1.5e-14.
+      // sums. The total is 11 * 12 u < 1.5e-14.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (!(test.value * test.value > 2.25e-28 * fifth)) [[unlikely]] {
         if (!(fifth < kExactFifth)) return Verdict::kOpen;
@@ -96,7 +96,7 @@ struct IntKernel {
       return lanes;
     }
 #ifdef __SSE2__
-    // If rounding modes are to be respected, GCC 12 converts lane by lane, though rounding does not
+    // When GCC 12 must respect rounding modes it converts lane by lane, though rounding does not
     // matter here.
     static Pair low(Lanes v) { return _mm_cvtepi32_pd(reinterpret_cast<__m128i>(v)); }
 #else
@@ -109,7 +109,7 @@ struct IntKernel {
     Lanes at_;
   };
 
-  /// > 0 if p lies inside the sphere through a, b, c, d, which are in order; 0 if on it.
+  /// > 0 if p is inside the sphere through a, b, c, d, which are in order; 0 if on it.
   [[gnu::noinline]] static int in_sphere(const Point& a, const Point& b, const Point& c,
                                          const Point& d, const Point& p) {
     const std::array<Vector, 4> r = {difference(a, p), difference(b, p), difference(c, p),

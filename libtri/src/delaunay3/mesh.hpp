@@ -16,11 +16,12 @@
 #include "delaunay3/wrap/scan.hpp"
 #include "facet_table.hpp"
 
-/// The data of a tetrahedralisation and the operations that all algorithms share. No geometry here.
+/// The data of a tetrahedralisation and the operations that all algorithms share. Contains no
+/// geometry.
 
 namespace terrace::tri::spatial {
 
-/// Beyond each hull facet lies a ghost tetrahedron that joins it to this vertex "at infinity"; so
+/// Beyond each hull facet is a ghost tetrahedron that joins it to this vertex "at infinity", so
 /// every facet has two tetrahedra.
 inline constexpr std::uint32_t kGhost = 0;
 inline constexpr std::uint32_t kFreeCorner = 0xFFFFFFFFu;
@@ -35,15 +36,15 @@ constexpr std::uint32_t tetrahedron_of(Side side) { return side >> 2; }
 constexpr std::uint32_t index_of(Side side) { return side & 3; }
 
 struct Tetrahedron {
-  /// In order: det(b - a, c - a, d - a) > 0; for a ghost this holds with any point beyond its
-  /// facet. A free slot has kFreeCorner first, then the next free slot.
+  /// In order: det(b - a, c - a, d - a) > 0. For a ghost this holds with any point beyond its
+  /// facet. In a free slot the first entry is kFreeCorner and the second the next free slot.
   std::array<std::uint32_t, 4> corner;
   /// mate[i]: the facet opposite to corner[i], as a side of the neighbour.
   std::array<Side, 4> mate;
 };
 static_assert(sizeof(Tetrahedron) == 32);
 
-/// Corners of the facet opposite to corner i, so that corner i and these three are in order.
+/// Corners of the facet opposite to corner i, such that corner i and these three are in order.
 inline constexpr std::array<std::array<std::uint8_t, 3>, 4> kFacet = {
     {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
@@ -61,11 +62,11 @@ constexpr std::uint32_t ghost_index(const std::array<std::uint32_t, 4>& corner) 
 constexpr bool has_ghost(const std::array<std::uint32_t, 4>& corner) {
   return corner[0] == kGhost || corner[1] == kGhost || corner[2] == kGhost || corner[3] == kGhost;
 }
-/// A ghost in use.
+/// True for a ghost in use.
 constexpr bool is_ghost(const std::array<std::uint32_t, 4>& corner) {
   return corner[0] != kFreeCorner && has_ghost(corner);
 }
-/// A finite tetrahedron in use.
+/// True for a finite tetrahedron in use.
 constexpr bool is_finite(const std::array<std::uint32_t, 4>& corner) {
   return corner[0] != kFreeCorner && !has_ghost(corner);
 }
@@ -73,13 +74,13 @@ constexpr bool is_finite(const std::array<std::uint32_t, 4>& corner) {
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 inline constexpr std::uint32_t kMaxTetrahedra = (std::uint32_t{1} << 30) - 2;
 
-// What Vertex::incident holds: a tetrahedron at the vertex (below 2^30), or one of these.
-/// Within one operation: the vertex's number in a cavity or hole, with this bit.
+// Vertex::incident holds a tetrahedron at the vertex (below 2^30), or one of these values. Within
+// one operation: the vertex's number in a cavity or hole, with this bit.
 inline constexpr std::uint32_t kLocalBit = 0x40000000u;
-/// During a removal: to be removed, not met yet; and met.
+/// During a removal: a vertex that will be removed but has not been met yet, and one that has.
 inline constexpr std::uint32_t kToRemove = 0x7FFFFFF0u;
 inline constexpr std::uint32_t kRemoving = 0x7FFFFFF1u;
-/// A living vertex without tetrahedra (all points are coplanar).
+/// An existing vertex without tetrahedra (all points are coplanar).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
 /// The slot is free; the other bits are the next free slot.
 inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
@@ -98,14 +99,14 @@ struct Cavity {
     std::array<std::uint32_t, 3> local;
     std::uint32_t slot;  ///< slot of the tetrahedron on the facet
   };
-  /// With up to this many facets the boundary has 63 vertices, which are numbered from 1 in six
-  /// bits.
+  /// With up to this many facets the boundary has at most 63 vertices, which six bits can number
+  /// from 1.
   static constexpr std::size_t kSmall = 2 * 63 - 4;
   static constexpr std::uint32_t kStride = 64;
 
   std::vector<std::uint32_t> inside;  ///< slots of the tetrahedra in conflict, as a queue
   std::vector<Facet> facets;
-  /// By directed edge of local numbers: the side that has it. Never cleared.
+  /// The side with a directed edge of local numbers. Never cleared.
   std::vector<Side> by_edge = std::vector<Side>(std::size_t{kStride} * kStride);
   /// The same for large cavities: both vertices of an edge, the smaller first, and a side.
   struct Edge {
@@ -121,31 +122,31 @@ struct Cavity {
 };
 
 /// The hole left by removed vertices: the open facets around it, and the vertices on and in it,
-/// which have local numbers; scratch memory of removal. Local number 0 is the ghost's.
+/// which have local numbers. Local number 0 is the ghost. Scratch memory of removal.
 template <class Point>
 struct Hole {
   struct Facet {
-    /// Local numbers; in order with a corner inside the hole before them.
+    /// Local numbers, in order with a corner inside the hole before them.
     std::array<std::uint32_t, 3> corner;
     Side outer;  ///< the side beyond; kMatched once both tetrahedra exist
   };
   static constexpr Side kMatched = 0xFFFFFFFFu;
 
   std::vector<std::uint32_t> vertex;    ///< by local number
-  std::vector<Point> point;             ///< of vertex, in parallel
+  std::vector<Point> point;             ///< points of `vertex`, in parallel
   std::vector<std::uint32_t> incident;  ///< a new tetrahedron at each vertex
   std::vector<Facet> facets;
   std::vector<std::uint32_t> slots;  ///< slots of the tetrahedra taken out
 
-  /// Fill the hole of one vertex by ear_queue.cpp, a second method for comparison.
+  /// True to fill the hole of one vertex by ear_queue.cpp, a second method for comparison.
   bool by_ears = false;
 
   // For wrap.hpp: open facets as a stack (some already closed again), and facets by corners.
   std::vector<std::uint32_t> pending;
   std::vector<FacetEntry> table;
 
-  // For wrap.cpp: coordinates of the vertices by local number, padded; the values of each vertex
-  // for a facet; numbers of the candidates for the next corner.
+  // For wrap.cpp: padded coordinates of the vertices by local number, the values of each vertex for
+  // a facet, and numbers of the candidates for the next corner.
   std::vector<double> x, y, z;
   std::vector<double> power, volume;
   std::vector<std::uint32_t> near;
@@ -169,11 +170,11 @@ struct Mesh {
   using Vertex = typename Kernel::Vertex;  ///< point and incident
 
   Pool<Vertex> vertex;  ///< slot 0 is the ghost
-  /// Covers all points that have existed since the slots were forgotten.
+  /// Covers all points that have existed since the slots were last forgotten.
   typename Kernel::Lattice lattice;
   // By tetrahedron slot. Empty while all points are coplanar ("flat").
   Pool<Tetrahedron> tetrahedron;
-  Pool<std::uint8_t> mark;  ///< kUnknown between two operations
+  Pool<std::uint8_t> mark;  ///< kUnknown between operations
 
   /// While flat: all vertices in lexicographic order.
   std::vector<std::uint32_t> waiting;
@@ -182,7 +183,7 @@ struct Mesh {
   bool flat = true;
 
   std::uint32_t vertex_count = 0;
-  std::uint32_t last_vertex = kNone;  ///< a living vertex, if there is any
+  std::uint32_t last_vertex = kNone;  ///< an existing vertex, if there is one
   std::uint32_t free_vertex = kFreeVertexBit - 1;
   std::uint32_t free_tetrahedron = kNone;
   std::uint32_t finite_count = 0;  ///< finite tetrahedra
@@ -206,7 +207,7 @@ struct Mesh {
     free_vertex = kFreeVertexBit - 1;
     free_tetrahedron = kNone;
   }
-  /// Removes everything and releases the memory; the journal continues.
+  /// Removes everything and releases the memory. The journal goes on recording.
   void clear() {
     if (journal.on()) {
       for (std::uint32_t v = 1; v < vertex.size(); ++v)
@@ -226,7 +227,7 @@ struct Mesh {
     return t < tetrahedron.size() && is_finite(tetrahedron[t].corner);
   }
 
-  /// Allocates a slot with the point and without tetrahedra.
+  /// Allocates a slot for the point, without tetrahedra.
   std::uint32_t new_vertex(const Point& p) {
     std::uint32_t v = free_vertex;
     const bool again = v != kFreeVertexBit - 1;
@@ -268,7 +269,7 @@ struct Mesh {
     record(t);
     return t;
   }
-  /// To be called before an algorithm overwrites or frees a tetrahedron in use.
+  /// Must be called before an algorithm overwrites or frees a tetrahedron in use.
   void record(std::uint32_t t) {
     if (journal.on()) [[unlikely]]
       journal.touch_cell(t, tetrahedron[t].corner);
@@ -285,7 +286,7 @@ struct Mesh {
     tetrahedron[tetrahedron_of(b)].mate[index_of(b)] = a;
   }
 
-  /// The finite tetrahedron on the other side of a ghost, or t itself.
+  /// The finite tetrahedron across the hull facet of a ghost, or t itself if it is finite.
   [[nodiscard]] std::uint32_t finite_side(std::uint32_t t) const {
     const std::uint32_t ghost = ghost_index(tetrahedron[t].corner);
     return ghost < 4 ? tetrahedron_of(tetrahedron[t].mate[ghost]) : t;
@@ -306,13 +307,13 @@ struct Mesh {
   }
 };
 
-/// operator== of std::array calls memcmp, which is slow for so little.
+/// operator== of std::array calls memcmp, which is slow for so few bytes.
 template <class Point>
 bool same_point(const Point& a, const Point& b) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/// Lexicographic order, that of the perturbation.
+/// Lexicographic order, which the perturbation uses.
 template <class Point>
 bool lexicographically_less(const Point& a, const Point& b) {
   if (a[0] != b[0]) return a[0] < b[0];

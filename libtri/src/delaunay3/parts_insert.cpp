@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Insertion of many vertices by two threads. Vertices are numbered along a Hilbert curve, so the
-// first half of the numbers lies on one side of space and the second on the other. Each thread
-// inserts the vertices of one half as long as it meets only tetrahedra of that half; others are
-// deferred. A second round cuts the circle of numbers elsewhere, so that most of these are far from
-// its border; the rest are inserted one by one.
+// first half of the numbers is on one side of space and the second half on the other. Each thread
+// inserts the vertices of one half as long as it meets only tetrahedra of that half; the others are
+// deferred. A second round cuts the circle of numbers elsewhere, so that most deferred vertices are
+// far from its border; the rest are inserted one by one.
 #include "parts_insert.hpp"
 
 #include <algorithm>
@@ -26,11 +26,11 @@ namespace {
 
 constexpr std::uint32_t kParts = 2;
 
-/// A part of the mesh in which one thread inserts while others work in theirs: the tetrahedra whose
-/// corners (except the ghost) all have numbers in one range, which may wrap around the end. Only
-/// this thread reads and writes such a tetrahedron; one with corners in several ranges is written
-/// by none, and all may read it. So the work on a part does not depend on what other parts do at
-/// the same time.
+/// A part of the mesh in which one thread inserts while others work in theirs. It consists of the
+/// tetrahedra whose corners (except the ghost) all have numbers in one range, which may wrap around
+/// the end. Only this thread reads and writes such a tetrahedron. A tetrahedron with corners in
+/// several ranges is read by all threads and written by none. The work on a part therefore does not
+/// depend on what happens in other parts at the same time.
 ///
 /// New tetrahedra go to blocks of slots that alternate between the parts.
 class Part {
@@ -38,7 +38,7 @@ class Part {
   static constexpr bool kWhole = false;
   static constexpr std::uint32_t kBlock = 128;  ///< marks of two cache lines
 
-  /// Vertices first, first + 1, ..., `size` of `all` on a circle that begins at `begin`.
+  /// `size` vertices first, first + 1, ... on a circle of `all` vertices that begins at `begin`.
   struct Range {
     std::uint32_t begin, all, first, size;
 
@@ -49,7 +49,7 @@ class Part {
     }
   };
 
-  /// Slots from `base` on: `blocks` blocks for each of `parts` parts; this is part `number`.
+  /// Uses slots from `base` on: `blocks` blocks for each of `parts` parts; this is part `number`.
   /// free_list: slots that this part may use first.
   Part(const Range& range, std::uint32_t base, std::uint32_t parts, std::uint32_t number,
        std::uint32_t blocks, std::uint32_t free_list)
@@ -69,15 +69,15 @@ class Part {
       if (!owns(v)) return false;
     return true;
   }
-  /// Whether the neighbour beyond facet i may be read: if a corner of that facet is in the range,
-  /// it cannot belong to another thread.
+  /// True if the neighbour beyond facet i may be read. If a corner of that facet is in the range,
+  /// the neighbour cannot belong to another thread.
   [[nodiscard]] bool may_read_beyond(const Tetrahedron& t, std::uint32_t i) const {
     for (std::uint32_t k = 0; k < 4; ++k)
       if (k != i && range_.has(t.corner[k])) return true;
     return false;
   }
 
-  /// Whether this many more slots are certainly available.
+  /// True if this many more slots are certainly available.
   [[nodiscard]] bool has_room(std::size_t count) const { return used_ + count <= room_; }
   template <class Mesh>
   std::uint32_t new_tetrahedron(Mesh& mesh) {
@@ -115,7 +115,8 @@ class Part {
   std::int64_t finite_ = 0;
 };
 
-/// Starts a thread with this one's metric; not joinable if the system refuses to start one.
+/// Starts a thread with this thread's metric. The result is not joinable if the system refuses to
+/// start one.
 template <class Kernel, class Work>
 std::thread in_thread(const Work& work) {
   try {
@@ -133,7 +134,7 @@ std::thread in_thread(const Work& work) {
 }
 
 /// The nearest vertex before v on the curve (or else after it) that has tetrahedra and is in the
-/// range, or kNone. Few steps, as one in four comes from coarser passes.
+/// range, or kNone. Takes few steps, as one vertex in four comes from coarser passes.
 template <class Kernel>
 std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Part::Range& range,
                           std::uint32_t v) {
@@ -149,7 +150,7 @@ std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Pa
   return kNone;
 }
 
-/// The work of one thread. Threads write to separate cache lines.
+/// The work of one thread. Alignment keeps the data of different threads in separate cache lines.
 template <class Kernel>
 class alignas(128) Worker {
  public:
@@ -177,7 +178,7 @@ class alignas(128) Worker {
 
   Part part;
   std::vector<std::uint32_t> put_off;
-  std::size_t tried = 0;  ///< all, unless slots ran out
+  std::size_t tried = 0;  ///< all vertices, unless slots ran out
   std::exception_ptr failure;
 
  private:
@@ -212,7 +213,7 @@ class alignas(128) Worker {
 template <class Kernel>
 class Round {
  public:
-  /// Parts of the circle of the curve's vertices, the first from number `cut` on.
+  /// Divides the curve's vertices, as a circle, into parts; the first begins at number `cut`.
   Round(Mesh<Kernel>& mesh, const Curve& curve, std::uint32_t cut) : mesh_(mesh), curve_(curve) {
     const std::uint32_t all = curve.end - curve.begin;
     const std::uint32_t half = all / 2;
@@ -220,8 +221,8 @@ class Round {
                Part::Range{curve.begin, all, curve.begin + (cut + half) % all, all - half}};
   }
 
-  /// Rotates `going` (sorted) so that the first part comes first. Returns the vertices that could
-  /// not be inserted, sorted.
+  /// Inserts the vertices `going` (sorted), which it rotates so that the first part comes first.
+  /// Returns the vertices that could not be inserted, sorted.
   std::vector<std::uint32_t> run(std::span<std::uint32_t> going, unsigned threads) {
     std::rotate(going.begin(), std::lower_bound(going.begin(), going.end(), ranges_[0].first),
                 going.end());
@@ -254,7 +255,7 @@ class Round {
       close_gaps(base, first.part, second.part);
       lists = {lists[0].subspan(first.tried), lists[1].subspan(second.tried)};
       if (first.tried + second.tried > 0) continue;
-      // A cavity larger than all the room.
+      // A cavity needs more than all the room.
       for (const auto& list : lists) put_off.insert(put_off.end(), list.begin(), list.end());
       break;
     }
@@ -275,8 +276,8 @@ class Round {
     }
   }
 
-  /// Makes room for the tetrahedra of this many new vertices, in whole blocks. Capacity that is
-  /// reserved anyway is used if it nearly suffices.
+  /// Makes room for the tetrahedra of this many new vertices, in whole blocks. Uses capacity that
+  /// is already reserved if it nearly suffices.
   void make_room(std::size_t vertices) {
     constexpr std::size_t kUnit = kParts * std::size_t{Part::kBlock};
     const std::size_t size = mesh_.tetrahedron.size();
@@ -292,7 +293,7 @@ class Round {
     std::fill(mesh_.mark.data() + size, mesh_.mark.data() + after, kUnknown);
   }
 
-  /// Returns the slots that the parts have not used.
+  /// Returns the slots that the parts have not used to the free list.
   void close_gaps(std::uint32_t base, const Part& first, const Part& second) {
     std::uint32_t end = base;
     for (const Part* part : {&first, &second})
@@ -337,8 +338,8 @@ void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint) {
 template <class Kernel>
 void insert_in_parts(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> going,
                      unsigned threads) {
-  // A Hilbert curve passes through the halves of space one after the other; so do its two middle
-  // quarters together and its two outer ones, with a perpendicular cut.
+  // A Hilbert curve passes through the halves of space one after the other. Its two middle quarters
+  // together and its two outer ones are also halves, with a perpendicular cut.
   const std::uint32_t all = curve.end - curve.begin;
   std::vector<std::uint32_t> left = Round<Kernel>(mesh, curve, 0).run(going, threads);
   left = Round<Kernel>(mesh, curve, all / 4).run(left, threads);

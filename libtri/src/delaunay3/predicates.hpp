@@ -4,7 +4,7 @@
 #include "in_sphere.hpp"
 #include "mesh.hpp"
 
-/// The kernel's predicates made strict (by symbolic perturbation) and extended to ghosts.
+/// The kernel's predicates, made strict by symbolic perturbation and extended to ghosts.
 
 namespace terrace::tri::spatial {
 
@@ -18,9 +18,9 @@ int orientation_with(const typename Kernel::Vertex* vertex, const Tetrahedron& t
                              vertex[t.corner[f[2]]].point);
 }
 
-/// Whether p, cospherical with the four points in order, lies inside their sphere after the
+/// True if p, cospherical with the four points in order, is inside their sphere after the
 /// perturbation: every lifted point is raised infinitesimally, the lexicographically larger
-/// infinitely more. Of the five only the largest counts: if it is p, p is outside; if it is another
+/// infinitely more. Of the five only the largest counts. If it is p, p is outside. If it is another
 /// one, the lifted hyperplane tilts about the other three, and p is below it on the side of the
 /// raised one. If p is in the plane of those three, the second largest decides: then no other four
 /// of the points are coplanar.
@@ -50,8 +50,9 @@ bool inside_perturbed_sphere(const typename Kernel::Point& a, const typename Ker
   return inside_perturbed_sphere<typename Kernel::Point>({&a, &b, &c, &d}, p, Kernel::orientation);
 }
 
-/// Whether p, different from the corners, lies inside the sphere through a, b, c, d, which are in
-/// order, after the perturbation. Exact from the start: for callers that have not applied a filter.
+/// True if p, different from the corners, is inside the sphere through a, b, c, d, which are in
+/// order, after the perturbation. Uses exact arithmetic from the start, for callers that have not
+/// applied a filter.
 template <class Kernel>
 bool inside_sphere_exactly(const typename Kernel::Point& a, const typename Kernel::Point& b,
                            const typename Kernel::Point& c, const typename Kernel::Point& d,
@@ -60,7 +61,7 @@ bool inside_sphere_exactly(const typename Kernel::Point& a, const typename Kerne
   return sign != 0 ? sign > 0 : inside_perturbed_sphere<Kernel>(a, b, c, d, p);
 }
 
-/// The same, preceded by the filter.
+/// The same, but applies the filter first.
 template <class Kernel>
 bool inside_sphere(const typename Kernel::Vertex& a, const typename Kernel::Vertex& b,
                    const typename Kernel::Vertex& c, const typename Kernel::Vertex& d,
@@ -70,7 +71,7 @@ bool inside_sphere(const typename Kernel::Vertex& a, const typename Kernel::Vert
   return inside_sphere_exactly<Kernel>(a.point, b.point, c.point, d.point, p);
 }
 
-/// A point to be inserted, to be tested against tetrahedra.
+/// A point to insert, which is tested against tetrahedra.
 template <class Kernel>
 class Conflicts {
  public:
@@ -90,13 +91,14 @@ class Conflicts {
       return Verdict::kOpen;
     return probe_.side(vertex_[a], vertex_[b], vertex_[c], vertex_[d]);
   }
-  /// Whether the point, which is not a corner, is in conflict with a tetrahedron for which filter()
+  /// True if the point, which is not a corner, is in conflict with a tetrahedron for which filter()
   /// returned kOpen.
   [[nodiscard, gnu::noinline]] bool decide(const Tetrahedron& t) const {
     const std::uint32_t ghost = ghost_index(t.corner);
     if (ghost == 4) return decide_finite(t);
-    // Beyond the hull facet; in its plane the sphere of the adjacent finite tetrahedron intersects
-    // in the facet's circle, perturbed in the same way.
+    // A point beyond the hull facet is in conflict. In the plane of the facet, the sphere of the
+    // adjacent finite tetrahedron decides: it intersects the plane in the facet's circle, perturbed
+    // in the same way.
     const int side = orientation_with<Kernel>(vertex_, t, ghost, point_);
     if (side != 0) return side > 0;
     return decide_finite(tetrahedron_[tetrahedron_of(t.mate[ghost])]);

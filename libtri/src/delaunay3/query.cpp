@@ -30,7 +30,7 @@ Location3 locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p)
   return result;
 }
 
-/// Whether a is preferred to b as the vertex nearest to p.
+/// True if a is preferred to b as the vertex nearest to p.
 template <class Kernel>
 bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t a,
             std::uint32_t b) {
@@ -109,9 +109,9 @@ Location3 locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std:
   return result;
 }
 
-// A vertex that is not nearest has a neighbour that is nearer, and the nearest vertices, all on one
-// empty sphere about p, are the corners of a convex polytope whose edges exist: so moving to better
-// neighbours ends at the best vertex.
+// A vertex that is not nearest has a neighbour that is nearer. The nearest vertices are all on one
+// empty sphere about p and are the corners of a convex polytope whose edges exist. Moving to better
+// neighbours therefore ends at the best vertex.
 template <class Kernel>
 std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
                       std::uint32_t hint) {

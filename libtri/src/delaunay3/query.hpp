@@ -8,7 +8,7 @@
 
 namespace terrace::tri::spatial {
 
-/// See Delaunay3::locate(), nearest(), adjacent(), tetrahedra_at() and hash().
+/// Implements Delaunay3::locate(), nearest(), adjacent(), tetrahedra_at() and hash().
 template <class Kernel>
 Location3 locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 template <class Kernel>

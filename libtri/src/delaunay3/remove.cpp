@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removal of vertices, one or a set: all tetrahedra at them are taken out, and the hole is filled
-// as a whole, whatever its shape: with vertices that stay inside it (islands), with handles and
-// pinches, at the hull. A hole ends at facets beyond which a tetrahedron stays; holes that touch
-// only in edges or vertices are filled one after the other.
+// Removes vertices, one or a set: takes out all tetrahedra at them and fills the hole as a whole,
+// whatever its shape. It may contain vertices that stay (islands), have handles and pinches, or be
+// at the hull. A hole ends at facets beyond which a tetrahedron stays; holes that touch only in
+// edges or vertices are filled one after the other.
 #include "remove.hpp"
 
 #include "delaunay3/wrap/wrap.hpp"
@@ -59,7 +59,7 @@ class Removal {
     return incident == kToRemove || incident == kRemoving;
   }
 
-  /// Local number of a corner that stays.
+  /// Returns the local number of a corner that stays.
   std::uint32_t number(std::uint32_t v) {
     if (v == kGhost) return 0;
     std::uint32_t& incident = mesh_.vertex[v].incident;
@@ -71,7 +71,7 @@ class Removal {
     return incident & ~kLocalBit;
   }
 
-  /// Lists the tetrahedra of a hole, the facets around it, and the vertices that stay on it.
+  /// Lists the tetrahedra of a hole, the facets around it, and the vertices on it that stay.
   void gather(std::uint32_t start) {
     hole_.vertex.assign(1, kGhost);
     hole_.point.assign(1, {});
@@ -112,9 +112,9 @@ class Removal {
       __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
   }
 
-  /// Whether everything must be rebuilt: if no tetrahedron is left to start from; if the survivors
-  /// are coplanar, which requires that all of them are on this hole; and if a hole has so many
-  /// vertices that testing each of them for each facet would cost more.
+  /// True if everything must be rebuilt: if no tetrahedron is left to start from; if the survivors
+  /// are coplanar, which requires that all of them are on this hole; or if a hole has so many
+  /// vertices that testing each of them for each facet would cost more than a rebuild.
   [[nodiscard]] bool must_restart() const {
     if (hole_.facets.empty()) return true;
     const std::size_t vertices = hole_.vertex.size();

@@ -7,7 +7,7 @@
 
 namespace terrace::tri::spatial {
 
-/// Removes different vertices, one or many, see remove.cpp.
+/// Removes one or many different vertices, see remove.cpp.
 template <class Kernel>
 void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 

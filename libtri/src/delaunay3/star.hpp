@@ -8,15 +8,15 @@
 
 namespace terrace::tri::spatial {
 
-/// The tetrahedra around a vertex, including ghosts, breadth-first. Marks are in a hash table of
-/// its own, so that concurrent readers can each have one.
+/// Enumerates the tetrahedra around a vertex, including ghosts, breadth-first. It keeps marks in
+/// its own hash table, so that concurrent readers can each have one.
 template <class Kernel>
 class Star {
  public:
   Star() = default;
   Star(const Mesh<Kernel>& mesh, std::uint32_t vertex) { start(mesh, vertex); }
 
-  /// Begins again, in the memory that there is.
+  /// Starts at another vertex and reuses the memory.
   void start(const Mesh<Kernel>& mesh, std::uint32_t vertex) {
     mesh_ = &mesh;
     vertex_ = vertex;

@@ -5,23 +5,22 @@
 
 namespace terrace::tri::spatial {
 
-/// Where a walk ended.
+/// The end of a walk.
 struct WalkEnd {
   /// The finite tetrahedron that contains the point, including its boundary, or the ghost beyond a
-  /// hull facet that the point sees; kNone: the walk left what may be read.
+  /// hull facet that the point sees. kNone if the walk left the readable part.
   std::uint32_t tetrahedron = kNone;
   bool outside = false;
 };
 
-/// May read all tetrahedra.
+/// Allows reading all tetrahedra.
 struct Everywhere {
   static constexpr bool kWhole = true;
 };
 
-/// Remembering visibility walk: from tetrahedron to tetrahedron through the first facet that
-/// separates the current one from p, never testing the facet just crossed. In a (perturbed)
-/// Delaunay triangulation the walk cannot cycle. `start` may be a ghost. `part`: see
-/// parts_insert.cpp.
+/// Remembering visibility walk: goes from tetrahedron to tetrahedron through the first facet that
+/// separates the current one from p, and never tests the facet just crossed. The walk cannot cycle
+/// in a (perturbed) Delaunay triangulation. `start` may be a ghost. `part`: see parts_insert.cpp.
 template <class Kernel, class Part = Everywhere>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start,
              const Part& part = {}) {

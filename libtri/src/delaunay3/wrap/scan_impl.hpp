@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Included once for each instruction set, after kLanes and a function bits_of() for masks are
-// defined. This code must not be shared between objects, so all names are local to the object, and
-// no function of another header is called.
+// Included once for each instruction set, after the definition of kLanes and of a function
+// bits_of() for masks. This code must not be shared between objects, so all names are local to the
+// object, and no function of another header is called.
 #include "scan.hpp"
 
 namespace terrace::tri::spatial {
@@ -21,9 +21,9 @@ namespace {
 
 constexpr double kNothing = __builtin_inf();
 
-/// Writes powers and volumes. Returns an upper bound of the least quotient, or infinity: the
-/// quotient of the vertex that has the least up to rounding, among those of certainly positive
-/// volume.
+/// Writes powers and volumes. Returns an upper bound of the least quotient: the quotient of the
+/// vertex that has the least up to rounding, among those of certainly positive volume, or infinity
+/// if there is none.
 [[gnu::always_inline]] inline double measure_all(const ScanVertices& v, const ScanFacet& f) {
   const Lanes volume_error = f.volume_error - Lanes{};
   Lanes best_power = kNothing - Lanes{};

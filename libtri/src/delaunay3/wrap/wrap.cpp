@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gift wrapping of a hole. A facet with the hole in front of it determines its tetrahedron: the
-// empty sphere grows along the facet's axis until it meets a vertex. So facets can be taken in any
-// order; each of a new tetrahedron's other facets either meets an open one, which closes both, or
-// becomes open. There is no validity rule, no required order and no failure case.
+// empty sphere grows along the facet's axis until it meets a vertex. Facets can therefore be taken
+// in any order. Each of a new tetrahedron's other facets either meets an open one, which closes
+// both, or becomes open. There are no validity rules, no required order and no failure cases.
 //
-// The vertex that is met first is found in double with error bounds, for all vertices of the hole
-// at once; those that the bounds cannot separate are compared by exact (and perturbed) sphere
-// tests.
+// The first vertex that the sphere meets is found in double with error bounds, for all vertices of
+// the hole at once. Exact (and perturbed) sphere tests compare the vertices that the bounds cannot
+// separate.
 //
 // If no vertex is in front of a facet, it is on the hull, and the tetrahedron is a ghost. Facets
 // with the ghost never need wrapping: every new ghost has a finite facet, and the finite tetrahedra
@@ -79,7 +79,8 @@ class Wrapping {
                  padded,         hole_.power.data(), hole_.volume.data()};
   }
 
-  /// The point as seen by scan(): in an elliptical metric, mapped to where the metric is Euclidean.
+  /// The point as scan() uses it; in an elliptical metric it is mapped to where the metric is
+  /// Euclidean.
   Point scanned(const Point& p) const {
     if constexpr (kMapped) {
       return EllipticalKernel::mapped(p, hole_.point[1]);
@@ -88,7 +89,7 @@ class Wrapping {
     }
   }
 
-  /// The vertex that the growing sphere meets first, or 0, the ghost.
+  /// The first vertex that the growing sphere meets, or 0, the ghost.
   std::uint32_t choose(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     ScanFacet facet;
     double volume_error = kInfinity;
@@ -120,17 +121,17 @@ class Wrapping {
     return inside_sphere<Kernel>(at(best), at(a), at(b), at(c), hole_.point[d], mesh_.lattice);
   }
 
-  /// The facet for scan(); false if the error bounds could not be trusted.
+  /// Prepares the facet for scan(). Returns false if the error bounds could not be trusted.
   ///
   /// With u = 2^-53, edges e and f from the corner, normal n = e x f, b = |e| |f| (|e| + |f|), k =
-  /// |e| |f| / |n|, to first order: each coordinate of n has an error of at most 4 u |e| |f|
-  /// (including differences), n of 7 u |e| |f|. A volume then has an error of 7 u |e| |f| w + 4 u
-  /// |e| |f| w, with w the length of the vertex's vector. r = |e|^2 f - |f|^2 e, of length at most
-  /// b, has an error of 8 u b; r x n of 25 k u b |n|; |n|^2 a relative error of 17 k u; so the
-  /// diameter, their quotient, has an error of 43 k u b / |n|, and its length is at most b / |n|. A
-  /// power has an error of that times w, plus 6 u w (w + b / |n|) for its own operations. The
-  /// constants below are larger by at least a tenth, which covers omitted terms and the operations
-  /// of code that uses the bounds.
+  /// |e| |f| / |n|, the errors to first order are as follows. Each coordinate of n has an error of
+  /// at most 4 u |e| |f| (including differences), n of 7 u |e| |f|. A volume then has an error of 7
+  /// u |e| |f| w + 4 u |e| |f| w, where w is the length of the vertex's vector. r = |e|^2 f - |f|^2
+  /// e, of length at most b, has an error of 8 u b; r x n of 25 k u b |n|; |n|^2 a relative error
+  /// of 17 k u. The diameter, their quotient, therefore has an error of 43 k u b / |n|, and its
+  /// length is at most b / |n|. A power has an error of that times w, plus 6 u w (w + b / |n|) for
+  /// its own operations. The constants below are larger by at least a tenth, which covers omitted
+  /// terms and the operations of code that uses the bounds.
   bool measure(std::uint32_t a, std::uint32_t b, std::uint32_t c, ScanFacet& facet) const {
     const std::array<const double*, 3> axis = {hole_.x.data(), hole_.y.data(), hole_.z.data()};
     std::array<double, 3> e;
@@ -164,16 +165,16 @@ class Wrapping {
     }
     const double diameter = k * (std::sqrt(ee) + std::sqrt(ff));
     facet.power_error = length_ * kUnit * (48 * k * diameter + 12 * (length_ + diameter));
-    // Integers that are small enough give exact results: 6 w^3 < 2^53.
+    // Small enough integers give exact results: 6 w^3 < 2^53.
     const bool exact = std::is_same_v<typename Kernel::Coord, std::int32_t> && length_ < 114'000;
     facet.volume_error = exact ? 0 : 16 * kUnit * lengths * length_;
     return !kMapped || add_vector_errors(std::sqrt(ee) + std::sqrt(ff), lengths, normal, facet);
   }
 
-  /// In addition all vectors have an error of d, vector_error_. Let s be the sum of the lengths of
-  /// e and f. Then n has an error of s d; r, of length at most k s |n|, of 1.5 s^2 d; so the
-  /// diameter of (1.5 s^2 + 3 k s^2) d / |n|, to first order, and k is at least 1. False if that
-  /// could be a large part.
+  /// Adds the errors of mapped vectors: each has an error of d, vector_error_. Let s be the sum of
+  /// the lengths of e and f. To first order, n then has an error of s d, and r, of length at most k
+  /// s |n|, of 1.5 s^2 d, so the diameter has an error of (1.5 s^2 + 3 k s^2) d / |n|, where k is
+  /// at least 1. Returns false if that could be a large part of the diameter.
   bool add_vector_errors(double s, double lengths, double normal, ScanFacet& facet) const {
     const double d = 1.1 * vector_error_;
     if (!(s * d < 0x1p-20 * normal)) return false;
@@ -192,7 +193,7 @@ class Wrapping {
   ScanVertices vertices_{};
   std::size_t count_ = 0;
   double length_ = 0;
-  double vector_error_ = 0;  ///< error of vectors between vertices, where they are mapped
+  double vector_error_ = 0;  ///< error of vectors between vertices if they are mapped
 };
 
 }  // namespace

@@ -10,9 +10,9 @@
 
 namespace terrace::tri::spatial {
 
-/// What all ways of filling a hole share: keeping the open facets, making a tetrahedron on one, and
-/// joining matching facets. Facets may be taken in any order, as long as each gets the tetrahedron
-/// that belongs there.
+/// The operations that all methods of filling a hole share: keeping the open facets, making a
+/// tetrahedron on one, and joining matching facets. Facets may be taken in any order, as long as
+/// each gets the right tetrahedron.
 template <class Kernel>
 class HoleFilling {
  public:
@@ -50,8 +50,8 @@ class HoleFilling {
     return corner[0] != 0 && corner[1] != 0 && corner[2] != 0;
   }
 
-  /// Makes the tetrahedron of an open facet and a vertex or the ghost. Newly opened facets are the
-  /// last ones.
+  /// Makes the tetrahedron of an open facet and a vertex or the ghost. Newly opened facets are at
+  /// the end of the list.
   void attach(std::uint32_t i, std::uint32_t apex) {
     const auto [a, b, c] = hole_.facets[i].corner;
     if (used_ == hole_.slots.size()) hole_.slots.push_back(mesh_.new_tetrahedron());
@@ -95,7 +95,7 @@ class HoleFilling {
   std::size_t used_ = 0;  ///< slots that have been reused
 };
 
-/// Fills mesh.hole, at least one facet of which is finite and whose vertices are not coplanar, see
+/// Fills mesh.hole, which has at least one finite facet and vertices that are not coplanar, see
 /// wrap.cpp. Gives its vertices tetrahedra and frees unused slots.
 template <class Kernel>
 void wrap_hole(Mesh<Kernel>& mesh);
