@@ -6,14 +6,15 @@
 #include <cstdint>
 #include <vector>
 
-/// The free slots of an array, one bit each; nothing is allocated before the first is freed.
+/// The free slots of an array, one bit each. Allocates nothing before the first slot is freed.
 
 namespace terrace::tri {
 
-/// Slots are taken in blocks of 64, the most recently freed block first, the lowest slot of a block
-/// first: slots that are freed together and reused together stay together in memory, in whatever
-/// order that happens. (Chained in the order of their freeing, the slots of a cluster come back
-/// shuffled; once it has left the caches this takes twice the time.)
+/// Takes slots in blocks of 64, the most recently freed block first, and the lowest slot of a block
+/// first. Slots that are freed together and reused together therefore stay together in memory, in
+/// whatever order they are freed and taken. (If slots were chained in the order of their freeing,
+/// those of a cluster would come back shuffled; once the cluster has left the caches this takes
+/// twice the time.)
 class FreeSlots {
  public:
   [[nodiscard]] bool empty() const { return blocks_.empty(); }

@@ -32,7 +32,8 @@ void check_queries(std::span<const Point2> queries) {
   }
 }
 
-/// results[i] = answer(sampler, queries[i]), in an order in which successive queries are close.
+/// Computes results[i] = answer(sampler, queries[i]), in an order in which successive queries are
+/// close.
 template <class Mesh, class Result, class Answer>
 void answer_all(const Mesh& mesh, std::span<const Point2> queries, std::vector<Result>& results,
                 unsigned threads, Answer answer) {

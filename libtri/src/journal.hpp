@@ -20,7 +20,7 @@ class Journal {
   using Corners = std::array<std::uint32_t, kCorners>;
   struct CellRecord {
     std::uint32_t slot;
-    Corners before;  ///< kFreeCorner or a ghost: no cell
+    Corners before;  ///< kFreeCorner or a ghost: not a cell
   };
   struct VertexRecord {
     std::uint32_t slot;
@@ -40,7 +40,7 @@ class Journal {
     on_ = false;
   }
 
-  /// To be called only while on(), before the slot changes.
+  /// Must be called only while on(), before the slot changes.
   void touch_cell(std::uint32_t slot, const Corners& before) {
     if (cells_.first_touch(slot)) cells_.records.push_back({slot, before});
   }
@@ -53,10 +53,10 @@ class Journal {
   void for_each_cell(const Visit& visit) const {
     for (const CellRecord& record : cells_.records) visit(record.slot, record.before);
   }
-  /// Turns the records into net changes and empties the journal. The current state: point(slot) is
-  /// that of a living vertex, corners(slot) those of a finite cell, otherwise nullptr;
-  /// is_finite(corners) classifies recorded ones. `changes`: a triangulation's, empty; the last two
-  /// arguments are its lists of cells.
+  /// Turns the records into net changes and empties the journal. The callbacks describe the current
+  /// state: point(slot) returns the point of an existing vertex and corners(slot) the corners of a
+  /// finite cell, both nullptr for others; is_finite(corners) classifies recorded cells. `changes`:
+  /// an empty Changes of a triangulation; the last two arguments are its lists of cells.
   template <class PointNow, class CornersNow, class IsFinite, class Changes, class CellId>
   void take(const PointNow& point, const CornersNow& corners, const IsFinite& is_finite,
             Changes& changes, std::vector<CellId>& removed_cells,
@@ -64,7 +64,7 @@ class Journal {
     for (const VertexRecord& record : vertices_.records) {
       const Point* const now = point(record.slot);
       if (record.was_alive && now != nullptr && record.before == *now) {
-        // Unchanged; then its cells may be unchanged too.
+        // The vertex is unchanged, so its cells may be unchanged too.
         vertices_.untouch(record.slot);
         continue;
       }

@@ -24,7 +24,7 @@ std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// std::bit_cast, which Debian's Emscripten lacks.
+/// Replaces std::bit_cast, which Debian's Emscripten lacks.
 std::uint64_t bits_of(double value) {
   std::uint64_t bits = 0;
   std::memcpy(&bits, &value, sizeof bits);
@@ -39,9 +39,10 @@ struct PointCloud::Impl {
   FreeSlots free;
   std::size_t count = 0;
   bool journal = false;
-  // Since the last changes were taken: slots touched, what was there, and whether a slot is listed.
+  // Since the last call of take_changes(): slots touched, their former contents, and whether a slot
+  // is listed.
   std::vector<std::uint32_t> touched;
-  std::vector<Point> before;  // of touched, where was_living
+  std::vector<Point> before;  // points of `touched`, where was_living
   std::vector<bool> was_living, listed;
 
   void touch(std::uint32_t slot) {

@@ -23,7 +23,7 @@ double mean_above(std::array<double, 3> h) {
   if (std::isnan(h[0] + h[1] + h[2])) return std::numeric_limits<double>::quiet_NaN();
   std::sort(h.begin(), h.end());
   const auto& [low, middle, high] = h;
-  // A cut-off tip is a pyramid over a similar triangle.
+  // The tip that is cut off is a pyramid over a similar triangle.
   const auto tip = [](double apex, double b, double c) {
     return apex * (apex / (apex - b)) * (apex / (apex - c)) / 3;
   };
@@ -46,8 +46,8 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
     at[i] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
     height[i] = heights(vertices[i]) - datum;
   }
-  // Edges opposite to corner i, counter-clockwise; all scaled by a power of two to lengths of about
-  // 1, so that only results that are sizes themselves can overflow.
+  // Edges opposite to corner i, counter-clockwise. All are scaled by a power of two to lengths of
+  // about 1, so that only results that are sizes themselves can overflow.
   std::array<Vector, 3> edge;
   int exponent = 0;
   const auto take_edges = [&](double unit) {
@@ -86,7 +86,7 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
   result.area = std::scalbn(twice_area, 2 * exponent - 1);
   result.aspect = *std::max_element(lengths.begin(), lengths.end()) *
                   (lengths[0] + lengths[1] + lengths[2]) / (2 * std::numbers::sqrt3 * twice_area);
-  // The normal of the sloping triangle has these components besides twice_area.
+  // These are the components of the normal of the sloping triangle besides twice_area.
   const double bh = std::scalbn(height[1] - height[0], -exponent);
   const double ch = std::scalbn(height[2] - height[0], -exponent);
   const double x = bh * -edge[1][1] - ch * edge[2][1];

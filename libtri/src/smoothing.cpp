@@ -41,7 +41,7 @@ void check(const SmoothingOptions& options) {
                                      " is too large for this method; use at most 0.6");
 }
 
-/// The vertices of a region by rows of a sparse matrix: first those that move, then those that
+/// The vertices of a region as rows of a sparse matrix: first those that move, then those that
 /// stay.
 struct Rows {
   std::vector<std::uint32_t> vertex;
@@ -51,7 +51,7 @@ struct Rows {
   std::vector<double> weight;  ///< >= 0; the sum per row is 1
 };
 
-/// The vectors from a vertex to its neighbours, scaled to at most 1, which does not change angles.
+/// Scales the vectors from a vertex to its neighbours to at most 1, which does not change angles.
 void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
   bool huge = false;
   for (const auto& p : at)
@@ -67,9 +67,9 @@ void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
     for (double& c : p) c /= largest;
 }
 
-/// Weights of the neighbours of a vertex at the origin: the sum of the cotangents of the two angles
-/// opposite to an edge, which is twice the common side of the Voronoi cells divided by the edge's
-/// length. Returns false if they are NaN.
+/// Computes the weights of the neighbours of a vertex at the origin: the sum of the cotangents of
+/// the two angles opposite to an edge, which is twice the common side of the Voronoi cells divided
+/// by the edge's length. Returns false if they are NaN.
 bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
   weights.assign(at.size(), 0);
   for (std::size_t i = 0; i < at.size(); ++i) {
@@ -83,7 +83,7 @@ bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
   }
   double sum = 0;
   for (double& w : weights) {
-    w = std::isnan(w) ? w : std::max(w, 0.0);  // negative only by rounding
+    w = std::isnan(w) ? w : std::max(w, 0.0);  // only rounding makes it negative
     sum += w;
   }
   for (double& w : weights) w /= sum;
@@ -137,8 +137,8 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
   return rows;
 }
 
-/// next = height + step * (mean of neighbours - height) for rows that move; count(d) weighs a
-/// neighbour that is higher by d.
+/// Computes next = height + step * (mean of neighbours - height) for rows that move. count(d)
+/// weights a neighbour that is higher by d.
 template <class Count>
 void take_step(const Rows& rows, double step, std::vector<double>& height,
                std::vector<double>& next, Count count, base::StopTicks& ticks) {
