@@ -7,7 +7,7 @@
 
 #include "place.hpp"
 
-/// The triangles that the insertion of a query would remove, without inserting it.
+/// Finds the triangles that the insertion of a query would remove, without inserting it.
 
 namespace terrace::tri::planar {
 
@@ -49,9 +49,9 @@ struct Cavity {
   }
 };
 
-/// The cavity of a query that is inside the hull, not a vertex and not on a hull edge; `root` is a
-/// triangle that contains it. The circle test is exact and strict: of cocircular triangles all or
-/// none are taken. So the cavity is connected and star-shaped about the query.
+/// Finds the cavity of a query that is inside the hull, not a vertex and not on a hull edge; `root`
+/// is a triangle that contains it. The circle test is exact and strict, so it takes all or none of
+/// several cocircular triangles. The cavity is therefore connected and star-shaped about the query.
 template <class Kernel>
 void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, Cavity& cavity) {
   const Triangle* const triangle = mesh.triangle.data();
@@ -87,7 +87,7 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
     const auto number = static_cast<std::uint32_t>(cavity.triangle.size());
     cavity.triangle.push_back({edge.from, apex, edge.to});
     cavity.link.push_back({edge.from, edge.to, edge.triangle, number});
-    // Counter-clockwise: the edge from -> apex first.
+    // Counter-clockwise, so the edge from -> apex comes first.
     const Side later = t.mate[previous_index(i)];
     __builtin_prefetch(&triangle[triangle_of(later)]);
     if (height == cavity.pending.size()) [[unlikely]]
@@ -97,8 +97,9 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
   }
 }
 
-/// For a vertex inside the hull: its neighbours as corners, and their polygon as rim. There are no
-/// triangles inside, as if the vertex were the only point in the polygon. False for hull vertices.
+/// For a vertex inside the hull: takes its neighbours as corners, and their polygon as rim. There
+/// are no triangles inside, as if the vertex were the only point in the polygon. Returns false for
+/// hull vertices.
 template <class Kernel>
 bool find_link(const Mesh<Kernel>& mesh, std::uint32_t vertex, Cavity& cavity) {
   cavity.clear();

@@ -35,7 +35,7 @@ struct QueryPlace {
   std::uint32_t triangle = kNone;  ///< a triangle that contains the query, unless flat or outside
 };
 
-/// All points are on one line: the hull is the segment.
+/// All points are collinear, so the hull is the segment between the outermost.
 template <class Kernel>
 QueryPlace place_on_line(const Mesh<Kernel>& mesh, const Query& p) {
   const auto after = std::partition_point(mesh.line.begin(), mesh.line.end(), [&](std::uint32_t v) {
@@ -50,7 +50,8 @@ QueryPlace place_on_line(const Mesh<Kernel>& mesh, const Query& p) {
   return {QueryPlace::kHullEdge, {*(after - 1), *after}, kNone};
 }
 
-/// Like walk() in walk.hpp: the triangle that contains the query, or a ghost whose edge it sees.
+/// Like walk() in walk.hpp: finds the triangle that contains the query, or a ghost whose edge it
+/// sees.
 template <class Kernel>
 std::uint32_t walk_to(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t start) {
   const auto* const point = mesh.point.data();
@@ -83,7 +84,7 @@ std::uint32_t walk_to(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t st
   }
 }
 
-/// `last`: the triangle to start from; set to where the next search should start.
+/// `last`: the triangle to start from; set to the start of the next search.
 template <class Kernel>
 QueryPlace find_place(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& last) {
   if (mesh.flat) return place_on_line(mesh, p);
@@ -102,7 +103,7 @@ QueryPlace find_place(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& l
   return {QueryPlace::kInside, {}, last};
 }
 
-/// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts; corner
+/// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts. Corner
 /// i of t is the vertex.
 template <class Kernel, class Visit>
 void for_triangles_round(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit visit) {
@@ -115,8 +116,8 @@ void for_triangles_round(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit v
   } while (t != start);
 }
 
-/// The vertex nearest to the query, on ties the lexicographically smallest. See nearest() in
-/// query.cpp for why moving to better neighbours finds it.
+/// The vertex nearest to the query; of equally near vertices the lexicographically smallest. The
+/// comment on nearest() in query.cpp explains why moving to better neighbours finds it.
 template <class Kernel>
 std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& last) {
   if (mesh.vertex_count == 0) return kNone;
@@ -124,8 +125,7 @@ std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint
     return DoubleKernel::compare_distance(p, to_query(mesh.point[a]), to_query(mesh.point[b]));
   };
   if (mesh.flat) {
-    // Along the line the distance decreases and then increases; after the last vertex there is
-    // none.
+    // Along the line the distance decreases and then increases. There is no vertex after the last.
     const auto found =
         std::partition_point(mesh.line.begin(), mesh.line.end() - 1,
                              [&](const std::uint32_t& v) { return compare(v, *(&v + 1)) > 0; });

@@ -99,7 +99,7 @@ template <class Kernel>
 void Sampler<Kernel>::weigh_edge(const Query& p, std::uint32_t a, std::uint32_t b) {
   const Query from = to_query(mesh_.point[a]);
   const Query to = to_query(mesh_.point[b]);
-  // Differences of finite doubles may overflow; then halves are used.
+  // Uses halves if differences of finite doubles overflow.
   const bool huge = !std::isfinite(to[0] - from[0]) || !std::isfinite(to[1] - from[1]);
   const auto difference = [&](double u, double v) {
     return std::abs(huge ? u / 4 - v / 4 : u - v);
@@ -169,8 +169,8 @@ Gradient Sampler<Kernel>::gradient_of_cell(const Query& p, const Heights& height
       exact().cell.differentiate(cavity_, on_vertex, slopes_);
     }
   }
-  // The slopes of the weights add up to zero, so heights are taken relative to one of them; this
-  // keeps the digits of their differences.
+  // The slopes of the weights add up to zero, so heights may be taken relative to any one of them,
+  // which keeps the digits of their differences.
   const double base = heights(on_vertex ? centre : VertexId{cavity_.corner[0].vertex});
   Gradient result{0, 0};
   for (std::size_t i = 0; i < slopes_.size(); ++i) {

@@ -11,8 +11,8 @@
 
 namespace terrace::tri::planar {
 
-/// Answers queries one after another, each search starting where the last one ended. For one
-/// thread; memory is kept between queries.
+/// Answers queries one after another; each search starts where the last one ended. For use by one
+/// thread. Memory is kept between queries.
 template <class Kernel>
 class Sampler {
  public:
@@ -21,7 +21,8 @@ class Sampler {
   Sampler(Sampler&&) = delete;
   Sampler& operator=(Sampler&&) = delete;
 
-  /// The next search starts at this vertex; kNone: at the vertex last used by the triangulation.
+  /// Makes the next search start at this vertex; kNone: at the vertex last used by the
+  /// triangulation.
   void start_at(std::uint32_t vertex);
   /// See weights_at().
   std::span<const VertexWeight> weigh(const Query& p, Interpolation method);
@@ -36,7 +37,7 @@ class Sampler {
   void weigh_neighbours(const Query& p, std::uint32_t t);
   /// Measures the cell of p in cavity_. Returns false if double precision does not suffice.
   bool measure(const Query& p);
-  /// Returns false if the numbers leave a weight open.
+  /// Returns false if the numbers leave a weight undecided.
   template <class Number>
   bool take_weights(const VoronoiCell<Number>& cell);
   void divide_by_sum();

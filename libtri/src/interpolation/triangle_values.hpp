@@ -9,12 +9,12 @@
 #include "terrace/tri/interpolation.hpp"
 #include "voronoi_cell.hpp"
 
-/// Values that depend on triangles alone, with doubles or exact rationals.
+/// Values that depend on triangles alone, in doubles or exact rationals.
 
 namespace terrace::tri::planar {
 
-/// Twice the areas of the triangles of p and two corners, as shares of their sum, if accurate.
-/// `corner` is counter-clockwise.
+/// Twice the areas of the triangles of p and two corners, as shares of their sum, if they are
+/// accurate. `corner` is counter-clockwise.
 template <class Number>
 bool barycentric(const Query& p, const std::array<Query, 3>& corner,
                  std::array<double, 3>& weights) {

@@ -11,26 +11,26 @@
 #include "bounded_number.hpp"
 #include "cavity.hpp"
 
-/// The Voronoi cell that a query would get, and the areas it would take from its neighbours.
+/// The Voronoi cell that a query would get, and the areas that it would take from its neighbours.
 ///
 /// The cell's corners are the centres of the circles through the query and the edges of the
-/// cavity's rim; inside lie the centres of the cavity's triangles, which are corners of the
-/// existing cells. The area that the query takes from corner v is a polygon: the cell's side
-/// towards v and the centres of the triangles at v. Each edge of such polygons is shared by two of
-/// them, is dual to an edge of the cavity, and adds to one area what it subtracts from the other.
+/// cavity's rim. Inside the cell are the centres of the cavity's triangles, which are corners of
+/// the existing cells. The area that the query takes from corner v is a polygon: the cell's side
+/// towards v and the centres of the triangles at v. Each edge of such polygons belongs to two of
+/// them and is dual to an edge of the cavity. It adds to one area what it subtracts from the other.
 
 namespace terrace::tri::planar {
 
-/// Weights computed in double are not accepted with errors above this.
+/// Greatest accepted error of weights computed in double.
 inline constexpr double kTolerance = 1e-11;
-/// Roundings that add up in a weight, besides those counted by VoronoiCell::error.
+/// Number of roundings that add up in a weight, besides those counted by VoronoiCell::error.
 inline constexpr double kRoundings = 4;
-/// Bounds of squared sizes, so that products of four lengths neither overflow nor lose bits.
+/// Limits of squared sizes, so that products of four lengths neither overflow nor lose bits.
 inline constexpr double kLeastSquare = 1e-130;
 inline constexpr double kGreatestSquare = 1e130;
 
-/// Rounded to a double (NaN: the number is not known so well), or, if it kShortens, to a relative
-/// 2^-kShortBits; specialised for rational numbers where they are used.
+/// Rounds to a double (NaN: the number is not known precisely enough) or, if it kShortens, to a
+/// relative 2^-kShortBits. Specialised for rational numbers where they are used.
 inline constexpr int kShortBits = 512;
 template <class Number>
 struct Rounded;
@@ -44,7 +44,7 @@ struct Rounded<double> {
   static constexpr bool kShortens = false;
   static double of(double value) { return value; }
 };
-/// Sums of so many exact quotients get too long: their digits would grow with every term.
+/// Longer sums of exact quotients take too much time, as their digits grow with every term.
 inline constexpr std::size_t kLongSum = 32;
 
 /// Number = double, BoundedNumber, or exact rationals.
@@ -59,19 +59,20 @@ struct VoronoiCell {
   std::vector<Vector> round;   ///< corners of the cell by edge of the rim
   std::vector<Number> area;    ///< twice the area taken from each corner
   Number total = 0;            ///< twice the cell's area
-  /// For doubles: the sum of squared errors of centres, in units of rounding; an estimate.
+  /// For doubles: the sum of squared errors of centres, in units of rounding. An estimate.
   Number error = 0;
   Number extent = 0;  ///< for doubles: the sum of squares of `round`
 
-  /// With rationals exact, but for cells of more than kLongSum sides, whose corners are shortened
-  /// where the total keeps kShortBits / 2 certain bits.
+  /// Measures the cell, exactly with rationals. For cells of more than kLongSum sides the rationals
+  /// of the corners are shortened if the total keeps kShortBits / 2 certain bits.
   void measure(const Cavity& cavity, const Query& p);
-  /// For doubles, after measure(): whether the weights will be accurate to kTolerance.
+  /// For doubles, after measure(): true if the weights will be accurate to kTolerance.
   [[nodiscard]] bool accurate() const;
-  /// The derivatives of the weights area / total by the query's coordinates, per corner. On a
-  /// vertex (find_link()): numbers s(i) such that the sum of s(i) * (height(i) - height of the
-  /// vertex) is the mean gradient over the cell. To be called after measure(). Returns false if not
-  /// accurate to kTolerance, or if a bounded number leaves one open.
+  /// Computes the derivatives of the weights area / total by the query's coordinates, per corner.
+  /// On a vertex (find_link()) computes numbers s(i) such that the sum of s(i) * (height(i) -
+  /// height of the vertex) is the mean gradient over the cell. Must be called after measure().
+  /// Returns false if they are not accurate to kTolerance, or if a bounded number leaves one
+  /// undecided.
   bool differentiate(const Cavity& cavity, bool on_vertex,
                      std::vector<std::array<double, 2>>& slopes);
 
@@ -98,8 +99,8 @@ auto VoronoiCell<Number>::circumcentre(const Vector& b, const Vector& c) -> Vect
   const Number cc = square(c);
   const Number half = Number(0.5) / cross(b, c);
   const Vector result{(bb * c.y - cc * b.y) * half, (cc * b.x - bb * c.x) * half};
-  // The cross product has a relative error of 1 / sin of the angle, hence so does the radius. This
-  // is a sum, so it is NaN if a term is.
+  // The cross product has a relative error of 1 / sin of the angle, and so does the radius. The
+  // error is a sum, so it is NaN if one of its terms is.
   if constexpr (std::is_same_v<Number, double>) error += bb * cc * half * half * square(result);
   return result;
 }
@@ -110,7 +111,7 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
   measure(cavity, p, kShortens && cavity.rim.size() > kLongSum);
   if constexpr (kShortens) {
     if (!shortens_) return;
-    // Each area that is added is wrong by less than 2^-kShortBits of the sum of all squares.
+    // Each added area has an error of less than 2^-kShortBits of the sum of all squares.
     Number doubt = 0;
     for (const Vector& v : round) doubt += square(v);
     for (const Vector& v : centre) doubt += square(v);
@@ -135,7 +136,7 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p, bool sho
     at[i] = {number(v[0]) - number(p[0]), number(v[1]) - number(p[1])};
   }
   for (std::size_t i = 0; i < centre.size(); ++i) {
-    // Uses differences of the vertices themselves, as those of needles must be accurate.
+    // Uses differences of the vertices themselves, because those of needles must be accurate.
     const auto [ia, ib, ic] = cavity.triangle[i];
     const Query& a = cavity.corner[ia].at;
     const Query& b = cavity.corner[ib].at;
@@ -173,15 +174,15 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p, bool sho
 
 template <class Number>
 bool VoronoiCell<Number>::accurate() const {
-  // A centre with an error of e moves the border of an area by e along a length of at most the
+  // If a centre has an error of e, the border of an area moves by e along a length of at most the
   // cell's extent.
   constexpr double kFactor = kRoundings * 0x1p-53 / kTolerance;
   return total > kLeastSquare && total < kGreatestSquare &&
          error * extent * (kFactor * kFactor) < total * total;
 }
 
-// A query that moves towards a corner of the cavity moves the side of its cell facing that corner.
-// B. Piper, "Properties of local coordinates based on Dirichlet tesselations",
+// When a query moves towards a corner of the cavity, the side of its cell facing that corner moves
+// too. B. Piper, "Properties of local coordinates based on Dirichlet tesselations",
 // doi:10.1007/978-3-7091-6916-2_15: area i grows by the side's length divided by the corner's
 // distance, times the vector from the query to the side's midpoint.
 template <class Number>
