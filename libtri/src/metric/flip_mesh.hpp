@@ -12,7 +12,7 @@
 
 namespace terrace::tri::planar {
 
-/// In Triangle::mate: nothing is beyond the edge.
+/// In Triangle::mate: there is no triangle beyond the edge.
 inline constexpr Side kNoMate = 0xFFFFFFFFu;
 
 struct FlipMesh {
@@ -41,9 +41,10 @@ struct FlipMesh {
     link(make_side(t, 1), make_side(o, 1));
   }
 
-  /// Flips until no pending side violates the Delaunay condition, ties broken as always; a flip
-  /// adds those around it. Only edges for which may_flip(side, mate) are flipped; flipping(t, o) is
-  /// called before each flip of the edge between t and o. `point` is by vertex slot.
+  /// Flips until no pending side violates the Delaunay condition, with ties broken as in Delaunay2;
+  /// a flip adds the sides around it. Only edges for which may_flip(side, mate) is true are
+  /// flipped. Calls flipping(t, o) before each flip of the edge between t and o. `point` is indexed
+  /// by vertex slot.
   template <class Kernel, class Point, class MayFlip, class Flipping>
   void settle(std::vector<Side>& pending, const std::vector<Point>& point, const MayFlip& may_flip,
               const Flipping& flipping) {
@@ -55,7 +56,8 @@ struct FlipMesh {
       if (mate == kNoMate || !may_flip(side, mate)) continue;
       const std::uint32_t o = triangle_of(mate), k = index_of(mate);
       const auto& [a, b, c] = triangle[t].corner;
-      // A corner inside lies within the angle at the opposite one, so the four are convex.
+      // A corner inside the circle is within the angle at the opposite corner, so the four are
+      // convex.
       if (!inside_circle<Kernel>(point[a], point[b], point[c], point[triangle[o].corner[k]]))
         continue;
       flipping(t, o);

@@ -29,7 +29,7 @@ std::array<double, 2> direction_of(double degrees) {
   return {c, s};
 }
 
-/// Whether the rows of the map are linearly independent; exact.
+/// True if the rows of the map are linearly independent. Exact.
 bool invertible(const LinearMap2& m) {
   return planar::DoubleKernel::orientation({0, 0}, {m[0], m[1]}, {m[2], m[3]}) != 0;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flips of tetrahedra of one region. For a facet that is not Delaunay, with apices d and e: if the
-// line from d to e passes through the facet, two tetrahedra become three; if it passes outside an
-// edge, the three at that edge become two if there are only three; if it meets the edge, the four
-// (or on the hull two) at that edge become as many. Otherwise the facet is stuck until its
-// neighbourhood changes.
+// Flips tetrahedra of one region. Consider a facet that is not Delaunay, with apices d and e. If
+// the line from d to e passes through the facet, two tetrahedra become three. If it passes outside
+// an edge, the three tetrahedra at that edge become two, provided that there are only three. If it
+// meets the edge, the four (or on the hull two) at that edge are replaced by as many. Otherwise the
+// facet is stuck until its neighbourhood changes.
 //
-// Facets wait in the order of their corners, not of their slots: so the result is canonical.
+// Facets wait in the order of their corners, not of their slots, so the result is canonical.
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -24,7 +24,7 @@ namespace {
 
 using namespace spatial;
 
-/// A copy of tetrahedra that can be flipped. It has no ghosts: kHullSide stands for the outside.
+/// A copy of tetrahedra that can be flipped. It has no ghosts; kHullSide represents the outside.
 class Flips {
  public:
   using Vertex = EllipticalKernel::Vertex;
@@ -42,8 +42,8 @@ class Flips {
   }
   [[nodiscard]] std::uint32_t region_of(std::uint32_t t) const;
 
-  /// Flips among the tetrahedra of a region, in the metric of the scope, until nothing changes.
-  /// `own`: the tetrahedra of the region at the start. Returns the number of stuck facets.
+  /// Flips the tetrahedra of a region, in the metric of the scope, until nothing changes. `own`:
+  /// the tetrahedra of the region at the start. Returns the number of stuck facets.
   std::size_t settle(std::uint32_t number, const std::vector<std::uint32_t>& own);
   [[nodiscard]] std::size_t flip_count() const { return flips_; }
 
@@ -85,7 +85,8 @@ Flips::Key Flips::key_of(Side side) const {
   return key;
 }
 
-/// Called for a tetrahedron of the region; also true at its border, where no flip is possible.
+/// Called for a tetrahedron of the region. Also true at the region's border, where no flip is
+/// possible.
 bool Flips::is_delaunay(std::uint32_t t, std::uint32_t i) const {
   const Side mate = tetrahedron[t].mate[i];
   if (mate == kHullSide) return true;
@@ -100,7 +101,7 @@ std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>
   number_ = number;
   for (const std::uint32_t t : own) {
     for (std::uint32_t i = 0; i < 4; ++i) {
-      // Each facet from one side.
+      // Takes each facet from one side.
       const Side mate = tetrahedron[t].mate[i];
       if (mate != kHullSide && mate > make_side(t, i) && !is_delaunay(t, i))
         pending_.push({key_of(make_side(t, i)), make_side(t, i)});
@@ -135,8 +136,8 @@ bool Flips::try_flip(std::uint32_t t, std::uint32_t i) {
   const std::uint32_t o = tetrahedron_of(mate);
   const std::uint32_t d = tetrahedron[t].corner[i];
   const std::uint32_t e = tetrahedron[o].corner[index_of(mate)];
-  // On which side of the facets at d is e? Each of the facet's edges is opposite to one of its
-  // corners.
+  // Decides on which side of the facets at d e is. Each of the facet's edges is opposite to one of
+  // its corners.
   std::uint32_t passed = 4;
   bool coplanar = false;
   for (std::uint32_t k = 0; k < 4; ++k) {
@@ -163,7 +164,8 @@ std::uint32_t Flips::apex_beyond(std::uint32_t t, std::uint32_t corner) const {
   return side == kHullSide ? kNone : tetrahedron[tetrahedron_of(side)].corner[index_of(side)];
 }
 
-/// The line passes outside the edge opposite to corner number `edge` of the facet.
+/// Flips where the line passes outside the edge opposite to corner number `edge` of the facet, or
+/// meets it (`coplanar`). Returns false if no flip is possible.
 bool Flips::flip_at_edge(std::uint32_t t, std::uint32_t i, std::uint32_t edge, bool coplanar) {
   const Side mate = tetrahedron[t].mate[i];
   const std::uint32_t o = tetrahedron_of(mate);
@@ -213,7 +215,7 @@ void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners>
     Key key;
     Side side;
   };
-  // Facets that wait for a second tetrahedron: those on the boundary, then those of new ones.
+  // Facets that wait for a second tetrahedron: first those on the boundary, then those of new ones.
   std::array<Facet, 16> open;
   std::size_t count = 0;
   for (const std::uint32_t t : old) {
@@ -259,7 +261,7 @@ void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners>
 const LinearMap3& map_of(const Euclidean&) { return kIdentityMap<3>; }
 const LinearMap3& map_of(const EllipticalMetric3& metric) { return metric.map(); }
 
-/// Numbers the regions in the order of their vertices, and keeps the map of each.
+/// Numbers the regions in the order of their vertices and keeps the map of each.
 template <class Triangulation>
 std::vector<LinearMap3> find_regions(const Triangulation& triangulation, const MetricField3& field,
                                      Flips& flips) {
@@ -271,9 +273,9 @@ std::vector<LinearMap3> find_regions(const Triangulation& triangulation, const M
     auto& place = flips.vertex[slot(v)].point;
     for (std::size_t k = 0; k < 3; ++k) place[k] = static_cast<double>(p[k]);
     const LinearMap3 map = field(place);
-    // Successive vertices mostly share their region.
+    // Successive vertices are mostly in the same region.
     if (maps.empty() || map != maps[last]) {
-      // Checked before it becomes a key: NaN has no order.
+      // Checked before it becomes a key, because NaN has no order.
       check_metric(map, "the field of metrics: the map at " + std::to_string(place[0]) + ", " +
                             std::to_string(place[1]) + ", " + std::to_string(place[2]));
       const auto [at, fresh] = known.try_emplace(map, static_cast<std::uint32_t>(maps.size()));
@@ -295,7 +297,7 @@ void rank_vertices(const Triangulation& triangulation, Flips& flips) {
   for (std::uint32_t i = 0; i < order.size(); ++i) flips.rank[order[i]] = i;
 }
 
-/// Dense numbers.
+/// Gives the tetrahedra dense numbers.
 template <class Triangulation>
 void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
   std::vector<std::uint32_t> number(triangulation.tetrahedron_slots());
@@ -314,7 +316,7 @@ void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
       t.mate[i] = Flips::kHullSide;
       if (beyond[i] == kNoTetrahedron) continue;
       const std::uint32_t other = number[slot(beyond[i])];
-      // Seen from there, it is opposite to the corner that is not one of this one's.
+      // From there, the facet is opposite to the corner that is not a corner of this tetrahedron.
       const auto& corner = flips.tetrahedron[other].corner;
       std::uint32_t k = 0;
       while (std::find(t.corner.begin(), t.corner.end(), corner[k]) != t.corner.end()) ++k;
@@ -323,7 +325,7 @@ void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
   }
 }
 
-/// All points in one region: triangulated from scratch, without flips.
+/// Triangulates points that are all in one region from scratch, without flips.
 template <class Triangulation>
 void build_anew(const Triangulation& triangulation, const LinearMap3& map,
                 MetricTetrahedra& result) {

@@ -19,7 +19,7 @@ constexpr std::uint32_t kNoRegion = 0xFFFFFFFFu;
 const LinearMap2& map_of(const Euclidean&) { return kIdentityMap<2>; }
 const LinearMap2& map_of(const EllipticalMetric2& metric) { return metric.map(); }
 
-/// A copy of triangles whose edges can be flipped. It has no ghosts: kNoMate stands for the
+/// A copy of triangles whose edges can be flipped. It has no ghosts; kNoMate represents the
 /// outside.
 class Flips {
  public:
@@ -52,7 +52,7 @@ class Flips {
         const std::uint32_t other = beyond[i] == kNoTriangle ? kNone : number[slot(beyond[i])];
         t.mate[i] = kNoMate;
         if (other == kNone) continue;
-        // The same edge seen from there: its first corner is this one's second.
+        // From there the edge is reversed: its first corner is this one's second.
         const auto& corner = mesh_.triangle[other].corner;
         const auto at = std::find(corner.begin(), corner.end(), t.corner[previous_index(i)]);
         t.mate[i] =
@@ -76,7 +76,7 @@ class Flips {
       for (const std::uint32_t t : members[region]) {
         ticks_(256);
         for (std::uint32_t i = 0; i < 3; ++i) pending_.push_back(make_side(t, i));
-        // Two of the neighbour's corners are this triangle's.
+        // Two of the neighbour's corners belong to this triangle, so only the third is checked.
         mesh_.settle<EllipticalKernel>(
             pending_, point_,
             [&](Side, Side mate) {
@@ -110,9 +110,9 @@ class Flips {
       for (const std::uint32_t v : t.corner) {
         if (region_[v] != kNoRegion) continue;
         const LinearMap2 map = field(point_[v]);
-        // Successive vertices mostly share their region.
+        // Successive vertices are mostly in the same region.
         if (maps_.empty() || map != maps_[last_]) {
-          // Checked before it becomes a key: NaN has no order.
+          // Checked before it becomes a key, because NaN has no order.
           check_metric(map, "the field of metrics: the map at " + std::to_string(point_[v][0]) +
                                 ", " + std::to_string(point_[v][1]));
           const auto [at, fresh] = known.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));

@@ -25,20 +25,20 @@ using planar::triangle_of;
 using PlanePosition = planar::DoubleKernel::Point;
 using Triple = std::array<std::uint32_t, 3>;
 
-/// Where the metric is the Euclidean one.
+/// The region with the Euclidean metric.
 constexpr std::uint32_t kPlainRegion = 0;
 constexpr std::uint32_t kNoOneRegion = 0xFFFFFFFFu;
 
 std::uint32_t least_index(const Triple& c) {
   return static_cast<std::uint32_t>(std::min_element(c.begin(), c.end()) - c.begin());
 }
-/// The same turn, the smallest number first.
+/// The triangle rotated so that the smallest number comes first.
 Triple from_least(Triple c) {
   std::rotate(c.begin(), c.begin() + least_index(c), c.end());
   return c;
 }
 
-/// The metrics that have been met, as numbers.
+/// Assigns numbers to the metrics of the field, in the order in which they first occur.
 class RegionTable {
  public:
   explicit RegionTable(MetricField2 field) : field_(std::move(field)) {
@@ -46,12 +46,12 @@ class RegionTable {
     forms_.emplace_back(kIdentityMap<2>);
     known_.emplace(maps_.back(), kPlainRegion);
   }
-  /// Throws as metric_triangles() does.
+  /// Returns the number of the region at a position. Throws as metric_triangles() does.
   std::uint32_t at(const PlanePosition& p) {
     const LinearMap2 map = field_(p);
-    // Successive points mostly share their region.
+    // Successive points are mostly in the same region.
     if (map == maps_[last_]) return last_;
-    // Checked before it becomes a key: NaN has no order.
+    // Checked before it becomes a key, because NaN has no order.
     check_metric(map, "the field of metrics: the map at " + std::to_string(p[0]) + ", " +
                           std::to_string(p[1]));
     const auto [at, fresh] = known_.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
@@ -74,8 +74,8 @@ class RegionTable {
   std::uint32_t last_ = kPlainRegion;
 };
 
-/// The triangles at a vertex: counter-clockwise, and once the hull is met, clockwise from the first
-/// one.
+/// Enumerates the triangles at a vertex, counter-clockwise from the first one and, after meeting
+/// the hull, clockwise from the first one.
 class Around {
  public:
   Around(const FlipMesh& mesh, std::uint32_t first, std::uint32_t vertex)
@@ -119,15 +119,15 @@ struct RegionalDelaunay2<Coord>::Impl {
 
   Delaunay2<Coord> plain;
   RegionTable regions;
-  FlipMesh mesh;  ///< each triangle from its smallest corner on, except within follow()
+  FlipMesh mesh;  ///< each triangle starts with its smallest corner, except within follow()
   FreeSlots free;
   std::size_t count = 0;
   Journal<Point, 3> journal;
-  // By vertex slot; those of new vertices from follow() on.
+  // By vertex slot. Entries of new vertices are valid after follow().
   std::vector<PlanePosition> position;
   std::vector<std::uint32_t> region;
-  std::vector<std::uint32_t> incident;     ///< a triangle; kNone without one
-  std::vector<std::uint32_t> next_region;  ///< of vertices inserted since follow()
+  std::vector<std::uint32_t> incident;     ///< a triangle at the vertex, or kNone
+  std::vector<std::uint32_t> next_region;  ///< of vertices inserted since the last follow()
 
   // Scratch memory of follow().
   struct Listed {
@@ -142,13 +142,13 @@ struct RegionalDelaunay2<Coord>::Impl {
       return low != other.low ? low < other.low : high < other.high;
     }
   };
-  // Bits of marks.
+  // Bits of `marks`.
   static constexpr std::uint8_t kTouched = 1, kUnflipped = 2, kGone = 4, kKept = 8;
   Changes changes;
-  std::vector<std::uint8_t> marks;             ///< by triangle slot; 0 between two calls
+  std::vector<std::uint8_t> marks;             ///< by triangle slot; 0 between calls
   std::vector<std::uint32_t> to, turn;         ///< by triangle slot; `to` is kNone between calls
   std::vector<std::uint32_t> touched;          ///< slots that change
-  std::vector<Listed> before, after;           ///< the triangles in them
+  std::vector<Listed> before, after;           ///< the triangles in these slots
   std::vector<std::uint32_t> unflipped, gone;  ///< slots
   std::vector<planar::Side> pending;
   std::vector<Edge> edges;
@@ -164,7 +164,7 @@ struct RegionalDelaunay2<Coord>::Impl {
     std::vector<std::uint32_t> result(points.size(), kPlainRegion);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const PlanePosition p = as_position(points[i]);
-      if (std::isfinite(p[0]) && std::isfinite(p[1])) result[i] = regions.at(p);  // else refused
+      if (std::isfinite(p[0]) && std::isfinite(p[1])) result[i] = regions.at(p);  // else it throws
     }
     return result;
   }
@@ -173,12 +173,13 @@ struct RegionalDelaunay2<Coord>::Impl {
     next_region[slot(vertex)] = number;
   }
 
-  /// The region of all corners, or kNoOneRegion.
+  /// The region of all three corners, or kNoOneRegion.
   [[nodiscard]] std::uint32_t region_of(const Triple& c) const {
     const std::uint32_t one = region[c[0]];
     return region[c[1]] == one && region[c[2]] == one ? one : kNoOneRegion;
   }
-  /// Whether a triangle of plain() is one of these, wherever it is.
+  /// True if a triangle of plain() with these corners is also a triangle of this mesh, in any
+  /// region.
   [[nodiscard]] bool never_flipped(const Triple& c) const {
     const std::uint32_t one = region_of(c);
     return one == kPlainRegion || one == kNoOneRegion;
@@ -198,7 +199,7 @@ struct RegionalDelaunay2<Coord>::Impl {
 
   // ---- The steps of follow() ------------------------------------------------------------------
 
-  /// Lists the triangles over those that plain() has lost.
+  /// Lists the triangles that cover those that plain() has lost.
   void gather() {
     for (const auto& corners : changes.removed_corners) {
       const Triple c = slots_of(corners);
@@ -212,9 +213,9 @@ struct RegionalDelaunay2<Coord>::Impl {
     marks[t] |= kUnflipped;
     unflipped.push_back(t);
   }
-  /// Takes the triangle to the left of the edge from a to b; if there is no such edge, all
-  /// triangles that the line between them crosses. Looks around both ends in turn, as one of them
-  /// may have many triangles.
+  /// Takes the triangle to the left of the edge from a to b or, if there is no such edge, all
+  /// triangles that the line between them crosses. Alternates between both ends, as one of them may
+  /// have many triangles.
   void take_along(std::uint32_t a, std::uint32_t b) {
     Around at_a(mesh, incident[a], a), at_b(mesh, incident[b], b);
     for (;;) {
@@ -230,7 +231,8 @@ struct RegionalDelaunay2<Coord>::Impl {
       }
     }
   }
-  /// Whether the line from v to w begins in or at this triangle; then takes what is to be taken.
+  /// Returns true, having taken the triangles along the line from v to w, if that line starts in
+  /// this triangle or along one of its edges.
   bool take_from(const Around& around, std::uint32_t v, std::uint32_t w, bool left) {
     const std::uint32_t t = around.triangle(), i = around.index();
     const planar::Triangle& triangle = mesh.triangle[t];
@@ -255,8 +257,9 @@ struct RegionalDelaunay2<Coord>::Impl {
     }
   }
 
-  /// Flips the listed triangles so that they are those of plain() where it has lost some: those
-  /// have empty circles, and none of their edges crosses the border of what is flipped.
+  /// Flips the listed triangles so that they contain the triangles that plain() has lost. This is
+  /// possible because those have empty circles, and none of their edges crosses the border of the
+  /// flipped area.
   void unflip() {
     for (const std::uint32_t t : unflipped) {
       if (never_flipped(mesh.triangle[t].corner)) continue;
@@ -272,15 +275,15 @@ struct RegionalDelaunay2<Coord>::Impl {
       for (const std::uint32_t v : mesh.triangle[t].corner) incident[v] = t;
   }
 
-  /// The side of the triangle to the left of the edge from a to b if nothing is beyond it; kNoMate
-  /// if there is no such edge on the hull.
+  /// The side of the triangle to the left of the edge from a to b if there is nothing beyond it;
+  /// kNoMate if there is no such edge on the hull.
   [[nodiscard]] planar::Side hull_side(std::uint32_t a, std::uint32_t b) const {
     if (incident[a] == planar::kNone || incident[b] == planar::kNone) return kNoMate;
     Around at_a(mesh, incident[a], a), at_b(mesh, incident[b], b);
     const auto free_side = [&](std::uint32_t t, std::uint32_t i) {
       return mesh.triangle[t].mate[i] == kNoMate ? make_side(t, i) : kNoMate;
     };
-    // Around both in turn, as one of them may have many triangles.
+    // Alternates between both ends, as one of them may have many triangles.
     for (; !at_a.done() && !at_b.done(); at_a.advance(), at_b.advance()) {
       const Triple& c = mesh.triangle[at_a.triangle()].corner;
       if (c[next_index(at_a.index())] == b)
@@ -294,8 +297,8 @@ struct RegionalDelaunay2<Coord>::Impl {
     return kNoMate;
   }
 
-  /// Takes the lost triangles out; `edges` becomes the sides around the holes, and those of the
-  /// hull that new triangles lie beyond.
+  /// Takes out the lost triangles. Sets `edges` to the sides around the holes and to the hull sides
+  /// to which new triangles will be attached.
   void take_out() {
     after.clear();
     for (const std::uint32_t t : unflipped)
@@ -346,7 +349,7 @@ struct RegionalDelaunay2<Coord>::Impl {
     }
   }
 
-  /// Puts the new triangles of plain() in.
+  /// Adds the new triangles of plain().
   void put_in() {
     for (const TriangleId id : changes.added_triangles) {
       std::uint32_t t = 0;
@@ -394,7 +397,7 @@ struct RegionalDelaunay2<Coord>::Impl {
       const planar::EllipticalKernel::Scope scope(regions.form(one));
       mesh.settle<planar::EllipticalKernel>(
           pending, position,
-          // Two of the neighbour's corners are this triangle's.
+          // Two of the neighbour's corners belong to this triangle, so only the third is checked.
           [&](planar::Side, planar::Side mate) {
             return region[mesh.triangle[triangle_of(mate)].corner[planar::index_of(mate)]] == one;
           },
@@ -405,8 +408,8 @@ struct RegionalDelaunay2<Coord>::Impl {
     }
   }
 
-  /// Triangles that are there before and after go back to their slots; the others take what is
-  /// left.
+  /// Triangles that exist before and after return to their slots; the others take the remaining
+  /// ones.
   void settle_slots() {
     after.clear();
     for (const std::uint32_t t : touched)
