@@ -144,7 +144,7 @@ TEST(MultiresolutionHostile, CoordinatesThatTheTriangulationCannotTake) {
        {-1.0, 0.5, 1073741824.0, 1e300, std::nan(""), std::numeric_limits<double>::infinity()}) {
     SCOPED_TRACE(bad);
     expect_refused([bad](MemorySource& s, ClusterId id) { s.at(id).positions[1][1] = bad; }, 0,
-                   "member 1 lies at");
+                   "member 1 is at");
   }
   MemorySource source = good_source(1);
   source.at(cluster_id(0, 0)).positions.assign(1, {0.0, std::nan(""), 0.0});

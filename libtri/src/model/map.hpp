@@ -20,14 +20,14 @@ struct ChildRef {
 };
 
 /// A hash table from cluster id to ChildRef: open addressing, linear probing, deletion by shifting
-/// back (so no tombstones, and lookups stay short however often clusters come and go). 16 bytes per
-/// place; between 3/8 and 3/4 of the places are in use once it has grown.
+/// back. There are no tombstones, so lookups stay short however often clusters come and go. 16
+/// bytes per place; once it has grown, between 3/8 and 3/4 of the places are occupied.
 class ClusterMap {
  public:
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t memory() const { return places_.capacity() * sizeof(Place); }
 
-  /// Afterwards `count` insertions cannot fail.
+  /// Makes room so that the next `count` insertions cannot fail.
   void reserve(std::size_t count) {
     std::size_t wanted = places_.empty() ? 16 : places_.size();
     while (count > wanted / 4 * 3) wanted *= 2;
@@ -60,7 +60,7 @@ class ClusterMap {
       assert(places_[hole].id != kFree);
       hole = next(hole);
     }
-    // An entry whose probe sequence crosses the hole moves into it, and leaves the next hole.
+    // An entry whose probe sequence crosses the hole moves into it and leaves the next hole.
     for (std::size_t i = next(hole); places_[i].id != kFree; i = next(i)) {
       const std::size_t from_home = (i - home(places_[i].id)) & (places_.size() - 1);
       const std::size_t from_hole = (i - hole) & (places_.size() - 1);
@@ -73,14 +73,14 @@ class ClusterMap {
   }
 
  private:
-  // level 255; the only ordinal that is never used
+  // on level 255, with the only ordinal that is never used
   static constexpr ClusterId kFree{~std::uint64_t{0}};
   struct Place {
     ClusterId id = kFree;
     ChildRef where;
   };
 
-  // Fibonacci hashing: consecutive ordinals land far apart.
+  // Fibonacci hashing spreads consecutive ordinals far apart.
   [[nodiscard]] std::size_t home(ClusterId id) const {
     return static_cast<std::size_t>((static_cast<std::uint64_t>(id) * 0x9E3779B97F4A7C15u) >>
                                     shift_);

@@ -21,14 +21,14 @@
 #include "terrace/tri/multiresolution.hpp"
 #include "tree.hpp"
 
-/// The templates of multiresolution.hpp, for files that instantiate them.
+/// Implements the templates of multiresolution.hpp, for files that instantiate them.
 
 namespace terrace::tri {
 
-/// The model's requirements on a triangulation; all triangulations of this library meet them. The
-/// result of any sequence of calls must be a function of the point set alone: then collapse is the
-/// exact inverse of expand. Point is an array of 2 or 3 coordinates, integers of at most 30 bits or
-/// doubles.
+/// The model's requirements on a triangulation, which all triangulations of this library meet. The
+/// result of any sequence of calls must be a function of the point set alone, so that collapse is
+/// the exact inverse of expand. Point is an array of 2 or 3 coordinates, integers of at most 30
+/// bits or doubles.
 template <class T>
 concept DynamicTriangulation = requires(T t, const T& c, std::span<const typename T::Point> points,
                                         std::span<typename T::Insertion> results, VertexId hint,
@@ -47,8 +47,8 @@ concept DynamicTriangulation = requires(T t, const T& c, std::span<const typenam
 
 namespace detail {
 
-/// The first coordinates of a position as the triangulation takes them. Returns false if that is
-/// not possible: not finite, or for integers not an integer of 30 bits.
+/// Converts the first coordinates of a position to a point of the triangulation. Returns false if
+/// that is impossible: a coordinate is not finite or, for integers, not an integer of 30 bits.
 template <class Point>
 bool to_point(const Point3& position, Point& point) {
   using Coord = typename Point::value_type;
@@ -75,14 +75,14 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   Impl(ClusterSource& source, const Detail& start, ModelOptions options, Triangulation empty);
 
-  // See the public members of the same names.
+  // Implements the public members of the same names.
   const Delta& expand(ClusterId cluster);
   const Delta& collapse(ClusterId cluster);
-  /// In a step: removes points of an expanded cluster, below which nothing is expanded, until
-  /// `left` of them are there. Before 0 are left, and the cluster is collapsed, nothing else may be
-  /// expanded or collapsed.
+  /// Removes, within a step, points of an expanded cluster that has no expanded clusters below it,
+  /// until `left` of them remain. The cluster is collapsed once 0 remain. Until then no other
+  /// cluster may be expanded or collapsed.
   void collapse_to(ClusterTree::Slot cluster, std::uint32_t left);
-  /// The points of an expanded cluster that are there.
+  /// The points of an expanded cluster that are present.
   [[nodiscard]] std::span<const VertexId> present(ClusterTree::Slot cluster) {
     const std::span<const VertexId> vertices = tree_.vertices(cluster);
     return cluster == partial_ ? vertices.first(left_) : vertices;
@@ -112,14 +112,15 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   using Slot = ClusterTree::Slot;
   using Verdict = ClusterTree::Verdict;
-  /// Whether a part of it follows after operations, and whether that can be made from scratch.
+  /// True if part of the triangulation is updated by follow() after operations, and if restore()
+  /// can compute it from scratch.
   static constexpr bool kFollows = requires(Triangulation t) { t.follow(); };
   static constexpr bool kRestores = requires(Triangulation t) { t.restore(1u); };
   static constexpr std::size_t kKeptPoints = 1 << 16;
 
   struct Staged {
     Slot slot;
-    std::size_t first;  // of its points in points and heights
+    std::size_t first;  // of its points in `points` and `heights`
   };
   // Points that a step has read and not yet inserted.
   struct Stage {
@@ -150,11 +151,12 @@ struct MultiresolutionModel<Triangulation>::Impl {
   std::size_t points_ = 0;
   bool deltas_, old_heights_;
   bool open_ = false;                    // between open_step() and close_step()
-  Slot partial_ = ClusterTree::kNoSlot;  // of which collapse_to() has left some points: left_
+  Slot partial_ = ClusterTree::kNoSlot;  // the cluster of which collapse_to() has left `left_`
+                                         // points
   std::uint32_t left_ = 0;
   Delta delta_;
   Stage stage_;
-  std::vector<VertexId> created_;         // in a step that also collapses
+  std::vector<VertexId> created_;         // vertices created in a step that also collapses
   std::vector<bool> marks_;               // scratch of finish_delta(), all false
   std::vector<double> heights_before_;    // with old_heights, by slot
   std::vector<bool> noted_;               // marks the valid entries of heights_before_
@@ -172,7 +174,7 @@ MultiresolutionModel<Triangulation>::Impl::Impl(ClusterSource& source, const Det
       old_heights_(options.deltas && options.old_heights) {
   const ClusterTree::Take take_points = take();
   tree_.read_root(take_points);
-  // Staged clusters stay staged: if this fails, the whole model is destroyed.
+  // Staged clusters stay staged, because the whole model is destroyed if this fails.
   static_cast<void>(tree_.plan(judge(start), take_points));
   check_room();
   if (options.reserve > 0) reserve(options.reserve);
@@ -236,9 +238,8 @@ ClusterTree::Take MultiresolutionModel<Triangulation>::Impl::take() {
     for (std::size_t i = 0; i < positions.size(); ++i) {
       if (!detail::to_point(positions[i], stage_.points[first + i])) {
         throw HierarchyError(
-            id, "member " + std::to_string(i) + " lies at " + std::to_string(positions[i][0]) +
-                    ", " + std::to_string(positions[i][1]) + ", " +
-                    std::to_string(positions[i][2]) +
+            id, "member " + std::to_string(i) + " is at " + std::to_string(positions[i][0]) + ", " +
+                    std::to_string(positions[i][1]) + ", " + std::to_string(positions[i][2]) +
                     ", which the triangulation cannot take; coordinates must be " +
                     (std::is_integral_v<typename Point::value_type> ? "integers from 0 to 2^30 - 1"
                                                                     : "finite"));
@@ -272,7 +273,7 @@ auto MultiresolutionModel<Triangulation>::Impl::apply(const ClusterTree::Plan& p
   // present before and after, but those are few.
   for (const Slot cluster : plan.collapsed) remove_points(cluster, 0);
   if (!plan.staged.empty()) insert_clusters(deltas_ && (open_ || !plan.collapsed.empty()));
-  if constexpr (kFollows) triangulation_.follow();  // so that what it takes is the operation's
+  if constexpr (kFollows) triangulation_.follow();  // counts as part of the operation
   if (!open_) finish_delta();
   return delta_;
 }
@@ -309,7 +310,7 @@ void MultiresolutionModel<Triangulation>::Impl::collapse_to(Slot cluster, std::u
   if constexpr (kFollows) triangulation_.follow();
 }
 
-// Removes points of a cluster until `left` of them are there, and with the last one the cluster.
+// Removes points of a cluster until `left` of them remain, and the cluster with its last point.
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::remove_points(Slot cluster, std::uint32_t left) {
   assert(partial_ == ClusterTree::kNoSlot || partial_ == cluster);
@@ -361,7 +362,7 @@ void MultiresolutionModel<Triangulation>::Impl::insert_clusters(bool list_create
     }
     points_ += size;
   }
-  // Scratch of one cluster is worth keeping, that of a whole level is not.
+  // The scratch memory of one cluster is worth keeping, but not that of a whole level.
   if (stage_.points.capacity() > kKeptPoints) stage_ = {};
 }
 
@@ -387,7 +388,7 @@ void MultiresolutionModel<Triangulation>::Impl::note(VertexOwners::Change change
   if (change == VertexOwners::Change::other && deltas_) delta_.reassigned.push_back(vertex);
   if (!old_heights_) return;
   if (change != VertexOwners::Change::other && change != VertexOwners::Change::last) return;
-  // The first change within a step knows the former height.
+  // The former height is known at the first change within a step.
   if (noted_.size() < owners_.slots()) {
     noted_.resize(owners_.slots());
     heights_before_.resize(owners_.slots());
@@ -410,8 +411,8 @@ template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::finish_delta() {
   if (!deltas_) return;
   triangulation_.take_changes(delta_.changes);
-  // A vertex that went with one point and came back with another has stayed, if it came back in its
-  // former slot.
+  // A vertex that was removed with one point and added again with another counts as unchanged if it
+  // has its former slot.
   if (created_.size() > delta_.changes.added_vertices.size()) {
     delta_.reassigned.insert(delta_.reassigned.end(), created_.begin(), created_.end());
   }
@@ -419,7 +420,7 @@ void MultiresolutionModel<Triangulation>::Impl::finish_delta() {
   if (old_heights_) finish_heights();
 }
 
-// Keeps only vertices that stayed, each once.
+// Keeps only vertices that existed before and after, each once.
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
   const auto& added = delta_.changes.added_vertices;
@@ -431,7 +432,7 @@ void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
   mark(added, true);
   mark(removed, true);
   std::erase_if(delta_.reassigned, [&](VertexId vertex) {
-    if (!owners_.owned(vertex)) return true;  // came and went
+    if (!owners_.owned(vertex)) return true;  // added and removed again
     const bool other = marks_[static_cast<std::uint32_t>(vertex)];
     marks_[static_cast<std::uint32_t>(vertex)] = true;
     return other;

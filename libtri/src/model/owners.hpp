@@ -12,11 +12,11 @@
 
 namespace terrace::tri {
 
-/// Which points share which vertex, and which of them represents it: among points with equal
-/// coordinates the one of the highest level, then of the smallest id. A vertex lives as long as one
-/// of its owners.
+/// Which points share which vertex, and which of them represents it: of several points with equal
+/// coordinates the one of the highest level, then of the smallest id. A vertex exists as long as it
+/// has an owner.
 ///
-/// Memory: 16 bytes per vertex slot; about 90 for each further owner of a vertex.
+/// Memory: 16 bytes per vertex slot, and about 90 for each further owner of a vertex.
 class VertexOwners {
  public:
   /// A point as a member of an expanded cluster.
@@ -46,7 +46,7 @@ class VertexOwners {
     return add_further(vertex, owner, height, tree);
   }
 
-  /// To be called while the owner's cluster is still in the tree.
+  /// Must be called while the owner's cluster is still in the tree.
   Change remove(VertexId vertex, Owner owner, const ClusterTree& tree) {
     Owner& standing = standing_[static_cast<std::uint32_t>(vertex)];
     if (standing.slot == owner.slot && standing.index == owner.index) {
@@ -56,12 +56,12 @@ class VertexOwners {
     return remove_shared(vertex, owner, tree);
   }
 
-  /// The point that represents a living vertex.
+  /// The point that represents an existing vertex.
   [[nodiscard]] Owner standing(VertexId vertex) const {
     const Owner owner = standing_[static_cast<std::uint32_t>(vertex)];
     return {owner.slot, owner.index & ~kShared};
   }
-  /// Whether a point is on the vertex in this slot, which must be below slots().
+  /// True if a point is on the vertex in this slot, which must be below slots().
   [[nodiscard]] bool owned(VertexId vertex) const {
     return standing_[static_cast<std::uint32_t>(vertex)].slot != ClusterTree::kNoSlot;
   }
@@ -86,11 +86,11 @@ class VertexOwners {
   /// Set in the index of a representing owner that is not the only one.
   static constexpr std::uint32_t kShared = 0x80000000u;
 
-  /// Orders before all points.
+  /// Sorts before all points.
   static constexpr PointId kFirst{cluster_id(255, 0), 0};
 
-  // A waiting owner. Points at the same x, y (walls seen from above) can make many of them for one
-  // vertex, so they are kept in order.
+  // A waiting owner. Points at the same x, y (walls seen from above) can give one vertex many
+  // owners, so they are kept in order.
   struct Further {
     VertexId vertex{};
     PointId id;

@@ -8,7 +8,7 @@
 namespace terrace::tri {
 namespace {
 
-// One less than 56 bits allow: the table of clusters uses the last ordinal for "none".
+// One less than 56 bits allow, because the table of clusters uses the last ordinal for "none".
 constexpr std::uint64_t kMaxClusters = (std::uint64_t{1} << 56) - 1;
 
 }  // namespace
@@ -145,7 +145,7 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
       }
       if (!ids.empty()) source_->announce(ids);
       for (std::size_t i = 0; i < ids.size(); ++i) {
-        // the place first, as every staged cluster must be listed
+        // before anything that may throw, as every staged cluster must be listed
         result.staged.push_back(kNoSlot);
         result.staged.back() = stage(ids[i], wanted[i].child, take);
         if (wanted[i].children_too) here.push_back(result.staged.back());
@@ -191,7 +191,7 @@ void ClusterTree::append_below(Slot slot, std::vector<Slot>& out) const {
   out.push_back(slot);
 }
 
-// Reads a cluster and adds it to the tree. Everything that can fail comes before the first visible
+// Reads a cluster and adds it to the tree. Does everything that can fail before the first visible
 // change.
 ClusterTree::Slot ClusterTree::stage(ClusterId id, ChildRef place, const Take& take) {
   const unsigned level = level_of(id);

@@ -15,22 +15,22 @@
 
 namespace terrace::tri {
 
-/// The expanded clusters and their tree; the part of the multiresolution model that does not depend
+/// The expanded clusters and their tree: the part of the multiresolution model that does not depend
 /// on a triangulation. A cluster of level L, headed by p, has as children the clusters of level L -
-/// 1 headed by p and by each member; it can be expanded while its parent is.
+/// 1 headed by p and by each member. A child can be expanded while its parent is expanded.
 ///
-/// A step has two halves. In the first, plan() or stage() reads everything the step needs from the
-/// source; an exception there leaves the tree unchanged. In the second, the clusters to collapse
-/// are released; that cannot fail.
+/// A step has two halves. In the first, plan() or stage() reads everything that the step needs from
+/// the source; an exception there leaves the tree unchanged. In the second, the clusters to
+/// collapse are released, which cannot fail.
 ///
-/// Memory: 48 bytes per expanded cluster and 4 per member; above level 0 also 20 + 8 * level per
-/// member and about 24 for its entry in the map, and 64 once its record was requested.
+/// Memory: 48 bytes per expanded cluster and 4 per member. Above level 0 also 20 + 8 * level per
+/// member, about 24 for its entry in the map, and 64 once its record was requested.
 class ClusterTree {
  public:
   using Slot = std::uint32_t;
   static constexpr Slot kNoSlot = 0xFFFFFFFFu;
   static constexpr Slot kRoot = 0;
-  /// Indices have 31 bits; the last one stands for the head.
+  /// Indices have 31 bits, and the last one represents the head.
   static constexpr std::uint32_t kMaxMembers = 0x7FFFFFFEu;
 
   /// The source must outlive the tree. Call read_root() before anything else.
@@ -40,7 +40,7 @@ class ClusterTree {
   [[nodiscard]] ClusterId id(Slot slot) const { return clusters_[slot].id; }
   [[nodiscard]] unsigned level(Slot slot) const { return level_of(clusters_[slot].id); }
   [[nodiscard]] std::uint32_t size(Slot slot) const { return clusters_[slot].size; }
-  /// One handle per member, filled in and read by the owner of the triangulation.
+  /// One handle per member, written and read by the owner of the triangulation.
   [[nodiscard]] std::span<VertexId> vertices(Slot slot) {
     return {clusters_[slot].vertices.get(), clusters_[slot].size};
   }
@@ -58,7 +58,7 @@ class ClusterTree {
   [[nodiscard]] VertexId head_vertex(ChildRef child) const;
   /// The cluster one level below the child that has the same head. Requires a child above level 0.
   [[nodiscard]] ClusterId head_child(ChildRef child) const;
-  /// Whether a cluster is in this slot; accepts any number.
+  /// True if a cluster is in this slot. Accepts any number.
   [[nodiscard]] bool live(Slot slot) const {
     return slot < clusters_.size() && clusters_[slot].live;
   }
@@ -67,8 +67,8 @@ class ClusterTree {
   [[nodiscard]] ChildRef place(Slot slot) const { return clusters_[slot].place; }
   /// kNoSlot while it is not expanded.
   [[nodiscard]] Slot child_slot(ChildRef child) const;
-  /// Queries the source at the first call and remembers the record. Throws: what the source throws;
-  /// HierarchyError if the record makes no sense.
+  /// Asks the source at the first call and remembers the record. Throws whatever the source throws,
+  /// and HierarchyError if the record makes no sense.
   const ClusterRecord& record(ChildRef child);
 
   [[nodiscard]] bool has_expanded_children(Slot slot) const {
@@ -86,13 +86,13 @@ class ClusterTree {
   }
   [[nodiscard]] unsigned top() const { return level(kRoot); }
 
-  /// What a plan does with a child of an expanded cluster.
+  /// The action of a plan for a child of an expanded cluster.
   enum class Verdict {
-    keep,          ///< leave it and everything below as it is
-    visit,         ///< leave it, but visit its children if it is expanded
-    expand,        ///< expand it, if it is not, and visit its children
-    expand_alone,  ///< the same, but do not expand any of its children
-    collapse       ///< collapse it, if it is expanded, and everything below
+    keep,          ///< leave it and everything below it unchanged
+    visit,         ///< leave it unchanged, but visit its children if it is expanded
+    expand,        ///< expand it if necessary, and visit its children
+    expand_alone,  ///< the same, but expand none of its children
+    collapse       ///< collapse it, if it is expanded, and everything below it
   };
   using Judge = std::function<Verdict(ChildRef, unsigned level, bool expanded)>;
   /// Receives the positions of a staged cluster before the next one is read. May throw.
@@ -101,14 +101,15 @@ class ClusterTree {
   /// Stages the root.
   void read_root(const Take& take);
 
-  /// A planned step. `staged`: parents before children. `collapsed`: children before parents.
+  /// A planned step. `staged` lists parents before children, `collapsed` children before parents.
   struct Plan {
     std::vector<Slot> staged, collapsed;
   };
   /// Walks down from the root, level by level, and reads the clusters that `judge` wants expanded.
-  /// Throws: what the source, judge or take throw, HierarchyError; the tree is then unchanged.
+  /// Throws whatever the source, `judge` or `take` throw, and HierarchyError; the tree is then
+  /// unchanged.
   [[nodiscard]] Plan plan(const Judge& judge, const Take& take);
-  /// The plan that expands one cluster. Requires that it is not expanded.
+  /// The plan that expands one cluster, which must not be expanded.
   [[nodiscard]] Plan plan_expand(ChildRef child, const Take& take);
   /// The plan that collapses one cluster and everything below it.
   [[nodiscard]] Plan plan_collapse(Slot slot) const;
@@ -118,7 +119,7 @@ class ClusterTree {
   /// Drops a collapsed cluster. Requires that nothing below it is expanded.
   void release(Slot slot);
 
-  /// Bytes held.
+  /// Memory in bytes.
   [[nodiscard]] std::size_t memory() const;
 
  private:
@@ -126,7 +127,7 @@ class ClusterTree {
   struct Inner {
     std::vector<std::uint64_t> ordinals;  // the clusters headed by its members: level per member
     std::vector<Slot> children;           // children one level down; kNoSlot if not expanded
-    std::vector<ClusterRecord> records;   // of the children; empty until one was requested
+    std::vector<ClusterRecord> records;   // of the children; empty until one is requested
     std::uint32_t expanded = 0;           // number of expanded children
   };
   struct Cluster {
