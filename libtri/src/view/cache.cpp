@@ -8,7 +8,7 @@
 namespace terrace::tri {
 namespace {
 
-// Bytes of a cluster's nodes in list and table.
+// Bytes of a cluster's nodes in the list and the table.
 constexpr std::size_t kOverhead = sizeof(GivenCluster) + 64;
 
 std::size_t bytes_held(const GivenCluster& cluster) {

@@ -13,19 +13,19 @@
 
 namespace terrace::tri {
 
-/// An LRU cache of given clusters within a budget of bytes. As a source it delivers what it holds
+/// An LRU cache of delivered clusters within a budget of bytes. As a source it returns its contents
 /// and never waits.
 class ViewCache final : public ClusterSource {
  public:
-  /// counts: clusters of each level below the top.
+  /// counts: number of clusters of each level below the top.
   explicit ViewCache(std::vector<std::uint64_t> counts) : counts_(std::move(counts)) {}
-  /// There is no budget until this is called, before clusters are given.
+  /// Sets the budget. Must be called before clusters are given; without it there is no limit.
   void limit(std::size_t max_bytes) { max_bytes_ = max_bytes; }
 
-  /// Replaces an earlier version. Returns false if it is larger than the budget: then it is not
-  /// kept.
+  /// Stores a cluster in place of an earlier version. Returns false, without storing it, if it is
+  /// larger than the budget.
   bool give(GivenCluster cluster);
-  /// Null if it is not cached. `use`: marks it as most recently used.
+  /// Returns null if the cluster is not cached. `use`: marks it as most recently used.
   const GivenCluster* find(ClusterId cluster, bool use);
   [[nodiscard]] const GivenCluster* find(ClusterId cluster) const;
   void drop(ClusterId cluster);
@@ -33,7 +33,8 @@ class ViewCache final : public ClusterSource {
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t max_bytes() const { return max_bytes_; }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
-  /// Memory of a cluster with this many members, each with as many values as in the last given.
+  /// Estimated memory of a cluster with this many members, each with as many values as in the last
+  /// one given.
   [[nodiscard]] double bytes_of(unsigned level, std::uint64_t members) const;
 
   /// Provides the record that the model will request.

@@ -15,7 +15,7 @@ constexpr double kFar = 1e150;
 constexpr double kMaxDemand = 1e299;
 constexpr std::size_t kBlock = 256;
 
-/// As many of its numbers are used as there are boxes.
+/// Only the first entries are used, as many as there are boxes.
 using Block = std::array<double, kBlock>;
 
 struct Boxes {
@@ -23,8 +23,8 @@ struct Boxes {
   std::size_t count;
 };
 
-// The minimum over the planes of the greatest signed distance of a point of the box: not negative
-// unless the box is wholly outside one plane.
+// The minimum over the planes of the greatest signed distance of a point of the box. Negative only
+// if the box is entirely outside one plane.
 void depth_inside(const Camera& camera, const Boxes& boxes, Block& depth) {
   std::fill_n(depth.begin(), boxes.count, std::numeric_limits<double>::infinity());
   for (const Plane& plane : camera.planes) {
@@ -41,7 +41,8 @@ void depth_inside(const Camera& camera, const Boxes& boxes, Block& depth) {
   }
 }
 
-// Euclidean distance to the nearest point; for the farthest, the greatest difference on an axis.
+// `near`: Euclidean distance to the nearest point. `far`: greatest difference on an axis to the
+// farthest point.
 void distances(const Point3& eye, const Boxes& boxes, Block& near, Block& far) {
   std::fill_n(near.begin(), boxes.count, 0.0);
   std::fill_n(far.begin(), boxes.count, 0.0);
@@ -59,8 +60,9 @@ void distances(const Point3& eye, const Boxes& boxes, Block& near, Block& far) {
   for (std::size_t i = 0; i < boxes.count; ++i) near[i] = std::sqrt(near[i]);
 }
 
-// Whether a normal of the cone may be perpendicular to a line of sight to a point of the box: the
-// line's direction v has |axis . v| <= sine |v|, and over the box axis . v is an interval.
+// Sets the gain of boxes for which a normal of the cone may be perpendicular to a line of sight to
+// a point of the box. The line's direction v then has |axis . v| <= sine |v|, and axis . v is an
+// interval over the box.
 void outlines(const Camera& camera, const ViewColumns& columns, std::size_t first,
               const Boxes& boxes, double slack, const Block& far, Block& factor, double gain) {
   for (std::size_t i = 0; i < boxes.count; ++i) {
@@ -100,10 +102,10 @@ void measure_camera(const View& view, const ViewOptions& options, const ViewColu
   const double scale = camera.pixels / view.pixel_error, guard = options.guard;
   for (std::size_t i = 0; i < boxes.count; ++i) {
     const double margin = guard * (camera.perspective ? far[i] : camera.height);
-    // Pixels of a ground unit; the eye may lie in the box.
+    // Pixels per ground unit. The eye may be inside the box.
     const double unit = camera.perspective ? scale / std::max(near[i], 1e-100) : scale;
     const double shown = std::min(error[i] * unit, kMaxDemand);
-    // Clusters above level 0 come early, as the clusters below them have to be requested.
+    // Clusters above level 0 are wanted early, as the clusters below them have to be requested.
     const double lead = level[i] / (level[i] + 1.0) * margin;
     want[i] =
         std::max(want[i], depth[i] >= -lead ? std::min(shown * want_gain[i], kMaxDemand) : 0.0);

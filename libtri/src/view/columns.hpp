@@ -10,8 +10,8 @@
 
 namespace terrace::tri {
 
-/// The data of clusters that a view needs, in columns, so that thousands are measured per step:
-/// box, error, level and, for outlines, the cone. 57 bytes per cluster, with cones 89.
+/// The data of clusters that a view needs, in columns, so that thousands can be measured per step:
+/// box, error, level and, for outlines, the cone. 57 bytes per cluster, 89 with cones.
 class ViewColumns {
  public:
   /// Columns 0..2 hold the minima of the boxes in x, y, z, columns 3..5 the maxima, 6 the errors;
@@ -35,7 +35,7 @@ class ViewColumns {
   void set_cone(std::size_t i, const NormalCone& cone);
   void set_error(std::size_t i, double error) { columns_[kError][i] = error; }
   void copy(std::size_t i, const ViewColumns& from, std::size_t j);
-  /// Extends the box of entry i to hold that of entry j.
+  /// Extends the box of entry i to contain that of entry j.
   void join(std::size_t i, const ViewColumns& from, std::size_t j);
   [[nodiscard]] std::size_t memory() const;
 
@@ -45,9 +45,10 @@ class ViewColumns {
   std::vector<std::uint8_t> levels_;
 };
 
-/// How urgently clusters are wanted: error over tolerance; above 1 a cluster is to be expanded.
+/// How urgently clusters are wanted: error over tolerance. A cluster should be expanded if this is
+/// above 1.
 struct ViewDemand {
-  /// At least this is the demand of a cluster requested by a level or by name.
+  /// Minimum demand of a cluster requested by a level or by name.
   static constexpr double kForced = 1e300;
 
   std::vector<double> want;      ///< by the view itself
@@ -61,9 +62,9 @@ struct ViewDemand {
   }
 };
 
-/// Measures entries from `first` to `last`. Neither demand is greater for a cluster inside another
-/// one's box with no greater error, including rounding; outlines can violate that. O(entries * (7 +
-/// focuses + regions)).
+/// Measures entries from `first` to `last`. If a cluster is inside the box of another and has no
+/// greater error, neither of its demands is greater, including rounding; outlines can violate that.
+/// O(entries * (7 + focuses + regions)).
 void measure(const View& view, const ViewOptions& options, const ViewColumns& columns,
              std::size_t first, std::size_t last, ViewDemand& demand);
 

@@ -14,13 +14,13 @@
 #include "model/model.hpp"
 #include "terrace/tri/view.hpp"
 
-/// The template ViewControl of view.hpp, for files that instantiate it.
+/// Implements the template ViewControl of view.hpp, for files that instantiate it.
 
 namespace terrace::tri {
 
 namespace detail {
 
-/// Throws HierarchyError if a given cluster contradicts itself.
+/// Throws HierarchyError if a delivered cluster contradicts itself.
 void check(const GivenCluster& cluster, unsigned top);
 ViewOptions checked(ViewOptions options);
 
@@ -55,27 +55,28 @@ struct ViewControl<Triangulation>::Impl {
   void ask_for_records();
   void request(const Candidate& candidate, double importance, double bytes);
   void expand(const Candidate& candidate, const GivenCluster& given);
-  /// In points of an ordinary place.
+  /// The work of removing vertices, as a number of points in ordinary places.
   [[nodiscard]] std::size_t work_to_remove(std::span<const VertexId> vertices) const {
-    if constexpr (kTellsWork) return model_.triangulation().removal_work(vertices);
+    if constexpr (kEstimatesWork) return model_.triangulation().removal_work(vertices);
     return vertices.size();
   }
   [[nodiscard]] std::size_t work_to_collapse(Slot slot) {
     return work_to_remove(model_.impl_->present(slot));
   }
   [[nodiscard]] bool has_time_to_collapse(Slot slot) {
-    if constexpr (kTellsWork) return meter_.has(work_to_collapse(slot), StepMeter::kCollapse);
+    if constexpr (kEstimatesWork) return meter_.has(work_to_collapse(slot), StepMeter::kCollapse);
     return meter_.has_usual(StepMeter::kCollapse);
   }
   [[nodiscard]] std::uint32_t fitting(Slot slot);
   bool collapse(Slot slot);
   void withdraw();
 
-  /// Missing clusters that are asked for in a step: requests for these take longer than it does.
+  /// Upper limit of missing clusters requested in a step; loading that many takes longer than the
+  /// step.
   static constexpr std::size_t kMostAsked = 1024;
-  /// Clusters between two looks at the clock.
-  static constexpr std::size_t kLooks = 16;
-  static constexpr bool kTellsWork = requires(const Triangulation& t) { t.removal_work({}); };
+  /// Number of clusters between two readings of the clock.
+  static constexpr std::size_t kClockInterval = 16;
+  static constexpr bool kEstimatesWork = requires(const Triangulation& t) { t.removal_work({}); };
 
   ViewOptions options_;
   ViewCache cache_;
@@ -84,12 +85,13 @@ struct ViewControl<Triangulation>::Impl {
   std::unordered_map<ClusterId, Asked> asked_;
   std::set<ClusterId> faulty_;
 
-  Slot partial_ = ClusterTree::kNoSlot;  // half collapsed; nothing else is done before it is gone
+  Slot partial_ = ClusterTree::kNoSlot;  // partly collapsed; collapsing it comes before all other
+                                         // operations
   Step result_;
   StepMeter meter_;
   std::uint64_t number_ = 0;  // of the step
-  bool evict_ = true;         // whether room can still be made in this step
-  std::size_t claimed_ = 0;   // points of wanted clusters that are given or requested
+  bool evict_ = true;         // true while room can still be made in this step
+  std::size_t claimed_ = 0;   // points of wanted clusters that were given or requested
   double claimed_bytes_ = 0.0;
 };
 
@@ -142,8 +144,8 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   return result_;
 }
 
-// Collapses until at most this many points of unwanted clusters are left; false if the budget ended
-// first.
+// Collapses until at most this many points of unwanted clusters are left. Returns false if the
+// budget ended first.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
   if (partial_ != ClusterTree::kNoSlot) return false;
@@ -155,13 +157,14 @@ bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
   return true;
 }
 
-// What a step looks at is bounded, or little would be expanded where thousands of clusters wait:
-// the most wanted are asked for, and once the budget is spent the others are left to later steps.
+// Examines only a limited number of clusters per step, as otherwise little would be expanded while
+// thousands wait. The most wanted are requested, and once the budget is spent the others are left
+// to later steps.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::expand_wanted() {
-  for (std::size_t looks = 0; const auto candidate = front_.next();) {
+  for (std::size_t examined = 0; const auto candidate = front_.next();) {
     const bool prepares = result_.pending > 0 || result_.missing > kMostAsked;
-    if (prepares && ++looks % kLooks == 0 && meter_.dwelt()) {
+    if (prepares && ++examined % kClockInterval == 0 && meter_.dwelt()) {
       result_.pending += 1 + front_.candidates();
       return;
     }
@@ -188,9 +191,9 @@ void ViewControl<Triangulation>::Impl::expand_wanted() {
   }
 }
 
-// Whether room could be made for this many points. Once there is none for a cluster, none is made
-// for a lesser one; but unwanted clusters always give way. So it does not matter where a step was
-// interrupted.
+// Returns true if room could be made for this many points. Once it is impossible for one cluster,
+// no room is made for less wanted ones, but unwanted clusters always give way. The result therefore
+// does not depend on where a step was interrupted.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::could_fit(const Candidate& candidate, std::size_t points) {
   const std::size_t lack = lacking(points);
@@ -211,7 +214,7 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
     const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
     while (lacking(members) > 0) {
       const Slot slot = front_.next_to_collapse(below);
-      if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
+      if (slot == ClusterTree::kNoSlot) return Room::none;  // pins keep them expanded
       if (!has_time_to_collapse(slot) || !collapse(slot)) return Room::later;
     }
   }
@@ -226,7 +229,7 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
   const std::size_t members = static_cast<std::size_t>(
       std::min<std::uint64_t>(candidate.members, ClusterTree::kMaxMembers));
   const unsigned level = level_of(candidate.id);
-  // Nothing is requested that could not be expanded, or kept until then.
+  // Requests only clusters that could be expanded, and kept until then.
   const std::size_t claims = claimed_ + members;
   const auto known = asked_.find(candidate.id);
   const double bytes = cache_.bytes_of(level, members);
@@ -242,12 +245,13 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
   request(candidate, candidate.want, bytes);
 }
 
-// Requests early what may be wanted soon, and keeps it if it is cached.
+// Requests early the clusters that may be wanted soon, and keeps them in the cache if they are
+// there.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::ask_soon() {
-  std::size_t looks = 0;
+  std::size_t examined = 0;
   for (const Candidate& candidate : front_.soon()) {
-    if (++looks % kLooks == 0 && meter_.dwelt()) break;
+    if (++examined % kClockInterval == 0 && meter_.dwelt()) break;
     if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
     const double bytes = cache_.bytes_of(level_of(candidate.id), candidate.members);
     const bool known = asked_.count(candidate.id) != 0;
@@ -305,8 +309,8 @@ void ViewControl<Triangulation>::Impl::expand(const Candidate& candidate,
   meter_.spend(given.positions.size());
 }
 
-// To how many points a cluster can be collapsed in what is left of the step; to fewer than there
-// are in any case.
+// Returns the number of points that remain after collapsing a cluster in the rest of the step;
+// always fewer than are present.
 template <class Triangulation>
 std::uint32_t ViewControl<Triangulation>::Impl::fitting(Slot slot) {
   const std::span<const VertexId> present = model_.impl_->present(slot);
@@ -319,14 +323,14 @@ std::uint32_t ViewControl<Triangulation>::Impl::fitting(Slot slot) {
   return static_cast<std::uint32_t>(left);
 }
 
-// False if there was no time for all of its points, where some cost far more than others: the step
-// then ends, and the next ones go on.
+// Returns false if there was no time for all of its points, some of which may cost far more than
+// others. The step then ends, and the next ones continue.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   const ClusterId id = tree().id(slot);
   const ChildRef place = tree().place(slot);
   const auto present = model_.impl_->present(slot);
-  const std::uint32_t left = kTellsWork ? fitting(slot) : 0;
+  const std::uint32_t left = kEstimatesWork ? fitting(slot) : 0;
   const std::size_t work = work_to_remove(present.subspan(left));
   model_.impl_->collapse_to(slot, left);
   meter_.spend(work, StepMeter::kCollapse);
@@ -341,7 +345,8 @@ bool ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   return true;
 }
 
-// Clusters that were requested and are neither wanted now nor within the band of hysteresis.
+// Withdraws clusters that were requested and are neither wanted now nor within the band of
+// hysteresis.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::withdraw() {
   for (const auto& [id, asked] : asked_) {
@@ -415,8 +420,8 @@ void ViewControl<Triangulation>::forget(ClusterId cluster) {
   impl_->asked_.erase(cluster);
 }
 template <class Triangulation>
-void ViewControl<Triangulation>::pin(ClusterId cluster, Pin how) {
-  impl_->front_.pin(cluster, how);
+void ViewControl<Triangulation>::pin(ClusterId cluster, Pin state) {
+  impl_->front_.pin(cluster, state);
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::unpin(ClusterId cluster) {

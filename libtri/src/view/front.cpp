@@ -77,8 +77,8 @@ void ViewFront::drop(Slot slot, ChildRef place) {
     free_groups_.push_back(group);
   }
   changed_groups_.push_back(group_of_[place.parent]);
-  // A cluster that gave way to a more important one may find room again in the same step, as it
-  // would in the next.
+  // A cluster that gave way to a more important one may find room again in the same step, just as
+  // it would in the next.
   if (own_.want[slot] > 1.0 && !pinned_down(slot)) {
     candidates_.push_back({own_.want[slot], own_.keep[slot], own_.distance[slot], place,
                            tree_->child_id(place), members(place)});
@@ -130,7 +130,7 @@ void ViewFront::set_columns(Group& group, std::uint32_t i, const ClusterRecord& 
                                 : terrain_cone(record));
 }
 
-// A box around the collapsed children, and the greatest of their errors.
+// Computes a box around the collapsed children, and the greatest of their errors.
 void ViewFront::bound(std::uint32_t number) {
   const Group& group = *groups_[number];
   ClusterRecord none;
@@ -184,7 +184,7 @@ void ViewFront::clamp_to_parents() {
   for (Slot slot = ClusterTree::kRoot + 1; slot < tree_->slots(); ++slot) {
     if (tree_->live(slot)) by_level_.push_back(slot);
   }
-  // Few levels: a pass for each is cheaper than sorting.
+  // There are few levels, so one pass for each is cheaper than sorting.
   for (unsigned level = tree_->top(); level-- > 0;) {
     for (const Slot slot : by_level_) {
       if (tree_->level(slot) != level) continue;
@@ -197,9 +197,9 @@ void ViewFront::clamp_to_parents() {
 }
 
 void ViewFront::apply_pins() {
-  for (const auto& [id, how] : pins_) {
+  for (const auto& [id, state] : pins_) {
     const auto place = tree_->find(id);
-    if (!place || how != Pin::expanded) continue;
+    if (!place || state != Pin::expanded) continue;
     Slot slot = tree_->child_slot(*place);
     if (slot == ClusterTree::kNoSlot) bound_demand_.want[group_of_[place->parent]] = kInfinity;
     if (slot == ClusterTree::kNoSlot) slot = place->parent;
@@ -207,9 +207,9 @@ void ViewFront::apply_pins() {
       own_.keep[slot] = kInfinity;
     }
   }
-  for (const auto& [id, how] : pins_) {
+  for (const auto& [id, state] : pins_) {
     const auto place = tree_->find(id);
-    if (!place || how != Pin::collapsed) continue;
+    if (!place || state != Pin::collapsed) continue;
     const Slot slot = tree_->child_slot(*place);
     if (slot == ClusterTree::kNoSlot) continue;
     for (const Slot below : tree_->plan_collapse(slot).collapsed) own_.keep[below] = kPinnedDown;
@@ -236,7 +236,7 @@ void ViewFront::measure_group(std::uint32_t number) {
     const ChildRef place{group.parent, i};
     if (tree_->child_slot(place) != ClusterTree::kNoSlot) continue;
     if (group.members[i] == ClusterRecord::kUnread) {
-      // In space errors would shrink less; it is the order alone that depends on it.
+      // In space errors would shrink less, but only the order depends on this estimate.
       const double estimate = scratch_.keep[i] / std::sqrt(static_cast<double>(count));
       unread_.push_back({0.0, estimate, 0.0, place, tree_->child_id(place), 0});
       continue;
@@ -251,10 +251,10 @@ void ViewFront::measure_group(std::uint32_t number) {
 
 void ViewFront::override_by_pins(std::uint32_t number) {
   const Group& group = *groups_[number];
-  for (const auto& [id, how] : pins_) {
+  for (const auto& [id, state] : pins_) {
     const auto place = tree_->find(id);
     if (!place || place->parent != group.parent) continue;
-    const bool up = how == Pin::expanded;
+    const bool up = state == Pin::expanded;
     scratch_.want[place->index] = scratch_.keep[place->index] = up ? kInfinity : 0.0;
   }
 }
@@ -282,7 +282,7 @@ std::size_t ViewFront::memory() const {
   return bytes;
 }
 
-// ---- What comes next: of the clusters to expand, and of those to collapse -----------------------
+// ---- The next cluster to expand or collapse -----------------------------------------------------
 
 bool ViewFront::less_wanted(const Candidate& a, const Candidate& b) {
   if (a.want != b.want) return a.want < b.want;
@@ -295,7 +295,7 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
     std::pop_heap(candidates_.begin(), candidates_.end(), less_wanted);
     const Candidate candidate = candidates_.back();
     candidates_.pop_back();
-    // The cluster above may have been collapsed for lack of room, and even come back.
+    // The cluster above may have been collapsed for lack of room, and even expanded again.
     const auto place = tree_->find(candidate.id);
     if (candidate.id == last_ || !place || *place != candidate.place) continue;
     last_ = candidate.id;
@@ -304,7 +304,7 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
   return std::nullopt;
 }
 
-// The first `most` by keep, the coarsest first on ties, as far as they are still there.
+// Returns the first `most` candidates by keep, the coarsest first on ties, that still exist.
 std::span<const ViewFront::Candidate> ViewFront::first_of(std::vector<Candidate>& list,
                                                           std::size_t most) {
   const auto sooner = [](const Candidate& a, const Candidate& b) {
@@ -368,7 +368,7 @@ std::size_t ViewFront::points_below(double below) {
 ViewFront::Slot ViewFront::next_to_collapse(double below) {
   sort(below);
   while (collapsed_ + 1 < order_.size() && order_[collapsed_].key < below) {
-    // Pins can hold a child of a cluster that is not wanted.
+    // Pins can keep a child of an unwanted cluster expanded.
     const Slot slot = order_[collapsed_].slot;
     if (!tree_->has_expanded_children(slot)) return slot;
     ++collapsed_;

@@ -15,16 +15,15 @@
 
 namespace terrace::tri {
 
-/// Decides by a view which clusters to expand and which to collapse, and in what order; it depends
-/// on the tree of expanded clusters, not on a triangulation.
+/// Decides by a view which clusters to expand and to collapse, and in what order. Depends on the
+/// tree of expanded clusters but not on a triangulation.
 ///
-/// The demand of a cluster is taken to be no greater than that of the one above it: so the wanted
-/// clusters form a tree, whatever records and cones say. The error bound remains true: no
-/// descendant is farther from the head of the cluster above, which is present, than that cluster's
-/// error.
+/// The demand of a cluster is limited to that of the cluster above it, so the wanted clusters form
+/// a tree, whatever records and cones say. The error bound remains true: no descendant is farther
+/// from the head of the cluster above, which is present, than that cluster's error.
 ///
-/// Per step it measures the expanded clusters, one box around the collapsed children of each, and
-/// the children themselves only if that box may hold a wanted one.
+/// A step measures the expanded clusters and one box around the collapsed children of each. It
+/// measures the children themselves only if that box may contain a wanted one.
 class ViewFront {
  public:
   using Slot = ClusterTree::Slot;
@@ -38,58 +37,58 @@ class ViewFront {
   };
   using Pin = ViewPin;
 
-  /// The tree must outlive it.
+  /// The tree must outlive this object.
   ViewFront(const ClusterTree& tree, const ViewOptions& options);
 
-  /// To be called for the root, then for every cluster that was expanded, with the records of its
-  /// children in the tree's order. In a step (after start()), `candidate` is what next() returned.
+  /// Call this for the root, then for every cluster that was expanded, with the records of its
+  /// children in the tree's order. In a step (after start()), `candidate` is the result of next().
   void add(Slot slot, std::span<const ClusterRecord> children, const Candidate* candidate);
-  /// To be called after the tree has released the cluster, with its former position.
+  /// Call this after the tree has released the cluster, with its former position.
   void drop(Slot slot, ChildRef place);
   [[nodiscard]] std::uint64_t members(ChildRef child) const {
     return groups_[group_of_[child.parent]]->members[child.index];
   }
-  /// As given, except for bounds beyond 1e150.
+  /// The record as it was given, except for bounds beyond 1e150.
   [[nodiscard]] ClusterRecord record(ChildRef child) const;
-  /// Whether the box of a collapsed cluster below an expanded one meets a box.
+  /// True if the box of a collapsed cluster below an expanded one meets the given box.
   [[nodiscard]] bool meets_collapsed(const Box3& box, Slot below = ClusterTree::kRoot) const;
-  /// The record of a child of which there were only bounds. Not to be called in a step.
+  /// Sets the record of a child of which only bounds were known. Must not be called in a step.
   void set_record(ChildRef child, const ClusterRecord& record);
 
-  /// Overrides the view for one cluster: a cluster pinned expanded is expanded as soon as the
-  /// cluster above it is, and then all above it stay; one pinned collapsed keeps everything below
-  /// collapsed.
-  void pin(ClusterId cluster, Pin how) { pins_[cluster] = how; }
+  /// Overrides the view for one cluster. A cluster pinned expanded is expanded as soon as the
+  /// cluster above it is, and then all above it stay expanded. A cluster pinned collapsed keeps
+  /// everything below it collapsed.
+  void pin(ClusterId cluster, Pin state) { pins_[cluster] = state; }
   void unpin(ClusterId cluster) { pins_.erase(cluster); }
 
-  /// Measures everything. The view must live until the end of the step.
+  /// Measures everything. The view must exist until the end of the step.
   void start(const View& view);
   /// The collapsed cluster with the greatest demand, on ties the coarsest, then the smallest id;
-  /// nullopt if no demand above 1 is left. Children of added clusters take part.
+  /// nullopt if no demand above 1 is left. Includes children of added clusters.
   [[nodiscard]] std::optional<Candidate> next();
-  /// No more than this many are left.
+  /// Upper bound of the number that is left.
   [[nodiscard]] std::size_t candidates() const { return candidates_.size(); }
-  /// Clusters that may be wanted soon, the greatest demand first, a thousand at most. To be called
-  /// after next().
+  /// At most a thousand clusters that may be wanted soon, the greatest demand first. Call it after
+  /// next().
   [[nodiscard]] std::span<const Candidate> soon() { return first_of(soon_, kMostSoon); }
-  /// Clusters whose record must be read before it can be told whether they are wanted, now or soon;
-  /// a few thousand at most. `keep` is an estimate of it; the greatest first. To be called
-  /// likewise.
+  /// At most a few thousand clusters whose record must be read to decide whether they are wanted,
+  /// now or soon. Their `keep` is an estimate; the greatest comes first. Call it after next().
   [[nodiscard]] std::span<const Candidate> unread() { return first_of(unread_, kMostUnread); }
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
-  /// The expanded cluster to collapse first, if its demand is less than `below`: out of view before
-  /// in view, then the farthest; in view the least demand, then the farthest. Children before
-  /// parents. kNoSlot if there is none. The same one until it is dropped.
+  /// The expanded cluster to collapse first, if its demand is less than `below`. Clusters out of
+  /// view come before those in view, the farthest first; those in view in order of demand, the
+  /// least first, then the farthest. Children come before parents. kNoSlot if there is none.
+  /// Returns the same one until it is dropped.
   [[nodiscard]] Slot next_to_collapse(double below);
-  /// The demand of a child by the widened view, computed now.
+  /// The demand of a child by the widened view, computed on call.
   [[nodiscard]] double keep(ChildRef child);
 
   [[nodiscard]] std::size_t memory() const;
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-  /// More are not asked for ahead of time in a step: it would take too much of its time.
+  /// Upper limits of requests ahead of time in a step; more would take too much of its time.
   static constexpr std::size_t kMostSoon = 1024, kMostUnread = 4096;
   // The children of one expanded cluster.
   struct Group {
@@ -104,7 +103,7 @@ class ViewFront {
     std::size_t points_before;  // of clusters earlier in the order
   };
 
-  /// The order of the heap: whether `a` comes after `b`.
+  /// The order of the heap: true if `a` comes after `b`.
   [[nodiscard]] static bool less_wanted(const Candidate& a, const Candidate& b);
   std::span<const Candidate> first_of(std::vector<Candidate>& list, std::size_t most);
   void set_columns(Group& group, std::uint32_t i, const ClusterRecord& record);

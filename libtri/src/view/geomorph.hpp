@@ -16,12 +16,12 @@
 #include "patches.hpp"
 #include "terrace/tri/geomorph.hpp"
 
-/// The template of geomorph.hpp, for files that instantiate it.
+/// Implements the template of geomorph.hpp, for files that instantiate it.
 
 namespace terrace::tri {
 namespace detail {
 
-/// Cells of the plane with a place in them, so that triangles without one are told at once.
+/// Marks the cells of the plane that contain a place, to reject triangles without one quickly.
 class PlaceMask {
  public:
   void clear() { places_.clear(); }
@@ -41,7 +41,7 @@ class PlaceMask {
     }
     for (const auto& place : places_) cells_[cell(place, 1) * kCells + cell(place, 0)] = true;
   }
-  /// False only if no place lies in the triangle.
+  /// False only if no place is in the triangle.
   [[nodiscard]] bool meets(const Point3& a, const Point3& b, const Point3& c) const {
     std::array<std::size_t, 2> first{}, last{};
     for (std::size_t k = 0; k < 2; ++k) {
@@ -83,8 +83,8 @@ Point3 place_of(const std::array<Coord, 3>& point, double = 0.0) {
 
 }  // namespace detail
 
-/// A step as triangles before and after. Their vertices are numbered, those that are gone before
-/// all others: their slots may be other vertices' by now.
+/// A step as triangles before and after. Their vertices are numbered; removed vertices come first,
+/// as other vertices may use their slots by now.
 template <class Triangulation>
 struct Geomorph<Triangulation>::Scratch {
   using Delta = typename Model::Delta;
@@ -95,23 +95,24 @@ struct Geomorph<Triangulation>::Scratch {
   struct Site {
     VertexId vertex;
     Point3 before, after;
-    std::uint32_t lost = 0, gained = 0;  ///< triangles
+    std::uint32_t lost = 0, gained = 0;  ///< number of triangles
   };
-  std::vector<std::uint32_t> number;  ///< of a site, by slot; kNone between calls
+  std::vector<std::uint32_t> number;  ///< of a site, by vertex slot; kNone between calls
   std::vector<Site> sites;
-  std::size_t gone = 0;  ///< of the sites
+  std::size_t gone = 0;  ///< number of sites that were removed
   std::vector<Triangle> before, after;
   std::vector<std::uint32_t> part;  ///< of each site
   Patches<kAxes> patches;
   detail::PlaceMask mask;
   struct Mover {
     Point3 place;
-    std::uint32_t part, who;   ///< who: a site, or an anchor
-    std::uint32_t on = kNone;  ///< the triangle that it is on then
+    std::uint32_t part, who;   ///< who: number of a site or an anchor
+    std::uint32_t on = kNone;  ///< the triangle on which it ends
   };
   std::vector<Mover> movers;
   std::vector<std::uint32_t> order;  ///< the triangles of `patches`
-  std::vector<std::uint32_t> index;  ///< in `before`, by slot of a triangle; kNone between calls
+  std::vector<std::uint32_t> index;  ///< index in `before`, by slot of a triangle; kNone between
+                                     ///< calls
 
   std::uint32_t site(const Model& model, VertexId vertex) {
     std::uint32_t& n = number[slot(vertex)];
@@ -158,7 +159,7 @@ struct Geomorph<Triangulation>::Scratch {
     }
     for (const VertexId vertex : changes.added_vertices) site(model, vertex);
   }
-  /// The number of parts.
+  /// Determines the connected parts and returns their number.
   std::size_t join() {
     base::UnionFind sets(sites.size());
     for (const auto* triangles : {&before, &after}) {
@@ -180,7 +181,7 @@ struct Geomorph<Triangulation>::Scratch {
     for (std::size_t i = gone; i < sites.size(); ++i) number[slot(sites[i].vertex)] = kNone;
   }
 
-  /// The anchors on triangles that have gone become movers.
+  /// Turns the anchors on removed triangles into movers.
   void find_anchors(std::span<const TriangleId> removed, std::span<Anchor> anchors) {
     if (anchors.empty()) return;
     for (std::uint32_t i = 0; i < removed.size(); ++i) {
@@ -196,7 +197,7 @@ struct Geomorph<Triangulation>::Scratch {
     }
     for (const TriangleId t : removed) index[slot(t)] = kNone;
   }
-  /// Moves the movers onto a surface, `onto` with its sites at `at`.
+  /// Moves the movers onto the surface with the triangles `onto`, whose sites are at `at`.
   void project(std::size_t part_count, const std::vector<Triangle>& onto, Point3 Site::*at) {
     if (movers.empty()) return;
     patches.clear();

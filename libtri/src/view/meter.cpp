@@ -10,18 +10,18 @@ namespace terrace::tri {
 namespace {
 
 // The estimate rises fast and falls slowly, as a step must not last longer than its budget. A
-// measurement disturbed from outside counts as at most twice the usual value.
+// measurement disturbed by other programs counts as at most twice the usual value.
 void learn(double& rate, double measured) {
   if (rate > 0.0) measured = std::min(measured, 2.0 * rate);
   rate += (measured - rate) * (rate == 0.0 ? 1.0 : measured > rate ? 0.25 : 0.0625);
 }
 
-// What is ahead scatters around the estimate, and steps that have work for all their time are to
-// end within the budget, too.
+// Share of the budget to plan for. Actual times scatter around the estimate, and steps with more
+// than enough work should end within the budget too.
 constexpr double kAim = 0.95;
 
-// A part of the cost of each operation, and of the end of a step, does not depend on the number of
-// points.
+// Adds the part of the cost of each operation, and of the end of a step, that does not depend on
+// the number of points.
 double with_overhead(std::size_t points) { return static_cast<double>(points) + 16.0; }
 
 }  // namespace

@@ -8,8 +8,8 @@ namespace terrace::tri {
 namespace patches {
 namespace {
 
-// A point is in a triangle if no barycentric coordinate is less than minus this: a point on an edge
-// must not fall between two triangles.
+// A point is in a triangle if no barycentric coordinate is less than minus this, so that a point on
+// an edge does not fall between two triangles.
 constexpr double kRounding = 1e-9;
 
 double doubled_area(const Point3& a, const Point3& b, double x, double y) {
@@ -35,9 +35,9 @@ Point3 nearest_on_edge(const Point3& a, const Point3& b, const Point3& p) {
   return at < length ? along(a, ab, at / length) : b;
 }
 
-/// By the region of the triangle's plane that a place lies over: C. Ericson, Real-Time Collision
-/// Detection, section 5.1.5. Where rounding leaves no region, or the triangle is flat, the nearest
-/// place on an edge.
+/// Decides by the region of the triangle's plane that contains the projected place: C. Ericson,
+/// Real-Time Collision Detection, section 5.1.5. If rounding leaves no region, or the triangle is
+/// flat, returns the nearest place on an edge.
 Point3 nearest_on_triangle(const Point3& a, const Point3& b, const Point3& c, const Point3& p) {
   const Point3 ab = difference(b, a), ac = difference(c, a), ap = difference(p, a);
   const double b1 = dot(ab, ap), c1 = dot(ac, ap);
@@ -80,7 +80,7 @@ auto Patches<kAxes>::box_of(const Triangle& triangle) -> Box {
   return box;
 }
 
-/// Part by part, along a Z curve through the middles of their boxes.
+/// Sorts by part, and within a part along a Z curve through the middles of the boxes.
 template <std::size_t kAxes>
 void Patches<kAxes>::sort() {
   constexpr unsigned kBits = 30 / kAxes;
@@ -131,7 +131,7 @@ void Patches<kAxes>::build(std::size_t parts) {
   }
 }
 
-/// Level by level, the root last.
+/// Adds the nodes level by level, the root last.
 template <std::size_t kAxes>
 void Patches<kAxes>::add_tree(std::uint32_t first, std::uint32_t last) {
   boxes_.clear();
@@ -192,7 +192,7 @@ requires(kAxes == 2) {
       const double least = std::min({u, v, w});
       if (!(least >= best) || (result && least == best)) continue;
       best = least;
-      // At a corner exactly the corner's own height.
+      // At a corner the result is exactly the corner's own height.
       const double height = u == 1.0   ? a[2]
                             : v == 1.0 ? b[2]
                             : w == 1.0 ? c[2]
@@ -241,7 +241,7 @@ auto Patches<kAxes>::nearest(Part& part, const Point3& place) const -> Found req
         away[i] += d * d;
       }
     }
-    // The nearest one is looked at first.
+    // Examines the nearest one first.
     const std::size_t begin = depth;
     for (std::uint32_t i = 0; i < kWidth; ++i) {
       if (away[i] > best) continue;

@@ -12,27 +12,29 @@
 
 namespace terrace::tri {
 
-/// Triangles on which places are looked up: over the plane (kAxes 2) what is above or below, in
-/// space (3) the nearest place on them. They come in parts, and a place is looked up in one part.
-/// Rebuilt and queried repeatedly; a tree of boxes per part, O(n log n) to build, about O(log n)
-/// per query.
+/// Triangles on which places are looked up. Over the plane (kAxes 2) the result is the place above
+/// or below, in space (3) the nearest place. Triangles belong to parts, and a lookup concerns one
+/// part. Rebuilt and queried repeatedly. Keeps a tree of boxes per part: O(n log n) to build, about
+/// O(log n) per query.
 template <std::size_t kAxes>
 class Patches {
  public:
   struct Found {
     Point3 place;
-    std::uint32_t triangle;  ///< as it was added, from 0
+    std::uint32_t triangle;  ///< number in the order of add(), from 0
   };
 
   void clear() { triangles_.clear(); }
-  /// part: less than their number. Over the plane the triangles of a part do not overlap.
+  /// Adds a triangle. part: less than the number of parts. Over the plane the triangles of a part
+  /// do not overlap.
   void add(std::uint32_t part, const Point3& a, const Point3& b, const Point3& c) {
     triangles_.push_back({{a, b, c}, part, static_cast<std::uint32_t>(triangles_.size())});
   }
   void build(std::size_t parts);
-  /// Over the plane at the same x and y, linear in the triangle that contains them; nullopt if none
-  /// does, up to rounding. In space the nearest place, edges included, among equally near ones the
-  /// least; nullopt if the part has no triangle. Fast where the place before was near.
+  /// Over the plane: the place at the same x and y, linear in the triangle that contains them;
+  /// nullopt if none does, up to rounding. In space: the nearest place, edges included, and of
+  /// equally near ones the least; nullopt if the part has no triangle. Fast if the previous place
+  /// was near.
   [[nodiscard]] std::optional<Found> find(std::uint32_t part, const Point3& place) {
     if (part >= parts_.size() || parts_[part].root == kNone) return {};
     if constexpr (kAxes == 2) return above(parts_[part], place);
@@ -50,14 +52,16 @@ class Patches {
   struct Box {
     std::array<double, kAxes> low, high;
   };
-  /// Boxes of nodes or triangles that lie together, the axes one after the other.
+  /// Boxes of nodes or triangles that are close together, stored axis by axis.
   struct Node {
-    std::array<std::array<double, kWidth>, kAxes> low, high;  ///< without a child low is above high
+    std::array<std::array<double, kWidth>, kAxes> low, high;  ///< low is above high if there is no
+                                                              ///< child
     std::uint32_t first;                                      ///< of the children
-    bool leaf;                                                ///< whether they are triangles
+    bool leaf;                                                ///< true if the children are
+                                                              ///< triangles
   };
   struct Part {
-    std::uint32_t root = kNone, near = 0;  ///< near: the triangle that a place was last found on
+    std::uint32_t root = kNone, near = 0;  ///< near: the triangle on which a place was last found
   };
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
@@ -69,7 +73,7 @@ class Patches {
   [[nodiscard]] Found nearest(Part& part, const Point3& place) const requires(kAxes == 3);
 
   std::vector<Triangle> triangles_, sorted_;
-  std::vector<std::array<std::uint64_t, 2>> keys_;  ///< along a curve; triangles
+  std::vector<std::array<std::uint64_t, 2>> keys_;  ///< along a curve, and triangles
   std::vector<Box> boxes_;
   std::vector<Node> nodes_;
   std::vector<Part> parts_;

@@ -2,8 +2,8 @@
 #include "view/control.hpp"
 #include "view/geomorph.hpp"
 
-/// The model of a surface in space, its control by a view and its geomorphs, on integers. Apart
-/// from those of the plane, for which space is not needed.
+/// Instantiates the model of a surface in space, its view control and its geomorphs, on integers.
+/// Separate from those of the plane, which do not need space.
 
 namespace terrace::tri {
 

@@ -319,7 +319,7 @@ class ViewControl {
 
   /// Overrides the view. A cluster pinned expanded is expanded as soon as its parent is, and then
   /// its ancestors stay expanded. A cluster pinned collapsed keeps everything below it collapsed.
-  void pin(ClusterId cluster, Pin how);
+  void pin(ClusterId cluster, Pin state);
   void unpin(ClusterId cluster);
 
   /// Memory of the kept clusters, in bytes.
