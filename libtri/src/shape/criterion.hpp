@@ -11,17 +11,17 @@
 #include "../delaunay3/mesh.hpp"
 #include "gabriel.hpp"
 
-/// The two criteria for facets that are likely to lie on the surface. Both depend on the points of
+/// The two criteria for facets that are likely to be on the surface. Both depend on the points of
 /// the tetrahedron alone, not on the order of its corners.
 
 namespace terrace::tri::shape {
 
-/// Whether the mesh is in an elliptical metric: that of the scope.
+/// True if the mesh is in an elliptical metric, which is then that of the scope.
 template <class Mesh>
 inline constexpr bool is_elliptical =
     std::is_same_v<typename Mesh::Kernel, spatial::EllipticalKernel>;
 
-/// A criterion returns whether the facet opposite to corner i of a tetrahedron is a boundary facet
+/// A criterion returns true if the facet opposite to corner i of a tetrahedron is a boundary facet
 /// as seen from that tetrahedron.
 struct Gabriel {
   template <class Mesh>
@@ -38,9 +38,9 @@ struct Gabriel {
   }
 };
 
-/// The length, without overflow or underflow. Symmetric.
+/// The distance, computed without overflow or underflow. Symmetric.
 inline double distance(const Vector3& a, const Vector3& b) {
-  // The difference of quarters of finite doubles is finite; below that, scaling is exact.
+  // The difference of quarters of finite doubles is finite; below kBig, scaling is exact.
   constexpr double kBig = 0x1p480, kSmall = 0x1p-480;
   Vector3 d = minus(a, b);
   const double m = largest(d);
@@ -65,7 +65,7 @@ Vector3 edge(const Mesh&, const Vector3& a, const Vector3& b) {
   }
 }
 
-/// The corresponding length.
+/// The length of that vector.
 template <class Mesh>
 double edge_length(const Mesh& mesh, const Vector3& a, const Vector3& b) {
   if constexpr (is_elliptical<Mesh>) {
@@ -90,10 +90,10 @@ struct EdgeLength {
   }
 
  private:
-  /// Added in order of size, so that the order of the corners does not affect the last bit.
+  /// Adds in order of size, so that the order of the corners does not affect the last bit.
   static double sum(std::array<double, 3> lengths) {
     std::sort(lengths.begin(), lengths.end());
-    // both sides are scaled alike, and finite
+    // both sides have the same scale and are finite
     return lengths[0] / 8 + lengths[1] / 8 + lengths[2] / 8;
   }
 };

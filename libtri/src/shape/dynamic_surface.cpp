@@ -23,7 +23,7 @@ namespace {
 
 using Corners3 = std::array<std::uint32_t, 3>;
 
-/// The same turn, the smallest number first.
+/// The face rotated so that the smallest number comes first.
 Corners3 turned(Corners3 c) {
   std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
   return c;
@@ -42,7 +42,7 @@ std::uint64_t number_of(Coord c) {
     return static_cast<std::uint32_t>(c);
   } else {
     const double value = c + 0.0;
-    std::uint64_t bits = 0;  // std::bit_cast, which Debian's Emscripten lacks
+    std::uint64_t bits = 0;  // replaces std::bit_cast, which Debian's Emscripten lacks
     std::memcpy(&bits, &value, sizeof bits);
     return bits;
   }
@@ -54,31 +54,31 @@ template <class Coord>
 struct DynamicSurface<Coord>::Impl {
   Delaunay3<Coord> tetrahedra;
   shape::State state;
-  // The facets of the closed surface by slot; behind: their slots by tetrahedron and corner
-  // opposite, kNone elsewhere.
-  Pool<Corners3> corners;  ///< kFreeCorner first: the slot is free
+  // The facets of the closed surface by slot. `behind` holds their slots by tetrahedron and
+  // opposite corner, kNone elsewhere.
+  Pool<Corners3> corners;  ///< in a free slot the first corner is kFreeCorner
   Pool<spatial::Side> side;
   Pool<shape::LidFace> lid_face;
   Pool<std::array<std::uint32_t, 4>> behind;
   FreeSlots free;
   shape::LidShare share;
-  bool open = false;                     ///< lids are no triangles
+  bool open = false;                     ///< if true, lids are not triangles
   std::vector<shape::Spacing> spacings;  ///< by vertex slot
-  // Triangles: all facets but the lids of an open scan.
-  Pool<std::uint32_t> at_vertex;  ///< how many have it as a corner, by vertex slot
+  // The triangles are all facets except for the lids of an open scan.
+  Pool<std::uint32_t> at_vertex;  ///< number of triangles with this corner, by vertex slot
   std::size_t count = 0;
   Journal<Point, 3> journal;
   base::StopCheck check_stop;
   // Scratch memory.
   struct Facet {
     Corners3 corners;
-    std::uint32_t what;  ///< a triangle's slot if it vanishes, a side if it appears
+    std::uint32_t slot_or_side;  ///< slot of a vanishing, side of a new facet
     bool operator<(const Facet& other) const { return corners < other.corners; }
   };
   typename Delaunay3<Coord>::Changes changes;
   std::vector<std::uint32_t> examined, exposed;
   std::vector<Facet> vanished, appeared;
-  std::vector<std::uint32_t> unsure;  ///< facets that may have become lids, or no longer are
+  std::vector<std::uint32_t> unsure;  ///< facets that may have become lids or stopped being lids
   std::vector<bool> fresh;  ///< by vertex slot: new since the last changes; false between calls
 
   [[nodiscard]] std::uint32_t& at(spatial::Side s) {
@@ -86,7 +86,7 @@ struct DynamicSurface<Coord>::Impl {
   }
   [[nodiscard]] const auto& mesh() const { return Delaunay3Access::mesh(tetrahedra); }
 
-  /// Brings labels up to date and lists the tetrahedra whose facets may have come or gone.
+  /// Brings labels up to date. Lists the tetrahedra whose facets may have appeared or vanished.
   void relabel(bool from_scratch, unsigned threads) {
     if (!from_scratch && shape::worth_updating(mesh(), state, changes)) {
       examined = shape::update_nearby(mesh(), state, changes, exposed);
@@ -128,7 +128,7 @@ struct DynamicSurface<Coord>::Impl {
     std::sort(appeared.begin(), appeared.end());
   }
 
-  /// Triangles that are there before and after keep their slots.
+  /// Applies the differences. Facets that exist before and after keep their slots.
   void exchange() {
     const std::uint32_t counted = at_vertex.size();
     at_vertex.resize(std::max(counted, tetrahedra.vertex_slots()));
@@ -142,16 +142,16 @@ struct DynamicSurface<Coord>::Impl {
     auto old = vanished.begin();
     std::size_t left = 0;
     for (const Facet& facet : appeared) {
-      for (; old != vanished.end() && *old < facet; ++old) drop(old->what);
+      for (; old != vanished.end() && *old < facet; ++old) drop(old->slot_or_side);
       if (old != vanished.end() && stays(*old, facet)) {
-        at(facet.what) = old->what;
-        side[old->what] = facet.what;
+        at(facet.slot_or_side) = old->slot_or_side;
+        side[old->slot_or_side] = facet.slot_or_side;
         ++old;
       } else {
         appeared[left++] = facet;
       }
     }
-    for (; old != vanished.end(); ++old) drop(old->what);
+    for (; old != vanished.end(); ++old) drop(old->slot_or_side);
     appeared.resize(left);
     for (const Facet& facet : appeared) add(facet);
   }
@@ -161,7 +161,7 @@ struct DynamicSurface<Coord>::Impl {
     corners[facet].fill(spatial::kFreeCorner);
     free.put(facet);
   }
-  /// As a triangle, until find_lids().
+  /// Adds a facet as a triangle; find_lids() decides later whether it is a lid.
   void add(const Facet& facet) {
     const std::uint32_t slot = free.empty() ? side.size() : free.take();
     if (slot == side.size()) {
@@ -169,10 +169,10 @@ struct DynamicSurface<Coord>::Impl {
       corners.push_back({});
       lid_face.push_back({});
     }
-    side[slot] = facet.what;
+    side[slot] = facet.slot_or_side;
     corners[slot] = facet.corners;
     lid_face[slot] = {};
-    at(facet.what) = slot;
+    at(facet.slot_or_side) = slot;
     unsure.push_back(slot);
     show(slot);
   }
@@ -187,7 +187,7 @@ struct DynamicSurface<Coord>::Impl {
     --count;
   }
 
-  /// Looks at the facets that are new and at those where spacings have changed.
+  /// Examines new facets and those where spacings have changed.
   void find_lids() {
     shape::LidFinder<std::decay_t<decltype(mesh())>> finder(mesh(), spacings);
     for (const std::uint32_t facet : unsure) {
@@ -197,12 +197,12 @@ struct DynamicSurface<Coord>::Impl {
     for (const VertexId v : changes.removed_vertices) finder.forget(slot(v));
     for (const VertexId v : changes.added_vertices) finder.forget(slot(v));
     for (const auto& v : changes.removed_corners)
-      finder.gone({slot(v[0]), slot(v[1]), slot(v[2]), slot(v[3])});
+      finder.remove({slot(v[0]), slot(v[1]), slot(v[2]), slot(v[3])});
     for (const TetrahedronId t : changes.added_tetrahedra)
-      finder.came(mesh().tetrahedron[slot(t)].corner, fresh);
+      finder.add(mesh().tetrahedron[slot(t)].corner, fresh);
     for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
     finder.renew([&](std::uint32_t v) {
-      if (state.degree[v] == 0) return;  // it is a corner of no facet
+      if (state.degree[v] == 0) return;  // it is not a corner of any facet
       finder.find_spacing(v, [&](std::uint32_t t) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const std::uint32_t facet = behind[t][i];
@@ -230,7 +230,7 @@ struct DynamicSurface<Coord>::Impl {
 
   void reserve(std::size_t vertices) {
     tetrahedra.reserve(vertices);
-    // About as many as there are on a scan.
+    // Typical numbers for a scan.
     const std::size_t of_tetrahedra = 7 * vertices, of_triangles = 5 * vertices / 2;
     state.of.reserve(of_tetrahedra);
     state.forest.reserve(of_tetrahedra);
@@ -246,7 +246,7 @@ struct DynamicSurface<Coord>::Impl {
     state.local_vertex.reserve(vertices + 1);
   }
 
-  /// Lists the tetrahedra beside new ghosts: facets may have come to the hull.
+  /// Lists the tetrahedra next to new ghosts, which may have new facets on the hull.
   void find_exposed() {
     exposed.clear();
     mesh().journal.for_each_cell([&](std::uint32_t t, const auto&) {
@@ -318,7 +318,7 @@ void DynamicSurface<Coord>::remove(std::span<const VertexId> vertices) {
 }
 template <class Coord>
 std::size_t DynamicSurface<Coord>::removal_work(std::span<const VertexId> vertices) const {
-  constexpr std::size_t kUsual = 14;  // tetrahedra inside at a vertex of a surface
+  constexpr std::size_t kUsual = 14;  // tetrahedra inside the surface at one of its vertices
   const auto& degree = impl_->state.degree;
   std::size_t inside = 0;
   for (const VertexId v : vertices)

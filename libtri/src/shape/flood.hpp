@@ -8,12 +8,12 @@
 #include "../delaunay3/star.hpp"
 #include "state.hpp"
 
-/// The flood rule removes what can be reached from beyond the hull through facets that are not
-/// boundary facets as seen from the tetrahedron behind them. These steps depend on the tetrahedra
-/// alone, so the reached set does not depend on the order.
+/// The flood rule removes the tetrahedra that can be reached from beyond the hull through facets
+/// that are not boundary facets as seen from the tetrahedron behind them. These steps depend on the
+/// tetrahedra alone, so the reached set does not depend on the order.
 ///
-/// Every removed tetrahedron stores the facet through which it was first reached. These form a
-/// forest rooted beyond the hull; the update needs it to find the tetrahedra that have lost their
+/// Every removed tetrahedron stores the facet through which it was first reached. These facets form
+/// a forest rooted beyond the hull. The update needs it to find the tetrahedra that have lost their
 /// path.
 
 namespace terrace::tri::shape {
@@ -65,8 +65,8 @@ void flood(const Mesh& mesh, State& state, const Criterion& criterion) {
   find_lost(mesh, state);
 }
 
-/// A removed tetrahedron whose path from outside is gone, and all whose paths led through it: kept
-/// until tested again.
+/// Keeps a removed tetrahedron whose path from outside no longer exists, and all tetrahedra whose
+/// paths led through it, until they are tested again.
 template <class Mesh>
 void take_back(const Mesh& mesh, State& state, std::uint32_t orphan) {
   const auto back = [&](std::uint32_t t) {
@@ -84,8 +84,8 @@ void take_back(const Mesh& mesh, State& state, std::uint32_t orphan) {
 }
 
 /// Appends to state.pending the surviving tetrahedra that have gained a facet on the hull (and
-/// perhaps others, which does no harm). They had a neighbour that is gone and have no new one
-/// there, so their facet is among those of the removed ones only.
+/// perhaps others, which does no harm). They had a neighbour that was removed and have no new one
+/// there, so their facet is a facet of removed tetrahedra only.
 template <class Changes, class Mesh>
 void find_exposed(const Mesh& mesh, State& state, const Changes& changes) {
   using Key = std::array<std::uint32_t, 3>;
@@ -121,10 +121,10 @@ void find_exposed(const Mesh& mesh, State& state, const Changes& changes) {
   }
 }
 
-/// Updates the state after changes; it equals that of flood() except for the paths. A removed
-/// tetrahedron that still exists and whose path did not lead through one that is gone stays
-/// removed: its path is still valid. All others are tested with everything from which they could be
-/// reached, so all reachable ones are found.
+/// Updates the state after changes. The result equals that of flood() except for the paths. A
+/// removed tetrahedron stays removed if it still exists and its path did not lead through one that
+/// no longer exists, because its path is still valid. All others are tested, along with everything
+/// from which they could be reached, so all reachable ones are found.
 template <class Criterion, class Changes, class Mesh>
 void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
                   const Changes& changes) {
@@ -152,8 +152,8 @@ void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
     state.keep(mesh, slot(id));
     state.pending.push_back(slot(id));
   }
-  // Paths through tetrahedra that are gone: their next step now starts at the new tetrahedra, or at
-  // the hull, which is equivalent.
+  // Some paths lead through tetrahedra that no longer exist. Their next step now starts at the new
+  // tetrahedra, or at the hull, which is equivalent.
   for (const TetrahedronId id : changes.added_tetrahedra) {
     for (const spatial::Side side : mesh.tetrahedron[slot(id)].mate)
       if (state.of[spatial::tetrahedron_of(side)] == spatial::index_of(side))
@@ -164,7 +164,7 @@ void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
     if (state.of[t] == kKept) judge(mesh, state, criterion, t);
   spread(mesh, state, criterion);
 
-  // Degrees increased only among pending ones, and decreased only among those in the queue.
+  // Degrees increased only at pending tetrahedra, and decreased only at those in the queue.
   for (const std::uint32_t v : state.lost) state.touched.push_back(v);
   for (const std::uint32_t t : state.queue)
     for (const std::uint32_t v : mesh.tetrahedron[t].corner) state.touched.push_back(v);

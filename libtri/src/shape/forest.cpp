@@ -17,20 +17,21 @@ namespace terrace::tri::shape {
 namespace {
 
 constexpr std::size_t kForestBlock = std::size_t{1} << 14;
-/// So many turns ahead memory is asked for.
+/// Number of iterations by which memory is prefetched.
 constexpr std::size_t kAhead = 8;
 
-/// A statement about two sets of tetrahedra: across a facet that they are alike, at a vertex that
+/// A statement about two sets of tetrahedra. A facet states that its sides are alike, a vertex that
 /// its poles differ.
 struct Statement {
-  /// The bits of the defect as a float (so in order of size, rounded), then whether of a vertex.
+  /// The bits of the defect as a float (so that keys sort by rounded defect), then a bit that is
+  /// set for a vertex.
   std::uint32_t key;
-  std::uint32_t what;  ///< a side or a vertex
-  /// The sets, by their roots; the second doubled, plus 1 if the roots are said to be unlike.
+  std::uint32_t subject;  ///< the side or vertex that makes the statement
+  /// The sets, by their roots. The second is doubled, plus 1 if the roots are said to be unlike.
   std::uint32_t one, other;
 
-  /// Key and what it is about.
-  [[nodiscard]] std::uint64_t claim() const { return std::uint64_t{key} << 32 | what; }
+  /// The key and the subject.
+  [[nodiscard]] std::uint64_t claim() const { return std::uint64_t{key} << 32 | subject; }
 };
 
 std::uint32_t key_of(double defect, bool of_vertex) {
@@ -40,14 +41,14 @@ std::uint32_t key_of(double defect, bool of_vertex) {
 
 struct Poles {
   std::uint32_t first = spatial::kNone;   ///< kNone: beyond the hull
-  std::uint32_t second = spatial::kNone;  ///< kNone: there is none
+  std::uint32_t second = spatial::kNone;  ///< kNone: does not exist
   double defect = 0.0;
 };
 
-/// Poles by vertex slot.
+/// Finds the poles of vertices, by vertex slot.
 class PoleFinder {
  public:
-  /// In a part only whole vertices have poles.
+  /// In a part, only whole vertices have poles.
   PoleFinder(const Spheres& spheres, const Part& part) : spheres_(spheres), part_(part) {
     const std::vector<Place>& places = spheres.places();
     vertices_.resize(static_cast<std::uint32_t>(places.size()));
@@ -72,7 +73,7 @@ class PoleFinder {
     for_all([&](std::uint64_t sphere, std::uint32_t v) {
       Vertex& vertex = vertices_[v];
       const Vector3 to_centre = spheres_.to_centre(tetrahedron_of(sphere), vertex.at);
-      // Without a branch, which the processor could not predict.
+      // Avoids a branch, which the processor could not predict.
       const auto admitted = static_cast<std::uint64_t>(dot(to_centre, vertex.to_first) < 0.0);
       take_larger(vertex.largest, sphere & (0 - admitted));
     });
@@ -88,18 +89,19 @@ class PoleFinder {
   }
 
  private:
-  /// What is looked at for every tetrahedron around a vertex, in one cache line.
+  /// The data needed for every tetrahedron around a vertex, in one cache line.
   struct Vertex {
     Vector3 at, to_first;
-    std::uint64_t largest;  ///< sphere so far whose centre is on the other side, see sphere_of()
+    std::uint64_t largest;  ///< largest so far with its centre on the other side, see sphere_of()
   };
 
-  // Spheres as numbers: the upper half of the squared radius, plus 2, above the tetrahedron's
-  // number. Below them: none. Above them: none, and none will be taken.
+  // Spheres as numbers: the upper half of the squared radius, plus 2, followed by the tetrahedron's
+  // number. kNoSphere is below all of them: no sphere yet. kNeverAny is above all of them: no
+  // sphere, and none will be accepted.
   static constexpr std::uint64_t kNoSphere = std::uint64_t{1} << 32;
   static constexpr std::uint64_t kNeverAny = ~std::uint64_t{0};
 
-  /// 0 if flat.
+  /// Returns the number of a sphere, or 0 if the tetrahedron is flat.
   [[nodiscard]] std::uint64_t sphere_of(std::uint32_t t) const {
     const double r2 = spheres_.radius2(t);
     if (std::isnan(r2)) return 0;
@@ -112,8 +114,8 @@ class PoleFinder {
   [[nodiscard]] std::uint64_t least(std::uint32_t v) const {
     return part_.whole.empty() || part_.whole[v] != 0 ? kNoSphere : kNeverAny;
   }
-  /// Where two radii are equal, the larger sphere is that of the tetrahedron with the
-  /// lexicographically first corners.
+  /// If two radii are equal, the sphere of the tetrahedron with the lexicographically first corners
+  /// is the larger one.
   void take_larger(std::uint64_t& held, std::uint64_t sphere) const {
     if (held >> 32 == sphere >> 32) [[unlikely]] {
       const std::uint32_t a = tetrahedron_of(held), b = tetrahedron_of(sphere);
@@ -136,8 +138,8 @@ class PoleFinder {
     }
   }
 
-  /// Vertices on the hull have their first pole beyond it, in the direction of the sum of the
-  /// outward normals around them.
+  /// Sets the first pole of vertices on the hull, which is beyond it, in the direction of the sum
+  /// of the outward normals around them.
   void add_hull(std::vector<Poles>& poles) {
     struct Normal {
       std::uint32_t vertex;
@@ -176,24 +178,24 @@ class PoleFinder {
   Pool<Vertex> vertices_;
 };
 
-/// Disjoint sets of tetrahedra, each known to be alike or unlike its set's root. Nodes are given
-/// doubled, plus 1 if what is meant is unlike them.
+/// Disjoint sets of tetrahedra, each known to be alike or unlike the root of its set. A node is the
+/// number of a tetrahedron doubled, plus 1 for "unlike it".
 class SignedSets {
  public:
   explicit SignedSets(std::uint32_t count) {
     up_.resize(count);
     for (std::uint32_t x = 0; x < count; ++x) up_[x] = 2 * x;
   }
-  /// Makes x, a root, a child.
+  /// Makes x, a root, a child of the node `below`.
   void hook(std::uint32_t x, std::uint32_t below) { up_[x] = below; }
-  /// Makes x a root again if it has been hooked to a root that has been hooked to x. To be called
-  /// in ascending order, so that the smaller number stays the root: roots are in spatial order
-  /// then, as their tetrahedra are.
+  /// Makes x a root again if it has been hooked to a root that has been hooked to x. Must be called
+  /// in ascending order, so that the smaller number stays the root. Roots are then in spatial
+  /// order, as their tetrahedra are.
   void cut_pair(std::uint32_t x) {
     if (up_[up_[x] >> 1] >> 1 == x) up_[x] = 2 * x;
   }
   [[nodiscard]] bool is_root(std::uint32_t x) const { return up_[x] == 2 * x; }
-  /// Makes x a child of its set's root.
+  /// Makes x a child of the root of its set.
   void flatten(std::uint32_t x) {
     for (std::uint32_t up = up_[x];;) {
       const std::uint32_t next = up_[up >> 1] ^ (up & 1);
@@ -233,7 +235,7 @@ class Forest {
       if (sets.is_root(x)) first_roots.push_back(x);
     std::vector<std::uint32_t> roots = first_roots;
     while (list_.size() > 0) join_best(sets, roots);
-    // These first, as they are on the way of all others.
+    // The first roots come first because they are on the paths of all others.
     for (const std::uint32_t x : first_roots) sets.flatten(x);
     for (std::uint32_t x = 0; x <= beyond_; ++x) sets.flatten(x);
     const std::uint32_t outside = sets.root(2 * beyond_);
@@ -244,9 +246,9 @@ class Forest {
   }
 
  private:
-  /// Whether this side of a finite tetrahedron stands for its facet, about which it says something
-  /// new.
-  [[nodiscard]] bool stands(std::uint32_t t, spatial::Side mate) const {
+  /// True if this side of a finite tetrahedron represents its facet, so that each facet is counted
+  /// once.
+  [[nodiscard]] bool represents_facet(std::uint32_t t, spatial::Side mate) const {
     const std::uint32_t other = spatial::tetrahedron_of(mate);
     return (t < other) | !spheres_.finite(other);
   }
@@ -264,21 +266,21 @@ class Forest {
         count, kForestBlock, threads_, scratch,
         [&](std::size_t begin, std::size_t end, std::vector<spatial::Side>& sides) {
           if (check_stop_) check_stop_();
-          // First the facets alone, so that the branch is not mixed with the arithmetic.
+          // Lists the facets first, so that the branch is not mixed with the arithmetic.
           sides.resize(4 * (end - begin));
           std::size_t facets = 0;
           for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
             if (!spheres_.finite(t)) continue;
             for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
               sides[facets] = spatial::make_side(t, i);
-              facets += stands(t, tetrahedra[t].mate[i]);
+              facets += represents_facet(t, tetrahedra[t].mate[i]);
             }
           }
           const auto mate_of = [&](spatial::Side side) {
             return tetrahedra[spatial::tetrahedron_of(side)].mate[spatial::index_of(side)];
           };
           for (std::size_t f = 0; f < facets; ++f) {
-            // Neighbours lie anywhere.
+            // Neighbours may be anywhere in memory.
             spheres_.prefetch(
                 spatial::tetrahedron_of(mate_of(sides[std::min(f + kAhead, facets - 1)])));
             const spatial::Side mate = mate_of(sides[f]);
@@ -289,7 +291,7 @@ class Forest {
         });
   }
 
-  /// Boruvka's first round, before there is a list: every tetrahedron is joined with another by the
+  /// Boruvka's first round, which needs no list: joins every tetrahedron with another one by the
   /// best statement about it.
   void join_tetrahedra(SignedSets& sets) {
     const std::uint32_t count = unlabelled();
@@ -318,12 +320,13 @@ class Forest {
     for (std::uint32_t t = 0; t < count; ++t) sets.flatten(t);
   }
 
-  /// The other node of a claim about t, whose side it names if it is of a facet.
+  /// The other node of a claim about t. If the claim is about a facet, it names the side of t.
   [[nodiscard]] std::uint32_t partner(std::uint32_t t, std::uint64_t claim) const {
-    const auto what = static_cast<std::uint32_t>(claim);
+    const auto subject = static_cast<std::uint32_t>(claim);
     if (!of_vertex(claim))
-      return 2 * spatial::tetrahedron_of(spheres_.tetrahedra()[t].mate[spatial::index_of(what)]);
-    const std::uint32_t other = poles_[what].first == t ? poles_[what].second : poles_[what].first;
+      return 2 * spatial::tetrahedron_of(spheres_.tetrahedra()[t].mate[spatial::index_of(subject)]);
+    const std::uint32_t other =
+        poles_[subject].first == t ? poles_[subject].second : poles_[subject].first;
     return 2 * (other == spatial::kNone ? beyond_ : other) + 1;
   }
 
@@ -335,10 +338,10 @@ class Forest {
     const auto has_room_for_more = [&](std::uint32_t more) {
       if (left + more > list_.size()) list_.resize(left + left / 8 + more);
     };
-    const auto list = [&](std::uint32_t key, std::uint32_t what, std::uint32_t one,
-                          std::uint32_t other, bool new_one) {
-      list_[left] = {key, what, one >> 1, other ^ (one & 1)};
-      left += static_cast<std::uint32_t>(new_one) & (one >> 1 != other >> 1);
+    const auto list = [&](std::uint32_t key, std::uint32_t subject, std::uint32_t one,
+                          std::uint32_t other, bool is_new) {
+      list_[left] = {key, subject, one >> 1, other ^ (one & 1)};
+      left += static_cast<std::uint32_t>(is_new) & (one >> 1 != other >> 1);
     };
     has_room_for_more(count + count / 2);
     for (std::uint32_t t = 0; t < count; ++t) {
@@ -348,7 +351,8 @@ class Forest {
       const std::uint32_t one = sets.root(2 * t);
       for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
         const spatial::Side side = spatial::make_side(t, i), mate = tetrahedra[t].mate[i];
-        list(keys_[side], side, one, sets.root(2 * spatial::tetrahedron_of(mate)), stands(t, mate));
+        list(keys_[side], side, one, sets.root(2 * spatial::tetrahedron_of(mate)),
+             represents_facet(t, mate));
       }
     }
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
@@ -363,8 +367,8 @@ class Forest {
     keys_.release();
   }
 
-  void take_better(std::uint64_t& best, std::uint32_t key, std::uint32_t what) const {
-    const std::uint64_t candidate = std::uint64_t{key} << 32 | what;
+  void take_better(std::uint64_t& best, std::uint32_t key, std::uint32_t subject) const {
+    const std::uint64_t candidate = std::uint64_t{key} << 32 | subject;
     if (best >> 33 == candidate >> 33) [[unlikely]] {
       if (before(candidate, best)) best = candidate;
     } else {
@@ -372,8 +376,8 @@ class Forest {
     }
   }
 
-  /// One of Boruvka's rounds: every set is joined with another by the best statement about it, and
-  /// statements within one set are dropped.
+  /// A further round of Boruvka's: joins every set with another by the best statement about it, and
+  /// drops statements within one set.
   void join_best(SignedSets& sets, std::vector<std::uint32_t>& roots) {
     for (const std::uint32_t root : roots) best_[root] = kNoBest;
     for (std::uint32_t i = 0; i < list_.size(); ++i) {
@@ -404,13 +408,13 @@ class Forest {
     std::uint32_t left = 0;
     for (const Statement& s : span_of(list_)) {
       const std::uint32_t one = sets.root(2 * s.one), other = sets.root(s.other);
-      list_[left] = {s.key, s.what, one >> 1, other ^ (one & 1)};
+      list_[left] = {s.key, s.subject, one >> 1, other ^ (one & 1)};
       left += one >> 1 != other >> 1;
     }
     list_.resize(left);
   }
 
-  /// Decides between claims with the same defect when rounded: by defect, corners, facets first.
+  /// Orders claims with the same rounded defect: by defect, then corners; facets before vertices.
   [[nodiscard]] bool before(std::uint64_t a, std::uint64_t b) const {
     const double defect_a = defect_of(a), defect_b = defect_of(b);
     if (defect_a != defect_b) return defect_a < defect_b;
@@ -418,14 +422,14 @@ class Forest {
   }
   static bool of_vertex(std::uint64_t claim) { return (claim >> 32 & 1) != 0; }
   [[nodiscard]] double defect_of(std::uint64_t claim) const {
-    const auto what = static_cast<std::uint32_t>(claim);
-    return of_vertex(claim) ? poles_[what].defect : spheres_.facet_defect(what);
+    const auto subject = static_cast<std::uint32_t>(claim);
+    return of_vertex(claim) ? poles_[subject].defect : spheres_.facet_defect(subject);
   }
   [[nodiscard]] Ranks corners_of(std::uint64_t claim) const {
     constexpr std::uint32_t kNoCorner = 0xFFFFFFFFu;
-    const auto what = static_cast<std::uint32_t>(claim);
-    if (!of_vertex(claim)) return spheres_.facet_ranks(what);
-    return {spheres_.places()[what].rank, kNoCorner, kNoCorner, kNoCorner};
+    const auto subject = static_cast<std::uint32_t>(claim);
+    if (!of_vertex(claim)) return spheres_.facet_ranks(subject);
+    return {spheres_.places()[subject].rank, kNoCorner, kNoCorner, kNoCorner};
   }
 
   static constexpr std::uint64_t kNoBest = ~std::uint64_t{0};
@@ -439,8 +443,8 @@ class Forest {
   std::vector<Poles> poles_;
   Pool<std::uint32_t> keys_;  ///< of facets, by side
   Pool<Statement> list_;
-  /// By root: the rounded defect of the best statement about the set, above its number; in the
-  /// first round its key, above a side or a vertex.
+  /// By root: the rounded defect of the best statement about the set, followed by its number. In
+  /// the first round its key, followed by a side or a vertex.
   Pool<std::uint64_t> best_;
 };
 

@@ -8,7 +8,7 @@ namespace {
 
 using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-/// A difference of integers. Ties, which are frequent on grids, must be cheap.
+/// A difference of integers. Ties are frequent on grids and must be cheap.
 struct Whole {
   std::int64_t x, y, z;
 };

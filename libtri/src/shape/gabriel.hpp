@@ -9,8 +9,8 @@
 
 #include "../delaunay3/elliptical_kernel.hpp"
 
-/// Whether a point lies inside the smallest sphere that contains a triangle. Exact: doubles with an
-/// error bound, and exact numbers if the bound does not decide.
+/// Decides whether a point is inside the smallest sphere that contains a triangle. Exact: uses
+/// doubles with an error bound, and exact numbers if the bound does not decide.
 
 namespace terrace::tri::shape {
 
@@ -38,25 +38,26 @@ inline double largest(const Vector3& a) {
   return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
 }
 
-/// Whether d lies inside the smallest sphere of the origin, b, c: 1, -1, or 0 if unknown. The
-/// vectors are differences of doubles, with an additional error of 9 u spread times their lengths.
+/// Returns 1 if d is inside the smallest sphere of the origin, b, c, -1 if not, and 0 if unknown.
+/// The vectors are differences of doubles, with an additional error of 9 u spread times their
+/// lengths.
 inline int filter_smallest_sphere(const Vector3& b, const Vector3& c, const Vector3& d,
                                   double spread = 0.0) {
   const double m = std::max({largest(b), largest(c), largest(d)});
-  // Within these limits no term below overflows or underflows in a way that matters.
+  // Outside these limits a term below could overflow, or underflow in a way that matters.
   if (!(m > 0x1p-120 && m < 0x1p160)) [[unlikely]]
     return 0;
 
   // A sum of products of two differences of at most m: three for each of bb, cc and twice as many
-  // for the rest; every product and partial sum is rounded, and so are differences of doubles. The
+  // for the rest. Every product and partial sum is rounded, and so are differences of doubles. The
   // total of the absolute products is below 12 m^2 in every case, each with at most 8 roundings.
-  // Scalar products of vectors with an error of e each, of at most 3^0.5 m, have an error of 2 e
+  // Scalar products of vectors of at most 3^0.5 m, each with an error of e, have an error of 2 e
   // 3^0.5 m; there are four.
   const double bound2 = (12 * 8 + 240 * spread) * 0x1p-53 * (m * m);
   const double bb = dot(b, b), cc = dot(c, c), bc = dot(b, c);
   const double at_b = bb - bc, at_c = cc - bc;  // cosines at a, b and c up to a positive factor
-  // The sphere on an edge, if the angle opposite to it is obtuse; the product of the vectors from d
-  // to its ends is negative inside.
+  // If an angle is obtuse, the sphere is the one on the opposite edge. The product of the vectors
+  // from d to its ends is negative inside.
   const double dd = dot(d, d);
   double product = 0.0;
   if (bc < -bound2) {
@@ -68,7 +69,8 @@ inline int filter_smallest_sphere(const Vector3& b, const Vector3& c, const Vect
   } else if (bc > bound2 && at_b > bound2 && at_c > bound2) {
     // The circumcentre is w / (2 n^2), and d is inside its sphere if d^2 < 2 d w / (2 n^2).
     // Everything is a sum of products of six differences, of at most 108 m^6 together, each with at
-    // most 24 roundings. Three products of six vectors, each with an error of e: 18 e 3^2.5 m^5.
+    // most 24 roundings. Three products of six vectors, each with an error of e, have an error of
+    // 18 e 3^2.5 m^5.
     const Vector3 n = cross(b, c);
     const Vector3 nb = cross(n, b), cn = cross(c, n);
     const double dw = cc * dot(d, nb) + bb * dot(d, cn);
@@ -81,7 +83,7 @@ inline int filter_smallest_sphere(const Vector3& b, const Vector3& c, const Vect
   return product < -bound2 ? 1 : product > bound2 ? -1 : 0;
 }
 
-/// Whether d is inside the smallest sphere of a, b, c.
+/// True if d is inside the smallest sphere of a, b, c.
 template <class Coord>
 bool in_smallest_sphere(const std::array<Coord, 3>& pa, const std::array<Coord, 3>& pb,
                         const std::array<Coord, 3>& pc, const std::array<Coord, 3>& pd) {

@@ -12,19 +12,19 @@
 #include "spheres.hpp"
 #include "terrace/tri/shape.hpp"
 
-/// Lids: the faces by which a closed surface bridges what an open scan has not seen. See
-/// BasicShape3::surface_without_lids().
+/// Finds lids: the faces with which a closed surface bridges the areas that an open scan does not
+/// cover. See BasicShape3::surface_without_lids().
 
 namespace terrace::tri::shape {
 
 inline constexpr double kLidSpacings = 10.0;
-/// Samples at the border of an open scan have few neighbours beside those across its gaps.
+/// Samples at the border of an open scan have few neighbours except those across its gaps.
 inline constexpr std::size_t kSpacingRank = 3;
-/// A scan is open if more than one part in so many of its area is in lids.
+/// A scan is open if lids are more than this fraction (1 / kLidParts) of its area.
 inline constexpr std::int64_t kLidParts = 10;
 
-/// Twice the area of a face, mantissa * 2^(bin - kOffset), cut to 18 bits so that sums of areas are
-/// exact: they do not depend on the order in which faces come and go.
+/// Twice the area of a face, mantissa * 2^(bin - kOffset), cut to 18 bits. Sums of such areas are
+/// exact, so they do not depend on the order in which faces are added and removed.
 struct LidFace {
   static constexpr int kOffset = 2700, kBins = 4800;
 
@@ -37,10 +37,11 @@ class LidShare {
  public:
   void add(const LidFace& face) { change(face, 1); }
   void remove(const LidFace& face) { change(face, -1); }
-  /// Whether more than a tenth of the area is in lids: 9 times theirs is above that of the others.
+  /// True if more than a tenth of the area is in lids: 9 times their area exceeds that of the
+  /// others.
   [[nodiscard]] bool open() const {
     std::int64_t sum = 0;
-    bool rest = false;  // of what is below the current exponent, a fraction
+    bool rest = false;  // true if there is a fraction below the current exponent
     for (const std::int64_t bin : bins_) {
       rest = rest || (sum & 1) != 0;
       sum = bin + (sum >> 1);
@@ -55,14 +56,15 @@ class LidShare {
   std::vector<std::int64_t> bins_ = std::vector<std::int64_t>(LidFace::kBins);
 };
 
-/// The spacing at a vertex, as far as it is known, and the edges that tell it.
+/// The spacing at a vertex, as far as it is known, and the edges that determine it.
 struct Spacing {
   static constexpr double kUnknown = -1.0;
 
   double length = kUnknown;                        ///< the third shortest edge
-  std::array<std::uint32_t, kSpacingRank> ends{};  ///< of the three shortest
-  /// Bits, for LidFinder: which of them tetrahedra that are gone had, and new ones have.
-  std::uint8_t gone = 0, there = 0;
+  std::array<std::uint32_t, kSpacingRank> ends{};  ///< the other ends of the three shortest edges
+  /// For LidFinder, bits by index in `ends`: the edges of removed tetrahedra, and those of new
+  /// ones.
+  std::uint8_t removed = 0, added = 0;
 };
 
 /// Requires a scope of the metric.
@@ -71,17 +73,17 @@ class LidFinder {
  public:
   using Face = std::array<std::uint32_t, 3>;
 
-  /// spacings: by vertex slot; found where lid() needs them.
+  /// spacings: by vertex slot; computed when lid() needs them.
   LidFinder(const Mesh& mesh, std::vector<Spacing>& spacings) : mesh_(mesh), spacings_(spacings) {
     spacings_.resize(std::max<std::size_t>(spacings_.size(), mesh.vertex.size()));
   }
 
-  /// Whether an edge of the face is longer than ten times the spacing at each of its corners.
+  /// True if an edge of the face is longer than ten times the spacing at each of its corners.
   bool lid(const Face& face) {
     const double limit =
         std::max({length(face[0], face[1]), length(face[1], face[2]), length(face[2], face[0])}) /
         kLidSpacings;
-    // What is not known yet is mostly not needed.
+    // The spacings that are not known yet are rarely needed.
     return std::all_of(face.begin(), face.end(),
                        [&](std::uint32_t v) { return spacings_[v].length < limit; }) &&
            std::all_of(face.begin(), face.end(), [&](std::uint32_t v) {
@@ -90,28 +92,28 @@ class LidFinder {
            });
   }
 
-  // ---- After changes: first forget() the vertices that came or went, then all tetrahedra
+  // ---- After changes: call forget() for added and removed vertices, then pass all tetrahedra ----
 
   void forget(std::uint32_t vertex) { spacings_[vertex] = {}; }
-  void gone(const std::array<std::uint32_t, 4>& corners) {
+  void remove(const std::array<std::uint32_t, 4>& corners) {
     for_edges(corners,
-              [&](Spacing& at, std::uint32_t, std::uint32_t end) { at.gone |= bit(at, end); });
+              [&](Spacing& at, std::uint32_t, std::uint32_t end) { at.removed |= bit(at, end); });
   }
-  /// fresh: of vertices that came, by slot.
-  void came(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& fresh) {
+  /// fresh: by vertex slot, true for added vertices.
+  void add(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& fresh) {
     for_edges(corners, [&](Spacing& at, std::uint32_t v, std::uint32_t end) {
       const std::uint8_t known = fresh[end] ? 0 : bit(at, end);
-      at.there |= known;
-      if (known == 0 && length(v, end) < at.length) at.gone |= kShorter;
+      at.added |= known;
+      if (known == 0 && length(v, end) < at.length) at.removed |= kShorter;
     });
   }
-  /// changed(v) where the spacing was known and no longer is.
+  /// Calls changed(v) for vertices whose spacing was known and no longer is.
   template <class Changed>
   void renew(const Changed& changed) {
     for (const std::uint32_t v : touched_) {
       Spacing& at = spacings_[v];
-      const bool same = (at.gone & ~at.there) == 0;
-      at.gone = at.there = 0;
+      const bool same = (at.removed & ~at.added) == 0;
+      at.removed = at.added = 0;
       if (same) continue;
       at = {};
       changed(v);
@@ -119,7 +121,7 @@ class LidFinder {
     touched_.clear();
   }
 
-  /// Finds a spacing; visit(t) for all tetrahedra at the vertex, ghosts too.
+  /// Computes a spacing. Calls visit(t) for all tetrahedra at the vertex, including ghosts.
   template <class Visit>
   void find_spacing(std::uint32_t v, const Visit& visit) {
     std::array<double, kSpacingRank> least;
@@ -144,7 +146,7 @@ class LidFinder {
     }
     at.length = least.back();
   }
-  /// The face as one that is no lid.
+  /// Measures the area of a face; the result is not marked as a lid.
   [[nodiscard]] LidFace measure(Face face) const {
     // In lexicographic order, so that the last bit does not depend on slots.
     const auto order = [&](std::size_t i, std::size_t j) {
@@ -165,7 +167,7 @@ class LidFinder {
     }
     const Vector3 normal = cross(u, v);
     const double area = std::sqrt(dot(normal, normal));
-    if (!(area > 0.0 && area < 0x1p10)) return {};  // flat, or beyond all numbers
+    if (!(area > 0.0 && area < 0x1p10)) return {};  // flat, or out of range
     int exponent = 0, of_scale = 0;
     const double mantissa = std::frexp(area, &exponent);
     std::frexp(scale, &of_scale);
@@ -183,23 +185,23 @@ class LidFinder {
   }
   static constexpr std::uint8_t kShorter = 1U << kSpacingRank;
 
-  /// Which of the shortest edges this is; 0 for none.
+  /// The bit of this edge among the shortest ones, 0 if it is not one of them.
   static std::uint8_t bit(const Spacing& at, std::uint32_t end) {
     std::uint8_t result = 0;
     for (std::size_t i = 0; i < kSpacingRank; ++i)
       if (at.ends[i] == end) result = static_cast<std::uint8_t>(1U << i);
     return result;
   }
-  /// told(spacing, vertex, end) for edges at vertices whose spacing is known.
-  template <class Told>
-  void for_edges(const std::array<std::uint32_t, 4>& corners, const Told& told) {
+  /// Calls visit(spacing, vertex, end) for edges at vertices whose spacing is known.
+  template <class Visit>
+  void for_edges(const std::array<std::uint32_t, 4>& corners, const Visit& visit) {
     for (const std::uint32_t v : corners) {
       Spacing& at = spacings_[v];
       if (at.length < 0.0) continue;
-      const bool first = (at.gone | at.there) == 0;
+      const bool first = (at.removed | at.added) == 0;
       for (const std::uint32_t end : corners)
-        if (end != v) told(at, v, end);
-      if (first && (at.gone | at.there) != 0) touched_.push_back(v);
+        if (end != v) visit(at, v, end);
+      if (first && (at.removed | at.added) != 0) touched_.push_back(v);
     }
   }
 

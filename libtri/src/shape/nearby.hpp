@@ -10,20 +10,21 @@
 
 #include "poles.hpp"
 
-/// The poles rule after a local change, see BasicShape3::update_nearby().
+/// Applies the poles rule after a local change, see BasicShape3::update_nearby().
 
 namespace terrace::tri::shape {
 
-/// Whether most of the new tetrahedra are far from the surface, see settle_most(): where detail
-/// ends, a few points on the other side of a body have tetrahedra with thousands of the fine ones.
+/// True if most of the new tetrahedra are far from the surface, see settle_most(): where fine
+/// detail ends, a few points have tetrahedra with thousands of the fine points on the other side of
+/// a body.
 template <class Changes>
 bool far_reaching(const Changes& changes) {
   return changes.added_tetrahedra.size() > 900 + 8 * changes.added_vertices.size();
 }
 
-/// The tetrahedra around a change as a triangulation of their own, in local numbers: new ones and
-/// their neighbours, whose labels are sought, and all others that have a vertex with one of them,
-/// whose labels are known.
+/// The tetrahedra around a change as a separate triangulation in local numbers. New tetrahedra and
+/// their neighbours come first, and their labels are computed. All others that share a vertex with
+/// one of them follow, and their labels are known.
 template <class Mesh>
 class Nearby {
  public:
@@ -45,7 +46,7 @@ class Nearby {
   Nearby(const Nearby&) = delete;
   Nearby& operator=(const Nearby&) = delete;
 
-  /// unlabelled: the new tetrahedra, less those that settle_most() has labelled.
+  /// unlabelled: the new tetrahedra that settle_most() has not labelled.
   template <class Changes>
   void relabel(const Changes& changes, std::span<const TetrahedronId> unlabelled) {
     collect(changes, unlabelled);
@@ -59,14 +60,14 @@ class Nearby {
     std::vector<std::uint8_t> inside = signed_forest(spheres, 1, part);
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
       if (i < sought_) state_.forest[slots_[i]] = inside[i];
-      // Where nothing will be flipped, the labels after the flips are kept.
+      // Where nothing will be flipped, keeps the labels after earlier flips.
       if (!between_whole(tetrahedra_[i])) inside[i] = state_.of[slots_[i]] == kKept;
     }
     smooth_and_sculpt(spheres, inside, part);
     write(inside);
   }
-  /// By slot, all tetrahedra whose label or whose neighbours may have changed: those looked at, the
-  /// new ones and their neighbours, and those exposed. To be called last.
+  /// Returns, by slot, all tetrahedra whose label or whose neighbours may have changed: those
+  /// examined, the new ones and their neighbours, and those exposed. Must be called last.
   template <class Changes>
   std::vector<std::uint32_t> examined(const Changes& changes,
                                       std::span<const std::uint32_t> exposed) {
@@ -109,8 +110,8 @@ class Nearby {
     };
     for (std::size_t i = 0; i < sought_; ++i)
       for (const std::uint32_t v : mesh_.tetrahedron[slots_[i]].corner) add(v);
-    // Vertices may have lost tetrahedra and gained none, at the hull; those at which only
-    // tetrahedra of one label were exchanged need no look.
+    // Vertices at the hull may have lost tetrahedra and gained none. Vertices at which only
+    // tetrahedra of one label were exchanged need not be examined.
     for (const auto& corners : changes.removed_corners) {
       for (const VertexId v : corners) {
         if (!mesh_.vertex_alive(slot(v))) continue;
@@ -119,8 +120,8 @@ class Nearby {
         take(mesh_.vertex[slot(v)].incident);
       }
     }
-    // All tetrahedra at these vertices, ghosts too: joined to those listed by facets with such a
-    // corner.
+    // Takes all tetrahedra at these vertices, including ghosts. They are connected with those
+    // listed through facets that have such a corner.
     tetrahedra_.reserve(4 * slots_.size());
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       const spatial::Tetrahedron& t = tetrahedra_.emplace_back(mesh_.tetrahedron[slots_[i]]);
@@ -135,7 +136,7 @@ class Nearby {
         if (count > at_vertex[k]) take(spatial::tetrahedron_of(t.mate[k]));
     }
   }
-  /// In lexicographic order, from 1.
+  /// Numbers the vertices in lexicographic order, from 1.
   void number_vertices() {
     const std::size_t whole = vertices_.size();
     for (const spatial::Tetrahedron& t : tetrahedra_) {
@@ -161,22 +162,22 @@ class Nearby {
     places.insert(places.begin(), kGhostPlace);
     return places;
   }
-  /// Turned. Behind the last one comes a slot that is not finite, the neighbour of what is not
-  /// here.
+  /// Turns the tetrahedra and gives them local numbers. After the last one follows a slot that is
+  /// not finite, the neighbour of tetrahedra at the border of this part.
   void number_tetrahedra() {
-    const auto nowhere = static_cast<std::uint32_t>(slots_.size());
+    const auto elsewhere = static_cast<std::uint32_t>(slots_.size());
     std::vector<std::uint8_t> turns;
     turns.reserve(slots_.size());
     for (spatial::Tetrahedron& t : tetrahedra_) {
       for (std::uint32_t& v : t.corner)
         if (v != spatial::kGhost) v = state_.local_vertex[v];
-      // Local numbers are ranks already. The ghost's, 0, wraps round to the last.
+      // Local numbers are already ranks. The ghost's number, 0, wraps round to the last rank.
       turns.push_back(turn_of(t.corner, [](std::uint32_t v) { return v - 1; }));
     }
     const auto new_side = [&](spatial::Side mate) {
       const std::uint32_t other = state_.local_tetrahedron[spatial::tetrahedron_of(mate)];
       return other == spatial::kNone
-                 ? spatial::make_side(nowhere, 0)
+                 ? spatial::make_side(elsewhere, 0)
                  : spatial::make_side(other, kTurns[turns[other]].to[spatial::index_of(mate)]);
     };
     for (std::size_t n = 0; n < turns.size(); ++n)
@@ -190,7 +191,8 @@ class Nearby {
   }
 
   void write(const std::vector<std::uint8_t>& inside) {
-    std::vector<std::array<bool, 2>> has(whole_.size());  // tetrahedra outside, inside
+    std::vector<std::array<bool, 2>> has(whole_.size());  // true if it has tetrahedra outside,
+                                                          // inside
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
       for (const std::uint32_t v : tetrahedra_[i].corner) has[v][inside[i]] = true;
       if (!spatial::is_finite(tetrahedra_[i].corner)) continue;
@@ -212,22 +214,25 @@ class Nearby {
   const Mesh& mesh_;
   State& state_;
   std::vector<std::uint32_t> slots_;              ///< of tetrahedra, by local number
-  std::vector<spatial::Tetrahedron> tetrahedra_;  ///< by local number, in the end in such numbers
+  std::vector<spatial::Tetrahedron> tetrahedra_;  ///< by local number; number_tetrahedra() makes
+                                                  ///< their contents local too
   std::vector<std::uint32_t> examined_;           ///< see examined()
-  std::size_t sought_ = 0;                        ///< how many of these, from the first, are sought
+  std::size_t sought_ = 0;                        ///< number of tetrahedra whose labels are
+                                                  ///< computed, which come first
   std::vector<std::uint32_t> vertices_;           ///< slots, by local number - 1
-  std::vector<std::uint8_t> whole_;  ///< by local vertex: all tetrahedra at it are here
+  std::vector<std::uint8_t> whole_;  ///< by local vertex: true if this part contains all tetrahedra
+                                     ///< at it
 };
 
-/// Whether update_nearby() can follow the changes, and costs less than starting from scratch.
+/// True if update_nearby() can follow the changes and costs less than starting from scratch.
 template <class Changes, class Mesh>
 bool worth_updating(const Mesh& mesh, const State& state, const Changes& changes) {
   return !state.forest.empty() && 2 * changes.added_tetrahedra.size() < mesh.finite_count;
 }
 
-/// Labels the new tetrahedra that are plainly far from the surface: those of which three corners or
-/// more are vertices where only tetrahedra of one label were removed, whose place they take there.
-/// Returns the others. Next to the surface one such corner would not tell.
+/// Labels the new tetrahedra that are clearly far from the surface: those with at least three
+/// corners at which only tetrahedra of one label were removed, whose place they take. Returns the
+/// others. Near the surface a single such corner would not be sufficient evidence.
 template <class Mesh>
 std::vector<TetrahedronId> settle_most(const Mesh& mesh, State& state,
                                        std::span<const TetrahedronId> added) {
@@ -250,9 +255,10 @@ std::vector<TetrahedronId> settle_most(const Mesh& mesh, State& state,
   return others;
 }
 
-/// The state of the poles rule after changes; `forest` has the labels before. exposed: by slot,
-/// tetrahedra of which a facet may have come to the hull. Returns, by slot, all tetrahedra whose
-/// label or whose neighbours may have changed, these among them. Requires a scope of the metric.
+/// Updates the state of the poles rule after changes. `forest` has the labels before. exposed:
+/// tetrahedra, by slot, that may have gained a facet on the hull. Returns, by slot, all tetrahedra
+/// whose label or whose neighbours may have changed, including these. Requires a scope of the
+/// metric.
 template <class Changes, class Mesh>
 std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const Changes& changes,
                                          std::span<const std::uint32_t> exposed = {}) {
@@ -261,7 +267,7 @@ std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const C
   for (std::size_t k = 0; k < changes.removed_tetrahedra.size(); ++k) {
     const std::uint32_t t = slot(changes.removed_tetrahedra[k]);
     const bool kept = state.of[t] == kKept;
-    // Labels that flips have changed count as both.
+    // A label that a flip has changed counts as both.
     const std::uint8_t bits = kept != (state.forest[t] != 0) ? 3 : kept ? 2 : 1;
     for (const VertexId v : changes.removed_corners[k])
       state.labels_gone[slot(v)] |= many ? bits : std::uint8_t{3};
@@ -274,7 +280,7 @@ std::vector<std::uint32_t> update_nearby(const Mesh& mesh, State& state, const C
   state.of.resize(std::max<std::size_t>(state.of.size(), mesh.tetrahedron.size()), kAbsent);
   state.forest.resize(state.of.size());
   state.degree.resize(std::max<std::size_t>(state.degree.size(), mesh.vertex.size()));
-  // Not of a vertex that had the slot before.
+  // Drops the bits of a vertex that had the slot before.
   for (const VertexId v : changes.added_vertices) state.labels_gone[slot(v)] = 0;
   std::vector<TetrahedronId> others;
   std::span<const TetrahedronId> unlabelled = changes.added_tetrahedra;

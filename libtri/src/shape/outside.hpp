@@ -11,11 +11,11 @@
 #include "gabriel.hpp"
 #include "state.hpp"
 
-/// The surface of the kept tetrahedra, and its parts, told apart by the tetrahedra inside.
+/// The surface of the kept tetrahedra, and its parts, which are separated by the tetrahedra inside.
 
 namespace terrace::tri::shape {
 
-/// See BasicShape3::surface().
+/// Implements BasicShape3::surface().
 template <class Mesh>
 ShapeSurface surface_of(const Mesh& mesh, const State& state) {
   const auto& of = state.of;
@@ -28,7 +28,7 @@ ShapeSurface surface_of(const Mesh& mesh, const State& state) {
     const spatial::Tetrahedron& tetrahedron = mesh.tetrahedron[t];
     for (std::uint32_t i = 0; i < 4; ++i) {
       if (is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
-      // In order with the corner first, so counter-clockwise when seen from the other side.
+      // In order with the corner first, so counter-clockwise seen from the other side.
       faces.push_back(spatial::facet_of(tetrahedron, i));
       result.behind.push_back(TetrahedronId{t});
       for (const std::uint32_t v : faces.back()) number[v] = 0;
@@ -46,8 +46,9 @@ ShapeSurface surface_of(const Mesh& mesh, const State& state) {
 }
 
 /// Components and Euler characteristic of a surface of the kept tetrahedra, some of whose faces may
-/// have been left out, with its vertices repeated where it touches itself: an edge joins the two
-/// faces that bound the same inside at it, a vertex the faces that such edges join. O(slots).
+/// have been left out. Vertices are repeated where the surface touches itself: an edge joins the
+/// two faces that bound the same inside at it, and a vertex joins the faces that such edges join.
+/// O(slots).
 template <class Mesh>
 ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface& surface) {
   const auto inside = [&](std::uint32_t t) { return is_kept(state.of[t]); };
@@ -73,20 +74,21 @@ ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface&
       if (sides[f] == side) return f;
     return kNoFace;
   };
-  // Corners of faces that are the same vertex, as disjoint sets.
+  // Corners of faces that belong to the same vertex, as disjoint sets.
   base::UnionFind corners(3 * faces), parts(faces);
   const auto corner_of = [&](std::uint32_t face, std::uint32_t vertex) {
     const auto f = spatial::facet_of(mesh.tetrahedron[spatial::tetrahedron_of(sides[face])],
                                      spatial::index_of(sides[face]));
     return 3 * face + (f[0] == vertex ? 0u : f[1] == vertex ? 1u : 2u);
   };
-  std::size_t shared = 0;  // edges of two faces, met from both
+  std::size_t shared = 0;  // edges of two faces, counted from both sides
   for (std::uint32_t face = 0; face < faces; ++face) {
     const std::uint32_t first = spatial::tetrahedron_of(sides[face]);
     const auto f = spatial::facet_of(mesh.tetrahedron[first], spatial::index_of(sides[face]));
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t p = f[k], q = f[(k + 1) % 3];
-      // Around the edge, through the inside: out of t by the corner that is not the facet's.
+      // Walks around the edge through the inside, leaving t opposite to the corner that is not on
+      // the facet.
       std::uint32_t t = first, from = spatial::index_of(sides[face]);
       for (;;) {
         const auto& corner = mesh.tetrahedron[t].corner;

@@ -12,38 +12,39 @@
 #include "spheres.hpp"
 #include "state.hpp"
 
-/// The poles rule, see ShapeRule::kPoles: which tetrahedra are inside, by the strongest evidence
-/// among angles between circumspheres.
+/// The poles rule, see ShapeRule::kPoles: decides which tetrahedra are inside by the strongest
+/// evidence among the angles between circumspheres.
 
 namespace terrace::tri::shape {
 
-/// How much heavier the angle at a vertex weighs than that across a facet.
+/// Weight of the angle at a vertex relative to the angle across a facet.
 inline constexpr double kPoleWeight = 2.0;
 
-/// What is known where the tetrahedra are a part of all, by slot.
+/// Known facts, by slot, if the tetrahedra are only a part of all.
 struct Part {
   std::span<const std::uint8_t> label;  ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
   std::size_t unlabelled = 0;           ///< the number of unknown ones, which come first
-  std::span<const std::uint8_t> whole;  ///< of vertices: whether all tetrahedra at them are here
+  std::span<const std::uint8_t> whole;  ///< of vertices: true if the part contains all tetrahedra
+                                        ///< at them
 };
 
-/// The first step: labels by tetrahedron slot, 1 inside, 0 outside or not finite. The nodes are the
-/// finite tetrahedra, and one for all space beyond the hull. A facet says that both of its sides
-/// are alike, the more credibly the less its defect; a vertex says that its two poles (the largest
-/// circumspheres on either side, N. Amenta, M. Bern, doi:10.1007/PL00009475) are of different
-/// sides. Of these statements a spanning forest of least defect is believed (found by Boruvka's
-/// rounds).
+/// The first step: returns labels by tetrahedron slot, 1 inside, 0 outside or not finite. The nodes
+/// are the finite tetrahedra, and one for all space beyond the hull. A facet states that both of
+/// its sides are alike, the more credibly the smaller its defect. A vertex states that its two
+/// poles (the largest circumspheres on either side, N. Amenta, M. Bern, doi:10.1007/PL00009475) are
+/// on different sides. A spanning forest of these statements with the least defect is believed;
+/// Boruvka's algorithm finds it.
 ///
-/// In a part the vertices of unknown tetrahedra are whole. If the known labels are those of the
-/// whole forest, so are the others: joining tetrahedra by their right labels in advance closes no
-/// cycle against them.
+/// In a part, the vertices of unknown tetrahedra are whole. If the known labels are those of the
+/// whole forest, so are the others: joining tetrahedra by their right labels in advance does not
+/// close a cycle that contradicts them.
 ///
-/// O(n log n); memory 60 bytes per tetrahedron, freed at the end, besides the spheres.
+/// O(n log n). Memory: 60 bytes per tetrahedron, freed at the end, besides the spheres.
 std::vector<std::uint8_t> signed_forest(const Spheres& spheres, unsigned threads,
                                         const Part& part = {},
                                         const base::StopCheck& check_stop = {});
 
-/// How many tetrahedra outside and inside every vertex has, by slot. Ghosts are outside.
+/// Number of tetrahedra outside and inside at every vertex, by slot. Ghosts are outside.
 using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
 
 /// The second and the third step. Returns the counts after them.
@@ -51,17 +52,17 @@ using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
 /// 2. Flips tetrahedra whose facets contradict their label by more than they support it, the
 /// strongest first. No vertex loses its last tetrahedron of a label.
 ///
-/// 3. Gives vertices that all tetrahedra around them call inside, or outside, a facet of the
-/// surface. Each flips a tetrahedron whose facet opposite to the vertex is on the surface, the one
-/// with the least defect first; this changes neither the topology of the surface nor the vertices
-/// on it otherwise.
+/// 3. Gives a facet of the surface to vertices whose tetrahedra are all labelled inside, or all
+/// outside. Each such vertex flips a tetrahedron whose facet opposite to the vertex is on the
+/// surface, the one with the least defect first. Otherwise this changes neither the topology of the
+/// surface nor the vertices on it.
 ///
-/// In a part only tetrahedra between whole vertices are flipped.
+/// In a part, only tetrahedra between whole vertices are flipped.
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
                               const Part& part = {}, const base::StopCheck& check_stop = {});
 
-/// The state of the poles rule from scratch. Vertices that are not on the surface are lost.
-/// Requires a scope of the metric.
+/// Computes the state of the poles rule from scratch. Vertices that are not on the surface are
+/// lost. Requires a scope of the metric.
 template <class Mesh>
 void restore_by_poles(const Mesh& mesh, State& state, unsigned threads,
                       const base::StopCheck& check_stop) {

@@ -10,20 +10,20 @@
 #include "criterion.hpp"
 #include "state.hpp"
 
-/// Puts tetrahedra back until every vertex has one. The literal guard, "do not remove the last
-/// tetrahedron of a vertex", would make the flood depend on its order: of two tetrahedra at a
-/// vertex the one met first would go. So the flood runs to its end, which does not depend on the
-/// order, and what it lost comes back in an order given by the coordinates alone.
+/// Puts tetrahedra back until every vertex has one. A literal guard, "do not remove the last
+/// tetrahedron of a vertex", would make the flood depend on its order: it would remove the first of
+/// two tetrahedra at a vertex that it meets. The flood therefore runs to its end, which does not
+/// depend on the order, and the lost tetrahedra return in an order given by the coordinates alone.
 ///
-/// Only tetrahedra with a vertex that has none are put back, each of them gives one to such a
-/// vertex, and every vertex is in some tetrahedron: so this ends, with no vertex lost. Each step
-/// chooses the first in a total order of a set that the previous steps determine, so the result is
-/// determined by that of the flood, the tetrahedra and their coordinates.
+/// Only tetrahedra with a vertex that has none are put back. Each of them gives a tetrahedron to
+/// such a vertex, and every vertex is in some tetrahedron, so this ends with no vertex lost. Each
+/// step chooses the first in a total order of a set that the previous steps determine. The result
+/// is therefore determined by the result of the flood, the tetrahedra and their coordinates.
 
 namespace terrace::tri::shape {
 
 /// Sorts tetrahedra by their longest edge, then lexicographically by their sorted corners. Lengths
-/// whose squares overflow or underflow are equal; then the corners decide.
+/// whose squares overflow or underflow count as equal.
 struct RescueKey {
   double longest2;
   std::array<std::uint32_t, 4> corner;  ///< sorted by coordinates
@@ -57,7 +57,7 @@ void rescue(const Mesh& mesh, State& state) {
                                                mesh.vertex[a.corner[i]].point);
     return false;
   };
-  // Added to the degree of a lost vertex that got a tetrahedron back, until the end.
+  // Added to the degree of a lost vertex once it has a tetrahedron again, until the end.
   constexpr std::uint32_t kOnce = 0x80000000u;
   const auto has_lost = [&](std::uint32_t t) {
     for (const std::uint32_t v : mesh.tetrahedron[t].corner)
@@ -82,7 +82,8 @@ void rescue(const Mesh& mesh, State& state) {
       break;
     }
   });
-  std::vector<RescueKey> rest;  // candidates next to no kept one, used once there are no others
+  std::vector<RescueKey> rest;  // candidates without a kept neighbour, used once there are no
+                                // others
   std::size_t at = 0;
   const auto take = [&](std::uint32_t t) {
     state.of[t] |= kRescuedBit;

@@ -31,7 +31,7 @@ void check(std::span<const Point3> points, const RestoreOptions& options) {
     throw std::invalid_argument("a metric and quantise_bits are given; leave one of them out");
 }
 
-/// Drops points that are in no face of the result, whose faces name input points.
+/// Drops points that are not in any face of the result, whose faces refer to input points.
 RestoredSurface compact(std::span<const Point3> points, RestoredSurface result) {
   std::vector<Face>& faces = result.surface.faces;
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
@@ -49,7 +49,7 @@ RestoredSurface compact(std::span<const Point3> points, RestoredSurface result) 
   return result;
 }
 
-/// Without points; faces name the input's.
+/// Restores a surface without its points; faces refer to those of the input.
 template <class Triangulation>
 RestoredSurface shape_faces(std::span<const typename Triangulation::Point> points,
                             const RestoreOptions& options,

@@ -10,7 +10,7 @@
 namespace terrace::tri::shape {
 namespace {
 
-/// Labels, and how many tetrahedra of each label every vertex has.
+/// Labels, and the number of tetrahedra of each label at every vertex.
 class Labels {
  public:
   Labels(const Spheres& spheres, std::vector<std::uint8_t>& inside,
@@ -33,7 +33,8 @@ class Labels {
   [[nodiscard]] bool buried(std::uint32_t v) const {
     return count_[v][0] == 0 || count_[v][1] == 0;
   }
-  /// By vertex, whether it is buried and its tetrahedra may change; empty if none is.
+  /// By vertex, true if it is buried and its tetrahedra may change. Empty if there is no such
+  /// vertex.
   [[nodiscard]] std::vector<std::uint8_t> all_buried() const {
     std::vector<std::uint8_t> result(count_.size());
     bool any = false;
@@ -43,7 +44,7 @@ class Labels {
     }
     return any ? result : std::vector<std::uint8_t>{};
   }
-  /// Whether t is finite and all tetrahedra at its corners are there.
+  /// True if t is finite and all tetrahedra at its corners are in the part.
   [[nodiscard]] bool changeable(std::uint32_t t) const {
     if (!spheres_.finite(t)) return false;
     const auto& corner = spheres_.tetrahedra()[t].corner;
@@ -66,10 +67,11 @@ class Labels {
   LabelCounts count_;
 };
 
-/// Gains of rounding alone could turn a tetrahedron back and forth.
+/// Smaller gains could be rounding errors that flip a tetrahedron back and forth.
 constexpr double kLeastGain = 0x1p-40;
 
-/// How much t's facets contradict its label, if two neighbours or more differ from it; else 0.
+/// How much t's facets contradict its label, if at least two neighbours differ from it; otherwise
+/// 0.
 double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
   const spatial::Tetrahedron& tetrahedron = spheres.tetrahedra()[t];
   std::array<bool, 4> differs{};

@@ -18,13 +18,13 @@ constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra,
                                 std::span<const Place> places, unsigned threads) {
-  // Ranks close together in memory.
+  // Keeps the ranks close together in memory.
   std::vector<std::uint32_t> ranks(places.size());
   for (std::size_t v = 0; v < places.size(); ++v) ranks[v] = places[v].rank;
   Renumbered result;
   const auto slots = static_cast<std::uint32_t>(tetrahedra.size());
   result.number.resize(slots);
-  Pool<std::uint8_t> turn;  // 0: the slot is free
+  Pool<std::uint8_t> turn;  // 0 for a free slot
   turn.resize(slots);
   std::vector<std::uint32_t> next(places.size());
   std::uint32_t count = 0;
@@ -94,7 +94,7 @@ Spheres::Sphere Spheres::sphere_of(const spatial::Tetrahedron& t) const {
 }
 
 Vector3 Spheres::hull_normal(Side side) const {
-  // Counter-clockwise as seen from outside; sorting turns it round if the permutation is odd.
+  // Counter-clockwise as seen from outside; sorting reverses it if the permutation is odd.
   std::array<std::uint32_t, 3> f =
       spatial::facet_of(tetrahedra_[spatial::tetrahedron_of(side)], spatial::index_of(side));
   bool odd = false;

@@ -18,27 +18,28 @@
 #include "../pool.hpp"
 #include "criterion.hpp"
 
-/// Circumspheres of the tetrahedra and the angles between them, on which the poles rule stands.
+/// Circumspheres of the tetrahedra and the angles between them, on which the poles rule is based.
 ///
 /// Every number is computed from corners in lexicographic order, by additions, multiplications,
-/// divisions and square roots alone. So its bits depend on the coordinates, not on slots, threads
-/// or the machine.
+/// divisions and square roots alone. Its bits therefore depend on the coordinates, not on slots,
+/// threads or the machine.
 
 namespace terrace::tri::shape {
 
-/// Where a vertex is, scaled by a power of two so that all points fit a box of side 1; in an
-/// elliptical metric mapped to where the metric is Euclidean.
+/// The position of a vertex, scaled by a power of two so that all points fit into a box of side 1.
+/// In an elliptical metric it is mapped to where the metric is Euclidean.
 struct Place {
   Vector3 at;
-  std::uint32_t rank;  ///< among all vertices in lexicographic order; the ghost's is the last
+  std::uint32_t rank;  ///< position among all vertices in lexicographic order; the ghost is the
+                       ///< last
 };
 inline constexpr Place kGhostPlace{{}, 0xFFFFFFFFu};
 
-/// Lexicographic order of the living vertices.
+/// The existing vertices in lexicographic order.
 template <class Mesh>
 std::vector<std::uint32_t> sorted_vertices(const Mesh& mesh) {
-  // By x in whole steps first, the others within a step. Halves, so that differences do not
-  // overflow.
+  // Sorts by x in integer steps first, then within each step. Uses halves, so that differences do
+  // not overflow.
   const auto x = [&](std::uint32_t v) { return static_cast<double>(mesh.vertex[v].point[0]) / 2; };
   std::vector<std::uint32_t> order;
   order.reserve(mesh.vertex.size());
@@ -67,16 +68,16 @@ std::vector<std::uint32_t> sorted_vertices(const Mesh& mesh) {
   return order;
 }
 
-/// The largest power of two by which coordinates of this size can be multiplied to be at most 1 in
-/// absolute value (up to a factor of 2); within the range of normal numbers.
+/// The largest power of two that scales coordinates of this size to at most 1 in absolute value (up
+/// to a factor of 2), within the range of normal numbers.
 inline double scale_to_one(double size) {
   int exponent = 0;
   std::frexp(size, &exponent);
   return std::ldexp(1.0, std::clamp(-exponent, -1022, 1022));
 }
 
-/// The places of vertices given in lexicographic order, which become ranks 0, 1 and so on. Requires
-/// a scope of the metric.
+/// The places of vertices given in lexicographic order, with ranks 0, 1 and so on. Requires a scope
+/// of the metric.
 template <class Mesh>
 std::vector<Place> places_of(const Mesh& mesh, std::span<const std::uint32_t> sorted) {
   std::vector<Place> places(sorted.size());
@@ -85,7 +86,8 @@ std::vector<Place> places_of(const Mesh& mesh, std::span<const std::uint32_t> so
     places[i] = {to_doubles(mesh.vertex[sorted[i]].point), i};
     size = std::max(size, largest(places[i].at));
   }
-  // First so that differences cannot overflow, then once more for points that lie together.
+  // Scales first so that differences cannot overflow, then once more for points that are close
+  // together.
   const auto rescale = [&](double by) {
     for (Place& place : places)
       for (double& c : place.at) c *= by;
@@ -112,20 +114,20 @@ std::vector<Place> places_of(const Mesh& mesh) {
   return places;
 }
 
-/// A turn of a tetrahedron that keeps its orientation and puts the two corners first, in order,
-/// that come first in lexicographic order.
+/// A permutation of a tetrahedron's corners that keeps its orientation and moves the two
+/// lexicographically first corners to the front, in order.
 struct Turn {
-  std::array<std::uint8_t, 4> from;  ///< by new index of a corner the old one
-  std::array<std::uint8_t, 4> to;    ///< by old index the new one
+  std::array<std::uint8_t, 4> from;  ///< old index of the corner at each new index
+  std::array<std::uint8_t, 4> to;    ///< new index of the corner at each old index
 };
-/// By the old index of the first corner, times 4, plus that of the second.
+/// Turns by the old index of the first corner, times 4, plus that of the second.
 inline constexpr std::array<Turn, 16> kTurns = [] {
   std::array<Turn, 16> turns{};
   for (std::uint8_t first = 0; first < 4; ++first) {
     for (std::uint8_t second = 0; second < 4; ++second) {
       if (second == first) continue;
       Turn& turn = turns[4 * first + second];
-      // The facet opposite to the first corner, begun at the second.
+      // The facet opposite to the first corner, starting at the second.
       const auto& facet = spatial::kFacet[first];
       const std::size_t at = facet[0] == second ? 0 : facet[1] == second ? 1 : 2;
       turn.from = {first, second, facet[(at + 1) % 3], facet[(at + 2) % 3]};
@@ -135,11 +137,11 @@ inline constexpr std::array<Turn, 16> kTurns = [] {
   return turns;
 }();
 
-/// The number of the turn in kTurns, never 0. rank(vertex): see Place.
+/// The number of the turn in kTurns, which is never 0. rank(vertex): see Place.
 template <class Rank>
 std::uint8_t turn_of(const std::array<std::uint32_t, 4>& corner, const Rank& rank) {
-  // An index behind its rank: such numbers are put in order without branches, which the processor
-  // could not predict.
+  // Combines each rank with its index, as such numbers can be sorted without branches, which the
+  // processor could not predict.
   std::array<std::uint64_t, 4> key;
   for (std::size_t i = 0; i < 4; ++i) key[i] = std::uint64_t{rank(corner[i])} << 2 | i;
   const std::uint64_t a = std::min(key[0], key[1]), b = std::min(key[2], key[3]);
@@ -150,7 +152,7 @@ std::uint8_t turn_of(const std::array<std::uint32_t, 4>& corner, const Rank& ran
   return static_cast<std::uint8_t>((first & 3) << 2 | (second & 3));
 }
 
-/// A tetrahedron turned. new_side(mate): the side that a neighbour's has become.
+/// Applies a turn to a tetrahedron. new_side(mate): the new number of a neighbour's side.
 template <class NewSide>
 spatial::Tetrahedron turned(const spatial::Tetrahedron& t, const Turn& turn,
                             const NewSide& new_side) {
@@ -162,38 +164,38 @@ spatial::Tetrahedron turned(const spatial::Tetrahedron& t, const Turn& turn,
   return result;
 }
 
-/// Tetrahedra in the order of their first corners, turned. Neighbours that a bulk build has left
-/// far apart lie close together in memory then, as the vertices of both do.
+/// Turned tetrahedra in the order of their first corners. Neighbours that a bulk build has left far
+/// apart in memory are then close together, as the vertices of both are.
 struct Renumbered {
   Pool<spatial::Tetrahedron> tetrahedra;
-  Pool<std::uint32_t> number;  ///< by slot; of free slots arbitrary
+  Pool<std::uint32_t> number;  ///< by slot; undefined for free slots
 };
 Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra,
                                 std::span<const Place> places, unsigned threads);
 
-/// The corners of a tetrahedron or facet by rank.
+/// The ranks of the corners of a tetrahedron or facet.
 using Ranks = std::array<std::uint32_t, 4>;
 
 class Spheres {
  public:
   using Side = spatial::Side;
 
-  /// The tetrahedra must be turned. O(tetrahedra). The result is the same for any number of
+  /// The tetrahedra must be turned. O(tetrahedra). The result does not depend on the number of
   /// threads.
   Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<Place> places,
           unsigned threads, const base::StopCheck& check_stop = {});
 
   [[nodiscard]] std::span<const spatial::Tetrahedron> tetrahedra() const { return tetrahedra_; }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }
-  /// Whether the slot holds a finite tetrahedron.
+  /// True if the slot holds a finite tetrahedron.
   [[nodiscard]] bool finite(std::uint32_t t) const { return finite_[t] != 0; }
-  /// Whether the tetrahedron is so flat that rounding decides where its circumcentre lies.
+  /// True if the tetrahedron is so flat that rounding decides where its circumcentre is.
   [[nodiscard]] bool flat(std::uint32_t t) const { return std::isnan(sphere_[t].centre[0]); }
   /// The squared circumradius; NaN if flat.
   [[nodiscard]] double radius2(std::uint32_t t) const {
     return dot(sphere_[t].centre, sphere_[t].centre);
   }
-  /// From a vertex of the finite tetrahedron t, given by its place, to its circumcentre.
+  /// The vector from a vertex of the finite tetrahedron t, given by its place, to its circumcentre.
   [[nodiscard]] Vector3 to_centre(std::uint32_t t, const Vector3& vertex) const {
     const Sphere& s = sphere_[t];
     const Vector3 shift = minus(places_[s.first].at, vertex);
@@ -215,7 +217,7 @@ class Spheres {
     std::sort(ranks.begin(), ranks.end());
     return ranks;
   }
-  /// Three ranks, then 0.
+  /// Three ranks, followed by 0.
   [[nodiscard]] Ranks facet_ranks(Side side) const {
     const auto f =
         spatial::facet_of(tetrahedra_[spatial::tetrahedron_of(side)], spatial::index_of(side));
@@ -229,18 +231,18 @@ class Spheres {
 
  private:
   struct Sphere {
-    Vector3 centre;       ///< as seen from the first corner; NaN if flat
+    Vector3 centre;       ///< relative to the first corner; NaN if flat
     std::uint32_t first;  ///< the first corner
   };
   [[nodiscard]] Sphere sphere_of(const spatial::Tetrahedron& t) const;
   std::span<const spatial::Tetrahedron> tetrahedra_;
   std::vector<Place> places_;  ///< by vertex slot
   // By tetrahedron slot:
-  Pool<Sphere> sphere_;        ///< of those that are finite
-  Pool<std::uint8_t> finite_;  ///< apart, as it is asked everywhere
+  Pool<Sphere> sphere_;        ///< of finite tetrahedra
+  Pool<std::uint8_t> finite_;  ///< separate, as it is read everywhere
 };
 
-/// 1 - cos of the angle between two vectors, in 0 .. 2; 1 where rounding leaves no angle.
+/// 1 - cos of the angle between two vectors, in 0 .. 2; 1 if rounding leaves no angle.
 inline double defect_between(const Vector3& u, const Vector3& v) {
   const double cosine = dot(u, v) / std::sqrt(dot(u, u) * dot(v, v));
   if (std::isnan(cosine)) return 1.0;

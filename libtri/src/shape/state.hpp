@@ -14,12 +14,13 @@
 
 namespace terrace::tri::shape {
 
-// Values of State::of. Below kKept: removed, and the facet through which the flood came.
+// Values of State::of. A value below kKept means removed and is the facet through which the flood
+// came.
 inline constexpr std::uint8_t kKept = 4;
-/// Not a finite tetrahedron. A ghost has this value too, so the neighbour of a living tetrahedron
-/// is open (removed or beyond the hull) if and only if its state is not kKept.
+/// Not a finite tetrahedron. Ghosts have this value too, so the neighbour of an existing
+/// tetrahedron is open (removed or beyond the hull) if and only if its state is not kKept.
 inline constexpr std::uint8_t kAbsent = 5;
-/// Removed by the flood and put back. Only set between two operations.
+/// Removed by the flood and put back. Set only between operations.
 inline constexpr std::uint8_t kRescuedBit = 8;
 
 constexpr bool is_kept(std::uint8_t state) { return state == kKept || (state & kRescuedBit) != 0; }
@@ -27,21 +28,21 @@ constexpr bool is_removed(std::uint8_t state) { return state < kKept; }
 
 struct State {
   std::vector<std::uint8_t> of;  ///< by tetrahedron slot
-  /// By vertex slot: the number of its tetrahedra in state kKept.
+  /// By vertex slot: number of its tetrahedra in state kKept.
   std::vector<std::uint32_t> degree;
-  std::vector<std::uint32_t> lost;     ///< living vertices of degree 0 while there are tetrahedra
+  std::vector<std::uint32_t> lost;     ///< existing vertices of degree 0 while there are tetrahedra
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
   std::size_t kept_count = 0;          ///< in state kKept
   std::vector<std::uint8_t> forest;    ///< poles rule: labels of its first step, by slot
   base::StopTicks ticks;               ///< of the rules that peel
   // Scratch memory, kept between calls.
-  std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
-  std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides
+  std::vector<std::uint32_t> queue;    ///< removed tetrahedra whose neighbours must be tested
+  std::vector<std::uint32_t> pending;  ///< kept tetrahedra that must be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
-  /// By vertex slot, bits: tetrahedra removed there were outside, 1; inside, 2. 0 between two
-  /// calls.
+  /// By vertex slot: bit 1 if tetrahedra removed there were outside, bit 2 if they were inside. 0
+  /// between calls.
   std::vector<std::uint8_t> labels_gone;
-  /// Local numbers by slot, see nearby.hpp; kNone between two calls.
+  /// Local numbers by slot, see nearby.hpp; kNone between calls.
   Pool<std::uint32_t> local_tetrahedron, local_vertex;
 
   template <class Mesh>

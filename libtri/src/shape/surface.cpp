@@ -22,7 +22,7 @@ struct SurfaceEdge {
   std::int32_t way;  ///< +1: from the smaller to the larger
 };
 
-/// Three per face, sorted by their ends and then by face.
+/// Three edges per face, sorted by their ends and then by face.
 std::vector<SurfaceEdge> sorted_edges(std::span<const std::array<std::uint32_t, 3>> faces) {
   std::vector<SurfaceEdge> edges;
   edges.reserve(3 * faces.size());
@@ -39,7 +39,7 @@ std::vector<SurfaceEdge> sorted_edges(std::span<const std::array<std::uint32_t, 
   return edges;
 }
 
-/// Sets of faces that edges join.
+/// The sets of faces that edges join.
 base::UnionFind parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
   base::UnionFind parts(faces.size());
   const std::vector<SurfaceEdge> edges = sorted_edges(faces);
