@@ -6,8 +6,8 @@
 
 #include "mesh.hpp"
 
-/// Insertion of a vertex into a Delaunay triangulation: the triangles whose circles contain it are
-/// replaced by triangles of the vertex and the sides of the hole (A. Bowyer, D. F. Watson, 1981).
+/// Inserts a vertex into a Delaunay triangulation: replaces the triangles whose circles contain it
+/// by triangles of the vertex and the sides of the hole (A. Bowyer, D. F. Watson, 1981).
 
 namespace terrace::tri::tin {
 
@@ -36,15 +36,15 @@ class Cavity {
     }
   }
 
-  /// Fills the hole with the triangles of `vertex` and its sides. `flat(a, b)`: for a side on the
-  /// hull, whether the vertex lies on it; such a side is split in two. The new triangles have the
+  /// Fills the hole with the triangles of `vertex` and its sides. `flat(a, b)`: true for a side on
+  /// the hull if the vertex is on it; such a side is split in two. The new triangles have the
   /// vertex as corner 0; their `place` and `error` are 0.
   template <class Flat>
   void fill(Triangles& triangles, std::uint32_t vertex, const Flat& flat) {
     bool open = false;
     for (std::size_t i = 0; i < edges_.size() && !open; ++i) {
       if (edges_[i].outer != kNone || !flat(edges_[i].a, edges_[i].b)) continue;
-      open = true;  // the others are a chain that begins after it
+      open = true;  // the other sides are a chain that starts after it
       turned_.assign(edges_.begin() + static_cast<std::ptrdiff_t>(i) + 1, edges_.end());
       turned_.insert(turned_.end(), edges_.begin(),
                      edges_.begin() + static_cast<std::ptrdiff_t>(i));
@@ -67,14 +67,14 @@ class Cavity {
     }
   }
 
-  /// The triangles made by fill(); they reuse all slots of the removed ones.
+  /// The triangles made by fill(), which reuse all slots of the removed ones.
   const std::vector<std::uint32_t>& created() const { return created_; }
 
  private:
   struct Edge {
     std::uint32_t a, b;   ///< along the hole, counter-clockwise
     std::uint32_t outer;  ///< the triangle beyond, or kNone
-    unsigned back;        ///< its side towards the hole
+    unsigned back;        ///< the side of `outer` towards the hole
   };
   std::vector<Edge> edges_, turned_;
   std::vector<std::uint32_t> removed_, created_;

@@ -10,13 +10,13 @@
 
 #include "mesh.hpp"
 
-/// Queues of the triangles whose error is too great. Entries of triangles that have changed since
-/// stay in the queue and are skipped when their turn comes.
+/// Queues of the triangles whose error is too great. If a triangle changes, its entry stays in the
+/// queue and is skipped when its turn comes.
 
 namespace terrace::tri::tin {
 
-/// Approximately the greatest error first: 4 buckets per power of two, last in, first out. The
-/// meshes are as good as with the exact order, and it is several times as fast.
+/// Returns approximately the greatest error first: 4 buckets per power of two, last in, first out.
+/// The meshes are as good as with the exact order, and it is several times as fast.
 class ErrorBuckets {
  public:
   /// Errors below `least` share its bucket.
@@ -30,14 +30,14 @@ class ErrorBuckets {
     top_ = std::max(top_, bucket + 1);
   }
 
-  /// The next triangle; kNone if the queue is empty.
+  /// The next triangle, or kNone if the queue is empty.
   std::uint32_t pop(const Triangles& triangles) {
     return pop(triangles, 1, [](const Triangle&) { return 0; });
   }
 
-  /// The same, but each bucket is sorted by tiles when its turn comes, so that triangles close to
-  /// each other in the plane are also close in time and memory. `tile_of(triangle)` is a number
-  /// below `tiles`.
+  /// The same, but sorts each bucket by tiles when its turn comes, so that triangles close to each
+  /// other in the plane are also close in time and memory. `tile_of(triangle)` is a number below
+  /// `tiles`.
   template <class TileOf>
   std::uint32_t pop(const Triangles& triangles, std::size_t tiles, const TileOf& tile_of) {
     for (; top_ > 0; --top_) {
@@ -92,13 +92,13 @@ class ErrorBuckets {
 
   static constexpr std::size_t kWorthSorting = 256;
   std::size_t base_;
-  std::size_t top_ = 0;                                     ///< buckets from here on are empty
+  std::size_t top_ = 0;                                     ///< buckets from this one on are empty
   std::size_t sorted_from_ = static_cast<std::size_t>(-1);  ///< top_ of the last bucket sorted
   std::vector<std::uint32_t> starts_, tile_, sorted_;
   std::vector<std::vector<std::uint32_t>> buckets_;
 };
 
-/// Exactly the greatest error first; of equal errors the smallest number first.
+/// Returns exactly the greatest error first; of equal errors the smallest number first.
 class ErrorHeap {
  public:
   explicit ErrorHeap(float) {}

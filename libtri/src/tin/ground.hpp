@@ -30,7 +30,7 @@ bool visit_rows(const P& a, const P& b, const P& c, const Visit& visit) {
     std::int64_t first = std::min({a.x, b.x, c.x}), last = std::max({a.x, b.x, c.x});
     for (int i = 0; i < 3; ++i) {
       const P &p = *corner[i], &q = *corner[i + 1];
-      // Left of pq: along_x (x - p.x) + along_y (y - p.y) >= 0.
+      // A sample is left of pq if along_x (x - p.x) + along_y (y - p.y) >= 0.
       const std::int64_t along_x = p.y - q.y, along_y = q.x - p.x;
       const std::int64_t rest = along_y * (y - p.y);
       if (along_x > 0) first = std::max(first, p.x - floor_divide(rest, along_x));
@@ -43,8 +43,8 @@ bool visit_rows(const P& a, const P& b, const P& c, const Visit& visit) {
   return true;
 }
 
-/// The tangent of an angle of at most 30 degrees, to 1e-9. Uses the first terms of the series, as
-/// results must not depend on a library's tangent.
+/// The tangent of an angle of at most 30 degrees, to 1e-9. Uses the first terms of the series,
+/// because results must not depend on a library's tangent.
 inline double tangent_of(double degrees) {
   constexpr double kRadians = 0.017453292519943295;
   const double a = degrees * kRadians;
@@ -57,7 +57,7 @@ inline double tangent_of(double degrees) {
 class Ground {
  public:
   /// column_step, row_step: on the ground. extent: the greatest difference of coordinates. tangent:
-  /// that of the smallest angle that is wide().
+  /// that of the smallest angle for which wide() is true.
   Ground(double column_step, double row_step, std::int64_t extent, double tangent)
       : tangent_(tangent) {
     const double x = std::fabs(column_step), y = std::fabs(row_step);
@@ -71,13 +71,13 @@ class Ground {
     narrow_ = 6 * static_cast<double>(x_ + y_) * size * size * size * size < 0x1p62;
   }
 
-  /// Whether p lies strictly in the circle through the counter-clockwise a, b, c.
+  /// True if p is strictly inside the circle through the counter-clockwise a, b, c.
   template <class P>
   bool in_circle(const P& a, const P& b, const P& c, const P& p) const {
     return narrow_ ? in_circle_with<std::int64_t>(a, b, c, p) : in_circle_with<Int128>(a, b, c, p);
   }
 
-  /// Whether the counter-clockwise a, b, c, of twice the area `twice` on the lattice, have no angle
+  /// True if the counter-clockwise a, b, c, of twice the area `twice` on the lattice, have no angle
   /// below the smallest one.
   template <class P>
   bool wide(const P& a, const P& b, const P& c, std::int64_t twice) const {
@@ -110,9 +110,9 @@ class Ground {
   }
 
   std::int64_t x_, y_;  ///< squares of the steps, up to a common factor
-  double area_;         ///< of a cell, in the same unit
+  double area_;         ///< of a cell, in the unit of the squares
   double tangent_;
-  bool narrow_;  ///< 64 bits suffice
+  bool narrow_;  ///< true if 64 bits suffice
 };
 
 }  // namespace terrace::tri::tin

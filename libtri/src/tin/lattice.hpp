@@ -7,7 +7,7 @@
 
 namespace terrace::tri::tin {
 
-/// The integer nearest to a place, halves up.
+/// The nearest integer to a coordinate, halves up.
 inline double to_whole(double place) { return std::floor(place + 0.5); }
 
 /// The lattice height nearest to `height`.

@@ -23,8 +23,8 @@
 
 namespace terrace::tri::tin {
 
-/// Squares of 32 x 32 samples, so small that the triangles of one fit into the first-level cache;
-/// numbered boustrophedon, so that each is next to the previous one.
+/// Squares of 32 x 32 samples, small enough for the triangles of one to fit into the first-level
+/// cache. Numbered boustrophedon, so that each is next to the previous one.
 class Tiles {
  public:
   Tiles(std::int32_t columns, std::int32_t rows)
@@ -44,7 +44,7 @@ class Tiles {
   std::int32_t across_, down_;
 };
 
-/// Whether a triangle is within the bound at one sample, or does not contain it. Most triangles
+/// True if a triangle is within the bound at one sample, or does not contain it. Most triangles
 /// that cannot replace a vertex fail at that vertex's own sample.
 template <class Vertex, class Sample>
 bool within_at(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& sample,
@@ -67,25 +67,23 @@ bool within_at(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& 
 /// CMU-CS-95-181. The samples in a triangle are found by their rows and columns, so triangles need
 /// no lists of samples, unlike those of point_tin().
 ///
-/// `Samples`, RasterSamples or PlacedSamples, evaluates triangles:
+/// `Samples`, which is RasterSamples or PlacedSamples, evaluates triangles:
 /// - Vertex: integer x, y and a height z, NaN without data. Sample: x, y, z of a sample.
-/// - kBeside: a vertex may differ in position from its sample, so it may fall on another vertex, on
-/// a
-///   side of the rectangle or into another triangle. Otherwise a vertex is at its sample, in the
-///   triangle that was evaluated, unless it is to separate data from missing data.
-/// - kThinDelaunay: removal may leave thin triangles if they are Delaunay.
+/// - kBeside: true if a vertex may differ in position from its sample, so that it may fall on
+///   another vertex, on a side of the rectangle or into another triangle. Otherwise a vertex is at
+///   its sample, in the triangle that was evaluated, unless it separates data from missing data.
+/// - kThinDelaunay: true if removal may leave thin triangles that are Delaunay.
 /// - columns(), rows(), ground().
 /// - least_error(): smaller errors need not be ordered.
 /// - judge(triangle, a, b, c): sets `place` and `error`.
-/// - open(place): whether the sample may become a vertex. take(place): the vertex of that sample.
-///   give_up(place): the sample cannot become a vertex. restore(): undoes all give_up().
+/// - open(place): true if the sample may become a vertex. take(place): returns the vertex of that
+///   sample. give_up(place): the sample cannot become a vertex. restore(): undoes all give_up().
 /// - place_of(vertex), sample_of(vertex).
-/// - within(a, b, c): whether the triangle is within the bound. fits(a, b, c, removed): whether it
+/// - within(a, b, c): true if the triangle is within the bound. fits(a, b, c, removed): true if it
 ///   may help to fill the hole of a removed vertex, given that vertex's sample.
-/// - narrow(v, b, c, rises): narrows the range by which v may rise to what the samples in the
-/// triangle
-///   allow. raise(v, rises): moves v to the middle of it; false if it stays.
-/// - covers(a, b, c): whether the triangle belongs to the result. publish(vertex, tin).
+/// - narrow(v, b, c, rises): narrows the range by which v may rise to the range that the samples in
+///   the triangle allow. raise(v, rises): moves v to the middle of it; false if it stays.
+/// - covers(a, b, c): true if the triangle belongs to the result. publish(vertex, tin).
 template <class Samples>
 class LatticeSurface {
  public:
@@ -139,12 +137,12 @@ class LatticeSurface {
   template <class Queue>
   void refine(std::size_t most) {
     Queue queue(samples_.least_error());
-    const auto look = [&](std::uint32_t t) {
+    const auto judge = [&](std::uint32_t t) {
       Triangle& triangle = triangles_[t];
       samples_.judge(triangle, vertex(triangle, 0), vertex(triangle, 1), vertex(triangle, 2));
       if (triangle.error > 0) queue.push(triangle.error, t);
     };
-    for (std::uint32_t t = 0; t < triangles_.size(); ++t) look(t);
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) judge(t);
     const auto has_data = [](const Vertex& vertex) { return vertex.z == vertex.z; };
     auto with_data =
         static_cast<std::size_t>(std::count_if(vertices_.begin(), vertices_.end(), has_data));
@@ -156,7 +154,7 @@ class LatticeSurface {
       const std::uint32_t place = triangles_[t].place;
       // Several triangles may have waited for this sample.
       if (!samples_.open(place)) {
-        look(t);
+        judge(t);
         continue;
       }
       const Vertex p = samples_.take(place);
@@ -168,14 +166,14 @@ class LatticeSurface {
         insert(static_cast<std::uint32_t>(vertices_.size() - 1), spot.triangle);
         for (const std::uint32_t created : cavity_.created()) {
           reached |= created == t;
-          look(created);
+          judge(created);
         }
       }
-      // Otherwise the triangle still exists, or its sample was a separating one that lies outside
+      // The triangle still exists, or its sample separated data from missing data and was outside
       // it.
       if (Samples::kBeside ? reached : spot.triangle == t) continue;
       samples_.give_up(place);
-      look(t);
+      judge(t);
     }
     samples_.restore();
   }
@@ -205,7 +203,7 @@ class LatticeSurface {
     triangles_.swap(triangles);
   }
 
-  /// Removes inner vertices if the bound still holds without them, in the order of their numbers.
+  /// Removes inner vertices without which the bound still holds, in the order of their numbers.
   void remove() {
     std::vector<std::uint32_t> triangle_of = triangle_of_vertices(triangles_, vertices_.size());
     Star star;
@@ -253,7 +251,7 @@ class LatticeSurface {
       });
       const Vertex before = own;
       if (!inner || !samples_.raise(own, rises)) continue;
-      // Steps of height may be larger than the interval.
+      // The lattice's height step may be larger than the interval.
       if (Samples::kBeside && !around(v, triangle_of[v], [&](const Vertex& b, const Vertex& c) {
             return samples_.within(own, b, c);
           }))
@@ -261,7 +259,7 @@ class LatticeSurface {
     }
   }
 
-  /// The triangles that samples cover, and their vertices in the order of their numbers.
+  /// Adds the triangles that samples cover, and their vertices in the order of their numbers.
   template <class Tin>
   void publish(Tin& tin) const {
     std::vector<std::uint32_t> number(vertices_.size(), kNone);
@@ -316,7 +314,7 @@ class LatticeSurface {
     return {t, zeros == 2, border};
   }
 
-  /// Inserts a vertex that lies in triangle t. The new triangles are cavity_.created().
+  /// Inserts a vertex that is in triangle t. The new triangles are cavity_.created().
   void insert(std::uint32_t number, std::uint32_t t) {
     const Vertex p = vertices_[number];
     cavity_.dig(triangles_, t, [&](const Triangle& triangle) {

@@ -9,15 +9,15 @@
 namespace terrace::tri {
 namespace {
 
-constexpr double kLeastStep = 1.002;  // between bounds that are told apart
+constexpr double kLeastStep = 1.002;  // ratio below which two bounds count as equal
 
-/// A bound that was tried and the vertices there.
+/// A bound that was tried, and its number of vertices.
 struct Tried {
   double bound = 0.0, vertices = 0.0;
   bool known = false;
 };
 
-/// The bounds closest to the one wanted, on either side.
+/// The bounds closest to the wanted one, on either side.
 class Bracket {
  public:
   Bracket(double wanted, const LeastErrorSearch& search)
@@ -34,8 +34,9 @@ class Bracket {
     return few_.known && many_.known && few_.bound <= many_.bound * kLeastStep;
   }
 
-  /// Numbers of vertices fall about as a power of the bound between 1 and 2, so through two known
-  /// places there is a line of logarithms; the middle, if one of them does not move.
+  /// The next bound to try. Numbers of vertices fall about as a power of the bound between 1 and 2,
+  /// so the logarithms are interpolated linearly between two known bounds. If the search has
+  /// repeatedly moved the same one, takes the middle.
   [[nodiscard]] double next() const {
     if (!few_.known) return std::min(range_, std::max(4.0 * many_.bound, 1e-4 * range_));
     if (!many_.known) {
@@ -52,7 +53,7 @@ class Bracket {
     return inside(many_.bound * base::exp(width * part));
   }
 
-  /// The nearest bound strictly between those known.
+  /// The nearest bound strictly between the known ones.
   [[nodiscard]] double inside(double bound) const {
     if (few_.known) bound = std::min(bound, few_.bound / kLeastStep);
     if (many_.known) bound = std::max(bound, many_.bound * kLeastStep);

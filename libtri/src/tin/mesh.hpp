@@ -8,25 +8,25 @@
 #include <limits>
 #include <vector>
 
-/// Triangles linked to their neighbours, without coordinates: shared by all TINs.
+/// Triangles linked to their neighbours, without coordinates. Shared by all TINs.
 
 namespace terrace::tri::tin {
 
 inline constexpr std::uint32_t kNone = 0xFFFFFFFF;
 
-/// Side i is the one opposite to corner i, from corner i + 1 to corner i + 2.
+/// Side i is opposite to corner i, from corner i + 1 to corner i + 2.
 struct Triangle {
-  std::array<std::uint32_t, 3> corner;  ///< counter-clockwise; corner[0] == kNone: no triangle
+  std::array<std::uint32_t, 3> corner;  ///< counter-clockwise; corner[0] == kNone: not a triangle
   std::array<std::uint32_t, 3> next;    ///< the triangle across side i, or kNone
   std::uint32_t place;                  ///< the sample or point with the greatest error
-  float error;                          ///< > 0 while `place` waits to be inserted
+  float error;                          ///< positive while `place` waits to be inserted
 
   bool live() const { return corner[0] != kNone; }
 };
 
 using Triangles = std::vector<Triangle>;
 
-/// An error as stored in Triangle::error: rounded up, above 0, finite.
+/// An error as stored in Triangle::error: rounded up, positive, finite.
 inline float rounded_up(double error) {
   constexpr float kHighest = std::numeric_limits<float>::max();
   if (!(error < double{kHighest})) return kHighest;
@@ -34,7 +34,7 @@ inline float rounded_up(double error) {
   return rounded < error || rounded == 0 ? std::nextafter(rounded, kHighest) : rounded;
 }
 
-/// Triangle::place of a sample in rows and columns, at most 65,535 of each.
+/// Triangle::place for a sample in rows and columns, at most 65,535 of each.
 inline constexpr std::uint32_t place_at(std::int32_t column, std::int32_t row) {
   return static_cast<std::uint32_t>(row) << 16 | static_cast<std::uint32_t>(column);
 }
@@ -48,12 +48,12 @@ inline constexpr std::int32_t row_of(std::uint32_t place) {
 inline constexpr unsigned after(unsigned side) { return side == 2 ? 0 : side + 1; }
 inline constexpr unsigned before(unsigned side) { return side == 0 ? 2 : side - 1; }
 
-/// The side of `triangle` across which `neighbour` lies, which must be one of its neighbours.
+/// The side of `triangle` across which its neighbour `neighbour` is.
 inline unsigned side_to(const Triangle& triangle, std::uint32_t neighbour) {
   return triangle.next[0] == neighbour ? 0 : triangle.next[1] == neighbour ? 1 : 2;
 }
 
-/// The index of the corner `vertex`, which must be one of its corners.
+/// The index of `vertex` among the corners of `triangle`.
 inline unsigned corner_of(const Triangle& triangle, std::uint32_t vertex) {
   return triangle.corner[0] == vertex ? 0 : triangle.corner[1] == vertex ? 1 : 2;
 }

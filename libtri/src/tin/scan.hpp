@@ -30,7 +30,7 @@ struct Scans {
     if constexpr (std::is_same_v<T, double>) return check_doubles;
   }
 };
-const Scans& scans(base::SimdPath set);  ///< Requires a supported set.
+const Scans& scans(base::SimdPath set);  ///< requires a supported set
 
 extern const Scans kScansPortable, kScansAvx2, kScansAvx512;
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// All scans. The includer defines masks of lanes first: not_negative(), at_most(), more(),
-// at_least(), above(), either(), both(), chosen(), kept(), beyond(), equal(), bits_of().
+// Includes all scans. The includer must first define the functions on masks of lanes:
+// not_negative(), at_most(), more(), at_least(), above(), either(), both(), chosen(), kept(),
+// beyond(), equal(), bits_of().
 #include "check/scan_impl.hpp"
 #include "grid/scan_impl.hpp"
 #include "rows/scan_impl.hpp"

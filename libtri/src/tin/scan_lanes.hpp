@@ -5,9 +5,9 @@
 #include <cstdint>
 
 // Vectors of 64 bytes. This file, scan_masks.hpp and the scans (*/scan_impl.hpp) are compiled once
-// for each instruction set. Nothing in them may be shared between objects, or the linker might keep
-// only the version for newer processors: everything is in anonymous namespaces, and no function of
-// another header is called.
+// for each instruction set. They must not share anything between objects, as otherwise the linker
+// might keep only the version for newer processors: everything is in anonymous namespaces, and no
+// function of another header is called.
 
 namespace terrace::tri::tin {
 namespace {
@@ -67,7 +67,7 @@ struct Lanes<float> {
     __builtin_memcpy(&b, second, sizeof b);
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   }
-  /// A quarter from each of four rows.
+  /// Loads a quarter from each of four rows.
   [[gnu::always_inline]] static Reals load_quarters(const float* from, std::size_t stride) {
     Quarter a, b, c, d;
     __builtin_memcpy(&a, from, sizeof a);

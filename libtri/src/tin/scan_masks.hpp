@@ -30,17 +30,17 @@ template <class Ints>
 [[gnu::always_inline]] inline Ints both(Ints a, Ints b) {
   return a & b;
 }
-/// Lanes of a where the mask is set, otherwise of b.
+/// Lanes of a where the mask is set, and of b elsewhere.
 template <class Ints, class Values>
 [[gnu::always_inline]] inline Values chosen(Ints mask, Values a, Values b) {
   return (Values)(((Ints)a & mask) | ((Ints)b & ~mask));
 }
-/// The other lanes become 0.
+/// Keeps the lanes of the mask and sets the others to 0.
 template <class Reals, class Ints>
 [[gnu::always_inline]] inline Reals kept(Reals lanes, Ints mask) {
   return (Reals)((Ints)lanes & mask);
 }
-/// A bit for each lane of the mask that is not at most the limit; this includes NaN.
+/// A bit for each lane of the mask that is not at most the limit, including NaN.
 template <class Reals, class Ints>
 [[gnu::always_inline]] inline unsigned beyond(Reals lanes, Reals limit, Ints mask) {
   return bits_of(~(Ints)(lanes <= limit) & mask);

@@ -10,10 +10,10 @@
 namespace terrace::tri {
 namespace {
 
-/// Which samples of a line must be vertices: the ends, the samples on both sides of where data
-/// begins or ends, and samples with data that have a neighbour without, on the line or beside it.
-/// So all samples inside a longer segment with data are surrounded by data, and triangles on the
-/// segment can have data too.
+/// Marks the samples of a line that must be vertices: the ends, the samples on both sides of where
+/// data begins or ends, and samples with data that have a neighbour without data on the line or
+/// next to it. All samples inside a longer segment with data are therefore surrounded by data, and
+/// triangles on the segment can have data too.
 template <class T>
 std::vector<std::uint8_t> needed_on(std::span<const T> line, std::span<const T> beside,
                                     std::span<const T> other_beside) {
@@ -47,7 +47,8 @@ void simplify(std::span<const T> line, std::size_t a, std::size_t b, double limi
     const auto start = static_cast<double>(line[from]);
     const double rise = static_cast<double>(line[to]) - start;
     const auto length = static_cast<double>(to - from);
-    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // ignores rounding
+    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // smaller errors may be due to
+                                                               // rounding
     std::size_t worst = from;
     for (std::size_t i = from + 1; i < to; ++i) {
       const double error = std::fabs(static_cast<double>(line[i]) - start -
@@ -74,7 +75,7 @@ std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const 
   if (!(max_error >= 0)) throw std::invalid_argument("settle_side: max_error must not be negative");
   for (const T z : line)
     if (std::isfinite(z) && std::fabs(static_cast<double>(z)) > 1e150)
-      throw std::invalid_argument("settle_side: a height beyond 1e150");
+      throw std::invalid_argument("settle_side: a height is beyond 1e150");
   std::vector<std::uint32_t> vertices;
   if (line.empty()) return vertices;
   std::vector<std::uint8_t> kept = needed_on(line, beside, other_beside);

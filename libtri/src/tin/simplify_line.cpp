@@ -18,9 +18,9 @@ void check(std::span<const double> t, std::span<const double> heights, double ma
            const std::optional<TinLattice>& lattice) {
   if (t.size() != heights.size())
     throw std::invalid_argument("simplify_line: arrays of different lengths");
-  if (!(max_error >= 0)) throw std::invalid_argument("simplify_line: max_error is below 0");
+  if (!(max_error >= 0)) throw std::invalid_argument("simplify_line: max_error must be at least 0");
   if (lattice && !valid(*lattice))
-    throw std::invalid_argument("simplify_line: a lattice needs a step above 0");
+    throw std::invalid_argument("simplify_line: the lattice's step must be positive");
   for (std::size_t i = 0; i < t.size(); ++i) {
     if (!std::isfinite(t[i]) || !std::isfinite(heights[i]))
       throw std::invalid_argument("simplify_line: sample " + std::to_string(i) + " is not finite");
@@ -37,7 +37,7 @@ LineVertex vertex_of(double t, double height, std::size_t sample,
   return {to_whole(t), on_lattice(*lattice, height), number};
 }
 
-/// Beyond the ends (rounding may go there) the height is that of the end.
+/// Beyond the ends, which rounding may reach, the height is that of the end.
 double height_at(const LineVertex& a, const LineVertex& b, double t) {
   if (!(t > a.t)) return a.height;
   if (!(t < b.t)) return b.height;
@@ -58,7 +58,7 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
                              double max_error, const std::optional<TinLattice>& lattice) {
   check(t, heights, max_error, lattice);
   SimplifiedLine result;
-  // The first of several samples at one place represents them.
+  // The first of several samples at one position represents them.
   std::vector<std::size_t> samples;
   for (std::size_t i = 0; i < t.size(); ++i)
     if (i == 0 || t[i] != t[i - 1]) samples.push_back(i);
@@ -69,7 +69,8 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
   const LineVertex begin = vertex(0);
   const LineVertex end = vertex(samples.size() - 1);
   result.vertices.push_back(begin);
-  // Greatest error first splits each piece independently, so the order of pieces does not matter.
+  // Taking the greatest error first splits each piece independently, so the order of pieces does
+  // not matter.
   std::vector<Piece> pieces{{begin, end, 0, samples.size()}};
   while (!pieces.empty()) {
     const Piece piece = pieces.back();

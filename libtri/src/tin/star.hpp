@@ -8,14 +8,14 @@
 
 #include "mesh.hpp"
 
-/// The triangles around a vertex, and those that may replace them.
+/// The triangles around a vertex, and the triangles that may replace them.
 
 namespace terrace::tri::tin {
 
 /// Larger stars are left alone, as filling one takes cubic time.
 inline constexpr std::size_t kMaxRing = 16;
 
-/// How a polygon is cut into triangles: the triangle on the chord from i to j (i < j, with the
+/// How a polygon is cut into triangles. The triangle on the chord from i to j (i < j, with the
 /// polygon's part i..j on its other side) has its third corner at apex[i][j]. The chord of the
 /// whole polygon is the last side, from 0 to size - 1.
 struct PolygonFill {
@@ -24,13 +24,13 @@ struct PolygonFill {
 
 /// Among the ways to cut a counter-clockwise polygon of `size` corners into triangles, finds the
 /// one whose worst triangle costs least. `worst(i, m, j, limit)`, for corners i < m < j, is the
-/// cost of a triangle, or any number above `limit` if it costs more than that, is not
-/// counter-clockwise or is not wanted. Returns false if each way costs more than `limit`. Dynamic
-/// programming, at most O(size^3) calls: G. T. Klincsek, "Minimal triangulations of polygonal
-/// domains", 1980.
+/// cost of a triangle. It may be any number above `limit` if the triangle costs more than that, is
+/// not counter-clockwise or is not wanted. Returns false if each way costs more than `limit`.
+/// Dynamic programming, at most O(size^3) calls: G. T. Klincsek, "Minimal triangulations of
+/// polygonal domains", 1980.
 ///
-/// Triangles that are all counter-clockwise do not overlap, as the polygon winds around each point
-/// only once.
+/// Triangles that are all counter-clockwise do not overlap, because the polygon winds around each
+/// point only once.
 template <class Cost, class Worst>
 bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonFill& fill) {
   constexpr Cost kNever = std::numeric_limits<Cost>::infinity();
@@ -57,15 +57,16 @@ bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonF
   return cost[0][size - 1] <= limit;
 }
 
-/// Finds any way to cut such a polygon into triangles for which fits(i, m, j) holds, which must
-/// imply counter-clockwise. Slightly more triangles remain in the end than with fill_least_worst(),
-/// but there are far fewer calls, as only parts beside a fitting triangle are examined.
+/// Finds any way to cut such a polygon into triangles for which fits(i, m, j) holds; only
+/// counter-clockwise triangles may fit. Slightly more triangles remain in the end than with
+/// fill_least_worst(), but there are far fewer calls, as only parts next to a fitting triangle are
+/// examined.
 template <class Fits>
 class AnyFill {
  public:
   AnyFill(const Fits& fits, PolygonFill& fill) : fits_(fits), fill_(fill) {}
 
-  /// For a polygon of `size` corners; false if there is no such way.
+  /// Fills a polygon of `size` corners. Returns false if it is impossible.
   bool find(std::size_t size) {
     found_.fill(0);
     failed_.fill(0);
@@ -97,10 +98,10 @@ class AnyFill {
   Parts found_, failed_;
 };
 
-/// The Delaunay triangles of a polygon that is the star of a vertex of a Delaunay triangulation.
-/// `left(i, m, j)`: whether the corners turn left; `inside(i, m, j, p)`: whether corner p lies
-/// strictly in the circle of those three. In other triangulations it may fail (false) or find
-/// triangles that are not Delaunay. O(size^2).
+/// Finds the Delaunay triangles of a polygon that is the star of a vertex of a Delaunay
+/// triangulation. `left(i, m, j)`: true if the corners turn left. `inside(i, m, j, p)`: true if
+/// corner p is strictly inside the circle of those three. In other triangulations it may fail
+/// (false) or find triangles that are not Delaunay. O(size^2).
 template <class Left, class Inside>
 bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, PolygonFill& fill) {
   std::array<std::array<std::uint8_t, 2>, kMaxRing> stack;
@@ -123,7 +124,7 @@ bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, Pol
 /// A vertex's triangles in counter-clockwise order.
 class Star {
  public:
-  /// Returns false if the vertex lies on the hull or has more than kMaxRing neighbours.
+  /// Returns false if the vertex is on the hull or has more than kMaxRing neighbours.
   bool gather(const Triangles& triangles, std::uint32_t vertex, std::uint32_t first) {
     size_ = 0;
     std::uint32_t t = first;
@@ -152,7 +153,7 @@ class Star {
   }
 
   /// Replaces the vertex's triangles by those of a fill. Two slots are empty afterwards.
-  /// `triangle_of` has a triangle of each vertex and is kept up to date.
+  /// `triangle_of` has a triangle for each vertex and is kept up to date.
   void replace(Triangles& triangles, const PolygonFill& fill,
                std::vector<std::uint32_t>& triangle_of, std::uint32_t vertex) {
     used_ = 0;
@@ -203,8 +204,9 @@ class Star {
   std::size_t size_ = 0;
   std::size_t used_ = 0;
   std::array<std::uint32_t, kMaxRing> ring_;
-  std::array<std::uint32_t, kMaxRing> outer_;  ///< across the side from ring i to ring i + 1
-  std::array<std::uint8_t, kMaxRing> back_;    ///< its side towards the star
+  std::array<std::uint32_t, kMaxRing> outer_;  ///< the triangle across the side from ring i to ring
+                                               ///< i + 1
+  std::array<std::uint8_t, kMaxRing> back_;    ///< the side of that triangle towards the star
   std::array<std::uint32_t, kMaxRing> slot_;
 };
 

@@ -28,7 +28,7 @@ class Checker {
         window_{heights_, flags_.data(), window.columns, window.rows, tolerance},
         scan_(tin::scans(set).check<T>()) {}
 
-  /// Returns twice the area of the points as given.
+  /// Measures a triangle. Returns twice its area, of the points as given.
   double visit(const Point3& a, Point3 b, Point3 c) {
     const double area = turn(a, b, c);
     if (area == 0) return area;
@@ -53,7 +53,7 @@ class Checker {
     }
     const std::size_t count = columns_ * rows_;
     for (std::size_t i = 0; i < count; ++i)
-      // finite, tested in a vectorisable way
+      // tests whether the height is finite, in a vectorisable way
       check_.samples += heights_[i] - heights_[i] == T{0} ? 1 : 0;
     for (const std::uint8_t *at = flags_.data(), *const end = at + count;; ++at) {
       at = std::find(at, end, std::uint8_t{0});

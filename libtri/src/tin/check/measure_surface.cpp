@@ -48,7 +48,7 @@ class Raster {
       });
   }
 
-  /// A triangle that contains the place; nullptr if there is none.
+  /// A triangle that contains the place, or nullptr.
   [[nodiscard]] const Corners* find(double x, double y) const {
     if (!(x >= low_[0] && x <= high_[0] && y >= low_[1] && y <= high_[1])) return nullptr;
     const std::size_t cell = cell_of(y, 1) * side_ + cell_of(x, 0);
@@ -94,7 +94,7 @@ class Raster {
   /// The columns that a triangle covers in a row of cells, slightly too many.
   [[nodiscard]] std::array<std::size_t, 2> columns_in(const Corners& corners,
                                                       std::size_t row) const {
-    // A band slightly wider than the row.
+    // Uses a band slightly wider than the row.
     const double height = (high_[1] - low_[1]) / static_cast<double>(side_);
     const double bottom = low_[1] + (static_cast<double>(row) - 0.01) * height;
     const double top = bottom + 1.02 * height;
@@ -129,7 +129,8 @@ class Raster {
   std::vector<std::uint32_t> entries_;
 };
 
-/// Uses the areas of the three parts, in long double: a different formula from that of the mesher.
+/// Uses the areas of the three parts, in long double. The formula differs from the mesher's on
+/// purpose.
 double height_at(const Point3& a, const Point3& b, const Point3& c, double x, double y) {
   using Long = long double;
   const auto part = [x, y](const Point3& p, const Point3& q) {
@@ -163,8 +164,8 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
   if (triangles.empty()) return result;
   const Raster raster(vertices, triangles);
   double squares = 0;
-  // So that the order of samples does not matter.
-  const auto stands_before = [&](std::size_t a, std::size_t b) {
+  // Makes the result independent of the order of samples.
+  const auto precedes = [&](std::size_t a, std::size_t b) {
     return std::array{x[a], y[a], z[a]} < std::array{x[b], y[b], z[b]};
   };
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -176,7 +177,7 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
     ++result.covered;
     squares += error * error;
     if (error > result.largest ||
-        (error == result.largest && error > 0 && stands_before(i, result.largest_at))) {
+        (error == result.largest && error > 0 && precedes(i, result.largest_at))) {
       result.largest = error;
       result.largest_at = static_cast<std::uint32_t>(i);
     }

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The inner loop of checking TINs of rasters: the samples in a triangle compared with its plane.
+/// The inner loop of checking TINs of rasters: compares the samples in a triangle with its plane.
 
 namespace terrace::tri::tin {
 
@@ -13,13 +13,13 @@ inline constexpr int kCheckLanes = 8;
 template <class T>
 struct CheckWindow {
   const T* heights;
-  /// One per sample plus kCheckLanes more: 1 if the sample is in some triangle.
+  /// One flag per sample plus kCheckLanes more: 1 if the sample is in some triangle.
   std::uint8_t* flags;
   std::int64_t columns, rows;
   double tolerance;
 };
 
-/// One per lane, so that the order of summation is the same for all instruction sets.
+/// One sum per lane, so that the order of summation is the same for all instruction sets.
 struct CheckSums {
   double most[kCheckLanes] = {};
   double squares[kCheckLanes] = {};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rules of scan_lanes.hpp apply here.
+// The rules in scan_lanes.hpp apply here.
 #include "scan.hpp"
 #include "tin/scan_lanes.hpp"
 
@@ -19,7 +19,7 @@ constexpr Reals8 kLane = {0, 1, 2, 3, 4, 5, 6, 7};
 }
 [[gnu::always_inline]] inline Reals8 load(const double* from) { return Lanes<double>::load(from); }
 
-/// Rounds a number of at least 0 up.
+/// Rounds a non-negative number up.
 [[gnu::always_inline]] inline std::int64_t up(double value) {
   const auto down = static_cast<std::int64_t>(value);
   return static_cast<double>(down) < value ? down + 1 : down;
@@ -42,8 +42,9 @@ struct Taker {
     __builtin_memcpy(&covered, sums.covered, sizeof covered);
   }
 
-  /// Adds the samples inside from a block that starts at number `at`. `across`: its columns
-  /// relative to the first corner; `rise_y`: how far the plane rises from that corner to the row.
+  /// Adds the samples marked by `inside` from a block that starts at number `at`. `across`: its
+  /// columns relative to the first corner. `rise_y`: how far the plane rises from that corner to
+  /// the row.
   [[gnu::always_inline]] void take(std::int64_t at, Ints8 inside, Reals8 across, double rise_y) {
     const std::int64_t left = window.columns * window.rows - at;
     Reals8 height;
@@ -99,13 +100,13 @@ bool check_in(const CheckWindow<T>& window, const CheckTriangle& triangle, Check
   Taker<T> taker(window, triangle, slope_x, sums);
   const std::int64_t first = up(left);
   const std::int64_t top = up(highest), bottom = static_cast<std::int64_t>(lowest);
-  // Inside: along_x (x - p.x) + along_y (y - p.y) + margin >= 0.
+  // A sample is inside if along_x (x - p.x) + along_y (y - p.y) + margin >= 0.
   double along_x[3], along_y[3];
   for (int i = 0; i < 3; ++i) {
     along_x[i] = corner[i][1] - corner[i + 1][1];
     along_y[i] = corner[i + 1][0] - corner[i][0];
   }
-  // For narrower boxes divisions would take longer than the blocks outside the triangle.
+  // In narrower boxes divisions would take longer than the blocks outside the triangle.
   if (right - left < 8 * kCheckLanes) {
     for (std::int64_t x = first; static_cast<double>(x) <= right; x += kCheckLanes) {
       const Reals8 columns = static_cast<double>(x) + kLane;

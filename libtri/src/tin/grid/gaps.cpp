@@ -18,14 +18,14 @@ GridGaps::GridGaps(const GridSamples<T>& samples, std::int32_t columns, std::int
   for (std::int32_t y = 0; y < rows; ++y) {
     std::uint16_t before = 0;
     for (std::int32_t x = 0; x < columns; ++x) {
-      bool has = false, lacks = false;
+      bool any_data = false, any_missing = false;
       for (std::int32_t v = std::max(y - 1, 0); v <= std::min(y + 1, rows - 1); ++v)
         for (std::int32_t u = std::max(x - 1, 0); u <= std::min(x + 1, columns - 1); ++u)
-          ((flags_[index(u, v)] & kMissing) != 0 ? lacks : has) = true;
+          ((flags_[index(u, v)] & kMissing) != 0 ? any_missing : any_data) = true;
       std::uint8_t& own = flags_[index(x, y)];
       if ((own & kMissing) != 0) {
-        if (has) own |= kCoastal;
-      } else if (!lacks) {
+        if (any_data) own |= kCoastal;
+      } else if (!any_missing) {
         own |= kInner;
         ++before;
       }
@@ -63,7 +63,7 @@ std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground
     for (std::int32_t x = first; x <= last; ++x) {
       const std::uint8_t flags = flags_[index(x, y)];
       if ((flags & kVertex) != 0) continue;
-      // If all corners have data, it chooses among samples without data, preferably next to data;
+      // If all corners have data, chooses among samples without data, preferably next to data;
       // otherwise among samples with data, preferably on the shore.
       const bool missing = (flags & kMissing) != 0;
       const int rank = whole                   ? (flags & kCoastal) != 0 ? 2
@@ -82,14 +82,14 @@ std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground
     }
     return true;
   });
-  return best != kNone || whole ? best : beside_inner(samples, ground, corners);
+  return best != kNone || whole ? best : next_to_inner(samples, ground, corners);
 }
 
-/// For a triangle whose only samples are its corners and samples on a side of the window: a
+/// For a triangle whose only samples are its corners and samples on a side of the window: returns a
 /// neighbour of an inner one of these, as close as possible to a corner without data.
 template <class T>
-std::uint32_t GridGaps::beside_inner(const GridSamples<T>& samples, const Ground& ground,
-                                     const GridCorner<T>* const (&corners)[3]) const {
+std::uint32_t GridGaps::next_to_inner(const GridSamples<T>& samples, const Ground& ground,
+                                      const GridCorner<T>* const (&corners)[3]) const {
   std::uint32_t best = kNone;
   std::int64_t best_square = 0;
   const auto compare = [&](std::int32_t x, std::int32_t y) {

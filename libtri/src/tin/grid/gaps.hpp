@@ -8,20 +8,20 @@
 #include "tin/ground.hpp"
 #include "tin/mesh.hpp"
 
-/// Where data is missing in a window. The whole window is triangulated, including samples without
+/// Handles missing data in a window. The whole window is triangulated, including samples without
 /// data, until no triangle is mixed; then triangles that have a corner without data are dropped. A
 /// triangle is mixed if
 /// - its corners have data, but not all samples in it do, or
-/// - a corner has no data, but it contains (perhaps as a corner) an *inner* sample: one with data
-///   whose 8 neighbours have data too.
-/// So each inner sample lies only in triangles with data. The boundary may run through the other
-/// samples with data, the *shore*.
+/// - a corner has no data, but the triangle contains (perhaps as a corner) an *inner* sample: one
+///   with data whose 8 neighbours have data too.
+/// Each inner sample is therefore only in triangles with data. The boundary may run through the
+/// other samples with data, the *shore*.
 
 namespace terrace::tri::tin {
 
 class GridGaps {
  public:
-  /// Heights that are NaN are missing.
+  /// A NaN height marks missing data.
   template <class T>
   GridGaps(const GridSamples<T>& samples, std::int32_t columns, std::int32_t rows);
 
@@ -29,12 +29,12 @@ class GridGaps {
   void take(std::uint32_t place) { flags_[index(place)] |= kVertex; }
   bool taken(std::uint32_t place) const { return (flags_[index(place)] & kVertex) != 0; }
 
-  /// For a triangle with at least one corner without data.
+  /// True if the triangle, which has at least one corner without data, is mixed.
   template <class T>
   bool mixed(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<T>& c) const;
 
-  /// The sample to insert in order to resolve a mixed triangle: the one deepest inside it,
-  /// preferably on the shore or next to it. kNone if the samples' range has none.
+  /// The sample whose insertion resolves a mixed triangle: the one deepest inside it, preferably on
+  /// the shore or next to it. kNone if the samples' range has none.
   template <class T>
   std::uint32_t cure(const GridSamples<T>& samples, const Ground& ground, const GridCorner<T>& a,
                      const GridCorner<T>& b, const GridCorner<T>& c) const;
@@ -47,8 +47,8 @@ class GridGaps {
   }
   std::size_t index(std::uint32_t place) const { return index(column_of(place), row_of(place)); }
   template <class T>
-  std::uint32_t beside_inner(const GridSamples<T>& samples, const Ground& ground,
-                             const GridCorner<T>* const (&corners)[3]) const;
+  std::uint32_t next_to_inner(const GridSamples<T>& samples, const Ground& ground,
+                              const GridCorner<T>* const (&corners)[3]) const;
 
   std::int32_t columns_;
   std::vector<std::uint8_t> flags_;

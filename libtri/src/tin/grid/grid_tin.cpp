@@ -37,7 +37,7 @@ void check_side(const std::vector<std::uint32_t>& side, std::uint32_t count, con
                                 std::to_string(count - 1));
 }
 
-/// The range of heights, which determines the type of the computation.
+/// The range of heights, which determines the number type of the computation.
 struct Range {
   double least = std::numeric_limits<double>::infinity();
   double greatest = -least;
@@ -61,7 +61,7 @@ Range range_of(const GridWindow<T>& window) {
   range.least = static_cast<double>(least);
   range.greatest = static_cast<double>(greatest);
   if (range.data > 0 && std::max(-range.least, range.greatest) > kGreatest)
-    throw std::invalid_argument("grid_tin: a height beyond 1e150");
+    throw std::invalid_argument("grid_tin: a height is beyond 1e150");
   return range;
 }
 
@@ -73,7 +73,7 @@ Range check_window(const GridWindow<T>& window) {
   return range_of(window);
 }
 
-/// Whether floats are precise enough for most triangles; for the others errors are recomputed.
+/// True if floats are precise enough for most triangles; errors of the others are recomputed.
 bool floats_suffice(const Range& range, double bound) {
   return range.floats && std::max(-range.least, range.greatest) <= 1e30 && bound >= 1e-30 &&
          bound <= 1e30 && bound >= (range.greatest - range.least) * 0x1p-17;

@@ -8,12 +8,12 @@
 
 namespace terrace::tri::tin {
 
-/// grid_tin() with a given instruction set, for tests.
+/// grid_tin() with a given instruction set. For tests.
 template <class T>
 GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
                       const GridTinOptions& options, base::SimdPath set);
 
-/// check_grid_tin() with a given instruction set, for tests.
+/// check_grid_tin() with a given instruction set. For tests.
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,

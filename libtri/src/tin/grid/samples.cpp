@@ -12,8 +12,8 @@
 namespace terrace::tri::tin {
 namespace {
 
-/// Larger triangles are tested coarsely first. Until triangles are small most samples need not be
-/// visited, and the result tends to have fewer triangles. Measured: 256 and 1024 are worse.
+/// Larger triangles are tested coarsely first. Most samples need not be visited until triangles are
+/// small, and the result tends to have fewer triangles. 256 and 1024 were measured and are worse.
 constexpr std::int64_t kCoarseArea = 400;
 
 constexpr double kTangent = 0.08748866352592401;  // tangent of 5 degrees
@@ -35,13 +35,13 @@ bool have_data(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<
 
 struct CarefulWorst {
   double error = 0;
-  double slack = 0;  ///< bound of its rounding error
+  double slack = 0;  ///< bound of the rounding error of `error`
   std::uint32_t place = 0;
   bool missing = false;  ///< a sample has no data
 };
 
-/// The computation of the scans in double, for triangles whose planes are too steep for floats.
-/// Corners do not count.
+/// Computes in double what the scans compute in floats, for triangles whose planes are too steep
+/// for floats. Corners do not count.
 template <class T>
 CarefulWorst careful_worst(const GridSamples<T>& samples, const GridCorner<T>& a,
                            const GridCorner<T>& b, const GridCorner<T>& c) {
@@ -205,8 +205,8 @@ bool RasterSamples<T>::fits(const Vertex& a, const Vertex& b, const Vertex& c,
   return within_at(a, b, c, removed, bound_) && within(a, b, c);
 }
 
-/// A sample at which the vertex has weight w allows it to rise by (error - bound) / w to (error +
-/// bound) / w.
+/// A sample at which the vertex has weight w allows the vertex to rise by (error - bound) / w to
+/// (error + bound) / w.
 template <class T>
 void RasterSamples<T>::narrow(const Vertex& v, const Vertex& b, const Vertex& c,
                               Interval& rises) const {

@@ -6,7 +6,7 @@
 
 #include "tin/scan_results.hpp"
 
-/// The inner loops of TINs of rasters: the samples in a triangle compared with its plane.
+/// The inner loops of TINs of rasters: compare the samples in a triangle with its plane.
 
 namespace terrace::tri::tin {
 
@@ -19,7 +19,8 @@ struct GridCorner {
 };
 
 /// Samples, row by row, with at least kScanPadRight values after each row and kScanPadBelow rows
-/// after the last one. NaN: no data. Only columns and rows from `first` to `last` are scanned.
+/// after the last one. NaN marks missing data. Only columns and rows from `first` to `last` are
+/// scanned.
 template <class T>
 struct GridSamples {
   const T* heights;
@@ -31,21 +32,23 @@ inline constexpr std::size_t kScanPadRight = 16;
 inline constexpr std::size_t kScanPadBelow = 4;
 inline constexpr int kGridCoarse = 4;
 
-/// Instead of an error: T is not precise enough for this triangle and bound. T = float only.
+/// Returned in place of an error if T is not precise enough for this triangle and bound. T = float
+/// only.
 inline constexpr int kUnsure = -1;
 
 template <class T>
 struct GridScan {
-  /// The sample in the triangle (including sides, excluding corners) with the greatest error that
-  /// may exceed `bound`; on ties the first in the first row. Error 0 if there is none; infinite,
-  /// without a place, if a sample has no data.
+  /// Finds the sample in the triangle (including sides, excluding corners) with the greatest error
+  /// that may exceed `bound`; on ties the first in the first row. The error is 0 if there is none,
+  /// and infinite, without a place, if a sample has no data.
   WorstSample<T> (*worst)(const GridSamples<T>& samples, const GridCorner<T>& a,
                           const GridCorner<T>& b, const GridCorner<T>& c, T bound);
-  /// The same for `samples` that are every kGridCoarse-th column and row of the lattice, numbered
-  /// as such; corners and the result are in columns and rows of the lattice.
+  /// The same for `samples` that are every kGridCoarse-th column and row of the lattice and are
+  /// numbered accordingly. Corners and the result are in columns and rows of the lattice.
   WorstSample<T> (*coarse)(const GridSamples<T>& samples, const GridCorner<T>& a,
                            const GridCorner<T>& b, const GridCorner<T>& c, T bound);
-  /// 1: all errors are certainly at most `bound`; 0: perhaps not, or data is missing; or kUnsure.
+  /// Returns 1 if all errors are certainly at most `bound`, 0 if perhaps not or data is missing, or
+  /// kUnsure.
   int (*within)(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
                 const GridCorner<T>& c, T bound);
 };

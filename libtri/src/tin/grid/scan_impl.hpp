@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rules of scan_lanes.hpp apply here.
+// The rules in scan_lanes.hpp apply here.
 #include "scan.hpp"
 #include "tin/scan_lanes.hpp"
 
@@ -9,7 +9,7 @@ namespace terrace::tri::tin {
 namespace {
 
 /// The triangle's plane relative to its first corner, the box of the samples to scan, and a bound
-/// of the rounding error of errors. The samples are those of every kStep-th column and row; the box
+/// of the rounding error of errors. The samples are those of every kStep-th column and row. The box
 /// is numbered in these, corners in columns and rows.
 template <class T, int kStep>
 struct Plane {
@@ -34,7 +34,7 @@ struct Plane {
     min_y = greatest((top + kStep - 1) / kStep, samples.first_y);
     max_y = least(bottom / kStep, samples.last_y);
     clipped = max_x != right / kStep || max_y != bottom / kStep;
-    // Twice the area is 1, or the box is 2 x 2: only corners.
+    // Twice the area is 1, or the box is 2 x 2, so there are only corners.
     empty = area <= 1 || (right - left <= 1 && bottom - top <= 1) || min_x > max_x || min_y > max_y;
     if (empty) return;
     const double inverse = 1.0 / static_cast<double>(area);
@@ -44,9 +44,9 @@ struct Plane {
     const double slope_y = (cz * static_cast<double>(bx) - bz * static_cast<double>(cx)) * inverse;
     gradient_x = static_cast<T>(slope_x);
     gradient_y = static_cast<T>(slope_y);
-    // Rounding: of the gradients, 2 products and 3 sums. In double the gradients are rounded
-    // several times, in proportion to the terms of their sums, which are bounded by |difference of
-    // heights| * extent / area.
+    // Rounding errors come from the gradients, 2 products and 3 sums. In double the gradients are
+    // rounded several times, in proportion to the terms of their sums, which are bounded by
+    // |difference of heights| * extent / area.
     const double width = right - left, height = bottom - top;
     const double rise = __builtin_fabs(slope_x) * width + __builtin_fabs(slope_y) * height;
     double rounded = Lanes<T>::kRounding * (6.5 * rise + 4.0 * static_cast<double>(bound));
@@ -57,7 +57,7 @@ struct Plane {
   }
 };
 
-/// Edge functions: not negative for samples to the left of a side or on it.
+/// Edge functions, which are not negative for samples to the left of a side or on it.
 template <class T, int kStep>
 struct Sides {
   typename Lanes<T>::Int along_x[3], along_y[3], start[3];
@@ -78,7 +78,7 @@ struct Sides {
   }
 };
 
-/// The exact samples of a row that lie in a triangle: quotients differ from integers by at least
+/// The exact samples of a row that are in a triangle. Quotients differ from integers by at least
 /// half their unit, far more than rounding.
 template <class T, int kStep>
 struct Spans {
@@ -102,7 +102,7 @@ struct Spans {
     start[i] = towards * (kStep * plane.min_y - p.y) + p.x * size + half;
     scale[i] = along_x == 0 ? 0.0 : 1.0 / unit;
   }
-  /// The columns of row plane.min_y + down.
+  /// Computes the columns of row plane.min_y + down.
   [[gnu::always_inline]] void row(double down, std::int32_t& left, std::int32_t& right) const {
     for (int i = 0; i < 3; ++i) {
       if (sign[i] == 0) continue;
@@ -119,7 +119,7 @@ struct Spans {
   }
 };
 
-/// Blocks of kWidth columns, for boxes that are no wider. Calls visit(errors, inside, x, y,
+/// Visits blocks of kWidth columns, for boxes that are no wider. Calls visit(errors, inside, x, y,
 /// columns) with the errors of the block at (x, y) until it returns false.
 template <int kWidth, class T, int kStep, class Visit>
 [[gnu::always_inline]] inline void scan_blocks(const GridSamples<T>& samples,
@@ -216,9 +216,9 @@ template <class T, int kStep, class Visit>
 }
 
 /// Errors are compared as the integers with their bits, so that NaN is greater than all others. No
-/// branch depends on errors before the end, as new maxima cannot be predicted.
+/// branch depends on errors before the end, because new maxima cannot be predicted.
 ///
-/// Corners are never the worst: their errors are at most `slack`, which is at most `limit`.
+/// Corners are never the worst, as their errors are at most `slack`, which is at most `limit`.
 template <class T, int kStep>
 WorstSample<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a,
                         const GridCorner<T>& b, const GridCorner<T>& c, T bound) {
@@ -235,7 +235,7 @@ WorstSample<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a,
     limit = greatest(limit, plane.slack);
   }
   Ints most = (Ints)(limit - Reals{});
-  Ints block = {};  // where it was found
+  Ints block = {};  // the block of each lane's worst sample
   auto grown = more(most, most);
   int width = 1;
   scan_triangle(

@@ -12,7 +12,7 @@
 namespace terrace::tri::tin::points {
 namespace {
 
-/// Sectors of more rays are searched, those of fewer found by a bit for each ray.
+/// Sectors are found by a bit for each ray up to this many rays, otherwise by binary search.
 constexpr std::size_t kMaskBits = 64;
 
 }  // namespace
@@ -34,7 +34,7 @@ void Fan::finish() {
     pairs_[i / 2 * 4 + i % 2] = rays_[i].x - apex_.x;
     pairs_[i / 2 * 4 + i % 2 + 2] = rays_[i].y - apex_.y;
   }
-  // An open fan is half a turn, or less by rounding.
+  // An open fan covers half a turn, or less by rounding.
   half_ = rays;
   if (!open_ && rays > kMaskBits) {
     const double x = pairs_[0], y = pairs_[2];
@@ -52,8 +52,8 @@ void Fan::finish() {
 }
 
 // A sample is in sector i if it is left of (or on) ray i and right of ray i + 1. If rounding leaves
-// none or two, close to the apex, any of them will do: the surfaces are equal there. Beside an open
-// fan it is the sector at that end.
+// none or two, close to the apex, any of them will do, because the surfaces are equal there. A
+// sample just outside an open fan belongs to the sector at that end.
 std::size_t Fan::sector_of(double dx, double dy) const {
   const std::size_t rays = rays_.size();
   const double* pair = pairs_.data();
@@ -72,8 +72,8 @@ std::size_t Fan::sector_of(double dx, double dy) const {
     for (std::size_t k = 0; k < 2; ++k)
       left |= static_cast<std::uint64_t>(pair[k] * dy >= pair[k + 2] * dx) << (i + k);
 #endif
-  // The ray after the last is the first; in an open fan there is none. The padding of the last pair
-  // is left of everything: its bit must not be taken for a ray's.
+  // The first ray follows the last, except in an open fan. The padding of the last pair is left of
+  // everything, and its bit must not be mistaken for a ray's.
   left &= ~std::uint64_t{0} >> (64 - rays);
   const std::uint64_t next = left >> 1 | (open_ ? 0 : (left & 1) << (rays - 1));
   const std::uint64_t found = left & ~next & (~std::uint64_t{0} >> (64 - sectors_.size()));

@@ -11,21 +11,21 @@ namespace terrace::tri::tin::points {
 /// The triangles around a new vertex, as sectors to which samples are assigned.
 class Fan {
  public:
-  /// `open`: the vertex lies on the border, so there is one more ray than sectors.
+  /// `open`: the vertex is on the border, so there is one more ray than sectors.
   void start(const Vertex& apex, bool open);
   void add_ray(const Vertex& end);
-  /// To be called after the last ray.
+  /// Must be called after the last ray.
   void finish();
 
-  /// Assigns the samples of a list, except `apart`.
+  /// Assigns the samples of a list to sectors, except for `apart`.
   void deal(Sample* samples, std::uint32_t head, std::uint32_t apart);
   /// Terminates the sectors' lists.
   void close();
 
   struct Sector {
-    std::uint32_t* end;  ///< where the sector's next sample is linked
+    std::uint32_t* end;  ///< the place of the link to the sector's next sample
     std::uint32_t head;
-    /// sample of greatest error, kNone if there is none; stuck ones do not count
+    /// sample of greatest error that is not stuck, kNone if there is none
     std::uint32_t worst;
     double error;
   };
@@ -38,7 +38,7 @@ class Fan {
 
   Vertex apex_{};
   bool open_ = false;
-  std::vector<Vertex> rays_;  ///< end points of the rays
+  std::vector<Vertex> rays_;  ///< the first ray at least 180 degrees to the left of ray 0
   std::size_t half_ = 0;      ///< the first ray at 180 degrees or more to the left of ray 0
   /// Directions of the rays in pairs, padded with zeros: 2 x, 2 y.
   std::vector<double> pairs_;

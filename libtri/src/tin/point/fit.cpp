@@ -23,7 +23,7 @@ void narrow(Interval& interval, const Vertex& v, const Vertex& a, const Vertex& 
   const double wb = part(v, a);
   const double sum = wv + wa + wb;
   if (!(wv > kLeast * sum)) return;
-  // Heights relative to the vertex's current one.
+  // Heights are relative to the vertex's current one.
   const double others = (wa * (a.z - v.z) + wb * (b.z - v.z)) / sum;
   const double wanted = sample.z - v.z - others;
   interval.low = std::max(interval.low, (wanted - bound) * sum / wv);
@@ -59,7 +59,8 @@ void fit_heights(Mesh& mesh, std::size_t fixed, double bound,
       for (std::uint32_t i = mesh.heads[star.triangle(k)]; i != kNone; i = samples[i].next)
         narrow(interval, vertex, a, b, samples[i], bound);
     }
-    // If no height satisfies all samples there is no compromise: it would break the bound.
+    // If no height satisfies all samples the vertex stays, because a compromise would break the
+    // bound.
     if (!(interval.low < interval.high && interval.high - interval.low < HUGE_VAL)) continue;
     const double before = vertex.z;
     vertex.z += interval.low / 2 + interval.high / 2;

@@ -129,7 +129,7 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
   const Spot spot = spot_for(vertex, triangle);
   if (spot.triangle == kNone) return false;
   const bool open = is_open(spot);
-  // Rounding may have assigned it to another list.
+  // Rounding may have assigned the sample to another list.
   if (!lattice_ && spot.triangle != triangle) move(index, triangle, spot.triangle);
   put(vertex, spot);
   const std::vector<std::uint32_t>& created = cavity_.created();
@@ -142,7 +142,7 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
     if (!reached) rescan(triangle);
     return true;
   }
-  // If its triangle still exists, the sample would be tried again, but its place is taken.
+  // If its triangle still existed, the sample would be tried again, but its place is taken.
   return reached;
 }
 

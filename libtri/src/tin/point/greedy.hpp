@@ -23,17 +23,18 @@ class Greedy {
   Greedy(Mesh& mesh, double max_error, bool fixed_border, const std::optional<TinLattice>& lattice)
       : mesh_(mesh), bound_(max_error), fixed_border_(fixed_border), lattice_(lattice) {}
 
-  /// From now on a new vertex only splits the triangles that contain it: for meshes that are no
+  /// From now on a new vertex only splits the triangles that contain it, for meshes that are no
   /// longer Delaunay.
   void stop_delaunay() { delaunay_ = false; }
-  /// One pass over the samples 0, step, 2 * step, ... in their order: each that is beyond the bound
-  /// when its turn comes becomes a vertex, if it can. Several times as fast as run() per vertex, as
-  /// no lists are kept, and more vertices; removal leaves about as many. Later vertices may take
-  /// the surface away from samples that were passed. The lists are to be made anew.
+  /// Passes once over the samples 0, step, 2 * step, ... in their order. Each sample that is beyond
+  /// the bound when its turn comes becomes a vertex, if it can. This is several times as fast as
+  /// run() per vertex, as no lists are kept, and makes more vertices; removal leaves about as many.
+  /// Later vertices may move the surface away from samples that were passed. The lists must be
+  /// rebuilt afterwards.
   void sweep(std::uint32_t step);
-  /// Begins with these triangles, which have an error, from newly made lists. Samples are handled
-  /// in parts of `together` numbers, which are close to each other: part by part, they and their
-  /// triangles stay in the cache, and the result is as good as if all were handled together.
+  /// Starts with these triangles, which have an error, from newly made lists. Samples are handled
+  /// in parts of `together` numbers, which are close to each other. Each part and its triangles
+  /// stay in the cache, and the result is as good as if all parts were handled together.
   void start(std::span<const std::uint32_t> triangles, std::size_t together);
   /// Inserts samples until none that can become a vertex exceeds the bound, or there are
   /// max_vertices, or more than max_triangles.
@@ -42,9 +43,9 @@ class Greedy {
  private:
   /// Returns false if the sample cannot become a vertex.
   bool insert(std::uint32_t index, std::uint32_t triangle);
-  /// Where a vertex can be put; no triangle if it cannot.
+  /// The spot where a vertex can be inserted; it has no triangle if that is impossible.
   [[nodiscard]] Spot spot_for(const Vertex& vertex, std::uint32_t near) const;
-  /// Whether it lies on the border.
+  /// True if the spot is on the border.
   [[nodiscard]] bool is_open(const Spot& spot) const;
   /// Adds a vertex; the new triangles are the cavity's.
   void put(const Vertex& vertex, const Spot& spot);
@@ -54,7 +55,7 @@ class Greedy {
   void move(std::uint32_t index, std::uint32_t from, std::uint32_t to);
   void rescan(std::uint32_t triangle);
   void enqueue(std::uint32_t triangle, double worst);
-  /// The next triangle; kNone if there is none in any part.
+  /// The next triangle, or kNone if there is none in any part.
   std::uint32_t next_triangle();
 
   Mesh& mesh_;
@@ -63,7 +64,7 @@ class Greedy {
   bool delaunay_ = true;
   std::size_t together_ = 0;
   std::size_t part_ = 0;  ///< the current part
-  /// Triangles with which later parts begin, by part; some of them may have changed since.
+  /// The triangles with which later parts start, by part; some of them may have changed since.
   std::vector<std::vector<std::uint32_t>> later_;
   std::optional<TinLattice> lattice_;
   static constexpr float kLeastError = 1e-30F;

@@ -91,7 +91,7 @@ Measured measure_lists(Mesh& mesh, double bound) {
     for (std::uint32_t i = mesh.heads[t]; i != kNone; i = samples[i].next) {
       const Sample& sample = samples[i];
       const Place2 p{sample.x, sample.y};
-      // Rounding has put it into a list that is not its own: then all are listed anew.
+      // Rounding has put the sample into the wrong list, so all lists are rebuilt.
       if (Kernel::orientation(a, b, p) < 0 || Kernel::orientation(b, c, p) < 0 ||
           Kernel::orientation(c, a, p) < 0)
         return list_samples(mesh, 1, bound);

@@ -13,9 +13,9 @@ namespace terrace::tri::tin::points {
 using Kernel = planar::DoubleKernel;
 using Place2 = std::array<double, 2>;
 
-/// The predicates of Kernel for whole numbers of at most 2^15 in absolute value, or a few more.
+/// The predicates of Kernel for integers of at most about 2^15 in absolute value.
 struct WholeKernel {
-  /// Exact, as products are.
+  /// Exact, because products are exact.
   static int orientation(const Place2& a, const Place2& b, const Place2& c) {
     const double left = (b[0] - a[0]) * (c[1] - a[1]);
     const double right = (b[1] - a[1]) * (c[0] - a[0]);
@@ -42,10 +42,10 @@ struct Vertex {
   std::uint32_t sample;  ///< index in Samples::all; kNone: of the frame
 };
 
-/// Where a walk ended.
+/// The end of a walk.
 struct Spot {
   std::uint32_t triangle = kNone;  ///< contains the place; kNone: outside
-  unsigned zeros = 0;              ///< the number of its edges on whose lines the place lies
+  unsigned zeros = 0;              ///< number of its edges whose lines contain the place
   unsigned edge = 0;               ///< one of these
 };
 
@@ -53,8 +53,8 @@ struct Mesh {
   Pool<Sample>* samples = nullptr;
   Pool<Vertex> vertices;
   Triangles triangles;        ///< `place`: the sample to insert next
-  Pool<std::uint32_t> heads;  ///< heads of the triangles' lists of samples, kNone: empty
-  bool whole = false;         ///< WholeKernel serves for vertices
+  Pool<std::uint32_t> heads;  ///< heads of the triangles' lists of samples, kNone if empty
+  bool whole = false;         ///< true if WholeKernel can handle the vertices
 
   [[nodiscard]] Place2 place(std::uint32_t v) const { return {vertices[v].x, vertices[v].y}; }
   [[nodiscard]] int orientation(const Place2& a, const Place2& b, const Place2& c) const {
@@ -64,8 +64,8 @@ struct Mesh {
                               const Place2& p) const {
     return whole ? WholeKernel::in_circle(a, b, c, p) : Kernel::in_circle(a, b, c, p);
   }
-  /// Walks from a triangle to the one that contains p, exactly. The region is convex, so a border
-  /// edge with p beyond it proves that p is outside.
+  /// Walks from a triangle to the one that contains p, exactly. The region is convex, so p is
+  /// outside if it is beyond a border edge.
   [[nodiscard]] Spot locate(const Place2& p, std::uint32_t start) const {
     std::uint32_t at = start;
     std::uint32_t from = kNone;
@@ -99,7 +99,8 @@ struct Mesh {
   }
 };
 
-/// The plane of a triangle relative to one of its vertices. `sound`: doubles can resolve its slope.
+/// The plane of a triangle relative to one of its vertices. `sound`: true if doubles can resolve
+/// its slope.
 struct Plane {
   double gx;
   double gy;
@@ -119,8 +120,8 @@ inline Plane plane_of(const Vertex& p, const Vertex& a, const Vertex& b) {
   return {(uz * wy - wz * uy) / det, (ux * wz - wx * uz) / det, det > 0x1p-36 * size};
 }
 
-/// The height of a triangle's surface at a place inside it: a convex combination of its vertices'
-/// heights whatever the rounding, so that slivers give no outliers.
+/// The height of a triangle's surface at a place inside it. It is a convex combination of the
+/// vertices' heights whatever the rounding, so slivers do not give outliers.
 inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, double x, double y) {
   const double ax = a.x - x;
   const double ay = a.y - y;
@@ -133,7 +134,7 @@ inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, doubl
   const double wb = positive(cx * ay - cy * ax);
   const double wc = positive(ax * by - ay * bx);
   const double sum = wa + wb + wc;
-  // All zero: the place is a vertex, or the triangle's area is zero in doubles.
+  // If all are zero, the place is a vertex, or the triangle's area is zero in doubles.
   if (!(sum > 0)) {
     const double da = ax * ax + ay * ay;
     const double db = bx * bx + by * by;

@@ -20,12 +20,12 @@ namespace terrace::tri {
 
 void tin::points::check_options(const PointTinOptions& options, std::span<const Point3> frame) {
   if (!(options.max_error >= 0) || !std::isfinite(options.max_error))
-    throw std::invalid_argument("point_tin: max_error is not a number of at least 0");
+    throw std::invalid_argument("point_tin: max_error must be at least 0");
   if (!(options.min_angle_degrees >= 0 && options.min_angle_degrees <= 30))
-    throw std::invalid_argument("point_tin: min_angle_degrees is not within 0 to 30");
+    throw std::invalid_argument("point_tin: min_angle_degrees must be from 0 to 30");
   if (!options.lattice) return;
   if (!tin::valid(*options.lattice))
-    throw std::invalid_argument("point_tin: a lattice needs a step above 0");
+    throw std::invalid_argument("point_tin: the lattice's step must be positive");
   if (frame.empty()) throw std::invalid_argument("point_tin: a lattice needs a frame");
   for (std::size_t i = 0; i < frame.size(); ++i)
     for (std::size_t k = 0; k < 2; ++k)
@@ -42,7 +42,7 @@ using tin::kNone;
 constexpr double kMostWhole = 0x1p15;
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
-/// Makes the mesh for one bound after another.
+/// Makes the mesh, for one bound after another.
 class Maker {
  public:
   Maker(Samples& samples, std::span<const Point3> frame, const PointTinOptions& options)
@@ -67,8 +67,8 @@ class Maker {
     }
     if (mesh_.triangles.empty()) return false;
     const std::size_t fixed = mesh_.vertices.size();
-    // Reserves so much that growing, which briefly takes twice the memory, is rare; unused capacity
-    // costs only address space.
+    // Reserves so much that reallocation, which briefly takes twice the memory, is rare. Unused
+    // capacity costs only address space.
     mesh_.vertices.reserve(fixed + samples_.size());
     mesh_.triangles.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
     mesh_.heads.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
@@ -88,7 +88,7 @@ class Maker {
     };
     remove();
     if (quality == TinQuality::kFitted) {
-      // Vertices that were moved have errors at their own samples.
+      // The moved vertices have errors at their own samples.
       for (Sample& sample : span_of(samples_))
         if (sample.next == kIsVertex) sample.next = kUnlisted;
       list_samples(mesh_, 1, bound);
@@ -102,7 +102,7 @@ class Maker {
   [[nodiscard]] const Measured& measured() const { return measured_; }
   [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
 
-  /// Between the lowest and the highest of the samples and the frame.
+  /// The difference between the lowest and the highest of the samples and the frame.
   [[nodiscard]] double height_range() const {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     const auto take = [&](double z) { low = std::min(low, z), high = std::max(high, z); };
@@ -111,13 +111,13 @@ class Maker {
     return high - low;
   }
 
-  /// Moves the mesh into the result; nothing is left.
+  /// Moves the mesh into the result and leaves it empty.
   void publish(PointTin& result) {
     result.errors = measured_.errors;
     result.stuck = measured_.above - measured_.to_mend;
     result.inserted = inserted_;
     result.removed = removed_;
-    // Memory for the result is allocated after that of the samples is freed.
+    // Frees the memory of the samples before allocating that of the result.
     for (Vertex& vertex : span_of(mesh_.vertices))
       vertex.sample = vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]);
     samples_.release();
@@ -141,13 +141,13 @@ class Maker {
   }
 
  private:
-  /// While triangles are large, a few of their samples choose the vertices as well as all would,
-  /// and need not be redistributed each time. sweeps: what is removed later need not be chosen
-  /// well.
+  /// Inserts vertices. While triangles are large, a few of their samples choose the vertices as
+  /// well as all would, and need not be redistributed each time. sweeps: true if vertices are
+  /// removed later and therefore need not be chosen well.
   void insert(Greedy& greedy, double bound, std::size_t max_vertices, bool sweeps) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 3;
-    // So few that they and their triangles stay in the cache.
+    // Few enough samples for them and their triangles to stay in the cache.
     constexpr std::size_t kTogether = 8192;
     for (const std::uint32_t step : kSteps) {
       const std::size_t listed = samples_.size() / step;
@@ -160,7 +160,7 @@ class Maker {
     }
   }
 
-  /// Measures, and inserts samples that rounding hid from the lists, which are very rare.
+  /// Measures, and inserts the very rare samples that rounding hid from the lists.
   void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
     measured_ = measure_lists(mesh_, bound);
     while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
@@ -179,12 +179,13 @@ class Maker {
   std::size_t removed_ = 0;
 };
 
-/// The least bound that leaves at most max_points. Removal leaves about 0.6 of the vertices that
-/// greedy insertion takes for a bound, and their number is about linear in the bound's inverse.
+/// Makes the mesh with the least bound that leaves at most max_points. Removal leaves about 0.6 of
+/// the vertices that greedy insertion needs for a bound, and their number is about linear in the
+/// bound's inverse.
 bool make_of_points(Maker& maker, const PointTinOptions& options) {
   const std::size_t limit = options.max_points;
   if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
-  // More vertices than this are fixed.
+  // The fixed vertices alone may exceed the limit.
   if (options.quality == TinQuality::kGreedy || maker.vertices() > limit) return true;
   const double left = 0.6 * static_cast<double>(limit) * maker.measured().errors.largest;
   const bool found =
@@ -200,7 +201,7 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
                          maker.make(bound, kUnlimited, options.quality);
                          return static_cast<double>(maker.vertices());
                        }});
-  // Sweeps insert more vertices than greedy insertion does, and removal may leave more.
+  // Sweeps insert more vertices than greedy insertion, and removal may leave more.
   return found || maker.make(options.max_error, limit, TinQuality::kGreedy);
 }
 

@@ -58,7 +58,7 @@ double merged_height(std::span<const Sample> group, PointDuplicates duplicates) 
       height = duplicates == PointDuplicates::kMin ? std::min(height, sample.z)
                                                    : std::max(height, sample.z);
   } else if (duplicates == PointDuplicates::kMean) {
-    // Differences from the first height, so that equal heights are preserved exactly.
+    // Adds differences from the first height, so that equal heights are preserved exactly.
     double sum = 0;
     for (const Sample& sample : group) sum += sample.z - group[0].z;
     height += sum / static_cast<double>(group.size());
@@ -90,7 +90,7 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
   numbers.resize(count);
   const std::span<std::uint32_t> order = span_of(numbers);
   std::iota(order.begin(), order.end(), 0u);
-  // Samples of one place become adjacent, the smaller number first.
+  // Samples at one position become adjacent, the smaller number first.
   sort_along_curve<32>(
       order, [&](std::span<const std::uint32_t> part) { return Cells(x.data(), y.data(), part); },
       1,
@@ -115,7 +115,7 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
     while (end < count && all[end].x == first.x && all[end].y == first.y) ++end;
     if (end - begin > 1 && duplicates == PointDuplicates::kError)
       throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
-                                  " has the same place as sample " + std::to_string(first.id));
+                                  " is at the position of sample " + std::to_string(first.id));
     if (end - begin == 1) {
       all[kept++] = first;
       begin = end;
@@ -128,7 +128,7 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
     samples.duplicates += group.size() - 1;
     samples.duplicate_range = std::max(samples.duplicate_range, highest.z - lowest.z);
     if (duplicates == PointDuplicates::kAll) {
-      // Once one of them is a vertex, the other cannot become one: its place is taken.
+      // Once one of them is a vertex, the other cannot become one, because its position is taken.
       all[kept++] = lowest;
       if (highest.z > lowest.z) all[kept++] = highest;
     } else {

@@ -15,16 +15,17 @@ inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
 inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;
 inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;
 
-/// Below this, products of coordinates do not overflow.
+/// Products of coordinates below this do not overflow.
 inline constexpr double kLargest = 1e100;
 
-/// A sample as a member of its triangle's list. Half a cache line: following the list also loads
-/// the values to measure.
+/// A sample as a member of its triangle's list. It takes half a cache line, so following the list
+/// also loads the values to measure.
 struct Sample {
   double x;
   double y;
   double z;
-  std::uint32_t next;  ///< the next in the list, kNone at its end; or why it is in no list
+  std::uint32_t next;  ///< the next in the list, kNone at its end; or the reason why it is not in a
+                       ///< list
   /// The caller's number, with kStuck set if it cannot become a vertex.
   std::uint32_t id;
 };
@@ -33,11 +34,11 @@ inline bool stuck(const Sample& sample) { return (sample.id & kStuck) != 0; }
 inline std::uint32_t number(const Sample& sample) { return sample.id & ~kStuck; }
 
 struct Samples {
-  /// Along a curve: consecutive samples are close to each other. Every place occurs once, or, with
-  /// kAll, twice if heights differ.
+  /// In the order of a curve, so that consecutive samples are close to each other. Every position
+  /// occurs once, or with kAll twice if heights differ.
   Pool<Sample> all;
   std::size_t duplicates = 0;
-  double duplicate_range = 0;  ///< the largest difference of heights at one place
+  double duplicate_range = 0;  ///< the largest difference between heights at one position
 };
 
 /// Checks, sorts and merges; throws as point_tin() does.

@@ -56,11 +56,12 @@ double StarSamples::cross_at(std::size_t i, std::size_t j, std::size_t sample) c
 bool StarSamples::out_of_reach(std::size_t sample, double bound) const {
   if (sample == index_.size()) return false;
   const std::size_t size = ring_.size();
-  // No triangle goes beyond its corners.
+  // A triangle does not extend above or below its corners.
   const auto [low, high] = std::minmax_element(
       ring_.begin(), ring_.end(), [](const Vertex& a, const Vertex& b) { return a.z < b.z; });
   if (z_[sample] - high->z > bound || low->z - z_[sample] > bound) return true;
-  // Bit j of left[i] and bit i of left_from[j]: left of the line from corner i to j, or on it.
+  // Bit j of left[i] and bit i of left_from[j] are set if the sample is left of the line from
+  // corner i to j, or on it.
   std::array<std::uint32_t, kMaxRing> left{}, left_from{}, right{};
   for (std::size_t i = 0; i < size; ++i) {
     for (std::size_t j = i + 1; j < size; ++j) {
@@ -70,7 +71,7 @@ bool StarSamples::out_of_reach(std::size_t sample, double bound) const {
       right[i] |= std::uint32_t{cross <= 0} << j;
     }
   }
-  // Inside the ring by these signs it is, by the same signs, in a triangle of each fill.
+  // If these signs place the sample inside the ring, they also place it in a triangle of each fill.
   for (std::size_t i = 0; i + 1 < size; ++i)
     if ((left[i] >> (i + 1) & 1U) == 0) return false;
   if ((right[0] >> (size - 1) & 1U) == 0) return false;
@@ -196,7 +197,7 @@ void StarSamples::list(Mesh& mesh, const Star& star, const PolygonFill& fill) {
       list_rest(mesh, star, fill, w * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
-// Samples that rounding puts into no triangle go to the triangle they are least outside of.
+// Samples that rounding places in no triangle go to the triangle that they are least outside of.
 void StarSamples::list_rest(Mesh& mesh, const Star& star, const PolygonFill& fill,
                             std::size_t sample) const {
   double best = -kNever;

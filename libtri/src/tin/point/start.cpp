@@ -70,7 +70,8 @@ void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
       if (!(std::abs(c) < kLargest)) refuse_frame(i, "is not finite or too large");
     mesh.vertices.push_back({frame[i][0], frame[i][1], frame[i][2], kNone});
   }
-  // Convex everywhere and once around: the lexicographic order rises once and falls once.
+  // The frame is convex everywhere and goes around once if the lexicographic order rises once and
+  // falls once.
   const auto count = static_cast<std::uint32_t>(frame.size());
   std::size_t turns = 0;
   bool bends = false;
@@ -100,7 +101,7 @@ void start_with_hull(Mesh& mesh) {
   const auto less = [&](std::uint32_t a, std::uint32_t b) {
     return lexicographically_less(place(a), place(b));
   };
-  // The extremes in 16 directions make a polygon; points strictly inside are not corners.
+  // The extremes in 16 directions form a polygon; points strictly inside it are not corners.
   constexpr std::array<Place2, 8> kDirections{
       {{8, 0}, {7, 3}, {6, 6}, {3, 7}, {0, 8}, {-3, 7}, {-6, 6}, {-7, 3}}};
   std::array<double, 16> best;
@@ -124,7 +125,8 @@ void start_with_hull(Mesh& mesh) {
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
   const std::vector<std::uint32_t> inner = hull_of(candidates, place);
   candidates.clear();
-  // Most are recognised at once: between four of the extremes, one in each quadrant around them.
+  // Most points are recognised at once as between four of the extremes, one in each quadrant around
+  // them.
   const Sample& ne = samples[extreme[2]];
   const Sample& nw = samples[extreme[6]];
   const Sample& sw = samples[extreme[10]];

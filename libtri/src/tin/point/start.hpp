@@ -7,11 +7,11 @@
 
 namespace terrace::tri::tin::points {
 
-/// The first mesh: only the frame's vertices. Throws as point_tin() does if it is not a convex
-/// polygon.
+/// Makes the first mesh of the frame's vertices alone. Throws as point_tin() does if the frame is
+/// not a convex polygon.
 void start_with_frame(Mesh& mesh, std::span<const Point3> frame);
 
-/// The first mesh: the corners of the samples' hull. Empty if all samples are on one line.
+/// Makes the first mesh of the corners of the samples' hull. Empty if all samples are collinear.
 void start_with_hull(Mesh& mesh);
 
 }  // namespace terrace::tri::tin::points

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-/// How far columns and rows may deviate from equal spacing, in spacings.
+/// Maximum deviation of columns and rows from equal spacing, in spacings.
 constexpr double kRegular = 1e-3;
-/// Samples farther from a lattice would make scans slow.
+/// Maximum distance of samples from a lattice, in spacings; larger ones would make scans slow.
 constexpr double kFarthestOff = 4.0;
 
 struct Region {
@@ -37,7 +37,7 @@ struct Region {
   }
 };
 
-/// Whether places ascend at approximately equal spacing.
+/// True if the places ascend at approximately equal spacing.
 bool regular(std::span<const double> places) {
   if (places.empty() || places.size() > kMostRows || !std::isfinite(places.front())) return false;
   if (places.size() == 1) return true;
@@ -64,7 +64,7 @@ double per_unit(std::span<const double> places) {
   return extent > 0.0 ? static_cast<double>(places.size() - 1) / extent : 0.0;
 }
 
-/// Copies rows of `columns` numbers to longer ones.
+/// Copies rows of `columns` numbers into longer rows.
 std::vector<double> padded_rows(std::span<const double> from, std::size_t columns,
                                 std::size_t stride) {
   const std::size_t rows = from.size() / columns;
@@ -144,8 +144,8 @@ bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layou
   return true;
 }
 
-/// How far samples deviate from the lattice, in columns or rows; infinite if one has a height but
-/// no place.
+/// The greatest deviation of samples from the lattice, in columns or rows; infinite if one has a
+/// height but no place.
 double off_lattice(const SampleGrid& samples, const RowSamples& layout) {
   double off = 0.0;
   for (std::size_t i = 0; i < samples.z.size(); ++i) {
@@ -242,7 +242,7 @@ std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
   layout.columns = static_cast<std::int32_t>(columns);
   layout.rows = static_cast<std::int32_t>(rows);
   if (!find_lattice(samples, rows, layout)) return std::nullopt;
-  // Slightly more, for rounding.
+  // Adds a margin for rounding.
   layout.off = off_lattice(samples, layout) + 1e-6;
   if (!(layout.off <= kFarthestOff)) return std::nullopt;
   copy_heights(

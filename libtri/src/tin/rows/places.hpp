@@ -12,13 +12,13 @@
 
 namespace terrace::tri::tin::rows {
 
-/// Coordinates of frames are below this, so that predicates are exact in 128 bits.
+/// Upper limit of coordinates of frames, below which predicates are exact in 128 bits.
 inline constexpr double kFarthest = 0x1p20;
-/// The most columns or rows that fit into Triangle::place.
+/// The largest number of columns or rows that fits into Triangle::place.
 inline constexpr std::size_t kMostRows = 65535;
 
-/// Whether the frame is an axis-parallel rectangle with integer coordinates from 0 to kFarthest,
-/// its vertices counter-clockwise along the sides, including the corners.
+/// True if the frame is an axis-parallel rectangle with integer coordinates from 0 to kFarthest and
+/// lists its vertices counter-clockwise along the sides, including the corners.
 bool is_rectangle(std::span<const Point3> frame);
 
 /// Samples with the padding that scans require. Samples outside the frame are omitted.
@@ -30,8 +30,8 @@ struct PaddedSamples {
   [[nodiscard]] RowSamples view() const;
 };
 
-/// nullopt if the places are not regular enough for scans. frame: see is_rectangle(). Throws as
-/// point_tin() does for heights.
+/// Returns nullopt if the places are not regular enough for scans. frame: see is_rectangle().
+/// Throws as point_tin() does for heights.
 std::optional<PaddedSamples> padded_samples(const SampleRows& samples,
                                             std::span<const Point3> frame);
 std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,

@@ -17,7 +17,7 @@
 namespace terrace::tri {
 namespace {
 
-/// Whether a LatticeSurface can serve these options.
+/// True if a LatticeSurface supports these options.
 bool has_surface(std::span<const Point3> frame, const PointTinOptions& options) {
   return options.lattice && options.max_points == 0 && tin::rows::is_rectangle(frame);
 }
@@ -31,13 +31,13 @@ std::array<double, 2> place_of(const SampleGrid& samples, std::size_t i) {
 
 void check_sizes(const SampleRows& samples) {
   if (samples.x.size() * samples.y.size() != samples.z.size())
-    throw std::invalid_argument("point_tin: not a height for each row and column");
+    throw std::invalid_argument("point_tin: z needs a height for each row and column");
 }
 void check_sizes(const SampleGrid& samples) {
   if (samples.x.size() != samples.z.size() || samples.y.size() != samples.z.size())
     throw std::invalid_argument("point_tin: arrays of different lengths");
   if (samples.columns == 0 ? !samples.z.empty() : samples.z.size() % samples.columns != 0)
-    throw std::invalid_argument("point_tin: not a height for each row and column");
+    throw std::invalid_argument("point_tin: z needs a height for each row and column");
 }
 
 template <class Samples>

@@ -73,7 +73,8 @@ void PlacedSamples::narrow(const Vertex& v, const Vertex& b, const Vertex& c,
 }
 
 bool PlacedSamples::raise(Vertex& v, const Interval& rises) const {
-  // If no height satisfies all samples there is no compromise: it would break the bound.
+  // If no height satisfies all samples the vertex stays, because a compromise would break the
+  // bound.
   if (!(rises.low < rises.high && std::isfinite(rises.high - rises.low))) return false;
   v.z = on_lattice(lattice_, v.z + (rises.low / 2 + rises.high / 2));
   return true;

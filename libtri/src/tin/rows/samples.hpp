@@ -24,7 +24,7 @@ class PlacedSamples {
   struct Vertex {
     std::int32_t x, y;
     double z;
-    std::uint32_t sample;  ///< its place_at(); kNone: of the frame
+    std::uint32_t sample;  ///< place_at() of the sample; kNone for a vertex of the frame
   };
   using Sample = RowCorner;
   static constexpr bool kBeside = true;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rules of scan_lanes.hpp apply here.
+// The rules in scan_lanes.hpp apply here.
 #include "scan.hpp"
 #include "tin/scan_lanes.hpp"
 
@@ -23,7 +23,7 @@ constexpr double kFlat = 1e-6;
   while (places[at - 1] >= from) --at;
   return at;
 }
-/// The first that is above `to`.
+/// The first of `count` ascending places that is above `to`.
 [[gnu::always_inline]] inline std::int32_t first_above(const double* places, std::int32_t count,
                                                        double per_unit, double to) {
   const double guess =
@@ -55,7 +55,7 @@ struct Box {
   return samples.row_0 + (samples.row_x * p.x + samples.row_y * p.y);
 }
 
-/// Rounded up and down to integers from -1 to `count`.
+/// Rounds up and down to integers from -1 to `count`.
 [[gnu::always_inline]] inline std::int32_t whole_from(double low, std::int32_t count) {
   const double kept = least(greatest(low, 0.0), static_cast<double>(count));
   const auto down = static_cast<std::int32_t>(kept);
@@ -104,8 +104,8 @@ struct Face {
     gradient_x = (bz * cy - cz * by) * inverse;
     gradient_y = (cz * bx - bz * cx) * inverse;
     const double width = max_x - min_x, height = max_y - min_y;
-    // Rounding: of the gradients several times, in proportion to the terms of their sums; of 2
-    // products, of differences of places and heights, and of 2 sums.
+    // Rounding errors come from the gradients (several times, in proportion to the terms of their
+    // sums), from 2 products, from differences of places and heights, and from 2 sums.
     const double rise = __builtin_fabs(gradient_x) * width + __builtin_fabs(gradient_y) * height;
     const double heights = __builtin_fabs(a.z) + __builtin_fabs(bz) + __builtin_fabs(cz);
     slack = 0x1p-51 * (rise + heights) +
@@ -123,7 +123,7 @@ struct Face {
   }
 };
 
-/// The columns of a row that may lie in a triangle, slightly too many.
+/// The columns of a row that may be in a triangle, slightly too many.
 struct Spans {
   double base[3], slope[3];  ///< the sides' columns at row 0, and columns per row along them
   bool left[3], right[3];    ///< which side of the triangle they are
@@ -135,8 +135,8 @@ struct Spans {
     for (int i = 0; i < 3; ++i) {
       const int next = i == 2 ? 0 : i + 1;
       const double down = q[next] - q[i];
-      // A side towards higher rows is on the right unless the lattice is mirrored. For a side along
-      // a row, rounding might decide.
+      // A side towards higher rows is on the right unless the lattice is mirrored. Rounding might
+      // decide for a side along a row, so such a side is ignored.
       const bool flat = __builtin_fabs(down) < kFlat;
       left[i] = !flat && (down < 0.0) != samples.mirrored;
       right[i] = !flat && (down > 0.0) != samples.mirrored;
@@ -162,7 +162,7 @@ struct Spans {
   }
 };
 
-/// The mask of samples that lie in the triangle or so close to it that rounding decides.
+/// The mask of samples that are in the triangle, or so close to it that rounding decides.
 template <bool kUpright, class Edge>
 [[gnu::always_inline]] inline auto inside(const Face<kUpright>& face, const Edge& edge) {
   const Reals8 margin = face.margin - Reals8{};
@@ -170,9 +170,9 @@ template <bool kUpright, class Edge>
               both(at_least(edge(1), margin), at_least(edge(2), margin)));
 }
 
-/// Blocks of two rows of four samples, for boxes that are no wider. Calls visit(heights above the
-/// plane, edge, column, row, log2 of the columns) until it returns false; edge(i) is the edge
-/// function of side i.
+/// Visits blocks of two rows of four samples, for boxes that are no wider. Calls visit(heights
+/// above the plane, edge, column, row, log2 of the columns) until it returns false; edge(i) is the
+/// edge function of side i.
 template <bool kUpright, class Visit>
 [[gnu::always_inline]] inline void scan_blocks(const RowSamples& samples,
                                                const Face<kUpright>& face, const RowCorner& a,
@@ -206,7 +206,7 @@ template <bool kUpright, class Visit>
   }
 }
 
-/// Row by row. In wide triangles each row has its own range of columns.
+/// Visits the samples row by row. In wide triangles each row has its own range of columns.
 template <bool kUpright, class Visit>
 [[gnu::always_inline]] inline void scan_rows(const RowSamples& samples, const Face<kUpright>& face,
                                              const RowCorner& a, const RowCorner& b,
