@@ -13,7 +13,7 @@
 
 namespace terrace::tri::test {
 
-/// Points of a bumpy ball; integers as doubles.
+/// Points of a bumpy ball, integers stored as doubles.
 inline std::vector<Point3> bumpy_ball(std::size_t count, std::mt19937_64& random) {
   std::vector<Point3> points(count);
   for (Point3& p : points) {

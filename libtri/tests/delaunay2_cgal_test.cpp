@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's Delaunay_triangulation_2 as an oracle, including ties: it perturbs in the same order. So
-// sets of triangles must be equal, whatever the input.
+// Uses CGAL's Delaunay_triangulation_2 as an oracle, including ties: it perturbs in the same order,
+// so the sets of triangles must be equal for any input.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -86,7 +86,7 @@ TYPED_TEST(Delaunay2CgalTest, SameTriangles) {
   }
 }
 
-/// Signs of the kernel for doubles against exact rational arithmetic.
+/// Compares signs of the kernel for doubles with exact rational arithmetic.
 using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
 Exact::Point_2 exact(const std::array<double, 2>& p) { return {p[0], p[1]}; }
 
@@ -107,7 +107,7 @@ TEST(DoubleKernel, SignsAreExact) {
   std::mt19937_64 random(5);
   for (int round = 0; round < 20'000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: from easy to
+    // Points on a small raster, moved far out, scaled, and perturbed in the last bits: from easy to
     // undecidable in doubles.
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 500) - 250);
     const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 50));
@@ -123,11 +123,12 @@ TEST(DoubleKernel, SignsAreExact) {
   }
 }
 
-TEST(DoubleKernel, SignsOfWholeNumbersAreExactFarFromZeroAndBelowIt) {
+TEST(DoubleKernel, SignsOfLargeAndNegativeIntegersAreExact) {
   std::mt19937_64 random(6);
   for (int round = 0; round < 20'000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // Few differences, so that many are collinear or cocircular, up to where they are exact.
+    // Few different coordinates, so that many points are collinear or cocircular, up to the sizes
+    // at which they are exact.
     const double step = std::ldexp(1.0, static_cast<int>(random() % 32));
     const double middle =
         std::floor(std::ldexp(to_unit(random()) - 0.5, static_cast<int>(random() % 55)));
@@ -154,7 +155,7 @@ std::string contents(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// All numbers of a text in pairs, whatever the separators.
+/// Reads all numbers of a text in pairs, with any separators.
 std::vector<std::array<double, 2>> number_pairs(const std::string& text, std::size_t limit) {
   std::vector<std::array<double, 2>> points;
   std::vector<double> numbers;
@@ -186,7 +187,7 @@ TEST(Delaunay2RealFiles, SameTrianglesAsCgal) {
       std::string text = contents(entry.path());
       std::size_t limit = 100'000;
       if (std::string(folder) == "cdt") {
-        // Numbers of points and edges in the first line, then the points.
+        // The first line has the numbers of points and edges; the points follow.
         limit = static_cast<std::size_t>(std::strtoul(text.c_str(), nullptr, 10));
         text.erase(0, text.find('\n'));
       }
@@ -199,7 +200,7 @@ TEST(Delaunay2RealFiles, SameTrianglesAsCgal) {
   EXPECT_GT(files, 0u);
 }
 
-TEST(DoubleKernel, SignsOfThePublishedCases) {
+TEST(DoubleKernel, MatchesThePublishedSigns) {
   // A. Nanevski, G. Blelloch, R. Harper, "Automatic generation of staged geometric predicates",
   // doi:10.1145/507635.507662: lines of number, coordinates, sign.
   if (data_folder().empty()) GTEST_SKIP() << "TERRACE_DATA is not set";

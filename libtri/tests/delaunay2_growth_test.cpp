@@ -11,11 +11,12 @@
 namespace terrace::tri {
 namespace {
 
-// Large arrays are mapped memory that the system moves when it grows: here several times, beyond
-// the sizes at which that begins.
-TEST(Delaunay2Growth, InsertionFromNothingGoesOn) {
+// Large arrays are mapped memory that the system moves when they grow. The tests grow them several
+// times beyond the size at which this begins.
+TEST(Delaunay2Growth, InsertsWhileArraysGrow) {
   using Point = Delaunay2<std::int32_t>::Point;
-  // First one point per tile of 20 x 20, then tile by tile: short walks, small cavities.
+  // Inserts one point per tile of 20 x 20 first, then tile by tile, so that walks are short and
+  // cavities small.
   std::vector<Point> points;
   for (std::int32_t y = 0; y < 400; y += 20)
     for (std::int32_t x = 0; x < 400; x += 20) points.push_back({x, y});
@@ -31,9 +32,9 @@ TEST(Delaunay2Growth, InsertionFromNothingGoesOn) {
   EXPECT_EQ(grown.hash(), built.hash());
 }
 
-// Sets so large that their scratch memory is released; one hole; holes that are too long to be
-// filled, which are given up after everything has been flooded; and a small set after these.
-TEST(Delaunay2Growth, LargeSetsLeaveTheRest) {
+// Removes sets so large that their scratch memory is released, one hole, holes that are too long to
+// be filled and are given up after everything has been flooded, and a small set after these.
+TEST(Delaunay2Growth, RemovingLargeSetsKeepsTheRest) {
   constexpr std::int32_t kSide = 300;
   Delaunay2<std::int32_t> triangulation;
   const VertexId first = triangulation.build_grid(0, 0, 1, kSide, kSide);

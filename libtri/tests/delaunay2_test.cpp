@@ -100,7 +100,7 @@ TYPED_TEST(Delaunay2Test, RemovalOfSetsEqualsRebuild) {
       triangulation.build(points);
       std::vector<VertexId> vertices;
       for (const VertexId v : triangulation.all_vertices()) vertices.push_back(v);
-      // Compact sets: nearest to a vertex, sometimes with vertices left out (islands).
+      // Compact sets: the vertices nearest to a vertex, some of them sometimes left out (islands).
       const auto centre = triangulation.point(vertices[random() % vertices.size()]);
       const auto distance = [&](VertexId v) {
         const auto p = triangulation.point(v);
@@ -166,7 +166,7 @@ TYPED_TEST(Delaunay2Test, RandomOperationsEqualRebuild) {
   }
 }
 
-TYPED_TEST(Delaunay2Test, JournalTellsTheNetDifference) {
+TYPED_TEST(Delaunay2Test, JournalReportsNetChanges) {
   using Triple = std::array<VertexId, 3>;
   for (const PointSet kind : kPointSets) {
     SCOPED_TRACE(name(kind));
@@ -223,7 +223,7 @@ TYPED_TEST(Delaunay2Test, JournalTellsTheNetDifference) {
   }
 }
 
-TYPED_TEST(Delaunay2Test, RestartedIsAsNew) {
+TYPED_TEST(Delaunay2Test, RestartedBehavesLikeNew) {
   Delaunay2<TypeParam> triangulation;
   std::uint64_t seed = 20;
   for (const PointSet kind : kPointSets) {
@@ -234,7 +234,7 @@ TYPED_TEST(Delaunay2Test, RestartedIsAsNew) {
     fresh.build(points);
     ASSERT_EQ(find_fault(triangulation), "");
     ASSERT_EQ(triangulation.hash(), fresh.hash());
-    // In the midst of changes.
+    // In the middle of other changes.
     triangulation.start_journal();
     std::vector<VertexId> some;
     for (const VertexId v : triangulation.all_vertices()) {
@@ -336,7 +336,7 @@ TYPED_TEST(Delaunay2Test, GridEqualsBuild) {
     built.build(points);
     EXPECT_EQ(grid.hash(), built.hash());
     EXPECT_EQ(grid.triangle_count(), built.triangle_count());
-    // From here on it is an ordinary triangulation.
+    // From here on it behaves like any triangulation.
     if (columns * rows < 2) continue;
     grid.remove(first);
     grid.insert({static_cast<TypeParam>(4), static_cast<TypeParam>(12)});
@@ -345,7 +345,7 @@ TYPED_TEST(Delaunay2Test, GridEqualsBuild) {
   }
 }
 
-TYPED_TEST(Delaunay2Test, NeighboursOfAVertexAreInOrder) {
+TYPED_TEST(Delaunay2Test, NeighboursAreCounterClockwise) {
   const auto points = make_points<TypeParam>(PointSet::kSevenBits, 200, 2);
   Delaunay2<TypeParam> triangulation;
   triangulation.build(points);
@@ -354,7 +354,7 @@ TYPED_TEST(Delaunay2Test, NeighboursOfAVertexAreInOrder) {
   for (const VertexId v : triangulation.all_vertices()) {
     triangulation.adjacent(v, around);
     ASSERT_GE(around.size(), 2u);
-    // Every two consecutive ones are corners of a triangle with v.
+    // Every two consecutive neighbours are corners of a triangle with v.
     std::size_t triangles = 0;
     for (std::size_t i = 0; i < around.size(); ++i) {
       for (const TriangleId t : triangulation.all_triangles()) {
@@ -369,13 +369,13 @@ TYPED_TEST(Delaunay2Test, NeighboursOfAVertexAreInOrder) {
     ends += around.size() - triangles;
     ASSERT_EQ(triangulation.vertices(triangulation.triangle_at(v)).size(), 3u);
   }
-  // One gap per hull vertex: consistent with the number of triangles.
+  // There is one gap per hull vertex, which agrees with the number of triangles.
   EXPECT_EQ(triangulation.triangle_count() + 2 + ends, 2 * triangulation.vertex_count());
 }
 
-// Clusters of rasters: what is complete around is written at once, and must be what one by one
-// gives.
-TEST(Delaunay2, SetsOnTheLatticeAreInsertedAsOneByOne) {
+// Clusters of rasters: squares with complete surroundings are written directly and must equal
+// insertion one by one.
+TEST(Delaunay2, LatticeSetsEqualInsertionOneByOne) {
   using Point = std::array<std::int32_t, 2>;
   for (std::uint32_t seed = 0; seed < 300; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -397,12 +397,12 @@ TEST(Delaunay2, SetsOnTheLatticeAreInsertedAsOneByOne) {
     }
     std::vector<Point> points(blob.begin(), blob.end());
     std::shuffle(points.begin(), points.end(), random);
-    // Around it a coarse triangulation, some of whose vertices are in the blob too.
+    // A coarse triangulation surrounds it; some of its vertices are in the blob too.
     std::vector<Point> base{{at[0] > 100 ? at[0] - 100 : 0, at[1] > 90 ? at[1] - 90 : 0},
                             {at[0] + 200, at[1] > 50 ? at[1] - 50 : 0},
                             {at[0] + 90, at[1] + 170}};
     for (int i = 0; i < 40; ++i) base.push_back({at[0] + below(60), at[1] + below(60)});
-    // The head is a vertex that the set lacks.
+    // The head is a vertex that is not in the set.
     const Point head = points.back();
     points.pop_back();
     if (seed % 2 == 0) base.push_back(head);
@@ -435,7 +435,7 @@ TEST(Delaunay2, SetsOnTheLatticeAreInsertedAsOneByOne) {
       ASSERT_EQ(triangles.at(t), together.vertices(t));
     }
     ASSERT_EQ(count, triangles.size());
-    // And it goes as it came.
+    // Removal restores the previous state.
     std::vector<VertexId> created;
     for (const auto& i : inserted) {
       if (i.created) created.push_back(i.vertex);

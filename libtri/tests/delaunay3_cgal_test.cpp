@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sets of tetrahedra and signs of predicates against CGAL's, on synthetic points.
+// Compares sets of tetrahedra and signs of predicates with CGAL's, on synthetic points.
 #include <algorithm>
 #include <cmath>
 
@@ -22,7 +22,7 @@ TYPED_TEST_SUITE(Delaunay3CgalTest, Coords);
 TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
   for (const PointSet3 kind : kPointSets3) {
     for (const std::size_t count : {4u, 10u, 150u, 2000u}) {
-      // Two lines of points have a tetrahedron for each pair of points.
+      // Two lines of points have a tetrahedron for each pair of edges.
       if (kind == PointSet3::kCurves && count > 150) continue;
       SCOPED_TRACE(name(kind) + " " + std::to_string(count));
       const auto points = make_points3<TypeParam>(kind, count, 31);
@@ -56,7 +56,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
 }
 
 TEST(Delaunay3Cgal, SameTetrahedraWhenPointsLeaveTheLattice) {
-  // Multiples of a power of two, then points in between, then all again without these.
+  // Multiples of a power of two, then points in between, then again without these.
   for (const double scale : {1.0, 0x1p-30, 0x1p-79, 0x1p-82, 0x1p79, 0x1p100, 0.1}) {
     SCOPED_TRACE("scale " + std::to_string(std::log2(scale)));
     std::mt19937_64 random(35);
@@ -86,8 +86,8 @@ TEST(Delaunay3Cgal, SameTetrahedraWhenPointsLeaveTheLattice) {
   }
 }
 
-/// A filter's verdict on the fifth point must be right, even where exact arithmetic finds it on the
-/// sphere of the others (which are not coplanar); it may leave anything undecided.
+/// A filter's verdict on the fifth point must be right, even if exact arithmetic finds it on the
+/// sphere of the others (which are not coplanar). The filter may leave anything undecided.
 template <class Ours>
 spatial::Verdict expect_right_verdict(std::array<typename Ours::Point, 5> p, int turn, int side) {
   if (turn < 0) {
@@ -111,7 +111,7 @@ bool is_new(const std::array<Point, 5>& p) {
   return std::find(p.begin(), p.begin() + 4, p[4]) == p.begin() + 4;
 }
 
-/// Signs of the kernel for doubles against exact rational arithmetic.
+/// Compares signs of the kernel for doubles with exact rational arithmetic.
 using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
 Exact::Point_3 exact(const std::array<double, 3>& p) { return {p[0], p[1], p[2]}; }
 
@@ -138,9 +138,9 @@ TEST(DoubleKernel3, SignsAreExact) {
   std::mt19937_64 random(5);
   for (int round = 0; round < 20'000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: from easy to
-    // undecidable in doubles. Those that are neither disturbed nor scaled too far must be decided
-    // by the filter.
+    // Points on a small raster, moved far out, scaled, and perturbed in the last bits: from easy to
+    // undecidable in doubles. The filter must decide those that are neither perturbed nor scaled
+    // too far.
     const int exponent = static_cast<int>(random() % (round % 2 == 0 ? 2000 : 180));
     const double scale = std::ldexp(1.0, exponent - (round % 2 == 0 ? 1000 : 90));
     const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 20));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tetrahedra of scans, and of point sets that were difficult for other programs, in the data folder
-// named by TERRACE_DATA.
+// Tetrahedra of scans, and of point sets that were difficult for other programs, from the data
+// folder named by TERRACE_DATA.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -43,8 +43,8 @@ class Delaunay3DataTest : public ::testing::Test {
 constexpr const char* kScans[] = {"armadillo_tm.ply", "bun_zipper.ply", "cow.obj",   "fandisk.obj",
                                   "lucy_100k.ply",    "spot.obj",       "teapot.obj"};
 
-/// Rounded to a raster of this many bits over the longest side: few bits make points equal,
-/// coplanar and cospherical.
+/// Rounds to a raster of this many bits over the longest side. Few bits make points equal, coplanar
+/// and cospherical.
 std::vector<std::array<std::int32_t, 3>> with_bits(const DoublePoints& points, unsigned bits) {
   double step = 0.0;
   auto result = quantised(points, step);
@@ -62,7 +62,7 @@ void expect_same_as_cgal(const std::vector<std::array<Coord, 3>>& points) {
   expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
 }
 
-TEST_F(Delaunay3DataTest, ScansHaveTheTetrahedraOfCgal) {
+TEST_F(Delaunay3DataTest, ScansMatchCgal) {
   std::size_t scans = 0;
   for (const char* name : kScans) {
     SCOPED_TRACE(name);
@@ -76,7 +76,7 @@ TEST_F(Delaunay3DataTest, ScansHaveTheTetrahedraOfCgal) {
   EXPECT_GT(scans, 0u);
 }
 
-TEST_F(Delaunay3DataTest, PointSetsInTheSpaceOfTheirNumbersHaveTheTetrahedraOfCgal) {
+TEST_F(Delaunay3DataTest, NumbersOfPointSetFilesMatchCgal) {
   constexpr std::size_t kMost = 10'000 / TERRACE_TEST_SHARE;
   std::size_t files = 0;
   for (const char* name : {"cdt", "delaunator", "georust", "julia"}) {
@@ -92,7 +92,8 @@ TEST_F(Delaunay3DataTest, PointSetsInTheSpaceOfTheirNumbersHaveTheTetrahedraOfCg
         const bool of_number = (c >= '0' && c <= '9') || c == '-' || c == '.' || c == 'e';
         if (!of_number) c = ' ';
       }
-      // Any three consecutive numbers are a point: coordinates, indices of edges, everything.
+      // Any three consecutive numbers are a point, whether they are coordinates, indices of edges
+      // or anything else.
       std::istringstream words(numbers);
       std::string word;
       std::vector<double> values;
@@ -133,7 +134,7 @@ void expect_no_history(const std::vector<std::array<Coord, 3>>& points, std::uin
   }
   EXPECT_EQ(grown.hash(), hash);
 
-  // Parts of space are removed and reinserted; the state in between is a triangulation too.
+  // Parts of space are removed and reinserted; the state in between is checked too.
   for (int round = 0; round < 3; ++round) {
     std::vector<VertexId> going;
     std::vector<std::array<Coord, 3>> gone, left;
@@ -156,7 +157,7 @@ void expect_no_history(const std::vector<std::array<Coord, 3>>& points, std::uin
   EXPECT_EQ(find_fault(grown), "");
 }
 
-TEST_F(Delaunay3DataTest, ScansHaveNoHistory) {
+TEST_F(Delaunay3DataTest, ScansDoNotDependOnHistory) {
   std::uint64_t seed = 41;
   for (const char* name : kScans) {
     SCOPED_TRACE(name);
@@ -169,7 +170,7 @@ TEST_F(Delaunay3DataTest, ScansHaveNoHistory) {
   }
 }
 
-TEST_F(Delaunay3DataTest, SignsOfThePublishedCases) {
+TEST_F(Delaunay3DataTest, MatchesThePublishedSigns) {
   // A. Nanevski, G. Blelloch, R. Harper, "Automatic generation of staged geometric predicates",
   // doi:10.1145/507635.507662: lines of number, coordinates, sign; in a left-handed frame.
   using Ours = spatial::DoubleKernel;

@@ -12,8 +12,8 @@
 
 #include "delaunay3/access.hpp"
 
-/// CGAL's Delaunay_triangulation_3 as an oracle, including ties: it perturbs in the same order. So
-/// sets of tetrahedra must be equal, whatever the input.
+/// Uses CGAL's Delaunay_triangulation_3 as an oracle, including ties: it perturbs in the same
+/// order, so the sets of tetrahedra must be equal for any input.
 
 namespace terrace::tri {
 

@@ -56,8 +56,9 @@ TYPED_TEST(Delaunay3Test, BuildIsValidAndCompleteForEveryKindOfPoints) {
   }
 }
 
-TYPED_TEST(Delaunay3Test, ThreadsLeaveNoTrace) {
-  // Enough for passes in parts, with duplicates across their border, large cavities, and ties.
+TYPED_TEST(Delaunay3Test, ResultDoesNotDependOnThreads) {
+  // Enough points for passes in parts, with duplicates across their border, large cavities, and
+  // ties.
   for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kFiveBits,
                                PointSet3::kSlab, PointSet3::kClusters}) {
     SCOPED_TRACE(name(kind));
@@ -80,7 +81,7 @@ TYPED_TEST(Delaunay3Test, ThreadsLeaveNoTrace) {
     }
     inserted.insert(points, {});
     ASSERT_EQ(inserted.hash(), one.hash());
-    // From here on it is an ordinary triangulation.
+    // From here on it behaves like any triangulation.
     const std::vector<VertexId> some(vertices.begin(), vertices.begin() + 300);
     std::set<VertexId> going(some.begin(), some.end());
     two.remove(std::vector<VertexId>(going.begin(), going.end()));
@@ -182,7 +183,7 @@ TYPED_TEST(Delaunay3Test, RandomOperationsEqualRebuild) {
   }
 }
 
-TYPED_TEST(Delaunay3Test, CompactSetsLeaveNoTrace) {
+TYPED_TEST(Delaunay3Test, ReinsertingCompactSetsRestoresAll) {
   for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kSlab,
                                PointSet3::kFiveBits, PointSet3::kClusters}) {
     for (std::uint64_t seed = 0; seed < 6; ++seed) {
@@ -192,7 +193,7 @@ TYPED_TEST(Delaunay3Test, CompactSetsLeaveNoTrace) {
       Delaunay3<TypeParam> triangulation;
       triangulation.build(points);
       const std::uint64_t before = triangulation.hash();
-      // Those nearest to a centre, some of them left out as islands.
+      // The vertices nearest to a centre, some of them left out as islands.
       const auto centre = points[random() % points.size()];
       std::vector<std::pair<double, VertexId>> by_distance;
       for (const VertexId v : triangulation.all_vertices()) {
@@ -221,9 +222,9 @@ TYPED_TEST(Delaunay3Test, CompactSetsLeaveNoTrace) {
   }
 }
 
-TYPED_TEST(Delaunay3Test, CavitiesAndHolesOfAnySize) {
-  // Points near a sphere, whose centre is joined to all of them, with 2 n - 4 facets around it:
-  // sizes below and above those that are handled separately.
+TYPED_TEST(Delaunay3Test, FillsCavitiesAndHolesOfAnySize) {
+  // Points near a sphere, whose centre is joined to all of them, with 2 n - 4 facets around it. The
+  // sizes are below and above those that are handled separately.
   for (const std::size_t count : {5u, 40u, 61u, 62u, 63u, 64u, 65u, 66u, 130u, 200u, 3000u}) {
     SCOPED_TRACE(count);
     std::mt19937_64 random(count);
@@ -255,7 +256,7 @@ TYPED_TEST(Delaunay3Test, CavitiesAndHolesOfAnySize) {
   }
 }
 
-TYPED_TEST(Delaunay3Test, EveryPathOfTheScanLeavesTheSameTetrahedra) {
+TYPED_TEST(Delaunay3Test, AllInstructionSetsGiveTheSameTetrahedra) {
   for (const PointSet3 kind : kPointSets3) {
     if (kind == PointSet3::kCurves) continue;
     SCOPED_TRACE(name(kind));
@@ -287,12 +288,12 @@ TYPED_TEST(Delaunay3Test, EveryPathOfTheScanLeavesTheSameTetrahedra) {
   }
 }
 
-TYPED_TEST(Delaunay3Test, JournalTellsTheNetDifference) {
+TYPED_TEST(Delaunay3Test, JournalReportsNetChanges) {
   using Corners = std::array<VertexId, 4>;
   for (const PointSet3 kind : kPointSets3) {
     SCOPED_TRACE(name(kind));
     std::mt19937_64 random(9);
-    // On the curves the tetrahedra are as many as pairs of points.
+    // On the curves there are as many tetrahedra as pairs of points.
     const auto points = make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 40 : 150, 4);
     Delaunay3<TypeParam> triangulation;
     // A consumer's state: arrays by slot, kept up to date by changes only.
@@ -412,7 +413,7 @@ TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
   }
 }
 
-TYPED_TEST(Delaunay3Test, NeighboursAreWhatTheTetrahedraSay) {
+TYPED_TEST(Delaunay3Test, NeighboursAgreeWithTetrahedra) {
   const auto points = make_points3<TypeParam>(PointSet3::kFiveBits, 200, 2);
   Delaunay3<TypeParam> triangulation;
   triangulation.build(points);

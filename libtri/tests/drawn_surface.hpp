@@ -11,11 +11,11 @@
 #include "terrace/tri/dynamic_surface.hpp"
 #include "terrace/tri/shape.hpp"
 
-/// Surfaces as they are seen: their triangles as points, each from its least corner on.
+/// Visible surfaces: their triangles as points, each starting at its smallest corner.
 
 namespace terrace::tri::test {
 
-/// What a renderer keeps: the corners of triangles as they were when it was told of them.
+/// The state of a renderer: the corners of triangles as they were when they were reported.
 template <class Coord>
 class Drawn {
  public:

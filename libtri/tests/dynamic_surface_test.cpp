@@ -25,8 +25,8 @@ class DynamicSurfaceOf : public testing::Test {};
 using SurfaceCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(DynamicSurfaceOf, SurfaceCoords);
 
-// Any points come and go: the deltas tell all, and the surface is that of the shape that follows
-// the same changes; from scratch it is that of a new object.
+// Any points are added and removed. The deltas must be complete, and the surface must be that of a
+// shape that follows the same changes; from scratch it must be that of a new object.
 TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
   using Coord = TypeParam;
   for (const PointSet3 kind : kPointSets3) {
@@ -43,7 +43,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
     surface.start_journal();
     typename Delaunay3<Coord>::Changes tetrahedra;
     for (int step = 0; step < (TERRACE_TEST_SHARE == 1 ? 60 : 20); ++step) {
-      // Both the same way, so that handles are equal.
+      // Both in the same way, so that handles are equal.
       if (random() % 2 == 0) {
         const std::size_t begin = random() % points.size();
         const auto some =
@@ -57,7 +57,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
         surface.remove(some);
         triangulation.remove(some);
       }
-      if (random() % 4 == 0) continue;  // several at once
+      if (random() % 4 == 0) continue;  // several operations at once
       triangulation.take_changes(tetrahedra);
       const bool scratch = random() % 4 == 0;
       if (scratch) {
@@ -79,7 +79,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
       ASSERT_EQ(surface.tetrahedra().hash(), triangulation.hash());
       ASSERT_EQ(drawn.triangles(),
                 faces_of(shape.surface_without_lids(triangulation), triangulation));
-      // A triangle that is told to go and to come has a new corner.
+      // A triangle that is reported as removed and as added has a new corner.
       std::set<std::array<VertexId, 3>> gone(changes.removed_corners.begin(),
                                              changes.removed_corners.end());
       for (const TriangleId t : changes.added_triangles) {
@@ -99,9 +99,9 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
   }
 }
 
-// Half of the body is fine, half coarse. Of large changes most tetrahedra are labelled without a
-// look at their surroundings.
-TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
+// Half of the body is fine, half coarse. After large changes most tetrahedra are labelled without
+// examining their surroundings.
+TYPED_TEST(DynamicSurfaceOf, FollowsChangesNextToCoarseParts) {
   using Coord = TypeParam;
   std::mt19937_64 random(7);
   std::vector<std::array<Coord, 3>> fine, coarse;
@@ -123,9 +123,9 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
   typename DynamicSurface<Coord>::Changes changes;
   typename Delaunay3<Coord>::Changes tetrahedra;
   std::size_t differing = 0, large = 0;
-  std::array<double, 2> work{}, gone{};  // of the fine points, of the coarse ones
+  std::array<double, 2> work{}, gone{};  // of the fine points, then of the coarse ones
   for (int step = 0; step < 12; ++step) {
-    // A fine patch goes, small or large, or a few of the coarse points, and comes back.
+    // Removes a fine patch, small or large, or a few of the coarse points, and adds it again.
     const bool of_coarse = step % 3 == 2;
     const double reach = step % 3 == 0 ? 0x1p16 : step % 3 == 1 ? 0x1p18 : 0x1p18;
     const auto middle = of_coarse ? coarse[random() % 25] : fine[random() % fine.size()];
@@ -172,15 +172,15 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesBesideCoarseParts) {
     shape.restore(triangulation);
   }
   EXPECT_GT(large, 0u);
-  // A coarse point is foreseen to be more work than a fine one.
+  // The estimate for a coarse point must exceed that for a fine one.
   EXPECT_GE(work[0], gone[0]);
   EXPECT_GT(work[1] / gone[1], 1.25 * work[0] / gone[0]);
   EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
 }
 
-// On a surface the work is foreseen to be that of the points; the middle of a body has tetrahedra
-// with all of them.
-TYPED_TEST(DynamicSurfaceOf, CostlyRemovalsAreForeseen) {
+// On a surface the estimated work is that of the points. The middle of a body has tetrahedra with
+// all of them.
+TYPED_TEST(DynamicSurfaceOf, EstimatesCostlyRemovals) {
   using Coord = TypeParam;
   std::mt19937_64 random(8);
   std::vector<std::array<Coord, 3>> points;
@@ -199,7 +199,7 @@ TYPED_TEST(DynamicSurfaceOf, CostlyRemovalsAreForeseen) {
   EXPECT_GT(surface.removal_work(std::vector<VertexId>{inserted[0].vertex}), 200u);
 }
 
-TYPED_TEST(DynamicSurfaceOf, WhatComesAndGoesUnseenIsNotTold) {
+TYPED_TEST(DynamicSurfaceOf, OmitsTransientChanges) {
   using Coord = TypeParam;
   std::mt19937_64 random(5);
   std::vector<std::array<Coord, 3>> points;
@@ -224,7 +224,7 @@ TYPED_TEST(DynamicSurfaceOf, WhatComesAndGoesUnseenIsNotTold) {
   EXPECT_EQ(surface.hash(), hash);
 }
 
-/// A surface made at once of the points that a model has.
+/// Builds a surface at once from the points of a model.
 template <class Coord>
 DynamicSurface<Coord> made_at_once(const MultiresolutionModel<DynamicSurface<Coord>>& model) {
   std::vector<std::array<Coord, 3>> there;
@@ -235,9 +235,10 @@ DynamicSurface<Coord> made_at_once(const MultiresolutionModel<DynamicSurface<Coo
   return surface;
 }
 
-// Under the control of views: it ends where the rule says, interrupted or not; the tetrahedra are
-// those made at once, the deltas add up to the surface, and from scratch the surface is that made
-// at once, too. Where the time is too short for a cluster, it goes point by point.
+// A view control must end in the state that the rule demands, interrupted or not. The tetrahedra
+// must be those built at once, the deltas must add up to the surface, and the surface from scratch
+// must be the one built at once. If the time is too short for a cluster, it is removed point by
+// point.
 TYPED_TEST(DynamicSurfaceOf, FollowsViews) {
   using T = DynamicSurface<TypeParam>;
   int mixed = 0;
@@ -291,7 +292,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsViews) {
   EXPECT_GT(partly, 100u) << "all clusters were collapsed at once";
 }
 
-// Regions by hand, and back to the start.
+// Regions set by hand, and back to the start.
 TYPED_TEST(DynamicSurfaceOf, FollowsRegions) {
   using Coord = TypeParam;
   World world = ball_world(3, 3000);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's Delaunay_triangulation_2 on points mapped without rounding as an oracle; signs of the
-// predicates against rational numbers.
+// Uses CGAL's Delaunay_triangulation_2 on points mapped without rounding as an oracle, and compares
+// signs of the predicates with rational numbers.
 #include <cmath>
 #include <random>
 
@@ -40,7 +40,7 @@ std::vector<Corners> mapped_triangles(const std::vector<PlanePoint>& points, con
   return result;
 }
 
-TEST(EllipticalMetric2, TrianglesAreCgalsOfTheMappedPointsTiesIncluded) {
+TEST(EllipticalMetric2, MatchesCgalOnMappedPointsIncludingTies) {
   for (const PointSet kind : kPointSets) {
     for (std::size_t m = 0; m < lower_maps().size(); ++m) {
       SCOPED_TRACE(name(kind) + " map " + std::to_string(m));
@@ -53,7 +53,7 @@ TEST(EllipticalMetric2, TrianglesAreCgalsOfTheMappedPointsTiesIncluded) {
   }
 }
 
-TEST(EllipticalMetric2, TrianglesAreCgalsOfTheMappedPointsForEllipses) {
+TEST(EllipticalMetric2, MatchesCgalOnMappedPointsForEllipses) {
   for (const double angle : {0.0, 17.0, 45.0, 90.0, 123.456, -60.0}) {
     for (const double ratio : {1.0, 3.0, 40.0}) {
       SCOPED_TRACE("angle " + std::to_string(angle) + " ratio " + std::to_string(ratio));

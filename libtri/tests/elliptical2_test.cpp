@@ -21,7 +21,7 @@ namespace {
 // ---- Laws --------------------------------------------------------------------------------------
 
 TEST(EllipticalMetric2, NoVertexIsInsideAnEllipse) {
-  // Symmetric maps on points with ties, where CGAL's choice among mapped points may differ.
+  // Symmetric maps on points with ties, for which CGAL may choose differently among mapped points.
   const LinearMap2 map = ellipse_map(4, 1, 30);
   for (const PointSet kind : kPointSets) {
     SCOPED_TRACE(name(kind));
@@ -36,7 +36,7 @@ TEST(EllipticalMetric2, NoVertexIsInsideAnEllipse) {
   }
 }
 
-TEST(EllipticalMetric2, WithAMapThatKeepsCirclesItIsDelaunay2) {
+TEST(EllipticalMetric2, CirclePreservingMapsGiveDelaunay2) {
   for (const LinearMap2& map :
        {kIdentityMap<2>, LinearMap2{1e-200, 0, 0, 1e-200}, LinearMap2{0, -3, 3, 0},
         LinearMap2{0, 1, 1, 0}, LinearMap2{3, -4, 4, 3}, LinearMap2{1e300, 0, 0, -1e300}}) {
@@ -101,7 +101,7 @@ TEST(EllipticalMetric2, RandomOperationsEqualRebuild) {
   }
 }
 
-TEST(EllipticalMetric2, PointsThatWouldFallTogetherWhenMappedStayApart) {
+TEST(EllipticalMetric2, PointsWithEqualMappedPositionsStayApart) {
   // An ellipse so flat and coordinates so large that neighbours along it have the same mapped
   // doubles.
   const LinearMap2 map = ellipse_map(1e12, 1, 45);
@@ -121,7 +121,7 @@ TEST(EllipticalMetric2, PointsThatWouldFallTogetherWhenMappedStayApart) {
   for (std::size_t i = 0; i < points.size(); ++i)
     EXPECT_EQ(triangulation.point(vertices[i]), points[i]);
   EXPECT_EQ(find_fault(triangulation), "");
-  // Points with equal coordinates share a vertex, and only those.
+  // Only points with equal coordinates share a vertex.
   EXPECT_FALSE(triangulation.insert(points[7]).created);
   EXPECT_TRUE(triangulation.insert({1e9, std::nextafter(1e9, 2e9)}).created);
   EXPECT_EQ(find_fault(triangulation), "");
@@ -154,7 +154,7 @@ TEST(EllipticalMetric2, NearestIsNearestInTheMetric) {
   }
 }
 
-/// A grid is triangulated in the Euclidean metric only.
+/// Grids are triangulated in the Euclidean metric only.
 template <class Triangulation>
 concept HasGrid = requires(Triangulation t) {
   t.build_grid(0.0, 0.0, 1.0, 2u, 2u);
@@ -198,7 +198,7 @@ TEST(Metric2, MapsMeasureEllipses) {
       std::hypot(turned[0] * 5 * c + turned[1] * 5 * s, turned[2] * 5 * c + turned[3] * 5 * s), 1.0,
       1e-15);
   EXPECT_NEAR(std::hypot(turned[1] * c - turned[0] * s, turned[3] * c - turned[2] * s), 1.0, 1e-15);
-  // Maps of space: an axis-parallel one bit for bit, another one by its lengths.
+  // Restrictions of maps of space: an axis-parallel one bit for bit, another one by its lengths.
   EXPECT_EQ(plane_map({turned[0], turned[1], 0, turned[2], turned[3], 0, 0, 0, 9}), turned);
   const std::array<double, 9> m{2, 0.5, 0.25, 0.5, 1, -0.5, 0.25, -0.5, 3};
   const LinearMap2 flat = plane_map(m);
@@ -214,7 +214,7 @@ TEST(Metric2, MapsMeasureEllipses) {
 // ---- Levels of detail --------------------------------------------------------------------------
 
 constexpr LinearMap2 kSlanted{0.3, -0.2, -0.2, 0.9};
-/// With a metric of its own, as the oracle makes triangulations by default.
+/// Has a fixed metric, as the oracle makes triangulations by default.
 struct Slanted : Elliptical2 {
   Slanted() : Elliptical2(kSlanted) {}
 };
@@ -242,7 +242,7 @@ TEST(EllipticalModel, HasLevelsOfDetail) {
       model.set_level(source.top());
       ASSERT_EQ(model.triangulation().hash(), coarse);
 
-      // The metric may be given to the model.
+      // The metric may be passed to the model.
       MultiresolutionModel<Elliptical2> given(source, {}, {}, Elliptical2(kSlanted));
       ASSERT_EQ(given.triangulation().hash(), coarse);
       ASSERT_EQ(given.triangulation().metric().map(), kSlanted);

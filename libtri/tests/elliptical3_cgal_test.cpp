@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's Delaunay_triangulation_3 on points mapped without rounding as an oracle; signs of the
-// predicates against rational numbers.
+// Uses CGAL's Delaunay_triangulation_3 on points mapped without rounding as an oracle, and compares
+// signs of the predicates with rational numbers.
 #include <cmath>
 #include <random>
 
@@ -43,7 +43,7 @@ std::vector<Corners3> mapped_tetrahedra(const std::vector<Space>& points, const 
   return result;
 }
 
-TEST(EllipticalMetric3, TetrahedraAreCgalsOfTheMappedPointsTiesIncluded) {
+TEST(EllipticalMetric3, MatchesCgalOnMappedPointsIncludingTies) {
   for (const PointSet3 kind : kPointSets3) {
     for (std::size_t m = 0; m < lower_maps3().size(); ++m) {
       SCOPED_TRACE(name(kind) + " map " + std::to_string(m));
@@ -56,7 +56,7 @@ TEST(EllipticalMetric3, TetrahedraAreCgalsOfTheMappedPointsTiesIncluded) {
   }
 }
 
-TEST(EllipticalMetric3, TetrahedraAreCgalsOfTheMappedPointsForEllipsoids) {
+TEST(EllipticalMetric3, MatchesCgalOnMappedPointsForEllipsoids) {
   for (const LinearMap3& axes : rotations()) {
     for (const double ratio : {3.0, 40.0}) {
       SCOPED_TRACE("axes " + std::to_string(axes[0]) + " ratio " + std::to_string(ratio));
@@ -87,7 +87,7 @@ std::vector<Space> hard_points(int round, std::size_t count, std::mt19937_64& ra
   return points;
 }
 
-/// An invertible matrix of small integers, in every fifth round scaled by very different powers of
+/// An invertible matrix of small integers, scaled in every fifth round by very different powers of
 /// two.
 LinearMap3 hard_map(int round, std::mt19937_64& random) {
   while (true) {
@@ -123,7 +123,7 @@ TEST(EllipticalKernel3, SignsAreExact) {
       ASSERT_EQ(EllipticalKernel::in_sphere(c[0], c[1], c[2], c[3], p[4]), side);
       tied += side == 0;
       using Corner = EllipticalKernel::Vertex;
-      // It may leave anything undecided.
+      // The filter may leave anything undecided.
       const auto verdict = EllipticalKernel::Probe(p[4], {}).side(Corner{c[0], 0}, Corner{c[1], 0},
                                                                   Corner{c[2], 0}, Corner{c[3], 0});
       if (verdict != spatial::Verdict::kOpen) {
@@ -149,7 +149,7 @@ TEST(EllipticalKernel3, MappedDifferencesAreWithinTheirBound) {
     const spatial::QuadraticForm form(map);
     if (!(form.spread() < 0x1p28)) continue;
     const EllipticalKernel::Scope scope(form);
-    // Only lengths can be compared, as R equals M up to a rotation and a power of two.
+    // Only lengths can be compared, because R equals M only up to a rotation and a power of two.
     const Space got = EllipticalKernel::mapped(p[1], p[0]);
     const double length = std::hypot(got[0], got[1], got[2]);
     double wanted = std::sqrt(CGAL::to_double(square(map, exact_difference(p[1], p[0]))));
@@ -173,8 +173,8 @@ TEST(EllipticalKernel3, SmallestSpheresAreExact) {
     const LinearMap3 map = hard_map(round, random);
     const spatial::QuadraticForm form(map);
     const EllipticalKernel::Scope scope(form);
-    // The smallest sphere through both ends of an edge that contains the third corner, or that
-    // through all three; by its centre.
+    // The smallest sphere, by its centre: the one through both ends of an edge that contains the
+    // third corner, or the one through all three.
     std::array<Rationals, 4> at;
     for (std::size_t i = 0; i < 4; ++i) at[i] = mapped_by(map, exact_difference(p[i], p[0]));
     const auto minus = [](const Rationals& u, const Rationals& v) {

@@ -34,7 +34,7 @@ TEST(EllipticalMetric3, NoVertexIsInsideAnEllipsoid) {
   }
 }
 
-TEST(EllipticalMetric3, WithAMapThatKeepsSpheresItIsDelaunay3) {
+TEST(EllipticalMetric3, SpherePreservingMapsGiveDelaunay3) {
   for (const LinearMap3& map :
        {kIdentityMap<3>, LinearMap3{1e-200, 0, 0, 0, 1e-200, 0, 0, 0, 1e-200},
         LinearMap3{0, -3, 0, 3, 0, 0, 0, 0, 3}, LinearMap3{0, 1, 0, 0, 0, 1, 1, 0, 0},
@@ -53,9 +53,9 @@ TEST(EllipticalMetric3, WithAMapThatKeepsSpheresItIsDelaunay3) {
   }
 }
 
-/// Maps of integers and powers of two that keep the lexicographic order: small integer points are
-/// mapped without rounding.
-TEST(EllipticalMetric3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
+/// Maps of integers and powers of two that keep the lexicographic order, so that small integer
+/// points are mapped without rounding.
+TEST(EllipticalMetric3, IntegerPointsAndMapsGiveDelaunay3OfMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1},
         LinearMap3{2, 0, 0, -7, 0.25, 0, 1, 0, 8}, LinearMap3{1, 0, 0, 0, 1, 0, 1, -1, 1}}) {
@@ -72,7 +72,7 @@ TEST(EllipticalMetric3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
       Delaunay3<double> plain;
       const auto vertices = elliptical.build(points);
       const auto others = plain.build(mapped);
-      // Equal vertices, by the points from which they came.
+      // Equal vertices, compared by the points from which they were made.
       std::vector<Corners3> wanted;
       std::vector<Space> original(plain.vertex_slots());
       for (std::size_t i = 0; i < points.size(); ++i) {
@@ -141,7 +141,7 @@ TEST(EllipticalMetric3, RandomOperationsEqualRebuild) {
   }
 }
 
-TEST(EllipticalMetric3, ThreadsLeaveNoTrace) {
+TEST(EllipticalMetric3, ResultDoesNotDependOnThreads) {
   const LinearMap3 map = ellipsoid_map({6, 1, 3}, rotations()[3]);
   for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kClusters}) {
     SCOPED_TRACE(name(kind));
@@ -226,7 +226,7 @@ TEST(Metric3, MapsMeasureEllipsoids) {
   EXPECT_EQ(ellipsoid_map({2, 4, 8}), (LinearMap3{0.5, 0, 0, 0, 0.25, 0, 0, 0, 0.125}));
 }
 
-TEST(MetricField3, HasClosedBoxesOfWhichTheFirstHolds) {
+TEST(MetricField3, FirstOfSeveralClosedBoxesApplies) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   using Regions = std::vector<MetricField3::Region>;
   const auto refuses = [](Regions regions, const std::string& where) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape in an elliptical metric equals that of the mapped points.
+// The shape in an elliptical metric must equal that of the mapped points.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -18,7 +18,7 @@
 namespace terrace::tri::test {
 namespace {
 
-/// Points spread uniformly on the unit sphere, on a spiral, then stretched.
+/// Points distributed uniformly on the unit sphere, along a spiral, then stretched.
 std::vector<Space> ellipsoid(std::size_t count, const Space& radii) {
   std::vector<Space> points;
   for (std::size_t i = 0; i < count; ++i) {
@@ -44,7 +44,7 @@ std::vector<ShapeOptions> all_options() {
 }
 
 /// Integer maps that keep the lexicographic order map small integer points without rounding.
-TEST(EllipticalShape, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
+TEST(EllipticalShape, IntegerPointsAndMapsGiveTheShapeOfMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1}}) {
     for (const PointSet3 kind : {PointSet3::kFiveBits, PointSet3::kGrid, PointSet3::kSphere,
@@ -112,7 +112,7 @@ TEST(EllipticalShape, FollowsTheModel) {
   }
 }
 
-TEST(EllipticalShape, AnEllipsoidOfStretchedSamplesComesBack) {
+TEST(EllipticalShape, RestoresAnEllipsoidOfStretchedSamples) {
   const Space radii{1, 1, 40};
   const auto points = ellipsoid(2000, radii);
   RestoreOptions options;
@@ -125,7 +125,7 @@ TEST(EllipticalShape, AnEllipsoidOfStretchedSamplesComesBack) {
   EXPECT_EQ(measures.components, 1u);
   EXPECT_EQ(measures.euler_characteristic, 2);
   EXPECT_NEAR(measures.volume, 4.0 / 3 * 3.141592653589793 * 40, 1.5);
-  // Edge lengths: with 1, which restores uniform samples (see ShapeOptions).
+  // Edge lengths with a factor of 1, which restores uniform samples (see ShapeOptions).
   options.shape = {ShapeRule::kFlood, ShapeCriterion::kEdgeLength, 1.0, true};
   EXPECT_EQ(measure(restore_surface(points, options).surface).faces, 3996u);
 
@@ -134,7 +134,7 @@ TEST(EllipticalShape, AnEllipsoidOfStretchedSamplesComesBack) {
   EXPECT_THROW((options.metric = LinearMap3{1, 0, 0, 0, 1, 0, 1, 1, 0}), std::invalid_argument);
 }
 
-TEST(EllipticalShape, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
+TEST(EllipticalShape, StretchedTorusKeepsItsHoleOnlyInTheMetric) {
   constexpr double kTurn = 6.283185307179586;
   std::vector<Space> points;
   for (int i = 0; i < 3000; ++i) {
@@ -154,7 +154,7 @@ TEST(EllipticalShape, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
   EXPECT_GT(std::abs(euclidean - wanted), 0.1 * wanted);
 }
 
-TEST(EllipticalShape, TheFilterOfSmallestEllipsoidsAgreesWithTheExactTest) {
+TEST(EllipticalShape, SmallestEllipsoidFilterAgreesWithTheExactTest) {
   using spatial::EllipticalKernel;
   std::mt19937_64 random(9);
   int filtered = 0;

@@ -9,7 +9,7 @@
 namespace terrace::tri {
 namespace {
 
-TEST(FreeSlots, EachIsTakenOnce) {
+TEST(FreeSlots, TakesEachSlotOnce) {
   std::mt19937_64 random(1);
   FreeSlots slots;
   std::set<std::uint32_t> expected;
@@ -32,7 +32,7 @@ TEST(FreeSlots, EachIsTakenOnce) {
   }
 }
 
-TEST(FreeSlots, ComeBackInOrderHoweverFreed) {
+TEST(FreeSlots, ReusesSlotsInOrderHoweverFreed) {
   FreeSlots slots;
   for (const std::uint32_t slot : {70u, 5u, 127u, 3u, 64u, 9u}) slots.put(slot);
   for (const std::uint32_t slot : {3u, 5u, 9u, 64u, 70u, 127u}) EXPECT_EQ(slots.take(), slot);

@@ -21,7 +21,7 @@ namespace {
 template <class Coord>
 using Model = MultiresolutionModel<Delaunay2<Coord>>;
 
-// A copy of the whole surface, with heights found by testing all triangles.
+// A copy of the whole surface. Finds heights by testing all triangles.
 template <class Coord>
 struct Surface {
   std::vector<std::array<Point3, 3>> triangles;
@@ -42,7 +42,7 @@ struct Surface {
     }
   }
   [[nodiscard]] std::optional<double> at(const Point3& p) const {
-    // The triangle whose least barycentric coordinate is the greatest.
+    // Chooses the triangle whose least barycentric coordinate is the greatest.
     double best = -1e-9;
     std::optional<double> result;
     for (const auto& [a, b, c] : triangles) {
@@ -84,7 +84,8 @@ class Geomorphs : public testing::Test {};
 using Coords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(Geomorphs, Coords);
 
-// Whatever a step does: new vertices start on the old surface, removed ones end on the new one.
+// For any step, new vertices must start on the old surface, and removed ones must end on the new
+// one.
 TYPED_TEST(Geomorphs, StartsOnTheOldSurfaceAndEndsOnTheNew) {
   std::size_t inside = 0, changed = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -136,9 +137,9 @@ TYPED_TEST(Geomorphs, CollapseMirrorsExpand) {
     model.children(cluster_id(world.source.top(), 0), children);
     if (children.empty()) continue;
     const ClusterId id = children[below(world.random, children.size())];
-    Geomorph2<TypeParam> there, back;
-    there.make(model, model.expand(id));
-    back.make(model, model.collapse(id));
+    Geomorph2<TypeParam> expanded, collapsed;
+    expanded.make(model, model.expand(id));
+    collapsed.make(model, model.collapse(id));
     const auto by_place = [](const Slides& slides) {
       std::map<std::pair<double, double>, std::pair<double, double>> result;
       for (std::size_t i = 0; i < slides.size(); ++i) {
@@ -146,20 +147,20 @@ TYPED_TEST(Geomorphs, CollapseMirrorsExpand) {
       }
       return result;
     };
-    const auto forth = by_place(there.added), again = by_place(reversed(back.removed));
+    const auto forth = by_place(expanded.added), again = by_place(reversed(collapsed.removed));
     ASSERT_EQ(forth.size(), again.size());
     for (const auto& [place, heights] : forth) {
       ASSERT_EQ(again.at(place).second, heights.second);
       // The same triangle with its corners in another order.
       ASSERT_NEAR(again.at(place).first, heights.first, 1e-9 * (1.0 + std::abs(heights.first)));
     }
-    ASSERT_EQ(by_place(there.reassigned), by_place(reversed(back.reassigned)));
-    ASSERT_EQ(there.removed.size() + back.added.size(), 0u);
+    ASSERT_EQ(by_place(expanded.reassigned), by_place(reversed(collapsed.reassigned)));
+    ASSERT_EQ(expanded.removed.size() + collapsed.added.size(), 0u);
   }
 }
 
-// The former height of a vertex, even where its slot was reused in the same step.
-TYPED_TEST(Geomorphs, StepsOfManyOperations) {
+// Reports the former height of a vertex even if its slot was reused in the same step.
+TYPED_TEST(Geomorphs, CombinesStepsOfManyOperations) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     World world(seed, Shape::duplicates, 250);
     SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -206,7 +207,7 @@ long double squared(const Point3& a, const Point3& b) {
   return sum;
 }
 
-/// The squared distance to a triangle, flat ones as well: to its plane if the foot is inside, else
+/// The squared distance to a triangle, which may be flat: to its plane if the foot is inside, else
 /// to its nearest edge.
 long double squared(const Facet& facet, const Point3& p) {
   using Vector = std::array<long double, 3>;
@@ -244,8 +245,8 @@ long double squared(const std::vector<Facet>& facets, const Point3& p) {
   return least;
 }
 
-// Against all triangles of the part, whatever these are: flat, in one place, touching each other.
-TEST(Patches, NearestPlaceAgainstAllTriangles) {
+// Compares with all triangles of the part, which may be flat, coincide, or touch each other.
+TEST(Patches, NearestPlaceAgreesWithBruteForce) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
@@ -289,7 +290,7 @@ TEST(Patches, NearestPlaceAgainstAllTriangles) {
   }
 }
 
-/// All triangles of a surface by the places of their corners, from the least.
+/// All triangles of a surface by the positions of their corners, starting at the smallest.
 template <class Coord>
 std::multiset<Facet> facets_of(const DynamicSurface<Coord>& surface) {
   std::multiset<Facet> all;
@@ -316,7 +317,8 @@ std::vector<Facet> without(const std::multiset<Facet>& facets, const std::multis
   return rest;
 }
 
-/// Who came to `to` from `from`, and from where: by definition, all triangles against all.
+/// Checks which vertices joined `to` and where they started on `from`, by definition: tests all
+/// triangles against all.
 void check_came(const Slides& slides, const std::multiset<Facet>& from,
                 const std::multiset<Facet>& to) {
   const std::set<Point3> before = places_of_corners(from), after = places_of_corners(to);
@@ -329,7 +331,7 @@ void check_came(const Slides& slides, const std::multiset<Facet>& from,
   std::vector<Facet> changed = gone;
   changed.insert(changed.end(), fresh.begin(), fresh.end());
   for (std::size_t i = 0; i < slides.size(); ++i) {
-    // The connected part, by passing from corner to corner.
+    // The connected part, found by moving from corner to corner.
     std::set<Point3> part{slides.end[i]};
     for (std::size_t size = 0; size != part.size();) {
       size = part.size();
@@ -349,12 +351,12 @@ void check_came(const Slides& slides, const std::multiset<Facet>& from,
     const long double best = squared(replaced, end);
     ASSERT_NEAR(static_cast<double>(squared(start, end)), static_cast<double>(best),
                 1e-9 * (1.0 + static_cast<double>(best)));
-    ASSERT_LE(squared(replaced, start), 1e-3L) << "not on a triangle that has gone";
+    ASSERT_LE(squared(replaced, start), 1e-3L) << "not on a removed triangle";
   }
 }
 
-// Whatever a step does to a surface in space, of points that come to it and leave it.
-TYPED_TEST(Geomorphs, InSpaceStartsAtTheNearestPlaceOfWhatHasGone) {
+// Checks any step of a surface in space for the points that join it and leave it.
+TYPED_TEST(Geomorphs, InSpaceStartsAtTheNearestRemovedTriangle) {
   using T = DynamicSurface<TypeParam>;
   std::size_t came = 0, left = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
@@ -387,7 +389,7 @@ TYPED_TEST(Geomorphs, InSpaceStartsAtTheNearestPlaceOfWhatHasGone) {
   EXPECT_GT(left, 300u);
 }
 
-// Where the surface follows back to the same triangles, the slides go back the same ways.
+// If the surface returns to the same triangles, the slides must be reversed.
 TYPED_TEST(Geomorphs, InSpaceCollapseMirrorsExpand) {
   using T = DynamicSurface<TypeParam>;
   std::size_t compared = 0;
@@ -400,17 +402,18 @@ TYPED_TEST(Geomorphs, InSpaceCollapseMirrorsExpand) {
     if (children.empty()) continue;
     const ClusterId id = children[below(world.random, children.size())];
     const auto start = facets_of(model.triangulation());
-    Geomorph<T> there, back;
-    there.make(model, model.expand(id));
-    back.make(model, model.collapse(id));
+    Geomorph<T> expanded, collapsed;
+    expanded.make(model, model.expand(id));
+    collapsed.make(model, model.collapse(id));
     if (facets_of(model.triangulation()) != start) continue;
     const auto by_place = [](const Slides& slides) {
       std::map<Point3, Point3> ways;
       for (std::size_t i = 0; i < slides.size(); ++i) ways[slides.end[i]] = slides.start[i];
       return ways;
     };
-    for (const auto& [one, other] : {std::pair{there.added, back.removed},
-                                     std::pair{reversed(there.removed), reversed(back.added)}}) {
+    for (const auto& [one, other] :
+         {std::pair{expanded.added, collapsed.removed},
+          std::pair{reversed(expanded.removed), reversed(collapsed.added)}}) {
       const auto forth = by_place(one), again = by_place(reversed(other));
       ASSERT_EQ(forth.size(), again.size());
       for (const auto& [end, from] : forth) {
@@ -424,7 +427,8 @@ TYPED_TEST(Geomorphs, InSpaceCollapseMirrorsExpand) {
   EXPECT_GT(compared, 100u);
 }
 
-/// Each anchor's end on its triangle, which is there; over the plane with `after`, at its x and y.
+/// The end of each anchor must be on its triangle, which must exist; over the plane also on
+/// `after`, at its x and y.
 template <class T>
 void check_anchors(const T& surface, const std::vector<Anchor>& anchors, const auto& height) {
   for (const Anchor& anchor : anchors) {
@@ -448,7 +452,7 @@ void add_anchors(const auto& morph, std::vector<Anchor>& anchors) {
     anchors.push_back({morph.removed.start[i], morph.removed.end[i], morph.removed_on[i], false});
 }
 
-// What has gone stays on the surface, whatever later steps make of that.
+// Removed vertices must stay on the surface through all later steps.
 TYPED_TEST(Geomorphs, AnchorsFollowTheSurface) {
   std::size_t moved = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -509,8 +513,9 @@ TYPED_TEST(Geomorphs, InSpaceAnchorsFollowTheSurface) {
   EXPECT_GT(moved, 100u);
 }
 
-// The connected parts, by passing from corner to corner of all triangles that the step exchanged.
-TYPED_TEST(Geomorphs, PartsAreThoseThatTouch) {
+// The connected parts, found by moving from corner to corner of all triangles that the step
+// exchanged.
+TYPED_TEST(Geomorphs, PartsConsistOfTouchingTriangles) {
   using T = DynamicSurface<TypeParam>;
   std::size_t several = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
@@ -528,7 +533,8 @@ TYPED_TEST(Geomorphs, PartsAreThoseThatTouch) {
       }
       const auto& delta = model.close_step();
       morph.make(model, delta);
-      // Corners by their place: of what has gone by the lists, of the others by the surface.
+      // Corners by their position: those of removed triangles from the lists, others from the
+      // surface.
       std::map<VertexId, Point3> gone;
       for (std::size_t i = 0; i < delta.changes.removed_vertices.size(); ++i) {
         const auto& p = delta.changes.removed_points[i];
@@ -558,7 +564,7 @@ TYPED_TEST(Geomorphs, PartsAreThoseThatTouch) {
           ASSERT_TRUE(first || at->second == part) << "two parts touch";
         }
       }
-      // All triangles of a part can be reached from one of them.
+      // All triangles of a part must be reachable from one of them.
       std::map<std::uint32_t, std::set<Point3>> reached;
       for (std::size_t change = 1; change > 0;) {
         change = 0;

@@ -31,7 +31,7 @@ TEST(GridTinCheck, FindsErrorsEverywhere) {
   }
 }
 
-TEST(GridTinCheck, CountsWhatIsNotCovered) {
+TEST(GridTinCheck, CountsUncoveredSamples) {
   std::vector<double> heights(16, 1.0);
   GridTinCheck check = check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}});
   EXPECT_EQ(check.samples, 16U);
@@ -39,7 +39,7 @@ TEST(GridTinCheck, CountsWhatIsNotCovered) {
   EXPECT_EQ(check.uncovered, 6U);
   EXPECT_EQ(check.uncovered_inner, 6U);
   EXPECT_EQ(check.max_error, 1);
-  heights[12] = kNoHeight;  // column 0, row 3: then its 3 neighbours are not inner
+  heights[12] = kNoHeight;  // column 0, row 3, so that its 3 neighbours are not inner
   check = check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}});
   EXPECT_EQ(check.samples, 15U);
   EXPECT_EQ(check.uncovered, 5U);
@@ -58,7 +58,7 @@ TEST(GridTinCheck, CountsTurnedTriangles) {
       check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 0, 2}}).turned, 1U);
 }
 
-TEST(GridTinCheck, CornersOffTheLattice) {
+TEST(GridTinCheck, AcceptsCornersOffTheLattice) {
   std::vector<double> heights;
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 4; ++x) heights.push_back(2 * x - 3 * y);
@@ -133,7 +133,7 @@ void compare_with_all(std::uint32_t columns, std::uint32_t rows, std::uint64_t s
   EXPECT_EQ(check.nodata_covered, missing);
 }
 
-TEST(GridTinCheck, AgreesWithAllSamplesInAllTriangles) {
+TEST(GridTinCheck, AgreesWithBruteForce) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     compare_with_all(12, 9, seed);
     compare_with_all(3, 40, seed);
@@ -171,7 +171,7 @@ TEST(GridTinCheck, SameBitsOnEveryProcessor) {
   }
 }
 
-TEST(GridTinCheck, MisuseIsRefused) {
+TEST(GridTinCheck, RejectsInvalidArguments) {
   const std::vector<double> heights(16, 0.0);
   const GridWindow<double> window{4, 4, heights};
   EXPECT_THROW(check_grid_tin<double>({4, 5, heights}, kSquare, kHalves), std::invalid_argument);
@@ -186,7 +186,7 @@ TEST(GridTinCheck, MisuseIsRefused) {
   }
 }
 
-// The tests of all paths skip instruction sets that the machine lacks; this one reports it.
+// The tests of all instruction sets skip those that the machine lacks; this test reports it.
 TEST(InstructionSets, Avx2IsTested) {
   if (!base::supports(base::SimdPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }

@@ -12,7 +12,7 @@
 #include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
 
-/// Shared by tests of meshes of grids: windows meshed on their own, and brute-force checks of the
+/// Shared by tests of meshes of grids: windows meshed individually, and brute-force checks of the
 /// result.
 
 namespace grid_tin_oracle {
@@ -39,7 +39,7 @@ inline Corners corners_of(const GridTin& tin, std::size_t i) {
   return result;
 }
 
-/// Every sample against every triangle, with integer positions. Returns the greatest error.
+/// Tests every sample against every triangle, with integer positions. Returns the greatest error.
 template <class T>
 double brute_force(const OwnedWindow<T>& owned, const GridTin& tin, bool gaps) {
   double most = 0;
@@ -49,7 +49,7 @@ double brute_force(const OwnedWindow<T>& owned, const GridTin& tin, bool gaps) {
     Corners t = corners_of(tin, i);
     std::array<long double, 3> z{};
     for (std::size_t k = 0; k < 3; ++k) z[k] = tin.vertices[tin.triangles[i][k]].height;
-    // Rows grow southward unless stated otherwise: clockwise on the lattice.
+    // Rows grow southward unless stated otherwise, so triangles are clockwise on the lattice.
     std::int64_t twice = turn(t[0], t[1], t[2]);
     EXPECT_LT(twice, 0) << "triangle " << i;
     std::swap(t[1], t[2]);

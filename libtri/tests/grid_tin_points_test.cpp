@@ -43,7 +43,7 @@ TEST(GridTin, BestOfPoints) {
   }
 }
 
-TEST(GridTin, BestOfPointsWithGapsCoversOnceThereAreEnough) {
+TEST(GridTin, BestOfPointsCoversDataOnceThereAreEnough) {
   for (const Gaps gaps : kGapPatterns) {
     const auto owned = make_window<float>(Relief::kHills, gaps, 40, 33, 8);
     SCOPED_TRACE(static_cast<int>(gaps));

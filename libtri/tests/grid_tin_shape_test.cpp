@@ -66,7 +66,7 @@ TEST(GridTin, GreedyIsDelaunayOnTheGround) {
   }
 }
 
-TEST(GridTin, RemovalMakesNoThinTriangles) {
+TEST(GridTin, RemovalAvoidsThinTriangles) {
   for (const double row_step : {-1.0, -0.6, -2.5}) {
     for (const Relief relief : {Relief::kHills, Relief::kNoise, Relief::kLake, Relief::kFlat}) {
       for (const Gaps gaps : {Gaps::kNone, Gaps::kBlobs}) {
@@ -106,7 +106,7 @@ TEST(GridTin, StillWaterHasFewTriangles) {
   }
 }
 
-TEST(GridTin, OrientationIsThatOfTheGround) {
+TEST(GridTin, OrientationFollowsTheGround) {
   const auto owned = make_window<float>(Relief::kHills, Gaps::kNone, 20, 20, 3);
   for (const double x : {1.0, -1.0})
     for (const double y : {1.0, -1.0}) {

@@ -54,7 +54,7 @@ TEST(GridTin, WithinBoundInSmallWindows) {
       expect_within_bounds<float>(columns, rows, 100 * columns + rows);
 }
 
-TEST(GridTin, NoTrianglesOnALine) {
+TEST(GridTin, SingleLinesHaveNoTriangles) {
   const auto owned = make_window<float>(Relief::kNoise, Gaps::kNone, 1, 50, 5);
   const GridTin tin = make(owned, 1, TinQuality::kRemoval);
   EXPECT_TRUE(tin.triangles.empty());
@@ -63,7 +63,7 @@ TEST(GridTin, NoTrianglesOnALine) {
   EXPECT_EQ(tin.check.uncovered, 50U);
 }
 
-TEST(GridTin, FlatAndRampAreTwoTriangles) {
+TEST(GridTin, PlanesHaveTwoTriangles) {
   for (const Relief relief : {Relief::kFlat, Relief::kRamp}) {
     for (const double bound : {0.0, 1e-6, 5.0}) {
       const auto owned = make_window<float>(relief, Gaps::kNone, 300, 200, 1);
@@ -76,7 +76,7 @@ TEST(GridTin, FlatAndRampAreTwoTriangles) {
   }
 }
 
-TEST(GridTin, BoundOfNothingKeepsAllThatIsNotPlane) {
+TEST(GridTin, ZeroBoundKeepsAllSamplesOffPlanes) {
   const auto owned = make_window<float>(Relief::kNoise, Gaps::kNone, 40, 30, 1);
   for (const TinQuality quality : kQualities) {
     const GridTin tin = make(owned, 0, quality);
@@ -113,14 +113,14 @@ TEST(GridTin, SameBytesOnEveryProcessor) {
   }
 }
 
-TEST(GridTin, DoublesThatAreFloatsGiveTheSame) {
+TEST(GridTin, DoublesWithFloatValuesGiveTheSame) {
   const auto owned = make_window<float>(Relief::kHills, Gaps::kBlobs, 80, 70, 2);
   OwnedWindow<double> wide{80, 70, {owned.heights.begin(), owned.heights.end()}};
   EXPECT_EQ(make(owned, 9, TinQuality::kFitted).vertices,
             make(wide, 9, TinQuality::kFitted).vertices);
 }
 
-TEST(GridTin, ShiftOfHeightsThatFloatsCannotHold) {
+TEST(GridTin, KeepsTheBoundWhereFloatsLackPrecision) {
   auto owned = make_window<double>(Relief::kHills, Gaps::kNone, 60, 60, 6);
   for (double& z : owned.heights) z = z * 1e-3 + 123456.789;
   for (const TinQuality quality : kQualities) {
@@ -130,7 +130,7 @@ TEST(GridTin, ShiftOfHeightsThatFloatsCannotHold) {
   }
 }
 
-TEST(GridTin, MisuseIsRefused) {
+TEST(GridTin, RejectsInvalidArguments) {
   const auto owned = make_window<float>(Relief::kHills, Gaps::kNone, 10, 8, 1);
   const GridSides sides = settle_sides(owned.window(), 1);
   GridTinOptions options;

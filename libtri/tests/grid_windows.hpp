@@ -35,10 +35,10 @@ inline constexpr Relief kReliefs[] = {Relief::kFlat,  Relief::kRamp,  Relief::kS
 enum class Gaps {
   kNone,
   kSprinkled,  ///< single samples
-  kHalf,       ///< beyond a slanted line
+  kHalf,       ///< on one side of a slanted line
   kBlobs,      ///< round holes
   kIslands,    ///< round islands
-  kFrame,      ///< all around
+  kFrame,      ///< along all four sides
   kMost,       ///< 9 of 10 samples
 };
 inline constexpr Gaps kGapPatterns[] = {Gaps::kNone,    Gaps::kSprinkled, Gaps::kHalf, Gaps::kBlobs,
@@ -135,7 +135,7 @@ OwnedWindow<T> make_window(Relief relief, Gaps gaps, std::uint32_t columns, std:
   return result;
 }
 
-/// A bound that leaves work to do.
+/// An error bound that leaves work to do.
 inline double bound_for(Relief relief) {
   switch (relief) {
     case Relief::kNoise:

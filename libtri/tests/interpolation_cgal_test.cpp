@@ -34,12 +34,12 @@ Weights weights_of(const ExactOracle& oracle, const Point2& query) {
   if (!result.third) return weights;
   for (const auto& [point, weight] : found)
     weights[to_point(point)] =
-        // of the interval the result is less exact
+        // within this, the result is less exact
         CGAL::to_double(CGAL::exact(weight / result.second));
   return weights;
 }
 
-/// The values, bounds and roundings of random sums, products and quotients against rationals.
+/// Compares the values, bounds and roundings of random sums, products and quotients with rationals.
 TEST(BoundedNumber, IsWithinItsBoundOfTheExactResult) {
   using planar::BoundedNumber;
   using Rational = CGAL::Exact_rational;
@@ -61,7 +61,7 @@ TEST(BoundedNumber, IsWithinItsBoundOfTheExactResult) {
     BoundedNumber number(0);
     Rational exact = 0;
     for (int step = 0; step < 12; ++step) {
-      // Small integers among them, so that much cancels.
+      // Includes small integers, so that much cancels.
       const double other = random() % 2 == 0
                                ? static_cast<double>(random() % 9) - 4
                                : std::ldexp(to_unit(random()), static_cast<int>(random() % 60));

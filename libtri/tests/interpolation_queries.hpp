@@ -19,8 +19,8 @@ Point2 query_at(const Delaunay2<Coord>& triangulation, VertexId v) {
   return {static_cast<double>(p[0]), static_cast<double>(p[1])};
 }
 
-/// Anywhere in the bounding box and beyond, on vertices and one rounding away from them, on edges
-/// (or as close as doubles allow), close to the hull, and on points cocircular with others.
+/// Queries anywhere in the bounding box and beyond, on vertices and one rounding away from them, on
+/// edges (or as close as doubles allow), close to the hull, and on points cocircular with others.
 template <class Coord>
 std::vector<Point2> make_queries(const Delaunay2<Coord>& triangulation, std::size_t count,
                                  std::uint64_t seed) {

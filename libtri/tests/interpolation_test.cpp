@@ -26,7 +26,7 @@ const double kNan = std::numeric_limits<double>::quiet_NaN();
 template <class Coord>
 class InterpolationTest : public ::testing::Test {
  public:
-  /// Decided at every edge of the hull, or of the line.
+  /// Decides at every edge of the hull, or of the line.
   static bool in_hull(const Delaunay2<Coord>& triangulation, const Point2& query) {
     for (const TriangleId t : triangulation.all_triangles()) {
       const auto v = triangulation.vertices(t);
@@ -63,7 +63,7 @@ TYPED_TEST(InterpolationTest, WeightsObeyTheirLaws) {
           weights_at(triangulation, query, method, weights);
           ASSERT_EQ(!weights.empty(), this->in_hull(triangulation, query));
           if (weights.empty()) continue;
-          // The sum, and the mean of the vertices; uses halves, as differences may overflow.
+          // The sum, and the mean of the vertices. Uses halves, as differences may overflow.
           double sum = 0;
           Point2 mean{};
           Point2 extent{};
@@ -101,7 +101,7 @@ TYPED_TEST(InterpolationTest, LinearWeightsAreThoseOfOneTriangle) {
   for (const Point2& query : make_queries(triangulation, 300, 1)) {
     weights_at(triangulation, query, Interpolation::kLinear, weights);
     if (weights.empty()) continue;
-    // The sum and the mean, tested above, determine the weights in a triangle.
+    // The sum and the mean, which are tested above, determine the weights in a triangle.
     std::size_t holders = 0;
     for (const TriangleId t : triangulation.all_triangles()) {
       const auto corners = triangulation.vertices(t);
@@ -138,8 +138,8 @@ TYPED_TEST(InterpolationTest, NearestIsNearest) {
   }
 }
 
-TYPED_TEST(InterpolationTest, CocircularPointsMayBeTriangulatedAnyWay) {
-  // Mirrored, the perturbation chooses the other diagonals; the weights must not change.
+TYPED_TEST(InterpolationTest, WeightsDoNotDependOnCocircularDiagonals) {
+  // In a mirrored set the perturbation chooses the other diagonals; the weights must not change.
   Delaunay2<TypeParam> grid;
   grid.build_grid(0, 0, 7, 12, 12);
   Delaunay2<TypeParam> mirrored;
@@ -179,8 +179,8 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
     std::mt19937_64 random(2);
     std::vector<double> heights(triangulation.vertex_slots());
     for (double& h : heights) h = to_unit(random());
-    // Steps along lines through the whole set. Vertices are at least 1 apart, heights differ by
-    // less than 1: on these sets no slope is near 100.
+    // Takes steps along lines through the whole set. Vertices are at least 1 apart and heights
+    // differ by less than 1, so no slope in these sets is near 100.
     const double step = 1e-5;
     std::vector<Point2> queries;
     for (int line = 0; line < 20; ++line) {
@@ -193,7 +193,7 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
         }
       }
     }
-    // Across the circles themselves: lattice points are on many of them.
+    // Crosses the circles themselves; lattice points are on many of them.
     for (int x = 10; x < 90; ++x) {
       queries.push_back({x - step / 2, 0.5 * x + 13});
       queries.push_back({x + step / 2, 0.5 * x + 13});
@@ -213,7 +213,7 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
   }
 }
 
-TYPED_TEST(InterpolationTest, ManyQueriesEqualSingleOnesForAnyThreads) {
+TYPED_TEST(InterpolationTest, ManyQueriesEqualSingleOnesForAnyNumberOfThreads) {
   Delaunay2<TypeParam> triangulation;
   const auto points = make_points<TypeParam>(PointSet::kUniform, 3000, 4);
   triangulation.build(points);
@@ -330,7 +330,8 @@ TEST(Interpolation, GradientsOnEdgesAndVerticesAreMeans) {
   // The edge from (0, 0) to the top: gradients (0, 1) and (1 / 2, 0), areas 2 and 4.
   EXPECT_DOUBLE_EQ(at({1, 0.5}, triangles).x, 1.0 / 3);
   EXPECT_DOUBLE_EQ(at({1, 0.5}, triangles).y, 1.0 / 3);
-  // The top: the sum over a closed fan with level borders is zero. The corner: its two.
+  // At the top the sum over a closed fan with a level border is zero. The corner has its two
+  // triangles.
   EXPECT_DOUBLE_EQ(at({2, 1}, triangles).x, 0);
   EXPECT_DOUBLE_EQ(at({2, 1}, triangles).y, 0);
   for (const GradientFrom from : {triangles, natural}) {
@@ -341,8 +342,8 @@ TEST(Interpolation, GradientsOnEdgesAndVerticesAreMeans) {
   }
 }
 
-TEST(Interpolation, ManyNeighboursOfOneQuery) {
-  // A regular polygon: every circle through three of its corners contains the centre.
+TEST(Interpolation, HandlesManyNeighboursOfOneQuery) {
+  // In a regular polygon every circle through three of its corners contains the centre.
   constexpr std::size_t kCorners = 1500;
   std::vector<std::array<double, 2>> points;
   for (std::size_t i = 0; i < kCorners; ++i) {
@@ -386,7 +387,7 @@ TEST(Interpolation, SlopeAndAspect) {
   EXPECT_DOUBLE_EQ(slope_degrees({0, 0}), 0);
   EXPECT_DOUBLE_EQ(slope_degrees({3, 4}), std::atan(5) * 180 / 3.14159265358979323846);
   EXPECT_TRUE(std::isnan(slope_degrees({})));
-  // It rises to the north, so it faces south; and so on, clockwise.
+  // A surface that rises to the north faces south, and so on, clockwise.
   EXPECT_DOUBLE_EQ(aspect_degrees({0, 1}), 180);
   EXPECT_DOUBLE_EQ(aspect_degrees({1, 0}), 270);
   EXPECT_DOUBLE_EQ(aspect_degrees({0, -1}), 0);
@@ -466,7 +467,7 @@ TEST(Interpolation, RefusesBadData) {
   }
 }
 
-TEST(Interpolation, AFunctionsExceptionComesOut) {
+TEST(Interpolation, ExceptionsOfHeightFunctionsPropagate) {
   Delaunay2<std::int32_t> triangulation;
   triangulation.build_grid(0, 0, 1, 3, 3);
   const auto fails = [](VertexId) -> double { throw std::runtime_error("no height"); };

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kRange = 1000.0;
 
-/// What became of a search on numbers of vertices that are known.
+/// The outcome of a search in which the numbers of vertices are known.
 struct Outcome {
   bool found = false;
   int runs = 0;
@@ -32,14 +32,14 @@ Outcome search(std::uint64_t most, const VertexCount& count, const VertexCount& 
   return outcome;
 }
 
-/// Relief with a spectrum: between all samples and the corners.
+/// Relief with a spectrum: from all samples at a bound of 0 to the corners alone.
 VertexCount relief(double samples, double power) {
   return [=](double bound) {
     return std::floor(4.0 + samples / (1.0 + std::pow(bound / 0.3, power)));
   };
 }
 
-TEST(LeastError, WithinTwoPercent) {
+TEST(LeastError, UsesNearlyAllVertices) {
   for (const double power : {0.8, 1.3, 2.0, 2.6}) {
     const VertexCount count = relief(1e7, power);
     for (const std::uint64_t most : {1000U, 20'000U, 1'000'000U, 5'000'000U}) {
@@ -51,7 +51,7 @@ TEST(LeastError, WithinTwoPercent) {
       EXPECT_LE(plain.vertices, wanted);
       EXPECT_GE(plain.vertices, 0.98 * wanted);
       EXPECT_LE(plain.runs, 12);
-      // The estimate has 40 % more, and another slope.
+      // The estimate is 40 % too high and has another slope.
       const VertexCount estimate = [&](double bound) { return 1.4 * std::pow(count(bound), 1.02); };
       const Outcome estimated = search(most, count, estimate);
       EXPECT_LE(estimated.vertices, wanted);
@@ -61,7 +61,7 @@ TEST(LeastError, WithinTwoPercent) {
   }
 }
 
-TEST(LeastError, NumbersBeyondTheMostMayBeRough) {
+TEST(LeastError, CountsBeyondTheLimitMayBeEstimates) {
   const VertexCount count = relief(1e6, 1.7);
   for (const std::uint64_t most : {5'000U, 100'000U}) {
     const auto wanted = static_cast<double>(most);
@@ -77,7 +77,7 @@ TEST(LeastError, NumbersBeyondTheMostMayBeRough) {
   }
 }
 
-TEST(LeastError, StepsThatCannotBeMet) {
+TEST(LeastError, StopsAtAStepOfTheCount) {
   // 100 vertices below a bound of 7, 60 from there on.
   const VertexCount steps = [](double bound) { return bound < 7.0 ? 100.0 : 60.0; };
   for (const VertexCount& estimate : {VertexCount{}, steps, relief(1e6, 1.0)}) {
@@ -90,7 +90,7 @@ TEST(LeastError, StepsThatCannotBeMet) {
   }
 }
 
-TEST(LeastError, EnoughForAllSamples) {
+TEST(LeastError, ReachesZeroIfAllSamplesFit) {
   const VertexCount count = relief(1e4, 1.5);
   for (const VertexCount& estimate : {VertexCount{}, count}) {
     const Outcome outcome = search(1'000'000, count, estimate);
@@ -99,14 +99,14 @@ TEST(LeastError, EnoughForAllSamples) {
   }
 }
 
-TEST(LeastError, TooFewEvenForTheFlattest) {
+TEST(LeastError, FailsIfEvenTheFlattestMeshHasTooMany) {
   const VertexCount count = relief(1e7, 1.0);
   for (const VertexCount& estimate : {VertexCount{}, count}) {
     EXPECT_FALSE(search(5, count, estimate).found);
   }
 }
 
-TEST(LeastError, NothingRises) {
+TEST(LeastError, FlatGroundTakesOneRun) {
   int runs = 0;
   EXPECT_TRUE(least_error({.most = 4, .range = 0.0, .estimate = {}, .run = [&](double bound) {
                              EXPECT_EQ(bound, 0.0);
@@ -116,7 +116,7 @@ TEST(LeastError, NothingRises) {
   EXPECT_EQ(runs, 1);
 }
 
-TEST(LeastError, NothingBelowTheLeastIsTried) {
+TEST(LeastError, TriesNoBoundBelowTheLeast) {
   const VertexCount count = relief(1e6, 1.5);
   for (const VertexCount& estimate : {VertexCount{}, count}) {
     for (const double least : {0.1, 40.0, kRange}) {
@@ -138,7 +138,7 @@ TEST(LeastError, NothingBelowTheLeastIsTried) {
   }
 }
 
-TEST(LeastError, UselessEstimate) {
+TEST(LeastError, ToleratesAUselessEstimate) {
   const VertexCount count = relief(1e6, 1.7);
   const Outcome outcome = search(50'000, count, [](double) { return 17.0; });
   EXPECT_LE(outcome.vertices, 50'000.0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lids of open scans: against their definition, and while points come and go.
+// Lids of open scans, compared with their definition, and while points are added and removed.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -30,7 +30,7 @@ class Lids : public testing::Test {};
 using LidCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(Lids, LidCoords);
 
-/// A surface, and whether the scan is open.
+/// A surface, and whether its scan is open.
 template <class Coord>
 struct Seen {
   std::multiset<typename Drawn<Coord>::Points> triangles;
@@ -43,7 +43,8 @@ Seen<Coord> seen(const ShapeSurface& surface, const Delaunay3<Coord>& triangulat
   return {faces_of(surface, triangulation), surface.open};
 }
 
-/// What is seen of the closed surface by the definition; `share` is that of the lids.
+/// Computes the visible part of the closed surface by the definition; `share` is the share of the
+/// lids.
 template <class Coord>
 Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& triangulation,
                           double& share, std::size_t& lids) {
@@ -96,7 +97,8 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
   return others.open ? others : all;
 }
 
-/// A sheet of two sides, thin and dense, now and then with a hole; of other sets it is chance.
+/// Uses a two-sided sheet, thin and dense, sometimes with a hole. Other sets have lids only by
+/// chance.
 template <class Coord>
 std::vector<std::array<Coord, 3>> dense_patches(std::mt19937_64& random) {
   std::vector<std::array<Coord, 3>> points;
@@ -115,7 +117,7 @@ std::vector<std::array<Coord, 3>> dense_patches(std::mt19937_64& random) {
   return points;
 }
 
-TYPED_TEST(Lids, AreThoseOfTheDefinition) {
+TYPED_TEST(Lids, MatchTheDefinition) {
   using Coord = TypeParam;
   std::size_t open = 0, kept = 0;
   const auto check = [&](const std::vector<std::array<Coord, 3>>& points) {
@@ -148,8 +150,8 @@ TYPED_TEST(Lids, AreThoseOfTheDefinition) {
   EXPECT_GT(kept, 3u);
 }
 
-// Coordinates times a power of two are the same scan, as far as doubles reach.
-TEST(LidsTest, OfAnySizeAreTheSame) {
+// Scaling the coordinates by a power of two does not change the scan, within the range of doubles.
+TEST(LidsTest, DoNotDependOnScale) {
   std::mt19937_64 random(3);
   std::vector<Point3> points = bumpy_ball(1500, random);
   std::erase_if(points, [](const Point3& p) { return p[2] > 0x1.1p20; });
@@ -171,7 +173,7 @@ TEST(LidsTest, OfAnySizeAreTheSame) {
   EXPECT_EQ(wanted[1], 1u);
 }
 
-/// The tetrahedra and their shape, which follows the same changes as a live surface.
+/// The tetrahedra and their shape, which follows the same changes as a dynamic surface.
 template <class Coord>
 struct Followed {
   DynamicSurface<Coord> surface;
@@ -180,7 +182,7 @@ struct Followed {
   typename DynamicSurface<Coord>::Changes changes;
   typename Delaunay3<Coord>::Changes tetrahedra;
   Drawn<Coord> drawn{surface};
-  std::array<std::size_t, 2> answers{};  ///< closed, open
+  std::array<std::size_t, 2> answers{};  ///< number of closed scans, of open ones
   std::size_t turns = 0;
 
   Followed() {
@@ -196,7 +198,8 @@ struct Followed {
     surface.remove(vertices);
     triangulation.remove(vertices);
   }
-  /// Compares with the lids found from scratch; `scratch`: of the shape found from scratch, too.
+  /// Compares with the lids found from scratch; `scratch`: also with those of the shape found from
+  /// scratch.
   void check(bool scratch) {
     const bool before = surface.open();
     triangulation.take_changes(tetrahedra);
@@ -223,8 +226,8 @@ struct Followed {
   }
 };
 
-// Patches of a scan come and go in any order.
-TYPED_TEST(Lids, OfALiveSurfaceAreThoseFromScratch) {
+// Patches of a scan are added and removed in any order.
+TYPED_TEST(Lids, OfDynamicSurfacesEqualThoseFromScratch) {
   using Coord = TypeParam;
   std::array<std::size_t, 2> answers{};
   std::size_t turns = 0;
@@ -243,7 +246,7 @@ TYPED_TEST(Lids, OfALiveSurfaceAreThoseFromScratch) {
           if (region ? live.surface.point(v)[0] < at : random() % 3 == 0) some.push_back(v);
         live.remove(some);
       }
-      if (random() % 4 == 0) continue;  // several at once
+      if (random() % 4 == 0) continue;  // several operations at once
       ASSERT_NO_FATAL_FAILURE(live.check(random() % 5 == 0));
     }
     for (std::size_t i = 0; i < 2; ++i) answers[i] += live.answers[i];
@@ -254,8 +257,8 @@ TYPED_TEST(Lids, OfALiveSurfaceAreThoseFromScratch) {
   EXPECT_GT(turns, 5u);
 }
 
-// A ball without its cap is open; the cap comes and goes, piece by piece and at once.
-TYPED_TEST(Lids, AScanIsClosedAndOpenedAgain) {
+// A ball without its cap is open. The cap is added and removed, piece by piece and at once.
+TYPED_TEST(Lids, FollowScansThatCloseAndOpenAgain) {
   using Coord = TypeParam;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -296,8 +299,9 @@ TYPED_TEST(Lids, AScanIsClosedAndOpenedAgain) {
   }
 }
 
-/// A model of a scan, in which random clusters are expanded and collapsed: after each change its
-/// surface is that of its points but where shapes depend on their history, and its lids always are.
+/// Random clusters in a model of a scan are expanded and collapsed. After each change its surface
+/// must be that of its points, except where shapes depend on their history, and its lids must
+/// always be.
 void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& random,
                            std::array<std::size_t, 2>& answers) {
   using Surface3 = DynamicSurface<std::int32_t>;
@@ -356,7 +360,7 @@ TEST(LidsDataTest, FollowExpandedClustersOfRealScans) {
   if (folder == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
   struct Scan {
     const char* file;
-    double cut;  ///< of the height that is left; 1: all
+    double cut;  ///< share of the height that is left; 1: all
   };
   std::array<std::size_t, 2> answers{};
   for (const Scan& scan : {Scan{"bunny_range/bun000.ply.gz", 1.0}, Scan{"armadillo_tm.ply", 1.0},

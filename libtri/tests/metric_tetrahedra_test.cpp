@@ -43,7 +43,7 @@ MetricField3 three_spatial_regions(const std::vector<std::array<Coord, 3>>& poin
                        {box({0.1, 0.7, 0}, {1, 1, 1}), ellipsoid_map({1, 2, 1}, rotations()[4])}});
 }
 
-/// Tetrahedra by their points, in order, the corners as they come.
+/// Tetrahedra by their points, in order, with the corners in any rotation.
 template <class Triangulation>
 std::vector<Corners3> corners_of_all(const Triangulation& triangulation,
                                      const std::vector<std::array<VertexId, 4>>& tetrahedra) {
@@ -83,7 +83,7 @@ Rational volume(const std::vector<Corners3>& tetrahedra) {
 
 using Facet = std::array<Space, 3>;
 using SpaceEdge = std::array<Space, 2>;
-/// The corners in ascending order, and whether that took an odd number of swaps.
+/// The corners in ascending order, and whether sorting them took an odd number of swaps.
 std::pair<Facet, bool> directed(Facet facet) {
   bool odd = false;
   for (const auto& [i, k] : {std::pair(0u, 1u), std::pair(1u, 2u), std::pair(0u, 1u)}) {
@@ -125,8 +125,8 @@ class Check {
   }
 
  private:
-  /// Positive volumes, every facet in two of opposite directions or in one, the same sum of volumes
-  /// and the same corners: so the hull is covered once.
+  /// Volumes must be positive, every facet must be in two tetrahedra from opposite sides or in one,
+  /// and the sum of volumes and the corners must be the same. The hull is then covered once.
   void is_a_tetrahedralisation() {
     std::set<Space> corners_before, corners_after;
     for (const Corners3& t : before_) corners_before.insert(t.begin(), t.end());
@@ -176,7 +176,7 @@ class Check {
     return count;
   }
 
-  /// By the number of tetrahedra around the edge that is in the way.
+  /// Depends on the number of tetrahedra around the edge that is in the way.
   [[nodiscard]] bool can_be_flipped(const Facet& facet, const Space& d, const Space& e,
                                     const LinearMap3& map) const {
     std::size_t in_the_way = 0;
@@ -192,7 +192,7 @@ class Check {
       if (of_e != 0) {
         can = can && ring.size() == 3;
       } else {
-        // Closed around the edge, or both outer facets on the hull and coplanar.
+        // Closed around the edge, or both outer facets are on the hull and coplanar.
         can = can && (ring.size() == 4 ||
                       (ring.size() == 2 && facets_.at(directed({a, b, d}).first).size() == 1 &&
                        facets_.at(directed({a, b, e}).first).size() == 1));
@@ -214,7 +214,7 @@ class MetricTetrahedraTest : public ::testing::Test {};
 using CoordTypes = ::testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(MetricTetrahedraTest, CoordTypes);
 
-TYPED_TEST(MetricTetrahedraTest, KeepWhatIsGuaranteed) {
+TYPED_TEST(MetricTetrahedraTest, KeepTheGuarantees) {
   for (const PointSet3 kind : kPointSets3) {
     for (const std::size_t count : {1u, 4u, 20u, 200u}) {
       if (kind == PointSet3::kCurves && count > 20) continue;
@@ -235,7 +235,7 @@ TYPED_TEST(MetricTetrahedraTest, KeepWhatIsGuaranteed) {
   }
 }
 
-TYPED_TEST(MetricTetrahedraTest, AreOfThePointsAlone) {
+TYPED_TEST(MetricTetrahedraTest, DependOnThePointsAlone) {
   for (const PointSet3 kind : kPointSets3) {
     if (kind == PointSet3::kCurves) continue;
     SCOPED_TRACE(name(kind));
@@ -264,7 +264,7 @@ TYPED_TEST(MetricTetrahedraTest, AreOfThePointsAlone) {
   }
 }
 
-TYPED_TEST(MetricTetrahedraTest, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
+TYPED_TEST(MetricTetrahedraTest, OfOneMetricEqualTheEllipticalTriangulation) {
   std::vector<LinearMap3> maps = lower_maps3();
   maps.push_back(ellipsoid_map({7, 1, 2}, rotations()[3]));
   for (const PointSet3 kind : kPointSets3) {
@@ -284,7 +284,7 @@ TYPED_TEST(MetricTetrahedraTest, OfOneMetricAreThoseOfTheEllipticalTriangulation
       ASSERT_EQ(result.stuck, 0u);
       ASSERT_TRUE(sorted(corners_of_all(triangulation, result.tetrahedra)) ==
                   tetrahedra_of(elliptical));
-      // And back.
+      // And back again.
       const MetricField3 none(std::vector<MetricField3::Region>{});
       ASSERT_TRUE(
           sorted(corners_of_all(elliptical, metric_tetrahedra(elliptical, none).tetrahedra)) ==
@@ -293,7 +293,7 @@ TYPED_TEST(MetricTetrahedraTest, OfOneMetricAreThoseOfTheEllipticalTriangulation
   }
 }
 
-TEST(MetricTetrahedra3, StartFromAnEllipticalTriangulationToo) {
+TEST(MetricTetrahedra3, AlsoStartFromAnEllipticalTriangulation) {
   const auto points = make_points3<double>(PointSet3::kFiveBits, 300, 45);
   Elliptical3 triangulation(ellipsoid_map({3, 1, 1}, rotations()[3]));
   triangulation.build(points);
@@ -306,7 +306,7 @@ TEST(MetricTetrahedra3, StartFromAnEllipticalTriangulationToo) {
   EXPECT_GT(Check(before, after, field).run(result.stuck, triangulation.metric().map()), 100u);
 }
 
-TEST(MetricTetrahedra3, RefuseWhatIsNoField) {
+TEST(MetricTetrahedra3, RejectInvalidFields) {
   Delaunay3<double> triangulation;
   triangulation.build(std::vector<Space>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}});
   const MetricField3 bad([&](const Space& p) {

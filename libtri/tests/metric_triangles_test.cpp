@@ -30,7 +30,7 @@ std::vector<Corners> corners_of_all(const Triangulation& triangulation,
 }
 
 using PlaneEdge = std::pair<PlanePoint, PlanePoint>;
-/// The corner to the left of each directed edge.
+/// The corner on the left of each directed edge.
 std::map<PlaneEdge, PlanePoint> apices(const std::vector<Corners>& triangles) {
   std::map<PlaneEdge, PlanePoint> result;
   for (const Corners& t : triangles) {
@@ -51,8 +51,8 @@ std::set<PlaneEdge> border(const std::map<PlaneEdge, PlanePoint>& edges) {
 /// Checks all guarantees. Returns the number of triangles that are not in `before`.
 std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>& after,
                   const MetricField2& field, const LinearMap2& given = kIdentityMap<2>) {
-  // A triangulation of the same points: positive areas, every edge matched, the same border; so it
-  // covers the inside of the border once. And it has the same corners.
+  // A triangulation of the same points must have positive areas, matching edges and the same
+  // border, so that it covers the inside of the border once. It must also have the same corners.
   EXPECT_EQ(before.size(), after.size());
   std::set<PlanePoint> corners_before, corners_after;
   for (const Corners& t : before) corners_before.insert(t.begin(), t.end());
@@ -63,7 +63,7 @@ std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>
   EXPECT_TRUE(corners_before == corners_after);
   const auto edges_before = apices(before), edges_after = apices(after);
   EXPECT_TRUE(border(edges_before) == border(edges_after));
-  // Where regions meet nothing has changed.
+  // Nothing may change where regions meet.
   const auto mixed = [&](const Corners& t) {
     return field(t[0]) != field(t[1]) || field(t[0]) != field(t[2]);
   };
@@ -71,7 +71,7 @@ std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>
   std::copy_if(before.begin(), before.end(), std::back_inserter(mixed_before), mixed);
   std::copy_if(after.begin(), after.end(), std::back_inserter(mixed_after), mixed);
   EXPECT_TRUE(mixed_before == mixed_after);
-  // Within regions edges are Delaunay, ties broken as always.
+  // Edges within regions must be Delaunay, with ties broken as in Delaunay2.
   std::map<LinearMap2, planar::QuadraticForm> forms;
   for (const auto& [edge, apex] : edges_after) {
     const auto mate = edges_after.find({edge.second, edge.first});
@@ -99,7 +99,7 @@ class MetricTriangles : public ::testing::Test {};
 using CoordTypes = ::testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(MetricTriangles, CoordTypes);
 
-TYPED_TEST(MetricTriangles, KeepWhatIsGuaranteed) {
+TYPED_TEST(MetricTriangles, KeepTheGuarantees) {
   for (const PointSet kind : kPointSets) {
     for (const std::size_t count : {1u, 3u, 30u, 800u}) {
       SCOPED_TRACE(name(kind) + " " + std::to_string(count));
@@ -118,7 +118,7 @@ TYPED_TEST(MetricTriangles, KeepWhatIsGuaranteed) {
   }
 }
 
-TYPED_TEST(MetricTriangles, AreOfThePointsAlone) {
+TYPED_TEST(MetricTriangles, DependOnThePointsAlone) {
   for (const PointSet kind : kPointSets) {
     SCOPED_TRACE(name(kind));
     auto points = make_points<TypeParam>(kind, 400, 42);
@@ -142,7 +142,7 @@ TYPED_TEST(MetricTriangles, AreOfThePointsAlone) {
   }
 }
 
-TYPED_TEST(MetricTriangles, CoverWhatTheTrianglesThatTakePartCover) {
+TYPED_TEST(MetricTriangles, CoverTheSelectedTriangles) {
   for (const PointSet kind : kPointSets) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points<TypeParam>(kind, 600, 44);
@@ -161,7 +161,7 @@ TYPED_TEST(MetricTriangles, CoverWhatTheTrianglesThatTakePartCover) {
   }
 }
 
-TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
+TYPED_TEST(MetricTriangles, OfOneMetricEqualTheEllipticalTriangulation) {
   std::vector<LinearMap2> maps = lower_maps();
   maps.push_back(ellipse_map(7, 1, 25));
   for (const PointSet kind : kPointSets) {
@@ -178,7 +178,7 @@ TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
       const MetricField2 everywhere([&](const PlanePoint&) { return maps[m]; });
       ASSERT_TRUE(corners_of_all(triangulation, metric_triangles(triangulation, everywhere)) ==
                   triangles_of(elliptical));
-      // And back.
+      // And back again.
       const MetricField2 none(std::vector<MetricField2::Region>{});
       ASSERT_TRUE(corners_of_all(elliptical, metric_triangles(elliptical, none)) ==
                   triangles_of(triangulation));
@@ -186,7 +186,7 @@ TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
   }
 }
 
-TEST(MetricTriangles2, StartFromAnEllipticalTriangulationToo) {
+TEST(MetricTriangles2, AlsoStartFromAnEllipticalTriangulation) {
   const auto points = make_points<double>(PointSet::kSevenBits, 700, 45);
   Elliptical2 triangulation(ellipse_map(3, 1, 80));
   triangulation.build(points);
@@ -199,7 +199,7 @@ TEST(MetricTriangles2, StartFromAnEllipticalTriangulationToo) {
             100u);
 }
 
-TEST(MetricTriangles2, AWindowIsAFunctionOfThePointsAndTheWindow) {
+TEST(MetricTriangles2, WindowsDependOnPointsAndWindowAlone) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
@@ -230,7 +230,7 @@ TEST(MetricTriangles2, AWindowIsAFunctionOfThePointsAndTheWindow) {
   }
 }
 
-TEST(MetricField2, RefusesWhatIsNoField) {
+TEST(MetricField2, RejectsInvalidFields) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   using Regions = std::vector<MetricField2::Region>;
   const auto refuses = [](Regions regions, const std::string& where) {
@@ -253,7 +253,7 @@ TEST(MetricField2, RefusesWhatIsNoField) {
     return p[0] > 0 ? LinearMap2{1, 0, 0, kNan} : kIdentityMap<2>;
   });
   EXPECT_THROW(static_cast<void>(metric_triangles(triangulation, bad)), std::invalid_argument);
-  // Closed boxes, the first one applies, Euclidean outside.
+  // Boxes are closed, the first one applies, and the metric is Euclidean outside.
   const MetricField2 field({{box, {2, 0, 0, 1}}, {box2(1, 0, 2, 1), {3, 0, 0, 1}}});
   EXPECT_EQ(field({1, 1})[0], 2);
   EXPECT_EQ(field({1.5, 0})[0], 3);

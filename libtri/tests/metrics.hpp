@@ -20,8 +20,8 @@ using Elliptical2 = Delaunay2<double, EllipticalMetric2>;
 using PlanePoint = std::array<double, 2>;
 using Corners = std::array<PlanePoint, 3>;
 
-/// Maps that keep the lexicographic order, so that mapped ties are broken in the same way; every
-/// metric has one such map.
+/// Maps that keep the lexicographic order, so that ties of mapped points are broken in the same
+/// way. Every metric has one such map.
 inline const std::vector<LinearMap2>& lower_maps() {
   static const std::vector<LinearMap2> maps{{1, 0, 0, 1},       {1, 0, 0, 3},
                                             {0.1, 0, 0.7, 0.3}, {5, 0, -4, 0.5},
@@ -36,7 +36,7 @@ inline CGAL::Exact_rational square(const LinearMap2& m, const CGAL::Exact_ration
   return u * u + v * v;
 }
 
-/// 1 if p lies inside the ellipse through the counter-clockwise a, b, c, 0 if on it, -1 if outside.
+/// 1 if p is inside the ellipse through the counter-clockwise a, b, c, 0 if on it, -1 if outside.
 inline int in_ellipse(const LinearMap2& m, const PlanePoint& a, const PlanePoint& b,
                       const PlanePoint& c, const PlanePoint& p) {
   using Q = CGAL::Exact_rational;

@@ -19,8 +19,8 @@ using Elliptical3 = Delaunay3<double, EllipticalMetric3>;
 using Space = std::array<double, 3>;
 using Corners3 = std::array<Space, 4>;
 
-/// Maps that keep the lexicographic order, so that mapped ties are broken in the same way; every
-/// metric has one such map.
+/// Maps that keep the lexicographic order, so that ties of mapped points are broken in the same
+/// way. Every metric has one such map.
 inline const std::vector<LinearMap3>& lower_maps3() {
   static const std::vector<LinearMap3> maps{{1, 0, 0, 0, 1, 0, 0, 0, 1},
                                             {1, 0, 0, 0, 3, 0, 0, 0, 0.25},
@@ -31,7 +31,7 @@ inline const std::vector<LinearMap3>& lower_maps3() {
   return maps;
 }
 
-/// Rotations with rational entries, not all of which are doubles, and those of the axes.
+/// Rotations with rational entries, not all of which are doubles, and one that permutes the axes.
 inline const std::vector<LinearMap3>& rotations() {
   static const std::vector<LinearMap3> axes{
       kIdentityMap<3>,
@@ -73,8 +73,8 @@ inline Rational determinant(const Rationals& a, const Rationals& b, const Ration
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/// 1 if p lies inside the ellipsoid through the four corners, 0 if on it, -1 if outside; for any
-/// order of the corners, which are not coplanar.
+/// 1 if p is inside the ellipsoid through the four corners, 0 if on it, -1 if outside. The corners,
+/// which are not coplanar, may have any order.
 inline int in_ellipsoid(const LinearMap3& m, const Corners3& corners, const Space& p) {
   std::array<Rationals, 4> d;
   std::array<Rational, 4> s;
@@ -82,7 +82,8 @@ inline int in_ellipsoid(const LinearMap3& m, const Corners3& corners, const Spac
     d[i] = exact_difference(corners[i], p);
     s[i] = square(m, d[i]);
   }
-  // Barycentric coordinates of p times the volume: the power of p is their sum of squares.
+  // Barycentric coordinates of p times the volume. Weighted with these, the squared distances of
+  // the corners add up to the power of p.
   const Rational w0 = determinant(d[1], d[2], d[3]), w1 = determinant(d[0], d[2], d[3]),
                  w2 = determinant(d[0], d[1], d[3]), w3 = determinant(d[0], d[1], d[2]);
   const Rational volume = w0 - w1 + w2 - w3;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The model in space, and the shape that follows it by its deltas.
+// The model in space, and the shape that follows it through its deltas.
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -65,7 +65,7 @@ ClusterId any_cluster(const MultiresolutionModel<Delaunay3<Coord>>& model, Clust
   return all.empty() ? root : all[below(random, all.size())];
 }
 
-TYPED_TEST(Multiresolution3D, IsAFunctionOfTheExpandedClustersAndTheShapeFollows) {
+TYPED_TEST(Multiresolution3D, DependsOnExpandedClustersAloneAndTheShapeFollows) {
   using Coord = TypeParam;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     for (const Place place : {Place::volume, Place::sphere, Place::lattice, Place::plane}) {

@@ -10,8 +10,8 @@
 
 #include "terrace/tri/multiresolution.hpp"
 
-/// Hierarchies of clusters in memory for the tests: small, made by nearest-centre clustering, able
-/// to simulate every fault of a source.
+/// Small hierarchies of clusters in memory for the tests, made by nearest-centre clustering. They
+/// can simulate every fault of a source.
 
 namespace terrace::tri::test {
 
@@ -61,7 +61,7 @@ class MemorySource : public ClusterSource {
   ClusterMembers read(ClusterId id) override {
     spend();
     was_read.push_back(id);
-    // A copy that the next call overwrites, as the contract allows.
+    // A copy that the next call overwrites, which the contract permits.
     last_ = at(id);
     return {last_.positions, last_.children};
   }
@@ -77,8 +77,8 @@ class MemorySource : public ClusterSource {
   Cluster last_;
 };
 
-/// Clusters the points level by level about random centres, most to the nearest one: one point in
-/// `ratio` goes up, `levels` times (fewer if one point is left).
+/// Clusters the points level by level about random centres, assigning most points to the nearest
+/// one. One point in `ratio` rises to the next level, `levels` times (fewer if one point is left).
 inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned levels, double ratio,
                                    std::mt19937_64& random) {
   struct Node {
@@ -108,7 +108,8 @@ inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned l
           nearest = c;
         }
       }
-      // Some go astray, so that clusters overlap and points with equal coordinates are separated.
+      // Some are assigned elsewhere, so that clusters overlap and points with equal coordinates are
+      // separated.
       if (below(random, 6) == 0) nearest = below(random, centres);
       MemorySource::Cluster& cluster = clusters[nearest];
       cluster.positions.push_back(nodes[i].position);
@@ -136,7 +137,7 @@ inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned l
   return source;
 }
 
-/// Kinds of point sets; heights distinguish all points.
+/// Kinds of point sets. Heights distinguish all points.
 enum class Shape { random, grid, duplicates, line, one_place };
 
 inline std::vector<Point3> make_points(Shape shape, std::size_t count, std::mt19937_64& random) {

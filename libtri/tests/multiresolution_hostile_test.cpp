@@ -20,7 +20,7 @@ MemorySource good_source(std::uint64_t seed) {
   return make_hierarchy(make_points(Shape::duplicates, 150, random), 3, 4.0, random);
 }
 
-// Wherever in a step the source fails, the model is unchanged and the next step works.
+// Wherever in a step the source fails, the model must be unchanged and the next step must work.
 TEST(MultiresolutionFailure, LeavesTheModelUnchanged) {
   const Detail details[] = {{0, {}},
                             {3, {}},
@@ -58,7 +58,7 @@ TEST(MultiresolutionFailure, LeavesTheModelUnchanged) {
   }
 }
 
-TEST(MultiresolutionFailure, LeavesNothingWhenTheModelCannotBegin) {
+TEST(MultiresolutionFailure, LeavesNothingBehindInTheConstructor) {
   for (std::size_t lives = 0; lives < 30; ++lives) {
     MemorySource source = good_source(3);
     source.lives = lives;
@@ -67,14 +67,14 @@ TEST(MultiresolutionFailure, LeavesNothingWhenTheModelCannotBegin) {
 }
 
 // Corrupts one cluster of an otherwise good source, and expects a step into it to fail with the
-// message, whether it comes first or last among the clusters of the step.
+// message, whether the cluster comes first or last in the step.
 void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, unsigned level,
                     const std::string& message) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     MemorySource source = good_source(seed);
     const WholeTree tree(source);
-    // The corrupted cluster must have at least two members, to contradict each other.
+    // The corrupted cluster needs at least two members, so that these can contradict each other.
     std::uint64_t ordinal = 0;
     while (source.levels[level][ordinal].positions.size() < 2) ++ordinal;
     const ClusterId id = cluster_id(level, ordinal);
@@ -92,13 +92,13 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     EXPECT_TRUE(none.empty());
     source.levels = good.levels;
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, {}));
-    // The failure leaves nothing behind.
+    // The failure must leave nothing behind.
     ASSERT_NO_THROW(model.set_level(0));
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, wanted(tree, source, {0, {}})));
   }
 }
 
-TEST(MultiresolutionHostile, OrdinalOutOfRange) {
+TEST(MultiresolutionHostile, RejectsOrdinalsOutOfRange) {
   expect_refused(
       [](MemorySource& s, ClusterId id) { s.at(id).children.back() = s.levels[0].size(); }, 1,
       "which has");
@@ -106,7 +106,7 @@ TEST(MultiresolutionHostile, OrdinalOutOfRange) {
                  "heads cluster 18446744073709551615 of level 1");
 }
 
-TEST(MultiresolutionHostile, CountsThatContradictEachOther) {
+TEST(MultiresolutionHostile, RejectsContradictoryCounts) {
   expect_refused([](MemorySource& s, ClusterId id) { s.at(id).positions.pop_back(); }, 0,
                  "its record claims");
   expect_refused([](MemorySource& s, ClusterId id) { s.at(id).children.pop_back(); }, 1,
@@ -117,8 +117,8 @@ TEST(MultiresolutionHostile, CountsThatContradictEachOther) {
                  0, "its record claims 18446744073709551615 members");
 }
 
-// A tree cannot have cycles, as levels decrease; what can occur are clusters with two heads.
-TEST(MultiresolutionHostile, ClusterWithTwoHeads) {
+// A tree cannot have cycles, as levels decrease. What can occur is a cluster with two heads.
+TEST(MultiresolutionHostile, RejectsClustersWithTwoHeads) {
   expect_refused([](MemorySource& s, ClusterId id) { s.at(id).children[1] = s.at(id).children[0]; },
                  1, "heads as well");
   expect_refused(
@@ -139,7 +139,7 @@ TEST(MultiresolutionHostile, ClusterWithTwoHeads) {
       2, "heads as well");
 }
 
-TEST(MultiresolutionHostile, CoordinatesThatTheTriangulationCannotTake) {
+TEST(MultiresolutionHostile, RejectsCoordinatesThatTheTriangulationCannotHold) {
   for (const double bad :
        {-1.0, 0.5, 1073741824.0, 1e300, std::nan(""), std::numeric_limits<double>::infinity()}) {
     SCOPED_TRACE(bad);
@@ -151,12 +151,12 @@ TEST(MultiresolutionHostile, CoordinatesThatTheTriangulationCannotTake) {
   source.at(cluster_id(0, 0)).record.members = 1;
   MultiresolutionModel<StandIn<double>> model(source);
   EXPECT_THROW(model.set_level(0), HierarchyError);
-  // Any height is accepted, and negative zero is zero.
+  // Any height must be accepted, and negative zero must be zero.
   source.at(cluster_id(0, 0)).positions[0] = {1e9, -0.0, std::nan("")};
   EXPECT_NO_THROW(model.set_level(0));
 }
 
-TEST(MultiresolutionHostile, RootThatIsBad) {
+TEST(MultiresolutionHostile, RejectsBadRoots) {
   MemorySource source = good_source(2);
   source.root().children.pop_back();
   EXPECT_THROW(StandInModel{source}, HierarchyError);
@@ -168,7 +168,7 @@ TEST(MultiresolutionHostile, RootThatIsBad) {
   EXPECT_THROW(StandInModel{source}, HierarchyError);
 }
 
-TEST(MultiresolutionHostile, BoxesThatAreNotNumbersIntersectNothing) {
+TEST(MultiresolutionHostile, NanBoxesIntersectNothing) {
   MemorySource source = good_source(2);
   for (auto& level : source.levels) {
     for (auto& cluster : level) cluster.record.box.min[0] = std::nan("");
@@ -178,7 +178,7 @@ TEST(MultiresolutionHostile, BoxesThatAreNotNumbersIntersectNothing) {
   EXPECT_EQ(model.expanded_count(), 0u);
 }
 
-TEST(MultiresolutionMisuse, ClustersThatAreNotThere) {
+TEST(MultiresolutionMisuse, RejectsMissingClusters) {
   MemorySource source = good_source(1);
   StandInModel model(source);
   const ClusterId hidden = cluster_id(0, 0), unknown = cluster_id(2, 1000), root = cluster_id(3, 0);

@@ -12,11 +12,11 @@
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
-/// The specification of the model, in the plainest form.
+/// The specification of the model, as simple as possible.
 
 namespace terrace::tri::test {
 
-/// The tree of all clusters of a hierarchy: parent by child, without the root.
+/// The tree of all clusters of a hierarchy, as parents by child, without the root.
 class WholeTree {
  public:
   explicit WholeTree(MemorySource& source) : source_(&source) {
@@ -124,8 +124,8 @@ Expectation<Point> expect(MemorySource& source, const ClusterSet& expanded) {
   return result;
 }
 
-/// Compares everything that a model reports with the expectation, and its triangles with those made
-/// from scratch.
+/// Compares everything that a model reports with the expected values, and its triangles with those
+/// made from scratch.
 template <class T>
 void check_model(const MultiresolutionModel<T>& model, MemorySource& source,
                  const ClusterSet& expanded) {

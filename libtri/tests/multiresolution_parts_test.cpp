@@ -22,7 +22,7 @@ TEST(ClusterId, HoldsLevelAndOrdinal) {
   EXPECT_EQ(to_string(cluster_id(3, 12)), "cluster 12 of level 3");
 }
 
-TEST(PointId, HigherLevelThenSmallerIdStands) {
+TEST(PointId, HigherLevelThenSmallerIdRepresents) {
   const PointId coarse{cluster_id(2, 9), 5}, fine{cluster_id(0, 1), 0};
   EXPECT_TRUE(stands_before(coarse, fine));
   EXPECT_FALSE(stands_before(fine, coarse));
@@ -43,7 +43,8 @@ TEST(Box, IsClosed) {
   EXPECT_FALSE(a.covers(box2(0, 0, 1, 1)));
 }
 
-// Against std::map, with ids that differ little, so that long probe sequences form and dissolve.
+// Compares with std::map, using ids that differ little, so that long probe sequences form and
+// dissolve.
 TEST(ClusterMap, BehavesLikeAMap) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);

@@ -15,9 +15,9 @@
 
 namespace terrace::tri::test {
 
-/// A stand-in for a triangulation that is too simple to be wrong: it keeps a set of points and
-/// calls any three consecutive ones in lexicographic order a triangle. Everything is rebuilt after
-/// each change, and the journal is made by comparison with a copy. It separates faults of the model
+/// A replacement for a triangulation that is too simple to be wrong. It keeps a set of points and
+/// calls any three consecutive ones in lexicographic order a triangle. It rebuilds everything after
+/// each change, and makes the journal by comparison with a copy. It separates faults of the model
 /// from those of the triangulation.
 template <class Coord>
 class StandIn {
@@ -41,9 +41,9 @@ class StandIn {
   }
   void insert(std::span<const Point> points, std::span<Insertion> results, VertexId) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto there = by_point_.find(points[i]);
-      if (there != by_point_.end()) {
-        results[i] = {VertexId{there->second}, false};
+      const auto found = by_point_.find(points[i]);
+      if (found != by_point_.end()) {
+        results[i] = {VertexId{found->second}, false};
         continue;
       }
       const std::uint32_t slot = take(free_vertices_, vertex_end_);
@@ -55,11 +55,11 @@ class StandIn {
   }
   void remove(std::span<const VertexId> vertices) {
     for (const VertexId vertex : vertices) {
-      const auto there = state_.vertices.find(static_cast<std::uint32_t>(vertex));
-      if (there == state_.vertices.end()) throw std::logic_error("removed twice");
-      by_point_.erase(there->second);
-      free_vertices_.push_back(there->first);
-      state_.vertices.erase(there);
+      const auto found = state_.vertices.find(static_cast<std::uint32_t>(vertex));
+      if (found == state_.vertices.end()) throw std::logic_error("removed twice");
+      by_point_.erase(found->second);
+      free_vertices_.push_back(found->first);
+      state_.vertices.erase(found);
     }
     renew();
   }
@@ -103,7 +103,7 @@ class StandIn {
   }
 
  private:
-  // Includes the slots: a point that comes back in another slot makes other triangles.
+  // Includes the slots, so a point that comes back in another slot makes other triangles.
   using Corner = std::pair<Point, std::uint32_t>;
   using Corners = std::array<Corner, 3>;
   struct State {

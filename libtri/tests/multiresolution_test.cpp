@@ -95,9 +95,9 @@ std::vector<ClusterId> expandable(const MultiresolutionModel<T>& model, MemorySo
   return found;
 }
 
-// Any sequence of steps: the expanded set agrees with the step's definition, the model with the
-// expanded set, and a consumer of deltas sees exactly that.
-TYPED_TEST(Multiresolution, EveryStepDoesWhatItSays) {
+// For any sequence of steps, the expanded set must agree with the step's definition, the model with
+// the expanded set, and a consumer of deltas with the model.
+TYPED_TEST(Multiresolution, EveryStepFollowsItsDefinition) {
   for (Case& c : cases(40)) {
     TRACE_CASE(c);
     const WholeTree tree(c.source);
@@ -180,9 +180,9 @@ TYPED_TEST(Multiresolution, CollapseIsTheInverseOfExpand) {
   }
 }
 
-// The order in which a set of clusters was expanded leaves no trace, nor does whatever was expanded
-// meanwhile, nor whether points came in bulk.
-TYPED_TEST(Multiresolution, OrderLeavesNoTrace) {
+// The order in which a set of clusters was expanded must not matter, nor other clusters expanded in
+// between, nor whether points were built in bulk.
+TYPED_TEST(Multiresolution, ResultDoesNotDependOnOrder) {
   for (Case& c : cases(15)) {
     TRACE_CASE(c);
     const WholeTree tree(c.source);
@@ -205,7 +205,7 @@ TYPED_TEST(Multiresolution, OrderLeavesNoTrace) {
   }
 }
 
-TYPED_TEST(Multiresolution, LevelZeroIsAllPointsAndTheTopIsTheRoot) {
+TYPED_TEST(Multiresolution, LevelZeroHasAllPointsAndTheTopOnlyTheRoot) {
   for (Case& c : cases(3)) {
     TRACE_CASE(c);
     const WholeTree tree(c.source);
@@ -225,7 +225,7 @@ TYPED_TEST(Multiresolution, LevelZeroIsAllPointsAndTheTopIsTheRoot) {
   }
 }
 
-TYPED_TEST(Multiresolution, HeadsAreWhereTheirClustersSay) {
+TYPED_TEST(Multiresolution, HeadsAgreeWithTheirClusters) {
   for (Case& c : cases(3)) {
     TRACE_CASE(c);
     MultiresolutionModel<TypeParam> model(c.source, {0, {}});
@@ -238,7 +238,7 @@ TYPED_TEST(Multiresolution, HeadsAreWhereTheirClustersSay) {
   }
 }
 
-TYPED_TEST(Multiresolution, DoingItAgainChangesNothing) {
+TYPED_TEST(Multiresolution, RepeatedStepsChangeNothing) {
   std::mt19937_64 random(5);
   MemorySource source = make_hierarchy(make_points(Shape::random, 100, random), 2, 5.0, random);
   MultiresolutionModel<TypeParam> model(source);
@@ -263,9 +263,9 @@ TYPED_TEST(Multiresolution, WithoutDeltasTheModelIsTheSame) {
   }
 }
 
-// One step takes a vertex out with one cluster and puts it back with another, possibly in its
-// former slot. Either way, the consumer learns the new height.
-TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
+// One step removes a vertex with one cluster and adds it again with another, possibly in its former
+// slot. In both cases the consumer must learn the new height.
+TYPED_TEST(Multiresolution, VertexMayChangeOwnersWithinAStep) {
   MemorySource source;
   source.levels.resize(2);
   const Box3 boxes[] = {box2(0, 0, 40, 40), box2(60, 0, 100, 40), box2(0, 60, 40, 100)};
@@ -290,8 +290,8 @@ TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
   }
 }
 
-// Roots with zero, one and two points; clusters without members; one level only.
-TYPED_TEST(Multiresolution, TinyHierarchies) {
+// Roots with zero, one and two points; clusters without members; a single level.
+TYPED_TEST(Multiresolution, HandlesTinyHierarchies) {
   for (const std::size_t count : {0u, 1u, 2u, 3u}) {
     SCOPED_TRACE(count);
     MemorySource source;

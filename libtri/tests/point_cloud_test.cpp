@@ -15,8 +15,8 @@
 namespace terrace::tri::test {
 namespace {
 
-// Against a map from slots to points: contents, hash, and the journal as the net difference.
-TEST(PointCloud, IsWhatAMapIs) {
+// Compares contents, hash and the journal's net changes with a map from slots to points.
+TEST(PointCloud, BehavesLikeAMap) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
@@ -76,8 +76,8 @@ TEST(PointCloud, RefusesPointsThatAreNotFinite) {
   EXPECT_EQ(set.vertex_count(), 0u);
 }
 
-// Under the view control: the points of the expanded clusters, each once, and a collapse gives back
-// the very set.
+// Under a view control the points must be those of the expanded clusters, each once, and a collapse
+// must restore the same set.
 TEST(PointCloud, HoldsThePointsOfTheExpandedClusters) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(seed);

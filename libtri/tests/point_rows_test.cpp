@@ -37,7 +37,7 @@ struct Grid {
   [[nodiscard]] SampleRows rows() const { return {x, y, z}; }
 };
 
-/// The places of all samples.
+/// The positions of all samples.
 struct Places {
   std::vector<double> x, y;
 
@@ -53,7 +53,7 @@ struct Places {
 struct Shape {
   std::size_t columns, rows;
   double extent;  ///< of the frame
-  double first;   ///< place of the first column and row, in steps from the frame's side
+  double first;   ///< position of the first column and row, in steps from the frame's side
 };
 
 /// `gaps`: the share of missing samples.
@@ -102,8 +102,8 @@ PointTinOptions options_of(double error, TinQuality quality, double step = 0x1p-
   return options;
 }
 
-/// Triangles are counter-clockwise, and every edge occurs once in each direction, except those of
-/// the frame.
+/// Triangles must be counter-clockwise, and every edge must occur once in each direction, except
+/// for those of the frame.
 void check_framed_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
   ASSERT_EQ(tin.sample.size(), tin.vertices.size());
   const auto place = [&](std::uint32_t v) {
@@ -131,7 +131,7 @@ void check_framed_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
   }
 }
 
-/// The errors that the TIN reports, against measure_surface(), which does not depend on rows.
+/// Compares the errors that the TIN reports with measure_surface(), which does not depend on rows.
 void check_errors(const Places& places, const std::vector<double>& heights, const PointTin& tin,
                   double bound) {
   std::vector<double> x, y, z;
@@ -198,7 +198,7 @@ TEST(PointRows, KeepTheErrorOnALattice) {
 struct Bend {
   double degrees;
   bool mirrored;
-  double bulge;  ///< shares of the extent
+  double bulge;  ///< share of the extent
 };
 
 Places bent(const Grid& grid, double extent, const Bend& bend) {
@@ -235,7 +235,7 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
                        std::to_string(static_cast<int>(quality)));
           Grid grid = make_grid(shape, 0.05, 3);
           Places places = bent(grid, shape.extent, bend);
-          // A sample without a place has no height.
+          // A sample without a position has no height.
           places.x[5] = places.y[5] = grid.z[5] = kMissing;
           const std::vector<Point3> frame = make_frame(shape.extent, 5, 4);
           const PointTinOptions options = options_of(error, quality);
@@ -251,7 +251,7 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
   }
 }
 
-TEST(PointRows, AsFewTrianglesAsOfPoints) {
+TEST(PointRows, HaveAsFewTrianglesAsPointTins) {
   const Grid grid = make_grid({300, 300, 32767, 0}, 0.0, 5);
   const std::vector<Point3> frame = make_frame(32767, 9, 6);
   std::vector<double> x, y;
@@ -266,7 +266,7 @@ TEST(PointRows, AsFewTrianglesAsOfPoints) {
       const PointTinOptions options = options_of(error, quality);
       const PointTin tin = point_tin(grid.rows(), frame, options);
       const PointTin of_points = point_tin(x, y, grid.z, frame, options);
-      // Points are inserted by sweeps before removal, which here leaves a few per cent less.
+      // Sweeps insert points before removal, which leaves a few per cent less here.
       const double most = quality == TinQuality::kRemoval ? 1.08 : 1.04;
       EXPECT_LE(static_cast<double>(tin.triangles.size()),
                 most * static_cast<double>(of_points.triangles.size()));
@@ -287,7 +287,7 @@ void expect_same(const PointTin& a, const PointTin& b) {
   EXPECT_EQ(a.errors.largest_at, b.errors.largest_at);
 }
 
-TEST(PointRows, AllPathsGiveTheSame) {
+TEST(PointRows, AllInstructionSetsGiveTheSame) {
   for (const double gaps : {0.0, 0.05}) {
     for (const double extent : {32767.0, 100.0}) {
       SCOPED_TRACE("gaps " + std::to_string(gaps) + ", extent " + std::to_string(extent));
@@ -315,8 +315,8 @@ TEST(PointRows, AllPathsGiveTheSame) {
   }
 }
 
-// Several samples per place of the lattice, with cliffs between them.
-TEST(PointRows, LatticeTooCoarseForTheError) {
+// Several samples per position of the lattice, with cliffs between them.
+TEST(PointRows, ReportLatticesTooCoarseForTheError) {
   Grid grid = make_grid({120, 120, 20, 0}, 0.0, 9);
   std::mt19937_64 random(9);
   for (double& z : grid.z) z = 100 * unit(random);
@@ -330,13 +330,13 @@ TEST(PointRows, LatticeTooCoarseForTheError) {
   }
 }
 
-TEST(PointRows, ErrorZero) {
+TEST(PointRows, KeepAnErrorOfZero) {
   const Grid grid = make_grid({20, 20, 1000, 0}, 0.1, 11);
   const std::vector<Point3> frame = make_frame(1000, 2, 12);
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, TinQuality::kRemoval));
   check_framed_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.0);
-  // All inside are vertices, as their heights are rounded.
+  // All samples inside are vertices, as their heights are rounded.
   EXPECT_GT(tin.vertices.size(), 250u);
 }
 
@@ -360,7 +360,7 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
   EXPECT_EQ(std::count(tin.sample.begin(), tin.sample.end(), 12u), 1);
 }
 
-TEST(PointRows, FewSamples) {
+TEST(PointRows, HandleFewSamples) {
   const std::vector<Point3> frame{{0, 0, 1}, {10, 0, 2}, {10, 10, 3}, {0, 10, 4}};
   const PointTinOptions options = options_of(0.5, TinQuality::kRemoval);
   Grid grid;
@@ -384,8 +384,9 @@ TEST(PointRows, FewSamples) {
   EXPECT_EQ(row.errors.covered, 3u);
 }
 
-// Inputs without a fast path take the other one, with the numbers of rows and columns.
-TEST(PointRows, IrregularPlacesAndFrames) {
+// Inputs that the fast path does not support take the other one, with the numbers of rows and
+// columns.
+TEST(PointRows, AcceptIrregularPlacesAndFrames) {
   Grid grid = make_grid({40, 40, 1000, 0}, 0.05, 13);
   grid.x[7] += 10;
   const std::vector<Point3> frame = make_frame(1000, 2, 14);
@@ -408,7 +409,7 @@ TEST(PointRows, IrregularPlacesAndFrames) {
   check_errors(Places(even), even.z, point_tin(even.rows(), {}, free), 1.0);
 }
 
-TEST(PointRows, RefuseBadInput) {
+TEST(PointRows, RejectBadInput) {
   Grid grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
   const std::vector<Point3> frame = make_frame(1000, 1, 16);
   const PointTinOptions options = options_of(1.0, TinQuality::kGreedy);

@@ -49,7 +49,7 @@ TEST(PointTin, KeepsTheFrame) {
         inside += x >= 0 && x <= 1000 && y >= 0 && y <= 1000 ? 1 : 0;
         cloud.add(x, y, rough(x / 1000, y / 1000));
       }
-      // A hair outside and on the sides, where the frame determines the heights.
+      // Slightly outside and on the sides, where the frame determines the heights.
       cloud.add(500, std::nextafter(1000.0, 2000.0), 0);
       cloud.add(std::nextafter(0.0, -1.0), 20, 0);
       cloud.add(500, 1000, 500);
@@ -67,7 +67,7 @@ TEST(PointTin, KeepsTheFrame) {
       const TinErrors measured = measure(cloud, tin);
       EXPECT_EQ(measured.covered, inside);
       EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
-      // All except these two keep the error.
+      // All except these two must keep the error.
       cloud.z[cloud.size() - 1] = frame[0][2];
       cloud.x[cloud.size() - 2] = 2000;
       EXPECT_LE(measure(cloud, tin).largest, 2 + 1e-9);
@@ -107,7 +107,7 @@ TEST(PointTin, KeepsTheErrorOnALattice) {
       const TinErrors measured = measure(cloud, tin);
       EXPECT_EQ(measured.covered, tin.errors.covered);
       EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
-      // A coarse lattice cannot represent the terrain, and reports it.
+      // A coarse lattice cannot represent the terrain and must report it.
       if (tin.stuck == 0) {
         EXPECT_LE(tin.errors.largest, 1.5);
       } else {
@@ -123,8 +123,8 @@ TEST(PointTin, KeepsTheErrorOnALattice) {
   }
 }
 
-/// On few whole numbers many places are on one line or circle.
-TEST(PointTin, PredicatesOfWholeNumbersAreThoseOfDoubles) {
+/// With few different integers many positions are collinear or cocircular.
+TEST(PointTin, IntegerPredicatesAgreeWithThoseOfDoubles) {
   using tin::points::Kernel, tin::points::Place2, tin::points::WholeKernel;
   std::mt19937_64 random(9);
   std::array<std::size_t, 2> ties{};
@@ -134,7 +134,7 @@ TEST(PointTin, PredicatesOfWholeNumbersAreThoseOfDoubles) {
       for (Place2& place : p) {
         for (double& c : place) {
           c = static_cast<double>(random() % (size + 1));
-          // The corners of the largest square are the largest products.
+          // The corners of the largest square give the largest products.
           if (i % 4 == 0) c = c < static_cast<double>(size) / 2 ? 0 : static_cast<double>(size);
         }
       }
@@ -151,7 +151,7 @@ TEST(PointTin, PredicatesOfWholeNumbersAreThoseOfDoubles) {
   EXPECT_GT(ties[1], 1000U);
 }
 
-/// The first vertices have more triangles than bits in a word.
+/// The first vertices have more triangles than a word has bits.
 TEST(PointTin, KeepsTheErrorInAFrameOfManyVertices) {
   for (const std::uint64_t seed : {1u, 2u}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -177,7 +177,7 @@ TEST(PointTin, KeepsTheErrorInAFrameOfManyVertices) {
   }
 }
 
-TEST(PointTin, LatticeTooCoarseForTheError) {
+TEST(PointTin, ReportsLatticesTooCoarseForTheError) {
   Cloud cloud;
   std::mt19937_64 random(9);
   for (std::size_t i = 0; i < 2000; ++i)

@@ -16,7 +16,7 @@ namespace {
 
 using namespace point_tin_oracle;
 
-TEST(PointTin, Duplicates) {
+TEST(PointTin, HandlesDuplicates) {
   const Cloud cloud{{0, 10, 10, 0, 5, 5, 5}, {0, 0, 10, 10, 5, 5, 5}, {0, 0, 0, 0, 7, 2, 6}};
   const std::pair<PointDuplicates, double> cases[] = {{PointDuplicates::kFirst, 7},
                                                       {PointDuplicates::kMin, 2},
@@ -63,7 +63,7 @@ TEST(PointTin, Duplicates) {
   }
 }
 
-TEST(PointTin, NothingToTriangulate) {
+TEST(PointTin, HasNoSurfaceWithoutArea) {
   const PointTinOptions options;
   for (const std::size_t count : {0u, 1u, 2u, 3u, 50u}) {
     Cloud equal;
@@ -86,7 +86,7 @@ TEST(PointTin, NothingToTriangulate) {
   EXPECT_EQ(tin.errors.covered, 0u);
 }
 
-TEST(PointTin, HugeAndTinyPlaces) {
+TEST(PointTin, HandlesHugeAndTinyCoordinates) {
   for (const double scale : {1e90, 1e-90, 1e-160}) {
     Cloud cloud = make_cloud(PointSet::kUniform, 300, 11);
     for (std::size_t i = 0; i < cloud.size(); ++i) {

@@ -80,8 +80,8 @@ inline Place place_of(const PointTin& tin, std::uint32_t v) {
   return {tin.vertices[v][0], tin.vertices[v][1]};
 }
 
-/// Triangles are counter-clockwise, every edge occurs once in each direction except for a simple
-/// border; no vertex is duplicated or unused. Returns the border's edges.
+/// Triangles must be counter-clockwise, every edge must occur once in each direction except for a
+/// simple border, and no vertex may be duplicated or unused. Returns the border's edges.
 inline std::set<std::array<std::uint32_t, 2>> check_mesh(const PointTin& tin) {
   EXPECT_EQ(tin.sample.size(), tin.vertices.size());
   std::set<std::array<std::uint32_t, 2>> edges;
@@ -99,7 +99,7 @@ inline std::set<std::array<std::uint32_t, 2>> check_mesh(const PointTin& tin) {
   std::set<std::array<std::uint32_t, 2>> border;
   for (const auto& e : edges)
     if (!edges.contains({e[1], e[0]})) border.insert(e);
-  // Euler's formula: a disc.
+  // By Euler's formula, the mesh is a disc.
   if (!tin.triangles.empty()) {
     EXPECT_EQ(tin.triangles.size(), 2 * tin.vertices.size() - 2 - border.size());
   }
@@ -117,7 +117,7 @@ inline void check_delaunay(const PointTin& tin) {
   }
 }
 
-/// Every sample in every triangle, by a different formula from the library's.
+/// Tests every sample in every triangle, with a different formula from the library's.
 inline TinErrors brute_force(const Cloud& cloud, const PointTin& tin) {
   TinErrors result;
   double squares = 0;

@@ -61,7 +61,8 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
   }
 }
 
-// So many samples that the first vertices are chosen by a few of them, and the last in parts.
+// So many samples that a few of them choose the first vertices, and the last vertices are inserted
+// in parts.
 TEST(PointTin, KeepsTheErrorOfManySamples) {
   for (const PointSet kind : {PointSet::kUniform, PointSet::kGrid, PointSet::kClusters}) {
     const Cloud cloud = make_cloud(kind, 70000, 17);
@@ -84,7 +85,7 @@ TEST(PointTin, KeepsTheErrorOfManySamples) {
   }
 }
 
-TEST(PointTin, MeasureSurfaceIsRight) {
+TEST(PointTin, MeasureSurfaceAgreesWithBruteForce) {
   for (const PointSet kind : {PointSet::kUniform, PointSet::kSevenBits, PointSet::kClusters}) {
     for (const std::uint64_t seed : {3u, 4u}) {
       SCOPED_TRACE(name(kind) + ", seed " + std::to_string(seed));
@@ -103,7 +104,7 @@ TEST(PointTin, MeasureSurfaceIsRight) {
   }
 }
 
-TEST(PointTin, MaxPoints) {
+TEST(PointTin, LimitsThePoints) {
   const Cloud cloud = make_cloud(PointSet::kUniform, 3000, 12);
   double before = std::numeric_limits<double>::infinity();
   for (const std::size_t points : {50u, 200u, 800u}) {
@@ -136,8 +137,8 @@ TEST(PointTin, MaxPoints) {
   EXPECT_GE(make(cloud, {}, options).vertices.size(), 3u);
 }
 
-// Numbers of vertices that fall steeply with the bound, as of trees over flat ground.
-TEST(PointTin, MaxPointsOfSpikesAreUsed) {
+// The number of vertices falls steeply with the bound, as for trees over flat ground.
+TEST(PointTin, UsesNearlyAllMaxPointsOnSpikes) {
   Cloud cloud = make_cloud(PointSet::kUniform, 6000, 14);
   std::mt19937_64 random(14);
   for (double& z : cloud.z)
@@ -149,14 +150,14 @@ TEST(PointTin, MaxPointsOfSpikesAreUsed) {
     const PointTin tin = make(cloud, {}, options);
     EXPECT_LE(tin.vertices.size(), points);
     if (tin.vertices.size() >= points * 98 / 100) continue;
-    // Then a bound that is a little less takes more.
+    // Then a bound that is a little smaller must give more.
     options.max_points = 0;
     options.max_error = tin.errors.largest * 0.99;
     EXPECT_GT(make(cloud, {}, options).vertices.size(), points);
   }
 }
 
-TEST(MeasureSurface, OfEqualErrorsTheLeastPlaceIsNamed) {
+TEST(MeasureSurface, NamesTheLeastPositionAmongEqualErrors) {
   const std::vector<Point3> vertices{{0, 0, 0}, {8, 0, 0}, {0, 8, 0}};
   const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}};
   const std::vector<double> x{3, 1, 2, 1}, y{1, 2, 1, 1}, z{5, -5, 5, 4};
@@ -165,8 +166,8 @@ TEST(MeasureSurface, OfEqualErrorsTheLeastPlaceIsNamed) {
   EXPECT_EQ(measure_surface(back_x, back_y, back_z, vertices, triangles).largest_at, 2u);
 }
 
-TEST(PointTin, OrderOfSamplesDoesNotMatterForTheResult) {
-  // All places differ, so the order along the curve is the same, and with it everything else.
+TEST(PointTin, ResultDoesNotDependOnTheOrderOfSamples) {
+  // All positions differ, so the order along the curve is the same, and so is everything else.
   const Cloud cloud = make_cloud(PointSet::kUniform, 4000, 13);
   Cloud shuffled = cloud;
   std::mt19937_64 random(13);

@@ -19,7 +19,7 @@ enum class PointSet {
   kSevenBits,   ///< 7 bits: cocircular points, fewer duplicates
   kGrid,        ///< a complete grid, row by row
   kHorizontal,  ///< on one line
-  kSlanted,     ///< on one line, duplicates among them
+  kSlanted,     ///< on one line, with duplicates
   kOffLine,     ///< collinear except the last point
   kCircle,      ///< cocircular: integer points on one circle, then its centre
   kClusters,    ///< tight clusters far apart
@@ -81,7 +81,7 @@ std::vector<std::array<Coord, 2>> make_points(PointSet kind, std::size_t count,
         if (i + 1 == count) p[1] += 1;
         break;
       case PointSet::kCircle: {
-        // Radius 65 * 17 * 29 has many Pythagorean points.
+        // A radius of 65 * 17 * 29 has many Pythagorean points.
         constexpr std::int64_t kRadius = 32045;
         if (i + 1 == count) {
           p = {Coord{kRadius}, Coord{kRadius}};

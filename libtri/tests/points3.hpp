@@ -20,8 +20,8 @@ enum class PointSet3 {
   kFiveBits,   ///< 5 bits: cospherical points, fewer duplicates
   kGrid,       ///< a complete grid, row by row
   kSlab,       ///< two layers of a grid
-  kLine,       ///< on one line, duplicates among them
-  kPlane,      ///< in one plane, duplicates among them
+  kLine,       ///< on one line, with duplicates
+  kPlane,      ///< in one plane, with duplicates
   kOffPlane,   ///< coplanar except the last point
   kSphere,     ///< cospherical: integer points on one sphere, then its centre
   kCurves,     ///< on two skew lines: every pair of edges makes a tetrahedron
@@ -99,7 +99,7 @@ std::vector<std::array<Coord, 3>> make_points3(PointSet3 kind, std::size_t count
         p[2] = p[0] + 2 * p[1] + (i + 1 == count ? 1 : 0);
         break;
       case PointSet3::kSphere: {
-        // From the parametrisation of x^2 + y^2 + z^2 = r^2 by four integers.
+        // Uses the parametrisation of x^2 + y^2 + z^2 = r^2 by four integers.
         constexpr std::int64_t kRadius = 3 * 5 * 7 * 11 * 13;
         if (i + 1 == count) {
           p = {Coord{kRadius}, Coord{kRadius}, Coord{kRadius}};

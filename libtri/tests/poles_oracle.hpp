@@ -13,10 +13,10 @@
 
 #include "shape_oracle.hpp"
 
-/// The poles rule implemented slowly from its definition in shape.hpp: on tetrahedra identified by
-/// their sorted corners, with every statement sorted, sets of tetrahedra in maps, and full scans in
-/// each step of the smoothing and the sculpting. Numbers are computed from sorted corners as
-/// src/shape/spheres.hpp says, so that ties are ties here too.
+/// A slow implementation of the poles rule from its definition in shape.hpp. It identifies
+/// tetrahedra by their sorted corners, sorts every statement, keeps sets of tetrahedra in maps, and
+/// scans everything in each step of the smoothing and the sculpting. It computes numbers from
+/// sorted corners as src/shape/spheres.hpp does, so that ties are ties here too.
 
 namespace terrace::tri {
 
@@ -46,14 +46,14 @@ class PolesOracle {
  private:
   using Facet = std::array<ShapePoint, 3>;
   using Node = std::optional<ShapeCorners>;  ///< nullopt: beyond the hull
-  /// Defect, corners, whether of a vertex; the nodes and whether they are unlike.
+  /// Defect, corners, whether it is of a vertex; then the nodes and whether they are unlike.
   struct Statement {
     double defect;
     std::vector<ShapePoint> corners;
     bool unlike;
     Node one, other;
     bool operator<(const Statement& s) const {
-      // A vertex alone sorts behind all facets that begin with it.
+      // A single vertex sorts after all facets that start with it.
       if (defect != s.defect) return defect < s.defect;
       if (corners[0] != s.corners[0]) return corners[0] < s.corners[0];
       if (unlike != s.unlike) return s.unlike;
@@ -76,7 +76,7 @@ class PolesOracle {
       if (j != i) result[k++] = t[j];
     return result;
   }
-  /// As seen from the first corner; nullopt if flat up to rounding.
+  /// Relative to the first corner; nullopt if flat up to rounding.
   static std::optional<ShapePoint> centre_of(const ShapeCorners& t) {
     const ShapePoint b = minus(t[1], t[0]), c = minus(t[2], t[0]), d = minus(t[3], t[0]);
     const double volume6 = dot(b, cross(c, d));
@@ -119,7 +119,8 @@ class PolesOracle {
         const Facet f = facet(corners, i);
         if (beside_.at(f).size() == 2) continue;
         ShapePoint n = cross(minus(f[1], f[0]), minus(f[2], f[0]));
-        // The fourth corner is behind: exactly, from the triangulation's order of the corners.
+        // Checks exactly that the fourth corner is behind, using the triangulation's order of the
+        // corners.
         std::array<ShapePoint, 4> ordered;
         for (std::size_t k = 0; k < 4; ++k) {
           const auto p = triangulation.point(triangulation.vertices(t)[k]);
@@ -136,7 +137,7 @@ class PolesOracle {
             ++swaps;
           }
         }
-        // In order means that the fourth corner lies on the side of the normal.
+        // In order means that the fourth corner is on the side of the normal.
         const double length = std::sqrt(dot(n, n));
         for (double& c : n) c = (swaps % 2 == 0 ? -c : c) / length;
         normal_[f] = n;
@@ -238,7 +239,8 @@ class PolesOracle {
       return std::find(entry.first.begin(), entry.first.end(), v) != entry.first.end();
     });
   }
-  /// How many tetrahedra at v are inside, or outside (the space beyond the hull is many).
+  /// The number of tetrahedra at v that are inside, or outside (the space beyond the hull counts as
+  /// many).
   [[nodiscard]] std::size_t count(const ShapePoint& v, bool label) const {
     std::size_t result = !label && on_hull(v) ? 3 : 0;
     for (const ShapeCorners& t : star_.at(v)) result += is_inside(t) == label;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The poles rule: against its definition, on synthetic surfaces, open ones, and parts that touch.
+// The poles rule, compared with its definition, and on synthetic surfaces, open ones, and parts
+// that touch.
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -25,7 +26,7 @@ TYPED_TEST_SUITE(PolesLawTest, PolesCoords);
 
 TYPED_TEST(PolesLawTest, EqualsTheDefinition) {
   for (const PointSet3 kind : kPointSets3) {
-    // The oracle does not scale: its numbers would overflow or vanish.
+    // The oracle does not scale, so its numbers would overflow or vanish.
     if (kind == PointSet3::kHuge || kind == PointSet3::kTiny) continue;
     for (const std::size_t count : {0u, 4u, 5u, 8u, 20u, 45u}) {
       if (kind == PointSet3::kCurves && count > 8) continue;
@@ -56,7 +57,7 @@ Points box(std::array<int, 3> cells, Point3 low = {}) {
   return points;
 }
 
-/// Spread evenly on a spiral, each moved by up to `noise` along every axis.
+/// Points distributed evenly on a spiral, each moved by up to `noise` along every axis.
 Points ball(std::size_t count, double radius, Point3 centre, double noise, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto moved = [&] { return noise * (static_cast<double>(random() >> 11) * 0x1p-52 - 1.0); };
@@ -84,7 +85,7 @@ void expect_solid(const RestoredSurface& found, std::size_t points, std::size_t 
   EXPECT_NEAR(measured.volume / volume, 1.0, tolerance);
 }
 
-TEST(PolesTest, ALatticeOnABoxWhereAllDefectsAreTies) {
+TEST(PolesTest, RestoresALatticeOnABoxDespiteTies) {
   for (const auto& cells : {std::array{6, 6, 6}, std::array{12, 9, 5}, std::array{20, 20, 2}}) {
     SCOPED_TRACE(std::to_string(cells[0]) + " x " + std::to_string(cells[2]));
     Points points = box(cells);
@@ -98,8 +99,8 @@ TEST(PolesTest, ALatticeOnABoxWhereAllDefectsAreTies) {
   }
 }
 
-TEST(PolesTest, AThinPlateOfRandomSamples) {
-  // A twentieth as thick as wide, a little more than the samples' spacing.
+TEST(PolesTest, RestoresAThinPlateOfRandomSamples) {
+  // A twentieth as thick as wide, slightly more than the spacing of the samples.
   std::mt19937_64 random(3);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   Points points;
@@ -120,7 +121,7 @@ TEST(PolesTest, AThinPlateOfRandomSamples) {
   EXPECT_NEAR(measure(found.surface).volume, 0.05, 0.002);
 }
 
-TEST(PolesTest, ShellsWithinShellsAndPartsBesideThem) {
+TEST(PolesTest, RestoresNestedShellsAndSeparateParts) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Points points = ball(4000, 1.0, {}, 0.01, seed);
@@ -128,13 +129,13 @@ TEST(PolesTest, ShellsWithinShellsAndPartsBesideThem) {
          {ball(1500, 0.6, {}, 0.008, seed + 10), ball(300, 0.2, {0.1, 0, 0}, 0.005, seed + 20),
           ball(800, 0.4, {1.7, 0.3, 0}, 0.005, seed + 30)})
       points.insert(points.end(), more.begin(), more.end());
-    // The hollow of a ball, with a ball in it, and a ball beside.
+    // A hollow ball with a ball in it, and a ball next to it.
     const double volume = 2 * kTurn / 3 * (1.0 - 0.216 + 0.008 + 0.064);
     expect_solid(restore_surface(points), points.size(), 4, 8, volume, 0.02);
   }
 }
 
-TEST(PolesTest, ATorusOfSamplesThatGrowDenser) {
+TEST(PolesTest, RestoresATorusOfVaryingDensity) {
   Points points;
   for (int i = 0; i < 9000; ++i) {
     const double s = i / 9000.0;
@@ -145,7 +146,7 @@ TEST(PolesTest, ATorusOfSamplesThatGrowDenser) {
   expect_solid(restore_surface(points), points.size(), 1, 0, kTurn * kTurn / 2 * 0.16, 0.02);
 }
 
-TEST(PolesTest, AnOpenScanIsLeftOpen) {
+TEST(PolesTest, OpenScansAreLeftOpen) {
   // The lower two thirds of a ball, and a round dome seen from above.
   Points bowl = ball(6000, 1.0, {}, 0.002, 5), sheet;
   std::erase_if(bowl, [](const Point3& p) { return p[2] > 0.35; });
@@ -182,9 +183,10 @@ TEST(PolesTest, LidsOfAClosedSurfaceStay) {
   EXPECT_EQ(surface.surface.faces, shape.surface(triangulation).surface.faces);
 }
 
-TEST(PolesTest, TouchingPartsAreApart) {
-  // Cubes of two units: the second shares an edge with the first, the third a corner with the
-  // second; the fourth a face with the second, an edge with the third, a corner with the first.
+TEST(PolesTest, TouchingPartsAreSeparated) {
+  // Cubes of two units. The second shares an edge with the first, the third a corner with the
+  // second; the fourth shares a face with the second, an edge with the third and a corner with the
+  // first.
   const std::array<std::array<std::int32_t, 3>, 4> lows{
       {{0, 0, 0}, {2, 2, 0}, {4, 4, 2}, {2, 2, 2}}};
   Delaunay3<std::int32_t> triangulation;
@@ -250,7 +252,7 @@ TEST(PolesTest, NearbyUpdatesFollowChanges) {
     Delaunay3<double>::Changes changes;
     std::size_t wrong = 0, compared = 0;
     for (int step = 0; step < 20; ++step) {
-      // A cap of the ball goes, or comes back denser.
+      // A cap of the ball is removed, or added again with more samples.
       const Point3 on = ball(1000, 1.0, {}, 0.0, 0)[random() % 1000];
       std::vector<VertexId> near;
       for (const VertexId v : triangulation.all_vertices()) {
@@ -282,7 +284,7 @@ TEST(PolesTest, NearbyUpdatesFollowChanges) {
                 triangulation.vertex_count());
     }
     EXPECT_LE(wrong, compared / 1000);
-    // From time to time all of it.
+    // Occasionally the whole ball.
     Shape3<double> again;
     again.restore(triangulation);
     shape.restore(triangulation);
@@ -290,7 +292,7 @@ TEST(PolesTest, NearbyUpdatesFollowChanges) {
   }
 }
 
-TEST(PolesTest, NearbyUpdatesOfSetsThatComeAndGoAltogether) {
+TEST(PolesTest, NearbyUpdatesFollowAnySets) {
   for (const PointSet3 kind : kPointSets3) {
     SCOPED_TRACE(name(kind));
     Delaunay3<double> triangulation;

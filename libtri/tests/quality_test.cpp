@@ -33,7 +33,7 @@ TEST(Quality, KnownTriangles) {
   EXPECT_DOUBLE_EQ(q.surface_area, 4 * 5 / 2.0);
   EXPECT_DOUBLE_EQ(q.volume_above, 6 * 7 / 3.0);
   EXPECT_EQ(q.volume_below, 0);
-  // Half way up: above it is a tip of a quarter of the area.
+  // At half height the tip above has a quarter of the area.
   const TriangleQuality cut = triangle_quality(triangulation, tilted, only, 3);
   EXPECT_DOUBLE_EQ(cut.volume_above, 1.5 * 2 / 3);
   EXPECT_DOUBLE_EQ(cut.volume_above - cut.volume_below, 6 * (7 / 3.0 - 3));
@@ -100,7 +100,7 @@ TYPED_TEST(QualityTest, SumsAgreeWithBruteForce) {
                           2;
       volume +=
           size * ((heights[slot(v[0])] + heights[slot(v[1])] + heights[slot(v[2])]) / 3 - 0.1);
-      // Many small pieces, each evaluated at its centre.
+      // Divides into many small pieces and evaluates each at its centre.
       constexpr int kParts = 24;
       for (int i = 0; i < kParts; ++i) {
         for (int k = 0; i + k < kParts; ++k) {
@@ -152,7 +152,7 @@ TYPED_TEST(QualityTest, DistancesOfPointsNotInserted) {
   EXPECT_EQ(none.rms, 0);
 }
 
-TEST(Quality, EmptyHugeAndBad) {
+TEST(Quality, HandlesEmptyHugeAndBadInput) {
   Delaunay2<double> triangulation;
   const std::vector<double> one(triangulation.vertex_slots());
   EXPECT_EQ(mesh_quality(triangulation, one).triangles, 0u);

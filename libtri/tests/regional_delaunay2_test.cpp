@@ -23,7 +23,7 @@ class RegionalDelaunay : public testing::Test {};
 using RegionalCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(RegionalDelaunay, RegionalCoords);
 
-/// What a renderer keeps: the corners of triangles as they were when it was told of them.
+/// The state of a renderer: the corners of triangles as they were when they were reported.
 template <class Coord>
 class DrawnTriangles {
  public:
@@ -36,7 +36,8 @@ class DrawnTriangles {
     for (const TriangleId t : changes.added_triangles)
       ASSERT_TRUE(drawn_.emplace(t, corners(t)).second);
   }
-  /// All of them, and what the field asks of the points, made by flips of the whole triangulation.
+  /// All triangles, and the triangles that the field requires, made by flips of the whole
+  /// triangulation.
   void check() const {
     ASSERT_EQ(drawn_.size(), triangles_->triangle_count());
     ASSERT_EQ(drawn_, now());
@@ -80,8 +81,9 @@ std::uint64_t hash_at_once(const RegionalDelaunay2<Coord>& triangles) {
   return fresh.hash();
 }
 
-// Any points come and go, in one region or several, some in the slots of others: the deltas tell
-// all, no more than that, and the triangles are those of the whole triangulation flipped.
+// Any points are added and removed, in one region or several, some in the slots of others. The
+// deltas must be complete and minimal, and the triangles must be those of the whole triangulation
+// flipped.
 TYPED_TEST(RegionalDelaunay, FollowsChangesOfAnyPoints) {
   using Coord = TypeParam;
   using T = RegionalDelaunay2<Coord>;
@@ -115,7 +117,7 @@ TYPED_TEST(RegionalDelaunay, FollowsChangesOfAnyPoints) {
           triangles.remove(some);
         }
         if (random() % 4 == 0) triangles.follow();
-        if (random() % 4 == 0) continue;  // several at once
+        if (random() % 4 == 0) continue;  // several operations at once
         triangles.take_changes(changes);
         for (std::size_t i = 0; i < changes.removed_vertices.size(); ++i) {
           const auto gone = vertices.find(changes.removed_vertices[i]);
@@ -134,8 +136,8 @@ TYPED_TEST(RegionalDelaunay, FollowsChangesOfAnyPoints) {
   }
 }
 
-// A triangle that is told to go and to come within one operation has a new corner.
-TYPED_TEST(RegionalDelaunay, TellsNetChanges) {
+// A triangle that is reported as removed and as added within one operation has a new corner.
+TYPED_TEST(RegionalDelaunay, ReportsNetChanges) {
   using Coord = TypeParam;
   using T = RegionalDelaunay2<Coord>;
   auto points = make_points<Coord>(PointSet::kUniform, 3000, 11);
@@ -145,21 +147,21 @@ TYPED_TEST(RegionalDelaunay, TellsNetChanges) {
   triangles.start_journal();
   typename T::Changes changes;
   std::vector<typename T::Insertion> inserted(1);
-  std::size_t told = 0;
+  std::size_t reported = 0;
   for (const auto& p : last) {
     triangles.insert({&p, 1}, inserted);
     for (const bool back : {false, true}) {
       if (back) triangles.remove(std::vector<VertexId>{inserted[0].vertex});
       triangles.take_changes(changes);
-      told += changes.added_triangles.size();
+      reported += changes.added_triangles.size();
       std::set<std::array<VertexId, 3>> gone(changes.removed_corners.begin(),
                                              changes.removed_corners.end());
       for (const TriangleId t : changes.added_triangles)
         ASSERT_EQ(gone.count(triangles.vertices(t)), 0u);
     }
   }
-  EXPECT_LT(told, 100u * 40u);
-  // What comes and goes unseen is not told.
+  EXPECT_LT(reported, 100u * 40u);
+  // Transient changes are not reported.
   std::vector<typename T::Insertion> many(100);
   triangles.insert(last, many);
   std::vector<VertexId> vertices;
@@ -170,8 +172,8 @@ TYPED_TEST(RegionalDelaunay, TellsNetChanges) {
   EXPECT_TRUE(changes.added_triangles.empty() && changes.removed_triangles.empty());
 }
 
-// A metric that is none, and a field that throws: nothing has changed.
-TYPED_TEST(RegionalDelaunay, RefusesWhatIsNoMetric) {
+// An invalid metric, and a field that throws, must change nothing.
+TYPED_TEST(RegionalDelaunay, RejectsInvalidMetrics) {
   using Coord = TypeParam;
   using T = RegionalDelaunay2<Coord>;
   const MetricField2 field([](const PlanePoint& p) {
@@ -191,8 +193,8 @@ TYPED_TEST(RegionalDelaunay, RefusesWhatIsNoMetric) {
   ASSERT_NO_FATAL_FAILURE(DrawnTriangles<Coord>(triangles).check());
 }
 
-// Under the control of views, interrupted or not, over any points: it ends where the rule says, the
-// deltas add up, and the triangles are those of the points at once.
+// A view control over any points, interrupted or not, must end in the state that the rule demands,
+// the deltas must add up, and the triangles must be those of the points at once.
 TYPED_TEST(RegionalDelaunay, FollowsViews) {
   using Coord = TypeParam;
   using T = RegionalDelaunay2<Coord>;
@@ -235,7 +237,7 @@ TYPED_TEST(RegionalDelaunay, FollowsViews) {
   EXPECT_GT(mixed, 8) << "the views show everything or nothing";
 }
 
-// Regions of detail by hand, and back to the start, without deltas too.
+// Regions of detail set by hand, and back to the start, also without deltas.
 TYPED_TEST(RegionalDelaunay, ExpandsAndCollapsesRegionsOfDetail) {
   using Coord = TypeParam;
   using T = RegionalDelaunay2<Coord>;

@@ -15,7 +15,7 @@
 namespace terrace::tri {
 namespace {
 
-/// On a Fibonacci spiral, in random order.
+/// Points on a Fibonacci spiral, in random order.
 std::vector<Point3> sphere(std::size_t count) {
   std::vector<Point3> points;
   for (std::size_t i = 0; i < count; ++i) {
@@ -28,7 +28,7 @@ std::vector<Point3> sphere(std::size_t count) {
   return points;
 }
 
-TEST(RestoreTest, ASphere) {
+TEST(RestoreTest, RestoresASphere) {
   const std::vector<Point3> points = sphere(1500);
   const RestoredSurface found = restore_surface(points);
   const SurfaceMeasures measured = measure(found.surface);
@@ -70,7 +70,7 @@ TEST(RestoreTest, CoarseRoundingJoinsPoints) {
   EXPECT_TRUE(measure(found.surface).closed);
 }
 
-TEST(RestoreTest, DegeneratePoints) {
+TEST(RestoreTest, HandlesDegeneratePoints) {
   for (const unsigned bits : {0u, 24u}) {
     RestoreOptions options;
     options.quantise_bits = bits;
@@ -91,7 +91,7 @@ TEST(RestoreTest, DegeneratePoints) {
   }
 }
 
-TEST(RestoreTest, ExtremeCoordinates) {
+TEST(RestoreTest, HandlesExtremeCoordinates) {
   for (const PointSet3 kind : {PointSet3::kHuge, PointSet3::kTiny}) {
     const auto points = make_points3<double>(kind, 100, 2);
     for (const unsigned bits : {0u, 24u}) {
@@ -115,7 +115,7 @@ std::string message(std::span<const Point3> points, const RestoreOptions& option
   return "";
 }
 
-TEST(RestoreTest, BadInputIsNamed) {
+TEST(RestoreTest, ErrorsNameBadInput) {
   std::vector<Point3> points = sphere(10);
   const auto names = [&](const char* what, auto&& change) {
     RestoreOptions options;

@@ -20,8 +20,8 @@
 
 #include "terrace/tri/shape.hpp"
 
-/// Scans for tests and benchmarks: PLY (ASCII and binary, points first, then faces with one list as
-/// their first property) and OBJ; polygons as fans of triangles.
+/// Reads scans for tests and benchmarks: PLY (ASCII and binary, points first, then faces with one
+/// list as their first property) and OBJ. Polygons become fans of triangles.
 
 namespace terrace::tri {
 
@@ -103,7 +103,7 @@ inline Surface read_ply(std::istream& in) {
         std::vector<std::uint32_t> corners(
             static_cast<std::size_t>(read_number(in, property[1], format)));
         for (auto& corner : corners)
-          // Other elements, such as strips, may have negative numbers, which do not count.
+          // Other elements, such as strips, may have negative numbers, which are ignored.
           corner = static_cast<std::uint32_t>(std::max(0.0, read_number(in, property[2], format)));
         if (element.name != "face") continue;
         for (std::size_t i = 2; i < corners.size(); ++i)
@@ -139,7 +139,7 @@ inline Surface read_obj(std::istream& in) {
   return surface;
 }
 
-/// By its ending: .obj, .ply, .ply.gz (by gzip).
+/// Chooses the format by the extension: .obj, .ply, .ply.gz (by gzip).
 inline Surface read_scan(const std::filesystem::path& path) {
   if (path.extension() == ".gz") {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(
@@ -155,7 +155,7 @@ inline Surface read_scan(const std::filesystem::path& path) {
   return path.extension() == ".obj" ? read_obj(in) : read_ply(in);
 }
 
-/// Closes each opening (a connected set of edges in one face) by a fan to its centre, so that the
+/// Closes each opening (a connected set of edges in one face) with a fan to its centre, so that the
 /// enclosed volume is defined.
 inline Surface with_openings_closed(Surface surface) {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;

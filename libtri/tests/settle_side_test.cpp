@@ -20,7 +20,7 @@ std::vector<std::uint32_t> settle(const Line& line, const Line& beside, const Li
   return settle_side<double>(line, beside, other, bound);
 }
 
-TEST(SettleSide, EndsOnlyWhereStraight) {
+TEST(SettleSide, KeepsOnlyTheEndsOfStraightLines) {
   EXPECT_EQ(settle({1, 2, 3, 4}, {}, {}, 0), (std::vector<std::uint32_t>{0, 3}));
   EXPECT_EQ(settle({5}, {}, {}, 0), (std::vector<std::uint32_t>{0}));
   EXPECT_EQ(settle({5, 9}, {}, {}, 0), (std::vector<std::uint32_t>{0, 1}));
@@ -29,18 +29,18 @@ TEST(SettleSide, EndsOnlyWhereStraight) {
             (std::vector<std::uint32_t>{0, 3}));
 }
 
-TEST(SettleSide, GreatestErrorFirst) {
+TEST(SettleSide, InsertsTheGreatestErrorFirst) {
   EXPECT_EQ(settle({0, 3, 10, 3, 0}, {}, {}, 2.5), (std::vector<std::uint32_t>{0, 2, 4}));
   EXPECT_EQ(settle({0, 3, 10, 3, 0}, {}, {}, 1.5), (std::vector<std::uint32_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(settle({0, 3, 10, 3, 0}, {}, {}, 10.5), (std::vector<std::uint32_t>{0, 4}));
 }
 
-TEST(SettleSide, DataEndsAtVertices) {
+TEST(SettleSide, EndsDataAtVertices) {
   EXPECT_EQ(settle({0, 0, 0, kNoHeight, kNoHeight, kNoHeight, 0, 0, 0, 0}, {}, {}, 1),
             (std::vector<std::uint32_t>{0, 2, 3, 5, 6, 9}));
 }
 
-TEST(SettleSide, MissingDataBesideMakesVertices) {
+TEST(SettleSide, NeighbouringMissingDataMakesVertices) {
   const Line line(7, 1.0);
   Line beside = line;
   beside[3] = kNoHeight;
@@ -50,7 +50,7 @@ TEST(SettleSide, MissingDataBesideMakesVertices) {
   EXPECT_EQ(settle(line, beside, line, 1), settle(line, line, beside, 1));
 }
 
-TEST(SettleSide, WithinTheBound) {
+TEST(SettleSide, KeepsTheBound) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
@@ -80,7 +80,7 @@ TEST(SettleSide, WithinTheBound) {
   }
 }
 
-TEST(SettleSide, MisuseIsRefused) {
+TEST(SettleSide, RejectsInvalidArguments) {
   EXPECT_THROW(settle({1, 2, 3}, {1, 2}, {}, 1), std::invalid_argument);
   EXPECT_THROW(settle({1, 2, 3}, {}, {1, 2, 3, 4}, 1), std::invalid_argument);
   EXPECT_THROW(settle({1, 2, 3}, {}, {}, -1), std::invalid_argument);

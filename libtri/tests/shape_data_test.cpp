@@ -30,7 +30,7 @@ class ShapeDataTest : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-/// Faces by their corners' coordinates, from the first corner on.
+/// Faces by the coordinates of their corners, starting at the smallest corner.
 std::set<std::array<Point3, 3>> face_set(const Surface& surface) {
   std::set<std::array<Point3, 3>> result;
   for (const auto& f : surface.faces) {
@@ -51,7 +51,7 @@ void expect_bunny(const Delaunay3<Coord>& triangulation, const Surface& original
   EXPECT_EQ(measured.components, 1u);
   EXPECT_EQ(measured.border_edges, 0u);
   EXPECT_EQ(measured.vertices, triangulation.vertex_count());
-  // Its openings are in a hollow base: how they are closed is a matter of taste.
+  // The openings are in a hollow base, and there are several ways of closing them.
   const double volume = measure(with_openings_closed(original)).volume;
   EXPECT_NEAR(measured.area * scale * scale / wanted.area, 1.0, 0.03);
   EXPECT_NEAR(measured.volume * scale * scale * scale / volume, 1.0, 0.02);
@@ -80,16 +80,16 @@ TEST_F(ShapeDataTest, BunnyIsOneClosedSurface) {
   }
 }
 
-/// What must come back from the points of a closed model.
+/// Properties of the surface restored from the points of a closed model.
 struct Model {
   const char* file;
-  std::size_t off;  ///< at most so many points are not on the surface
+  std::size_t off;  ///< maximum number of points that are not on the surface
   std::size_t components;
-  std::size_t touching;  ///< at most so many edges in four faces or more
-  double volume;         ///< relative difference to the model; 0: it has no faces
+  std::size_t touching;  ///< maximum number of edges in four faces or more
+  double volume;         ///< relative difference from the model; 0: the file has no faces
 };
 
-TEST_F(ShapeDataTest, ClosedModelsComeBackFromTheirPoints) {
+TEST_F(ShapeDataTest, ClosedModelsAreRestoredFromTheirPoints) {
   for (const Model& model : {Model{"lucy_100k.ply", 49, 1, 5, 0.002},
                              {"horse.ply", 0, 1, 0, 0.001},
                              {"igea.ply", 0, 1, 0, 0.0},
@@ -120,7 +120,7 @@ TEST_F(ShapeDataTest, ClosedModelsComeBackFromTheirPoints) {
   }
 }
 
-TEST_F(ShapeDataTest, TheDragonIsWholeButForCrumbs) {
+TEST_F(ShapeDataTest, DragonIsWholeExceptForCrumbs) {
   const Surface original = scan("dragon_vrip_res2.ply.gz");
   const RestoredSurface found = restore_surface(original.points);
   EXPECT_LE(found.points_off, 2u);
@@ -128,7 +128,7 @@ TEST_F(ShapeDataTest, TheDragonIsWholeButForCrumbs) {
   EXPECT_NEAR(measure(found.surface).volume / measure(original).volume, 1.0, 0.001);
 }
 
-TEST_F(ShapeDataTest, OpenScansAreFoundAndLeftOpen) {
+TEST_F(ShapeDataTest, OpenScansAreDetectedAndLeftOpen) {
   const char* const files[] = {"bunny_range/bun000.ply.gz", "bunny_range/bun045.ply.gz",
                                "bunny_range/bun090.ply.gz", "bunny_range/bun180.ply.gz",
                                "armadillo_tm.ply",          "bunny_range/bun270.ply.gz",

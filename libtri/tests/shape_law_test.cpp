@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Properties that hold for any points: the rules' definition, independence of order and history,
-// the update.
+// Properties that hold for any points: the definition of the rules, independence of order and
+// history, and the update.
 #include <random>
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ std::vector<ShapeOptions> peeling_options() {
 
 std::vector<ShapeOptions> all_options() {
   std::vector<ShapeOptions> result = peeling_options();
-  result.push_back({});  // the poles rule; its definition is tested in poles_test.cpp
+  result.push_back({});  // the poles rule, whose definition is tested in poles_test.cpp
   return result;
 }
 
@@ -157,14 +157,14 @@ TYPED_TEST(ShapeLawTest, UpdateEqualsRestore) {
       Triangulation triangulation;
       std::vector<Shape3<TypeParam>> shapes;
       for (const ShapeOptions& options : all_options()) {
-        // Computed from scratch in any case; one run is enough.
+        // Always computed from scratch, so one run is enough.
         if (options.rule == ShapeRule::kPublished && shapes.size() != 2) continue;
         shapes.emplace_back(options);
       }
       triangulation.start_journal();
       typename Triangulation::Changes changes;
       for (int step = 0; step < 30; ++step) {
-        // Sometimes several operations within one set of changes.
+        // Sometimes combines several operations into one set of changes.
         do {
           std::vector<VertexId> alive;
           for (const VertexId v : triangulation.all_vertices()) alive.push_back(v);

@@ -15,9 +15,9 @@
 
 #include "terrace/tri/shape.hpp"
 
-/// The rules of shape.hpp implemented slowly from their definition: on tetrahedra identified by
-/// their sorted corners, with rational numbers for the spheres, and with a full scan of every set
-/// in each step.
+/// A slow implementation of the rules of shape.hpp from their definition. It identifies tetrahedra
+/// by their sorted corners, uses rational numbers for the spheres, and scans every set in each
+/// step.
 
 namespace terrace::tri {
 
@@ -52,7 +52,7 @@ inline bool oracle_in_smallest_sphere(const std::array<ShapePoint, 3>& f, const 
     return Kernel::Point_3(CGAL::Gmpq(p[0]), CGAL::Gmpq(p[1]), CGAL::Gmpq(p[2]));
   };
   std::array<Kernel::Point_3, 3> p{exact(f[0]), exact(f[1]), exact(f[2])};
-  // The smallest sphere is the smallest of the four candidates that contains all three corners.
+  // The smallest sphere is the smallest of the four candidates that contain all three corners.
   std::optional<CGAL::Gmpq> radius2;
   Kernel::Point_3 centre;
   const auto consider = [&](const Kernel::Point_3& at) {

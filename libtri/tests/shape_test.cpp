@@ -62,7 +62,8 @@ void add_line(std::vector<std::array<double, 2>>& profile, std::array<double, 2>
         {from[0] + (to[0] - from[0]) * i / count, from[1] + (to[1] - from[1]) * i / count});
 }
 
-/// Measures of the restored surface, the same from doubles and from 24-bit integers up to rounding.
+/// Measures the restored surface, which must be the same from doubles and from 24-bit integers up
+/// to rounding.
 SurfaceMeasures restored(const Points& points, const ShapeOptions& options = {}) {
   Delaunay3<double> triangulation;
   triangulation.build(points);
@@ -88,7 +89,7 @@ SurfaceMeasures restored(const Points& points, const ShapeOptions& options = {})
   return measured;
 }
 
-TEST(ShapeTest, TorusWithNoise) {
+TEST(ShapeTest, RestoresATorusWithNoise) {
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Noise noise{std::mt19937_64(seed), 0.002};
@@ -108,7 +109,7 @@ TEST(ShapeTest, TorusWithNoise) {
   }
 }
 
-TEST(ShapeTest, TwoSpheres) {
+TEST(ShapeTest, RestoresTwoSpheres) {
   Noise noise{std::mt19937_64(5), 0.001};
   Points points = sphere(1.0, {0, 0, 0}, 0.08, noise);
   const Points other = sphere(0.5, {2.9, 0.2, 0.1}, 0.05, noise);
@@ -120,8 +121,9 @@ TEST(ShapeTest, TwoSpheres) {
   EXPECT_NEAR(measured.area / (4 * kPi * (1 + 0.25)), 1.0, 0.02);
 }
 
-TEST(ShapeTest, Cup) {
-  // Height 2, outer radius 1; the cavity goes down to 0.4 and widens from radius 0.5 to 0.8.
+TEST(ShapeTest, RestoresACup) {
+  // The height is 2 and the outer radius 1. The cavity goes down to 0.4 and widens from radius 0.5
+  // to 0.8.
   Noise noise{std::mt19937_64(6), 0.001};
   std::vector<std::array<double, 2>> profile;
   const double step = 0.05;
@@ -140,7 +142,7 @@ TEST(ShapeTest, Cup) {
   EXPECT_NEAR(measured.volume / (kPi * 2 - cavity), 1.0, 0.02);
 }
 
-TEST(ShapeTest, SphereByEdgeLength) {
+TEST(ShapeTest, RestoresASphereByEdgeLength) {
   Noise noise{std::mt19937_64(7), 0.001};
   ShapeOptions options;
   options.rule = ShapeRule::kFlood;
@@ -166,7 +168,7 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
   options.rule = ShapeRule::kPublished;
   Shape3<double> published(options);
   published.restore(triangulation);
-  // A tetrahedron removed by the published rule is also removed by the flood.
+  // The flood must remove every tetrahedron that the published rule removes.
   for (const TetrahedronId t : triangulation.all_tetrahedra()) {
     if (flood.kept(t)) {
       EXPECT_TRUE(published.kept(t));
@@ -175,7 +177,7 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
   EXPECT_GT(published.kept_count(), flood.kept_count());
 }
 
-TEST(ShapeTest, AGridStaysWhole) {
+TEST(ShapeTest, KeepsAGridWhole) {
   // No facet's smallest sphere contains a grid point in its interior.
   const auto points = make_points3<std::int32_t>(PointSet3::kGrid, 512, 0);
   Delaunay3<std::int32_t> triangulation;
@@ -190,7 +192,7 @@ TEST(ShapeTest, AGridStaysWhole) {
   EXPECT_EQ(measured.euler_characteristic, 2);
 }
 
-TEST(ShapeTest, WithoutTetrahedraThereIsNothing) {
+TEST(ShapeTest, IsEmptyWithoutTetrahedra) {
   for (const PointSet3 kind : {PointSet3::kLine, PointSet3::kPlane}) {
     for (const std::size_t count : {0u, 1u, 2u, 3u, 50u}) {
       Delaunay3<double> triangulation;
@@ -207,7 +209,7 @@ TEST(ShapeTest, WithoutTetrahedraThereIsNothing) {
   EXPECT_FALSE(Shape3<double>().kept(kNoTetrahedron));
 }
 
-TEST(ShapeTest, TheEdgeFactorIsChecked) {
+TEST(ShapeTest, ChecksTheEdgeFactor) {
   for (const double factor : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity()}) {
     ShapeOptions options;

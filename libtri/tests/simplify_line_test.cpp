@@ -16,7 +16,7 @@ namespace {
 
 using namespace point_tin_oracle;
 
-/// Every sample against the chain, by brute force.
+/// Compares every sample with the chain, by brute force.
 double line_error(const std::vector<double>& t, const std::vector<double>& z,
                   const SimplifiedLine& line) {
   double worst = 0;
@@ -77,7 +77,7 @@ TEST(SimplifyLine, KeepsTheError) {
   }
 }
 
-TEST(SimplifyLine, FewAndBadSamples) {
+TEST(SimplifyLine, HandlesFewAndBadSamples) {
   EXPECT_TRUE(simplify_line({}, {}, 1).vertices.empty());
   const std::vector<double> t{1, 1, 1};
   const std::vector<double> z{5, 6, 7};

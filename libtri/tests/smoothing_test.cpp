@@ -81,7 +81,7 @@ TYPED_TEST(SmoothingTest, ConstantsAndPlanesStay) {
   }
 }
 
-TYPED_TEST(SmoothingTest, WhatMovesIsInsideTheRegionOffItsBorderAndOffTheHull) {
+TYPED_TEST(SmoothingTest, MovesOnlyInnerVerticesOfTheRegion) {
   Delaunay2<TypeParam> triangulation;
   triangulation.build_grid(0, 0, 5, 20, 20);
   const auto heights = noise(triangulation);
@@ -133,7 +133,8 @@ TYPED_TEST(SmoothingTest, LaplacianAndBilateralObeyTheMaximumPrinciple) {
 }
 
 TYPED_TEST(SmoothingTest, LaplacianStepIsTheWeightedMean) {
-  // On a grid the neighbours along the axes count a quarter each, the diagonal ones nothing.
+  // On a grid the neighbours along the axes have a weight of a quarter each, the diagonal ones
+  // none.
   Delaunay2<TypeParam> triangulation;
   triangulation.build_grid(0, 0, 3, 9, 9);
   const auto heights = noise(triangulation);
@@ -151,7 +152,7 @@ TYPED_TEST(SmoothingTest, LaplacianStepIsTheWeightedMean) {
   }
 }
 
-TYPED_TEST(SmoothingTest, TaubinKeepsWhatIsWideAndTakesWhatIsRough) {
+TYPED_TEST(SmoothingTest, TaubinKeepsWideFeaturesAndRemovesRoughness) {
   Delaunay2<TypeParam> triangulation;
   triangulation.build_grid(0, 0, 1, 65, 65);
   const auto wave = [&](double length) {
@@ -195,7 +196,7 @@ TYPED_TEST(SmoothingTest, BilateralKeepsAStepThatTheLaplacianLoses) {
     EXPECT_GT(bilateral[high] - bilateral[low], 9.9);
     EXPECT_LT(laplacian[high] - laplacian[low], 4);
   }
-  // The noise is gone.
+  // The noise must be gone.
   for (TypeParam x = 5; x < 15; ++x)
     EXPECT_LT(std::abs(bilateral[slot(triangulation.nearest({x, 20}))]), 0.05);
 }
@@ -217,7 +218,7 @@ TYPED_TEST(SmoothingTest, OrderAndRepetitionInTheRegionDoNotMatter) {
   }
 }
 
-TEST(Smoothing, NothingToDo) {
+TEST(Smoothing, HandlesEmptyInput) {
   Delaunay2<double> triangulation;
   const std::vector<double> one(triangulation.vertex_slots());
   EXPECT_TRUE(smooth(triangulation, one, {}, {}).empty());

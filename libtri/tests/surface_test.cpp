@@ -17,14 +17,14 @@ Surface tetrahedron() {
           {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
 }
 
-TEST(SurfaceTest, NothingIsClosed) {
+TEST(SurfaceTest, EmptySurfaceIsClosed) {
   const SurfaceMeasures measured = measure({});
   EXPECT_TRUE(measured.closed);
   EXPECT_EQ(measured.components, 0u);
   EXPECT_EQ(measured.area, 0.0);
 }
 
-TEST(SurfaceTest, Tetrahedron) {
+TEST(SurfaceTest, MeasuresATetrahedron) {
   const SurfaceMeasures measured = measure(tetrahedron());
   EXPECT_EQ(measured.faces, 4u);
   EXPECT_EQ(measured.vertices, 4u);
@@ -38,7 +38,7 @@ TEST(SurfaceTest, Tetrahedron) {
   EXPECT_TRUE(measured.closed);
 }
 
-TEST(SurfaceTest, OpenAndTurned) {
+TEST(SurfaceTest, MeasuresOpenAndTurnedSurfaces) {
   Surface surface = tetrahedron();
   surface.faces.pop_back();
   SurfaceMeasures measured = measure(surface);
@@ -52,7 +52,7 @@ TEST(SurfaceTest, OpenAndTurned) {
   EXPECT_EQ(measured.border_edges, 0u);
 }
 
-TEST(SurfaceTest, TwoThatShareAnEdge) {
+TEST(SurfaceTest, MeasuresTwoThatShareAnEdge) {
   Surface surface = tetrahedron();
   surface.points.push_back({-1, 0, 0});
   surface.points.push_back({0, -1, 0});
@@ -68,7 +68,7 @@ TEST(SurfaceTest, TwoThatShareAnEdge) {
   EXPECT_EQ(measured.euler_characteristic, 6 - 11 + 8);
 }
 
-TEST(SurfaceTest, TwoApartAndPointsInNone) {
+TEST(SurfaceTest, MeasuresTwoApartAndUnusedPoints) {
   Surface surface = tetrahedron();
   surface.points.resize(7, {9, 9, 9});
   for (const auto& p : tetrahedron().points) surface.points.push_back({p[0] + 5, p[1], p[2]});
@@ -93,14 +93,14 @@ TEST(SurfaceTest, ComponentsAreTurnedOutward) {
   EXPECT_THROW(turn_outward(surface), std::invalid_argument);
 }
 
-TEST(SurfaceTest, FarFromTheOriginTheVolumeStays) {
+TEST(SurfaceTest, VolumeIsAccurateFarFromTheOrigin) {
   Surface surface = tetrahedron();
   for (auto& p : surface.points)
     for (double& c : p) c += 0x1p40;
   EXPECT_NEAR(measure(surface).volume, 1.0 / 6, 1e-12);
 }
 
-TEST(SurfaceTest, BadFacesAreNamed) {
+TEST(SurfaceTest, ErrorsNameBadFaces) {
   const auto message = [](const Surface& surface) -> std::string {
     try {
       measure(surface);

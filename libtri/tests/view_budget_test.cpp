@@ -19,9 +19,9 @@ using Control = ViewControl2<std::int32_t>;
   SCOPED_TRACE(testing::Message() << "seed " << (w).seed << ", shape " \
                                   << static_cast<int>((w).shape))
 
-// Neither memory budget is ever exceeded, and the view still comes as close as they allow: clusters
-// that stay collapsed for lack of room could only be had at the cost of others of about the same
-// importance.
+// Neither memory budget may ever be exceeded, and the view must still come as close as they allow:
+// clusters that stay collapsed for lack of room would only fit at the cost of others of about the
+// same importance.
 TEST(ViewBudget, MemoryIsNeverExceeded) {
   std::size_t full = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -53,8 +53,8 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
           ASSERT_LE(control.cached_bytes(), options.max_cached_bytes);
         }
       }
-      // No blocked cluster that the cache could hold has room, and for the first one too few points
-      // are less important.
+      // No blocked cluster that the cache could hold may have room, and for the first one too few
+      // points may be less important.
       const auto demands = all_demands(tree, world.source, view, options);
       const ClusterSet open = expanded_set(control);
       const std::size_t points = control.model().point_count();
@@ -83,8 +83,8 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
   EXPECT_GT(full, 50u);
 }
 
-// Under a limit of points interrupted steps end where complete ones do.
-TEST(ViewBudget, InterruptionsLeaveNoTraceUnderALimitOfPoints) {
+// Under a limit of points, interrupted steps must end where complete ones do.
+TEST(ViewBudget, InterruptionsDoNotMatterUnderALimitOfPoints) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     World world(seed, kWorldShapes[seed % 3], 500);
     TRACE(world);
@@ -92,11 +92,11 @@ TEST(ViewBudget, InterruptionsLeaveNoTraceUnderALimitOfPoints) {
     options.max_points = world.source.root().positions.size() + below(world.random, 200);
     Control whole(counts(world.source), load_root(world.source), options);
     Control cut(counts(world.source), load_root(world.source), options);
-    // Everything is given beforehand, so that both see the same.
+    // Everything is given beforehand, so that both see the same clusters.
     for (const auto& [id, parent] : WholeTree(world.source).parents) {
       ViewRequest request{id, {}, 0, 0.0};
       for (const auto& [child, above] : WholeTree(world.source).parents) {
-        // The last child of a cluster, in no particular order: the head's child is the one that no
+        // The last child of a cluster, in no particular order. The head's child is the one that no
         // member heads.
         if (above != id) continue;
         const auto& cluster = world.source.at(id);
@@ -121,8 +121,8 @@ TEST(ViewBudget, InterruptionsLeaveNoTraceUnderALimitOfPoints) {
   }
 }
 
-// A cluster evicted from the cache is requested again when it is wanted again.
-TEST(ViewBudget, EvictedIsAskedForAgain) {
+// A cluster evicted from the cache must be requested again when it is wanted again.
+TEST(ViewBudget, RequestsEvictedClustersAgain) {
   World world(11, Shape::random, 500);
   while (world.source.levels[0].size() < 30 || world.source.top() > 2) {
     world = World(world.seed + 1, Shape::random, 500);
@@ -154,7 +154,7 @@ TEST(ViewBudget, EvictedIsAskedForAgain) {
   EXPECT_LT(again.size(), asked.size()) << "nothing was kept";
 }
 
-TEST(ViewBudget, WithRoomNothingIsAskedForTwice) {
+TEST(ViewBudget, RequestsNothingTwiceIfThereIsRoom) {
   World world(11, Shape::random, 500);
   Control control(counts(world.source), load_root(world.source));
   View fine;
@@ -168,8 +168,8 @@ TEST(ViewBudget, WithRoomNothingIsAskedForTwice) {
   }
 }
 
-// A cluster larger than the whole budget is neither requested nor accepted.
-TEST(ViewBudget, ClusterLargerThanTheCache) {
+// A cluster larger than the whole budget must be neither requested nor accepted.
+TEST(ViewBudget, RejectsClustersLargerThanTheCache) {
   World world(2, Shape::random, 400);
   ViewOptions options;
   options.max_cached_bytes = 100;
@@ -186,10 +186,10 @@ TEST(ViewBudget, ClusterLargerThanTheCache) {
   EXPECT_EQ(control.cached_bytes(), 0u);
 }
 
-// With a clock that advances by 1 ms at each reading: a step ends in time, except for its first
-// operation and for looks at the clock that no step before has needed, and everything is done in
-// the end. Without a time limit the clock is not read.
-TEST(ViewBudget, TimeIsKept) {
+// The clock advances by 1 ms at each reading. A step must end in time, except for its first
+// operation and for readings of the clock that no earlier step has needed, and everything must be
+// done in the end. Without a time limit the clock must not be read.
+TEST(ViewBudget, KeepsTheTimeLimit) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     World world(seed, Shape::random, 500);
     TRACE(world);
@@ -224,7 +224,7 @@ TEST(ViewBudget, TimeIsKept) {
   }
 }
 
-// One stall of the clock does not make later steps timid for ever.
+// One stall of the clock must not slow down later steps for ever.
 TEST(ViewBudget, RecoversFromAStall) {
   World world(3, Shape::random, 2000);
   while (world.source.levels[0].size() < 40) world = World(world.seed + 1, Shape::random, 2000);
@@ -244,7 +244,7 @@ TEST(ViewBudget, RecoversFromAStall) {
   EXPECT_LT(settle(control, world.source, fine, budget), 60);
 }
 
-// Outlines: the same view with a smaller error for clusters that may show one.
+// For outlines: the same view with a smaller error for clusters that may show one.
 TEST(ViewSilhouette, RefinesWhereAnOutlineMayShow) {
   std::size_t more = 0, rightly = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -258,7 +258,7 @@ TEST(ViewSilhouette, RefinesWhereAnOutlineMayShow) {
     none.silhouette = all.silhouette = half.silhouette = 0.2;
     const bool perspective = view.camera->perspective;
     none.cone = [&](ClusterId, const ClusterRecord&) {
-      // Faces the camera: no normal perpendicular to a line of sight within the picture.
+      // Faces the camera, so that no normal is perpendicular to a line of sight within the picture.
       NormalCone cone{view.camera->direction, 1.0};
       return perspective ? NormalCone{{0, 0, 1}, 0.0} : cone;
     };

@@ -30,8 +30,9 @@ ViewOptions random_options(World& world) {
   return options;
 }
 
-// Steps end where the recursive rule over the whole hierarchy says, wherever they start.
-TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
+// Wherever steps start, they must end in the state given by the recursive rule over the whole
+// hierarchy.
+TYPED_TEST(ViewControlOf, EndsInTheStateOfTheRule) {
   int mixed = 0;
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     for (const Shape shape : kWorldShapes) {
@@ -63,8 +64,8 @@ TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
   EXPECT_GT(mixed, 50) << "the views show everything or nothing";
 }
 
-// Bounds in place of records lead to the same clusters, and records of what is out of sight are
-// never asked for.
+// Bounds in place of records must lead to the same clusters, and records of clusters out of sight
+// must never be requested.
 TEST(ViewControl, RecordsMayComeLater) {
   using T = Delaunay2<std::int32_t>;
   std::size_t asked = 0, known_later = 0;
@@ -81,7 +82,7 @@ TEST(ViewControl, RecordsMayComeLater) {
         for (std::size_t i = 0; i < cluster.child_records.size(); ++i) {
           ClusterRecord& record = cluster.child_records[i];
           if (below(world.random, 4) == 0) continue;
-          // The last one is the head's.
+          // The last one belongs to the head.
           if (i < cluster.positions.size()) {
             bounded.insert(cluster_id(static_cast<unsigned>(level) - 1,
                                       cluster.children[i * level + level - 1]));
@@ -118,7 +119,7 @@ TEST(ViewControl, RecordsMayComeLater) {
         }
         ASSERT_NO_FATAL_FAILURE(check_model(control.model(), world.source, goal));
       }
-      control.give_record(cluster_id(0, 1u << 30), {});  // of a cluster that is not there
+      control.give_record(cluster_id(0, 1u << 30), {});  // of a cluster that does not exist
       asked += read.size();
       known_later += bounded.size();
     }
@@ -127,9 +128,9 @@ TEST(ViewControl, RecordsMayComeLater) {
   EXPECT_LT(asked, known_later);
 }
 
-// However steps are interrupted, and in whatever portions clusters arrive, the triangulation is
-// valid in between and the end is the same.
-TEST(ViewControl, InterruptedStepsEndAtTheSame) {
+// However steps are interrupted, and in whatever portions clusters arrive, the triangulation must
+// be valid in between and the end must be the same.
+TEST(ViewControl, InterruptedStepsEndInTheSameState) {
   using T = Delaunay2<std::int32_t>;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     for (const Shape shape : kWorldShapes) {
@@ -160,9 +161,9 @@ TEST(ViewControl, InterruptedStepsEndAtTheSame) {
   }
 }
 
-// After any step a consumer of deltas sees the current state, even where expanding and collapsing
-// meet in one step and points share vertices.
-TEST(ViewControl, DeltasTellAll) {
+// After any step a consumer of deltas must have the current state, even if a step both expands and
+// collapses and if points share vertices.
+TEST(ViewControl, DeltasAreComplete) {
   using T = StandIn<std::int32_t>;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     World world(seed, Shape::duplicates);
@@ -189,9 +190,9 @@ Camera looking_down(double x, double y, double height) {
   return perspective_camera({{x, y, height}, {0, 0, -1}, {0, 1, 0}}, 60.0, 1.5, 1000.0);
 }
 
-// A camera that jitters by less than the band changes nothing, and one that goes away and comes
-// back finds the same.
-TEST(ViewControl, TremblingChangesNothing) {
+// A camera that jitters by less than the band must change nothing, and one that goes away and comes
+// back must find the same state.
+TEST(ViewControl, JitterChangesNothing) {
   std::size_t expanded = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     World world(seed, seed % 2 ? Shape::random : Shape::grid, 600);
@@ -208,7 +209,7 @@ TEST(ViewControl, TremblingChangesNothing) {
     view.camera = looking_down(x, y, height);
     settle(control, world.source, view);
     expanded += control.model().expanded_count();
-    // A cluster at the very edge may come with the first few movements, and then stays.
+    // A cluster at the very edge may be added by the first few movements, and then stays.
     std::size_t collapsed = 0, after = 0;
     for (int frame = 0; frame < 200; ++frame) {
       const auto shake = [&] { return tremble * (unit(world.random) - 0.5); };
@@ -226,7 +227,7 @@ TEST(ViewControl, TremblingChangesNothing) {
   EXPECT_GT(expanded, 200u);
 }
 
-TEST(ViewControl, StandingStillSettles) {
+TEST(ViewControl, RestingCamerasSettle) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     World world(seed, Shape::random, 600);
     TRACE(world);
@@ -249,9 +250,9 @@ TEST(ViewControl, StandingStillSettles) {
   }
 }
 
-// A missing cluster is requested once; if forgotten, withdrawn or evicted from the cache, it is
-// requested again.
-TEST(ViewControl, AsksOnce) {
+// A missing cluster must be requested once. If it is forgotten, withdrawn or evicted from the
+// cache, it must be requested again.
+TEST(ViewControl, RequestsClustersOnce) {
   World world(7, Shape::random, 400);
   while (world.source.top() < 2 || world.source.levels[0].size() < 20) {
     world = World(world.seed + 1, Shape::random, 400);
@@ -348,8 +349,8 @@ TEST(ViewControl, PinnedFromTheStart) {
   EXPECT_EQ(control.model().expanded(), std::vector<ClusterId>{top[0]});
 }
 
-// A cluster that contradicts itself stays collapsed, is reported, and can be given again.
-TEST(ViewControl, FaultyClustersAreToldOf) {
+// A cluster that contradicts itself must stay collapsed and be reported, and it can be given again.
+TEST(ViewControl, ReportsFaultyClusters) {
   World world(5, Shape::random);
   ViewControl2<std::int32_t> control(counts(world.source), load_root(world.source));
   View fine;
@@ -383,7 +384,7 @@ TEST(ViewControl, FaultyClustersAreToldOf) {
   EXPECT_EQ(find_fault(control.model().triangulation()), "");
 }
 
-TEST(ViewControl, RefusesWhatMakesNoSense) {
+TEST(ViewControl, RejectsInvalidOptions) {
   World world(5, Shape::random);
   const auto make = [&](ViewOptions options) {
     ViewControl2<std::int32_t> control(counts(world.source), load_root(world.source), options);
@@ -418,8 +419,8 @@ TEST(ViewControl, RefusesWhatMakesNoSense) {
   EXPECT_THROW(control.give(above), HierarchyError);
 }
 
-// Boxes and errors with NaN neither crash nor bring in clusters that are not visible.
-TEST(ViewControl, HostileRecords) {
+// Boxes and errors with NaN must neither crash nor add clusters that are not visible.
+TEST(ViewControl, ToleratesHostileRecords) {
   const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity(),
                         -std::numeric_limits<double>::infinity(), 1e308, -1.0};
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {

@@ -50,9 +50,9 @@ Pose pose_of(const Point3& eye, double turn, double tilt) {
   return {eye, {-s * t, c * t, -d}, {-s * d, c * d, t}};
 }
 
-// A matrix and the parameters from which it is made give the same camera; a point is visible if the
-// matrix maps it into the picture, and a step across the view is as many pixels as the matrix maps
-// it to.
+// A matrix and the parameters from which it is made must give the same camera. A point is visible
+// if the matrix maps it into the picture, and a step across the view must have as many pixels as
+// the matrix maps it to.
 TEST(Camera, MatrixAndPoseAgree) {
   std::mt19937_64 random(1);
   int seen = 0;
@@ -105,8 +105,8 @@ TEST(Camera, MatrixAndPoseAgree) {
   EXPECT_GT(seen, 500);
 }
 
-// An off-centre projection is as sharp as a centred one.
-TEST(Camera, ShearedProjection) {
+// An off-centre projection must be as sharp as a centred one.
+TEST(Camera, HandlesShearedProjections) {
   Matrix projection{1, 0, 0.4, 0, 0, 1.5, -0.7, 0, 0, 0, -1, -1, 0, 0, -1, 0};
   const Camera camera = matrix_camera(projection, 900.0);
   EXPECT_NEAR(camera.pixels, 1.5 * 450.0, 1e-9);
@@ -114,13 +114,13 @@ TEST(Camera, ShearedProjection) {
   EXPECT_NEAR(camera.direction[2], -1.0, 1e-12);
 }
 
-TEST(Camera, PixelsAreThoseOfTheDefinition) {
+TEST(Camera, PixelsMatchTheDefinition) {
   const Camera camera = perspective_camera({}, 90.0, 1.0, 1000.0);
   EXPECT_NEAR(camera.pixels, 500.0, 1e-9);
   EXPECT_NEAR(orthographic_camera({}, 250.0, 1.0, 1000.0).pixels, 4.0, 1e-12);
 }
 
-TEST(Camera, RefusesWhatMakesNoSense) {
+TEST(Camera, RejectsInvalidParameters) {
   const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
   for (const double bad : {0.0, -1.0, nan, infinity}) {
     EXPECT_THROW(perspective_camera({}, bad, 1.0, 100.0), std::invalid_argument);
@@ -163,8 +163,8 @@ ViewDemand measured(const View& view, const ViewOptions& options,
   return demand;
 }
 
-// Including rounding: a box inside another never has a greater demand.
-TEST(ViewMeasure, DemandFallsInward) {
+// A box inside another must never have a greater demand, including rounding.
+TEST(ViewMeasure, DemandNeverGrowsInward) {
   std::mt19937_64 random(2);
   int in_view = 0;
   for (int i = 0; i < 3000; ++i) {
@@ -200,7 +200,7 @@ TEST(ViewMeasure, DemandFallsInward) {
 }
 
 // Level ground seen from above shows no outline; seen from the side, or if the cone is wide, it
-// may. By random normals and lines of sight: an outline is never missed.
+// may. Random normals and lines of sight check that an outline is never missed.
 TEST(ViewMeasure, OutlinesAreNeverMissed) {
   ViewOptions options;
   options.silhouette = 0.25;

@@ -13,7 +13,7 @@
 #include "multiresolution_oracle.hpp"
 #include "terrace/tri/view.hpp"
 
-/// Hierarchies with true errors, and the demands of a view on them, in the plainest form.
+/// Hierarchies with true errors, and the demands of a view on them, as simple as possible.
 
 namespace terrace::tri::test {
 
@@ -60,7 +60,7 @@ struct Demands {
   double want, keep;
 };
 
-/// By definition, regardless of the clusters above.
+/// The demand by definition, regardless of the clusters above.
 inline Demands own_demands(const View& view, const ViewOptions& options,
                            const ClusterRecord& record, unsigned level) {
   Demands result{0.0, 0.0};
@@ -121,11 +121,11 @@ inline Demands own_demands(const View& view, const ViewOptions& options,
   return result;
 }
 
-/// The demand of each cluster: never greater than that of the cluster above.
+/// The demand of each cluster, limited to that of the cluster above.
 inline std::map<ClusterId, Demands> all_demands(const WholeTree& tree, MemorySource& source,
                                                 const View& view, const ViewOptions& options) {
   std::map<ClusterId, Demands> result;
-  // Ids ascend by level, so from the end parents come first.
+  // Ids ascend by level, so parents come first from the end.
   for (auto it = tree.parents.rbegin(); it != tree.parents.rend(); ++it) {
     Demands d = own_demands(view, options, source.at(it->first).record, level_of(it->first));
     const auto above = result.find(it->second);
@@ -138,7 +138,7 @@ inline std::map<ClusterId, Demands> all_demands(const WholeTree& tree, MemorySou
   return result;
 }
 
-/// Where steps that start from `before` must end.
+/// The state in which steps that start from `before` must end.
 inline ClusterSet wanted_by(const WholeTree& tree, MemorySource& source, const View& view,
                             const ViewOptions& options, const ClusterSet& before) {
   ClusterSet result;
@@ -154,8 +154,8 @@ ClusterSet expanded_set(const ViewControl<T>& control) {
   return {ids.begin(), ids.end()};
 }
 
-/// Steps, giving what is requested, until a step changes nothing and lacks nothing available.
-/// Returns the number of steps.
+/// Takes steps, giving the clusters that they request, until a step changes nothing and lacks no
+/// available cluster. Returns the number of steps.
 template <class T>
 int settle(ViewControl<T>& control, MemorySource& source, const View& view,
            const StepBudget& budget = {}) {
