@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Compares the planar triangulation with CGAL's Delaunay_triangulation_2 with EPICK, in one run on
-// the same points. Uniform: 1,000,000 points of 26 bits; grid: 1000 x 1000, in random order.
+// the same points. Uniform: 1,000,000 points of 26 bits. Grid: 1000 x 1000, in random order.
 // Clusters: 500 compact ones, each the 300 points nearest to a centre on a lattice.
 //
 // items_per_second counts points and is a median of 5 rounds. A round of a cluster row removes
@@ -58,7 +58,7 @@ const std::vector<Cells>& input_points(Input input) {
 }
 
 /// Indices of the points of each cluster, along a Hilbert curve as in a store, and of a point near
-/// the cluster that is in none.
+/// the cluster that is not in any.
 struct Cluster {
   std::vector<std::uint32_t> members;
   std::uint32_t outside = 0;
@@ -131,7 +131,7 @@ std::vector<Cluster> ordered_clusters(Input input, Order order) {
   return clusters;
 }
 
-/// One interface over both triangulations. Points and handles of a cluster are contiguous, as a
+/// One interface for both triangulations. Points and handles of a cluster are contiguous, as a
 /// store delivers them.
 template <class Coord>
 struct Ours {
@@ -217,7 +217,8 @@ struct Cgal {
   }
 };
 
-/// CPU time of the process, which has one thread: it is less affected by other load on the machine.
+/// CPU time of the process, which has one thread. It is less affected by other load on the machine
+/// than wall time.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {
@@ -245,7 +246,7 @@ void start_peak() {
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
-/// Times `rounds` calls of round(), which returns seconds, and reports the median; counters give
+/// Times `rounds` calls of round(), which returns seconds, and reports the median. Counters give
 /// the slowest and the fastest, in points per second.
 template <class Round>
 void measure(benchmark::State& state, std::size_t points, Round round) {
@@ -313,7 +314,7 @@ void clusters(benchmark::State& state) {
       }
     }
   };
-  // One warm-up round, so that memory is allocated.
+  // The first round is a warm-up, so that memory is allocated.
   remove();
   insert();
   measure(state, all.size() * kClusterSize, [&] {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Compares the spatial triangulation with CGAL's Delaunay_triangulation_3 with EPICK, in one run on
-// the same points. Cube: 200,000 uniform points of 21 bits; torus: as many on a torus of radii 1
-// and 0.4 with radial noise of 0.001, rounded to 21 bits; grid: 60^3, where every cube is
-// cospherical; all in random order. Clusters: 200 compact ones, each the 100 points nearest to a
-// random point.
+// the same points, all in random order. Cube: 200,000 uniform points of 21 bits. Torus: as many on
+// a torus of radii 1 and 0.4 with radial noise of 0.001, rounded to 21 bits. Grid: 60^3, where
+// every cube is cospherical. Clusters: 200 compact ones, each the 100 points nearest to a random
+// point.
 //
 // items_per_second counts points and is a median of 5 rounds (CGAL's removal: 1). A round of a
 // cluster row removes or inserts all clusters once; restoring the state afterwards is not timed.
@@ -59,7 +59,7 @@ std::vector<Cells> make_points(Input input) {
       points.push_back({cell(unit()), cell(unit()), cell(unit())});
       continue;
     }
-    // Two normal numbers by the Box-Muller transform; uniform in area by rejection.
+    // The noise is normal, by the Box-Muller transform. Rejection makes the points uniform in area.
     const double u = 2 * M_PI * unit();
     const double v = 2 * M_PI * unit();
     if (unit() * 1.4 > 1 + 0.4 * std::cos(v)) continue;
@@ -81,7 +81,7 @@ const std::vector<Cells>& input_points(Input input) {
 }
 
 /// Indices of the points of each cluster, in random order, and of a point near the cluster that is
-/// in none.
+/// not in any.
 struct Cluster {
   std::vector<std::uint32_t> members;
   std::uint32_t outside = 0;
@@ -94,7 +94,8 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
   for (std::uint32_t i = 0; i < points.size(); ++i) point_of[slot(vertices[i])] = i;
   std::mt19937_64 random(2);
   std::vector<Cluster> clusters;
-  std::vector<char> seen(triangulation.vertex_slots());  // 1: in a list, 2: in a cluster or beside
+  std::vector<char> seen(triangulation.vertex_slots());  // 1: in a list, 2: in a cluster or next to
+                                                         // one
   std::vector<VertexId> around;
   while (clusters.size() < kClusters) {
     const VertexId centre = vertices[random() % vertices.size()];
@@ -137,7 +138,7 @@ const std::vector<Cluster>& input_clusters(Input input) {
   return clusters;
 }
 
-/// One interface over both triangulations. Points and handles of a cluster are contiguous.
+/// One interface for both triangulations. Points and handles of a cluster are contiguous.
 template <class Coord>
 struct Ours {
   static constexpr std::size_t kRounds = 5;
@@ -228,7 +229,8 @@ struct Cgal {
   }
 };
 
-/// CPU time of the process, which has one thread: it is less affected by other load on the machine.
+/// CPU time of the process, which has one thread. It is less affected by other load on the machine
+/// than wall time.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {
@@ -256,7 +258,7 @@ void start_peak() {
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
-/// Times calls of round(), which returns seconds, and reports the median; counters give the slowest
+/// Times calls of round(), which returns seconds, and reports the median. Counters give the slowest
 /// and the fastest, in points per second.
 template <class Round>
 void measure(benchmark::State& state, std::size_t points, std::size_t rounds, Round round) {
@@ -293,7 +295,7 @@ void bulk(benchmark::State& state) {
   if (held > 0) state.counters["held_B/pt"] = held;
 }
 
-/// Wall time of bulk construction by one or two threads, to be run on two idle cores.
+/// Measures the wall time of bulk construction by one or two threads. Run it on two idle cores.
 template <class Coord>
 void bulk_by_threads(benchmark::State& state) {
   const auto& input = input_points(static_cast<Input>(state.range(0)));
@@ -329,7 +331,7 @@ void clusters(benchmark::State& state) {
       }
     }
   };
-  // One warm-up round, so that memory is allocated.
+  // The first round is a warm-up, so that memory is allocated.
   remove();
   insert();
   measure(state, all.size() * kClusterSize, kAction == kInsert ? 3 : Engine::kRounds, [&] {

@@ -2,9 +2,9 @@
 // Compares the elliptical tetrahedralisation with the Euclidean one of doubles, and with CGAL's
 // Delaunay_triangulation_3 with EPICK on points that were mapped and rounded, in one run on the
 // same points: 100,000 uniform ones, or the complete grid of 46^3, in random order. Metrics: a
-// sphere; axes of 5, 1, 2 along those of the coordinates, and rotated; 100, 1, 1 rotated. Then the
-// removal of 200 compact sets of 100 of the uniform points, and their insertion with hints. Then
-// flips to three regions.
+// sphere; axes of 5, 1, 2 along those of the coordinates, and rotated; 100, 1, 1 rotated. Also
+// measures the removal of 200 compact sets of 100 of the uniform points, their insertion with
+// hints, and flips to three regions.
 //
 // items_per_second counts points; CPU time, median of 5 rounds.
 #include <algorithm>
@@ -185,8 +185,9 @@ void elliptical_sets(benchmark::State& state) {
       state.range(0) != 0);
 }
 
-/// Three boxes that cover most of the cube, ellipsoids of the given ratio. Also counts the facets
-/// that remain non-Delaunay; there are about twice as many facets within regions as tetrahedra.
+/// Three boxes that cover most of the cube, with ellipsoids of the given ratio. Also counts the
+/// facets that remain non-Delaunay; there are about twice as many facets within regions as
+/// tetrahedra.
 void regions(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   const auto ratio = static_cast<double>(state.range(1));

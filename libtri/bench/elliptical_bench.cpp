@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Compares the elliptical triangulation with the Euclidean one, and with CGAL's
 // Delaunay_triangulation_2 with EPICK on points that were mapped and rounded, in one run on the
-// same points: 200,000 uniform ones, or the complete grid of 447 x 447 in random order. Then flips
-// to three regions, of the whole and following compact sets of 140 points that go and come.
+// same points: 200,000 uniform ones, or the complete grid of 447 x 447 in random order. Also
+// measures flips to three regions, of the whole triangulation and after removing and adding compact
+// sets of 140 points.
 //
 // items_per_second counts points; CPU time, median of 5 rounds.
 #include <algorithm>
@@ -107,7 +108,7 @@ void cgal_mapped(benchmark::State& state) {
   });
 }
 
-/// Three boxes that cover most of the square, ellipses of the given ratio.
+/// Three boxes that cover most of the square, with ellipses of the given ratio.
 tri::MetricField2 three_regions(double ratio) {
   const double side = kSide;
   return tri::MetricField2(
@@ -128,14 +129,14 @@ void regions(benchmark::State& state) {
   });
 }
 
-/// Compact sets of 140 points go and come back, the changes taken each time. Items are points that
-/// went and came.
+/// Removes compact sets of 140 points and adds them again, taking the changes each time. Items are
+/// points removed and added.
 template <class Triangulation>
 void sets(benchmark::State& state, Triangulation triangulation) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   const std::vector<tri::VertexId> built = triangulation.build(points);
   triangulation.start_journal();
-  const std::size_t side = kSmall ? 3 : 37;  // of a square in which sets of 12 x 12 cells lie
+  const std::size_t side = kSmall ? 3 : 37;  // of a square that contains sets of 12 x 12 cells
   std::vector<std::vector<tri::VertexId>> all(side * side);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto column = static_cast<std::size_t>(points[i][0] / 12);

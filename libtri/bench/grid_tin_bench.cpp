@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error-bounded meshes of a raster in windows of 512 cells, on one thread: triangles, and seconds
-// of meshing (including the settling of sides) and of the check at every sample.
+// Measures error-bounded meshes of a raster in windows of 512 cells, on one thread: the triangles,
+// and the seconds of meshing (including the settling of sides) and of the check at every sample.
 //
-// The raster is the file of 32-bit floats named by TERRACE_GRID, with TERRACE_GRID_COLUMNS per row,
-// or else synthetic: fractal relief of about the same roughness.
+// The raster is the file of 32-bit floats named by TERRACE_GRID, with TERRACE_GRID_COLUMNS per row.
+// Without it, a synthetic raster is used: fractal relief of about the same roughness.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -69,7 +69,8 @@ Raster fractal(std::uint32_t cells) {
 
 Raster read(const char* path) {
   const char* const columns = std::getenv("TERRACE_GRID_COLUMNS");
-  if (columns == nullptr) throw std::runtime_error("TERRACE_GRID without TERRACE_GRID_COLUMNS");
+  if (columns == nullptr)
+    throw std::runtime_error("TERRACE_GRID is set; set TERRACE_GRID_COLUMNS too");
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) throw std::runtime_error(std::string("cannot read ") + path);
   Raster raster;

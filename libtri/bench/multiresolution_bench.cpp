@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the time of expanding and collapsing is divided between the triangulation, its journal, the
-// source and the model's own bookkeeping. Times in microseconds per cluster (for the moving focus,
-// per step); `own/tri` is the model's own share relative to the triangulation's, which the project
-// keeps below 1.
+// Measures how the time of expanding and collapsing is divided between the triangulation, its
+// journal, the source and the model's own bookkeeping. Times are in microseconds per cluster (for
+// the moving focus, per step). `own/tri` is the model's own share relative to the triangulation's,
+// which the project keeps below 1.
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -25,7 +25,7 @@ enum Kind { kGrid, kRandom };
 
 int side() { return std::getenv("TERRACE_BENCH_SMALL") ? 128 : 2048; }
 
-/// Clusters of about 140 points: two levels of them below the root.
+/// Clusters of about 140 points, two levels of them below the root.
 ArraySource& source(Kind kind) {
   static std::map<Kind, ArraySource> made;
   const auto found = made.find(kind);
@@ -58,7 +58,7 @@ class Shares {
     points_ += difference(points, model.point_count());
     clusters_ += difference(clusters, model.expanded_count());
   }
-  /// For steps that both add and remove: counts steps instead of clusters.
+  /// For steps that both add and remove; counts steps instead of clusters.
   void count_step(double points) {
     ++steps_;
     step_points_ += points;
@@ -87,7 +87,7 @@ class Shares {
   double steps_ = 0, step_points_ = 0;
 };
 
-/// 500 scattered clusters of level 0, each in a step of its own, on top of a model of level 1.
+/// 500 scattered clusters of level 0, each in its own step, on top of a model of level 1.
 void expand_one_by_one(benchmark::State& state, Kind kind, bool deltas, bool measure_collapse) {
   ArraySource& src = source(kind);
   Model model(src, {1, {}}, {deltas});
@@ -145,7 +145,7 @@ void whole_level(benchmark::State& state, Kind kind, bool deltas, bool measure_c
   shares.report();
 }
 
-/// A square focus of about 40 000 points of level 0 that moves by a quarter of its side per step.
+/// A square focus of about 40,000 points of level 0 that moves by a quarter of its side per step.
 void moving_focus(benchmark::State& state, Kind kind) {
   ArraySource& src = source(kind);
   Model model(src, {1, {}});
@@ -167,7 +167,8 @@ void moving_focus(benchmark::State& state, Kind kind) {
   shares.report();
 }
 
-/// From scratch, points in bulk; reports the bytes per vertex of model and triangulation.
+/// Builds from scratch, with all points in bulk. Reports the bytes per vertex of model and
+/// triangulation.
 void start(benchmark::State& state, Kind kind) {
   ArraySource& src = source(kind);
   for (auto _ : state) {

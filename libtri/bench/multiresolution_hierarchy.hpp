@@ -13,7 +13,7 @@
 #include "terrace/tri/multiresolution.hpp"
 
 /// Large hierarchies of compact clusters that are fast to make, and timers between the model and
-/// what it uses.
+/// the parts that it uses.
 
 namespace terrace::tri::bench {
 
@@ -23,7 +23,7 @@ inline double unit(std::mt19937_64& random) {
 
 using Clock = std::chrono::steady_clock;
 
-/// Adds its lifetime in seconds to `sum`.
+/// Adds the seconds of its lifetime to `sum`.
 class Lap {
  public:
   explicit Lap(double& sum) : sum_(sum), begin_(Clock::now()) {}
@@ -47,7 +47,7 @@ class ArraySource : public ClusterSource {
     /// upper bound of the distance in the plane between the head and a descendant
     std::vector<double> errors;
   };
-  std::vector<Level> levels;  ///< the last one is the root alone
+  std::vector<Level> levels;  ///< the last one has only the root
   mutable double seconds = 0.0;
 
   [[nodiscard]] unsigned top() const override { return static_cast<unsigned>(levels.size()) - 1; }
@@ -71,9 +71,9 @@ class ArraySource : public ClusterSource {
   }
 };
 
-/// In each cell of about `cell_points` points one becomes a centre; each point joins the nearest
-/// centre of the cells around its own; members keep the order of `points`. Repeats this `levels`
-/// times with the centres as points.
+/// Makes one point a centre in each cell of about `cell_points` points. Each point joins the
+/// nearest centre of the cells around its own; members keep the order of `points`. Repeats this
+/// `levels` times with the centres as points.
 inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, double cell_points,
                                   std::mt19937_64& random) {
   struct Node {
@@ -101,7 +101,7 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
       return static_cast<std::size_t>(y) * static_cast<std::size_t>(cells) +
              static_cast<std::size_t>(x);
     };
-    // One of the cell's nodes at random, by reservoir sampling.
+    // Chooses one of the cell's nodes at random, by reservoir sampling.
     constexpr std::uint32_t kNone = 0xFFFFFFFFu;
     std::vector<std::uint32_t> centre(all, kNone), seen(all, 0);
     for (std::uint32_t i = 0; i < nodes.size(); ++i) {
@@ -132,7 +132,7 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
         }
       }
     }
-    for (std::uint32_t c = 0; c < count; ++c) cluster[centres[c]] = kNone;  // no members
+    for (std::uint32_t c = 0; c < count; ++c) cluster[centres[c]] = kNone;  // not a member
     ArraySource::Level out;
     out.first.assign(count + 1, 0);
     for (const std::uint32_t c : cluster) {
@@ -214,7 +214,8 @@ inline std::vector<Point3> random_points(std::size_t count, std::mt19937_64& ran
   return points;
 }
 
-/// A triangulation wrapped in a timer: the time the model spends in it, and on the journal.
+/// A triangulation wrapped in a timer, which measures the time that the model spends in it and on
+/// the journal.
 template <class T>
 class Timed {
  public:

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Restoring shapes: from scratch and after a change, on a noisy torus of 200,000 points, and on the
-// scans in the folder named by TERRACE_DATA, for which a table shows the quality of the results.
+// Measures the restoring of shapes, from scratch and after a change, on a noisy torus of 200,000
+// points and on the scans in the folder named by TERRACE_DATA. A table shows the quality of the
+// results for the scans.
 //
-// Times are of the restoring alone, after the build; "collapse" follows the removal of the 100
+// Times are those of restoring alone, after the build. "collapse" follows the removal of the 100
 // points nearest to one of them, "expand" their reinsertion.
 #include <algorithm>
 #include <array>
@@ -81,7 +82,7 @@ double seconds(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// 100 points nearest to one of them, breadth-first.
+/// The 100 points nearest to one of them, breadth-first.
 template <class Triangulation>
 std::vector<VertexId> nearest(const Triangulation& triangulation, VertexId seed) {
   std::vector<VertexId> cluster{seed}, around;
@@ -94,8 +95,8 @@ std::vector<VertexId> nearest(const Triangulation& triangulation, VertexId seed)
   return cluster;
 }
 
-/// Seconds that the shape takes to follow the expansion and the collapse of a cluster, which gets
-/// its new vertices.
+/// Seconds that the shape takes to follow the expansion and the collapse of a cluster, whose new
+/// vertices it stores in the cluster.
 template <class Coord>
 std::array<double, 2> take_out_and_put_back(Delaunay3<Coord>& triangulation, Shape3<Coord>& shape,
                                             std::vector<VertexId>& cluster) {
@@ -145,7 +146,7 @@ constexpr Scan kScans[] = {
     {"armadillo_tm.ply", "armadillo 2"},
 };
 
-/// The mean of 40 clusters all over a scan, see take_out_and_put_back().
+/// The mean of 40 clusters spread over a scan, see take_out_and_put_back().
 template <class Coord>
 std::array<double, 2> mean_of_clusters(Delaunay3<Coord>& triangulation, Shape3<Coord>& shape) {
   constexpr std::size_t kClusters = 40;
@@ -163,11 +164,11 @@ std::array<double, 2> mean_of_clusters(Delaunay3<Coord>& triangulation, Shape3<C
   return sum;
 }
 
-void print_row(const char* name, const char* how, double build, double shape_time,
+void print_row(const char* name, const char* label, double build, double shape_time,
                const SurfaceMeasures& m, std::size_t lost, std::size_t rescued, double scale,
                const SurfaceMeasures& original, double volume,
                const std::array<double, 2>& follow) {
-  std::printf("%-12s %-14s %6.3f %6.4f %7zu %6lld %5zu %6zu %6zu %6zu", name, how, build,
+  std::printf("%-12s %-14s %6.3f %6.4f %7zu %6lld %5zu %6zu %6zu %6zu", name, label, build,
               shape_time, m.faces, static_cast<long long>(m.euler_characteristic), m.components,
               m.non_manifold_edges, lost, rescued);
   if (original.faces > 0)
@@ -189,30 +190,32 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     build = std::min(build, seconds([&] { fresh.build(points); }));
     triangulation = std::move(fresh);
   }
-  struct Way {
+  struct Method {
     const char* name;
     ShapeOptions options;
   };
-  Way ways[] = {{"poles", {}}, {"flood", {}}, {"no guard", {}}, {"published", {}}};
-  for (Way* flood : {&ways[1], &ways[2]}) flood->options.rule = ShapeRule::kFlood;
-  ways[2].options.keep_vertices = false;
-  ways[3].options.rule = ShapeRule::kPublished;
-  for (const Way& way : ways) {
-    Shape3<Coord> shape(way.options);
+  Method methods[] = {{"poles", {}}, {"flood", {}}, {"no guard", {}}, {"published", {}}};
+  for (Method* flood : {&methods[1], &methods[2]}) flood->options.rule = ShapeRule::kFlood;
+  methods[2].options.keep_vertices = false;
+  methods[3].options.rule = ShapeRule::kPublished;
+  for (const Method& method : methods) {
+    Shape3<Coord> shape(method.options);
     double time = 1e9;
     for (int round = 0; round < 3; ++round)
       time = std::min(time, seconds([&] { shape.restore(triangulation); }));
-    const std::string how = std::string(way.name) + (std::is_same_v<Coord, double> ? " d" : " i");
+    const std::string label =
+        std::string(method.name) + (std::is_same_v<Coord, double> ? " d" : " i");
     const ShapeSurface surface = shape.surface(triangulation);
     SurfaceMeasures found = measure(surface.surface);
     const ShapeParts parts = shape.parts(triangulation, surface);
     found.components = parts.components;
     found.euler_characteristic = parts.euler_characteristic;
     const std::size_t lost = shape.lost_vertices().size(), rescued = shape.rescued_count();
-    // Last, as labels that follow changes may differ from those from scratch.
+    // This comes last, as labels that follow changes may differ from those from scratch.
     std::array<double, 2> follow{};
-    if (way.options.rule == ShapeRule::kPoles) follow = mean_of_clusters(triangulation, shape);
-    print_row(name, how.c_str(), build, time, found, lost, rescued, step, measures, volume, follow);
+    if (method.options.rule == ShapeRule::kPoles) follow = mean_of_clusters(triangulation, shape);
+    print_row(name, label.c_str(), build, time, found, lost, rescued, step, measures, volume,
+              follow);
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Table 8.1 of the thesis compared with ours: random clusters of an elevation model, expanded on
+// Compares table 8.1 of the thesis with ours. Random clusters of an elevation model, expanded on
 // top of a coarse triangulation, are collapsed: by the model (as sets, and its bookkeeping with the
 // journal), point by point, and point by point by CGAL. Writes table_8_1.csv.
 //
@@ -47,7 +47,8 @@ constexpr std::array<ThesisRow, 6> kThesis{{{15, 4454, 0.01, 0.09, 0.09},
                                             {250, 73060, 6.66, 4.04, 1.54},
                                             {500, 146741, 35.23, 10.34, 5.54}}};
 
-/// CPU time of the process, which has one thread: it is less affected by other load on the machine.
+/// CPU time of the process, which has one thread. It is less affected by other load on the machine
+/// than wall time.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double median(std::vector<double> values) {
@@ -94,7 +95,7 @@ void bookkeeping(ArraySource& source, const std::vector<ClusterId>& clusters, Ti
   times.bookkeeping = median(own);
 }
 
-/// Removal of the clusters' points, each cluster as a set or point by point.
+/// Removes the clusters' points, each cluster as a set or point by point.
 void removal(ArraySource& source, const std::vector<ClusterId>& clusters, Times& times) {
   Plain triangulation;
   std::vector<Plain::Point> base;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera flies over a grid of points in clusters of about 140, three levels, with an error chosen
-// such that about 500,000 of them are in the model: 600 frames, each moving by 1 % of the width of
-// the view, with one step of at most 10 ms per frame. The clusters that a step requests are given
-// before the next one. Times in milliseconds of the steps; `at_target`: share of the frames after
-// whose step no greater error is visible; `stop_frames`: steps until a view that stopped is at its
-// target and nothing is left to do; `decide`: a step that finds nothing to do.
+// A camera flies over a grid of points in clusters of about 140, on three levels, with an error
+// chosen such that about 500,000 points are in the model. There are 600 frames; each moves by 1 %
+// of the width of the view and has one step of at most 10 ms. The clusters that a step requests are
+// given before the next one. Times are in milliseconds per step. `at_target`: share of the frames
+// after whose step no greater error is visible. `stop_frames`: steps until a view that stopped is
+// at its target and nothing is left to do. `decide`: a step that finds nothing to do.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -40,7 +40,7 @@ std::vector<std::uint64_t> counts() {
 
 enum Kind { kPerspective, kMap };
 
-/// The camera's path: a circle about the middle, looking ahead and down; for the map, straight
+/// The camera's path is a circle about the middle, looking ahead and down; for the map, straight
 /// down.
 struct Flight {
   Kind kind;
@@ -79,7 +79,7 @@ std::unique_ptr<Control> settled(const View& view) {
   }
 }
 
-/// The error at which the model has about the wanted number of points.
+/// Finds the error at which the model has about the wanted number of points.
 double pixel_error_for(const Flight& flight) {
   double low = 0.01, high = 1000.0;
   for (int i = 0; i < 10; ++i) {
@@ -98,7 +98,7 @@ double pixel_error_for(const Flight& flight) {
 void flight(benchmark::State& state, Kind kind, bool heights) {
   Flight way{kind};
   View view;
-  // The map is at full resolution; in perspective the error decides.
+  // The map is at full resolution. In perspective the error decides.
   view.pixel_error = kind == kMap ? 0.01 : pixel_error_for(way);
   view.camera = way.camera(0.0);
   ViewOptions options;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A coarse grid gets detail in one place and loses it again; a consumer that sees only the changes
-// keeps its own list of triangles.
+// Adds detail to a coarse grid in one place and removes it again. A consumer that sees only the
+// changes keeps its own list of triangles.
 #include <cstdio>
 #include <cstdlib>
 #include <set>

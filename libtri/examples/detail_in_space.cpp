@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A coarse lattice of points in space gets detail in one place and loses it again; a consumer that
-// sees only the changes keeps its own list of tetrahedra.
+// Adds detail to a coarse lattice of points in space in one place and removes it again. A consumer
+// that sees only the changes keeps its own list of tetrahedra.
 #include <cstdio>
 #include <cstdlib>
 #include <set>
@@ -40,7 +40,7 @@ int main() {
   space.insert(detail, inserted, space.nearest({320, 320, 320}));
   correct = update() && correct;
 
-  // Where a point lies: in which tetrahedron, and near which vertex.
+  // Finds the tetrahedron that contains a point, and the nearest vertex.
   const Location3 location = space.locate({301, 302, 303});
   correct = correct && location.place != Place3::kOutside && space.alive(location.tetrahedron);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges that follow a direction: everywhere, or in two regions only. Detail comes and goes.
+// Makes edges follow a direction, everywhere or in two regions only, while detail is added and
+// removed.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -54,7 +55,7 @@ int main() {
   const double everywhere = stretch(slanted, all(slanted), everything, 30);
   std::printf("one ellipse: edges are %.2f times as long along it as across\n", everywhere);
 
-  // It is dynamic: inserting and removing points leaves no trace.
+  // The triangulation is dynamic: inserting points and removing them again restores it.
   const std::uint64_t before = slanted.hash();
   std::vector<Point> detail;
   for (int i = 0; i < 500; ++i) detail.push_back({40 + 10 * unit(), 40 + 10 * unit()});
@@ -65,7 +66,7 @@ int main() {
     if (created) added.push_back(vertex);
   slanted.remove(added);
   const bool same = slanted.hash() == before;
-  std::printf("detail came and went: %s triangles\n", same ? "the same" : "NOT the same");
+  std::printf("detail added and removed: %s triangles\n", same ? "the same" : "NOT the same");
 
   // Two regions, each with its own ellipse, Euclidean outside.
   tri::Delaunay2<double> plain;

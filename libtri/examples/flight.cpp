@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera flies over a terrain that is never in memory as a whole. Each frame the control brings
-// the model closer to what the camera wants and names the missing clusters; here a "loader"
-// delivers them two frames later. In a viewer it would be threads or requests to a server.
+// A camera flies over a terrain that is never in memory as a whole. In each frame the control
+// brings the model closer to the camera's view and names the missing clusters. A "loader" delivers
+// them two frames later; in a viewer these would be threads or requests to a server.
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -16,7 +16,7 @@ namespace tri = terrace::tri;
 
 namespace {
 
-// 729 x 729 heights in three levels: the middle of every 3 x 3 cells represents its neighbours, and
+// 729 x 729 heights in three levels. The middle of every 3 x 3 cells represents its neighbours, and
 // the middle of every 9 x 9 represents the middles around it. Any store of clusters can be a
 // source.
 class Raster : public tri::ClusterSource {
@@ -30,7 +30,7 @@ class Raster : public tri::ClusterSource {
   tri::ClusterRecord record(tri::ClusterId id) override {
     const auto [x, y] = middle(id);
     const double reach = tri::level_of(id) == 0 ? 1.0 : 4.0;
-    // Heights are within 20; the slope is less than 1.
+    // Heights are within 20, and the slope is less than 1.
     return {{{x - reach, y - reach, -20.0}, {x + reach, y + reach, 20.0}}, 2.0 * reach, 8};
   }
   tri::ClusterMembers read(tri::ClusterId id) override {
@@ -67,7 +67,7 @@ class Raster : public tri::ClusterSource {
     return static_cast<std::uint64_t>(y) / size * side(level) +
            static_cast<std::uint64_t>(x) / size;
   }
-  // A member of the root: the head of a cluster on each level below.
+  // A member of the root, which is the head of a cluster on each level below.
   void add(tri::ClusterId id, unsigned levels) {
     const auto [x, y] = middle(id);
     positions_.push_back({x, y, height(x, y)});
@@ -92,7 +92,7 @@ int main() {
                                           tri::load_root(raster), options);
   const auto& terrain = control.model().triangulation();
 
-  std::set<tri::TriangleId> drawn;  // what a renderer would keep
+  std::set<tri::TriangleId> drawn;  // the state of a renderer
   for (const tri::TriangleId t : terrain.all_triangles()) drawn.insert(t);
   tri::Geomorph2<std::int32_t> morph;
   std::deque<std::vector<tri::ViewRequest>> loading(2);
@@ -106,7 +106,7 @@ int main() {
     view.camera =
         tri::perspective_camera({{way, way, 60.0}, {1, 1, -1.2}, {0, 0, 1}}, 60.0, 1.6, 800.0);
     tri::StepBudget budget;
-    budget.operations = 300;  // or: budget.seconds = 0.010; budget.clock = ...
+    budget.operations = 300;  // or budget.seconds = 0.010; budget.clock = ...
 
     const auto& step = control.step(view, budget);
     for (const tri::TriangleId t : step.delta->changes.removed_triangles) drawn.erase(t);

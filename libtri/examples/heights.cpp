@@ -12,7 +12,7 @@
 namespace tri = terrace::tri;
 
 int main() {
-  // 40 x 40 points, a little off a grid, and a cone of slope 1 / 2 with its top at (200, 200).
+  // 40 x 40 points, slightly off a grid, and a cone of slope 1 / 2 with its top at (200, 200).
   std::vector<std::array<std::int32_t, 2>> points;
   for (std::int32_t y = 0; y < 40; ++y)
     for (std::int32_t x = 0; x < 40; ++x)
@@ -25,7 +25,7 @@ int main() {
     heights[slot(v)] = 100 - 0.5 * std::hypot(x - 200, y - 200);
   }
 
-  // Many queries in one call: heights, and slope and aspect.
+  // Passes many queries in one call: heights, and slope and aspect.
   const std::vector<tri::Point2> queries{{200, 120.5}, {280.25, 200}, {-50, 0}};
   const auto found =
       tri::heights_at(terrain, heights, queries, tri::Interpolation::kNaturalNeighbour);
@@ -53,7 +53,7 @@ int main() {
   std::printf("above a height of 50: %.0f, and %.0f with %zu vertices smoothed\n",
               before.volume_above, after.volume_above, overlay.size());
 
-  // The mesh against the cone itself, between its points.
+  // Compares the mesh with the cone itself, between its points.
   std::vector<tri::Point3> others;
   for (int i = 20; i < 380; i += 3)
     others.push_back({i + 0.5, 400.0 - i, 100 - 0.5 * std::hypot(i + 0.5 - 200, 200.0 - i)});

@@ -28,7 +28,7 @@ class Raster : public tri::ClusterSource {
         positions_.push_back(cell(column(child), row(child)));
         children_.push_back(c);
       }
-    } else {  // the eight around a middle
+    } else {  // the eight cells around a middle
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
           if (dx != 0 || dy != 0) positions_.push_back(cell(column(id) + dx, row(id) + dy));
@@ -58,9 +58,9 @@ int main() {
   std::printf("coarse: %zu vertices, %zu triangles\n", model.triangulation().vertex_count(),
               model.triangulation().triangle_count());
 
-  // All of level 0 inside the box; the rest stays as it is.
+  // Adds all of level 0 inside the box; the rest stays as it is.
   const auto& finer = model.refine(tri::box2(0, 0, 7, 7), 0);
-  std::printf("a fine corner: %zu vertices and %zu triangles more, %zu triangles gone\n",
+  std::printf("a fine corner: %zu vertices and %zu triangles more, %zu triangles removed\n",
               finer.changes.added_vertices.size(), finer.changes.added_triangles.size(),
               finer.changes.removed_triangles.size());
   for (const tri::ClusterId id : model.expanded()) {
@@ -70,7 +70,7 @@ int main() {
   std::printf("  its first new vertex has level %u and height %g\n", model.level(vertex),
               model.height(vertex));
 
-  // The same triangulation as before.
+  // The triangulation must be the same as before.
   model.set_level(1);
   const bool same = model.triangulation().hash() == before;
   std::printf("coarse again: %s\n", same ? "the same triangles" : "NOT the same triangles");

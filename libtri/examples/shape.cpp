@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Restores the surface of a dumbbell from points alone; then a part is sampled more densely, and
-// the shape follows the changes of the triangulation.
+// Restores the surface of a dumbbell from its points alone. Then samples a part more densely and
+// lets the shape follow the changes of the triangulation.
 #include "terrace/tri/shape.hpp"
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace tri = terrace::tri;
 
-// A dumbbell: `along` from end to end and `round` the axis, both from 0 to 1.
+// A point of the dumbbell: `along` from end to end and `round` the axis, both from 0 to 1.
 static tri::Point3 on_dumbbell(double along, double round) {
   const double t = 3.141592653589793 * along, angle = 6.283185307179586 * round;
   const double radius = std::sin(t) * (0.55 - 0.25 * std::cos(4 * t));
@@ -20,13 +20,13 @@ int main() {
   std::vector<tri::Point3> points;
   for (int i = 0; i < 4000; ++i) points.push_back(on_dumbbell((i + 0.5) / 4000, 0.618034 * i));
 
-  // In one call.
+  // Restores it in one call.
   const tri::SurfaceMeasures coarse = tri::measure(tri::restore_surface(points).surface);
   std::printf("%zu faces, area %.3f, volume %.3f, %zu component, Euler characteristic %d\n",
               coarse.faces, coarse.area, coarse.volume, coarse.components,
               static_cast<int>(coarse.euler_characteristic));
 
-  // With a triangulation that changes.
+  // Uses a triangulation that changes.
   tri::Delaunay3<double> triangulation;
   triangulation.build(points);
   tri::Shape3<double> shape;

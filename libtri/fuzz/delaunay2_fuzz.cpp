@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operations on points of a 10 x 10 raster, so that ties, duplicates and collinear states are
-// frequent. After each one the triangulation must be valid and equal to a rebuild.
+// Applies operations to points of a 10 x 10 raster, so that ties, duplicates and collinear states
+// are frequent. After each one the triangulation must be valid and equal to a rebuild.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

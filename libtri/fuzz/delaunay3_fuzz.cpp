@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operations on points of a lattice of 6 x 6 x 5, so that ties, duplicates and flat states are
-// frequent. After each one the triangulation must be valid and equal to a rebuild.
+// Applies operations to points of a lattice of 6 x 6 x 5, so that ties, duplicates and flat states
+// are frequent. After each one the triangulation must be valid and equal to a rebuild.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

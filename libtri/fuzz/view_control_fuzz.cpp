@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A view control over a small hierarchy with points of a 10 x 10 raster and false records, with
-// steps, given clusters and pins in any order. Budgets must hold, the triangulation must stay valid
-// and equal to a rebuild, and in the end a view that stays must settle.
+// Applies steps, given clusters and pins in any order to a view control over a small hierarchy with
+// points of a 10 x 10 raster and false records. Budgets must hold, the triangulation must stay
+// valid and equal to a rebuild, and in the end a view that stays must settle.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
