@@ -1,10 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 # check_symbols.sh NM ARCHIVE: fails if the archive defines a weak function. The linker may use such a function for the
-# whole program, which then crashes on processors that lack the instructions.
+# whole program, which would then crash on processors that lack the instructions.
 set -eu
 symbols=$("$1" --defined-only "$2")
-echo "$symbols" | grep -q scan_avx || { echo "no scan in $2"; exit 1; }
+echo "$symbols" | grep -q scan_avx || { echo "$2 does not contain the scans"; exit 1; }
 if echo "$symbols" | grep ' W '; then
   echo "the functions above may be shared with code for other processors"
   exit 1

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 # check_wasm.sh EM++ LIBTRI FOLDER SOURCES...: compiles the core and examples/flight.cpp for WebAssembly and runs it;
-# skipped without Emscripten. All sources are compiled together, which takes a fraction of the time.
+# Skipped without Emscripten. All sources are compiled together, which takes a fraction of the time.
 set -eu
 compiler=$1 root=$2 folder=$3/wasm
 shift 3
