@@ -58,7 +58,7 @@ class Shares {
     points_ += difference(points, model.point_count());
     clusters_ += difference(clusters, model.expanded_count());
   }
-  /// For steps that both add and remove; counts steps instead of clusters.
+  /// Counts a step instead of clusters, for steps that both add and remove.
   void count_step(double points) {
     ++steps_;
     step_points_ += points;

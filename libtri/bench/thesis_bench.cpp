@@ -77,8 +77,8 @@ struct Times {
   std::size_t points = 0;
 };
 
-/// The overhead of the model and its journal: its total time minus that of the triangulation and
-/// the source.
+/// The overhead of the model and its journal: its total time minus the time of the triangulation
+/// and the source.
 void bookkeeping(ArraySource& source, const std::vector<ClusterId>& clusters, Times& times) {
   std::vector<double> own;
   Model model(source, {1, {}});

@@ -2,9 +2,11 @@
 // A camera flies over a grid of points in clusters of about 140, on three levels, with an error
 // chosen such that about 500,000 points are in the model. There are 600 frames; each moves by 1 %
 // of the width of the view and has one step of at most 10 ms. The clusters that a step requests are
-// given before the next one. Times are in milliseconds per step. `at_target`: share of the frames
-// after whose step no greater error is visible. `stop_frames`: steps until a view that stopped is
-// at its target and nothing is left to do. `decide`: a step that finds nothing to do.
+// given before the next one.
+//
+// Times are in milliseconds per step. `at_target`: share of the frames after whose step no greater
+// error is visible. `stop_frames`: steps until a view that stopped is at its target and nothing is
+// left to do. `decide`: a step that finds nothing to do.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -185,7 +187,7 @@ void flight(benchmark::State& state, Kind kind, bool heights) {
     state.counters["changed"] = changed / flown;
     state.counters["clusters"] = static_cast<double>(control.model().expanded_count());
     state.counters["pixel_error"] = view.pixel_error;
-    state.counters["beside_MB"] = static_cast<double>(control.memory_bytes()) / 1e6;
+    state.counters["other_MB"] = static_cast<double>(control.memory_bytes()) / 1e6;
   }
 }
 

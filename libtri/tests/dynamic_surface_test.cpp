@@ -25,8 +25,8 @@ class DynamicSurfaceOf : public testing::Test {};
 using SurfaceCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(DynamicSurfaceOf, SurfaceCoords);
 
-// Any points are added and removed. The deltas must be complete, and the surface must be that of a
-// shape that follows the same changes; from scratch it must be that of a new object.
+// Any points are added and removed. The deltas must be complete, and the surface must equal the
+// surface of a shape that follows the same changes; from scratch it must equal a new object's.
 TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
   using Coord = TypeParam;
   for (const PointSet3 kind : kPointSets3) {
@@ -178,8 +178,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesNextToCoarseParts) {
   EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
 }
 
-// On a surface the estimated work is that of the points. The middle of a body has tetrahedra with
-// all of them.
+// On a surface the estimated work equals the number of points. The middle of a body has tetrahedra
+// with all of them.
 TYPED_TEST(DynamicSurfaceOf, EstimatesCostlyRemovals) {
   using Coord = TypeParam;
   std::mt19937_64 random(8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape in an elliptical metric must equal that of the mapped points.
+// The shape in an elliptical metric must equal the shape of the mapped points.
 #include <algorithm>
 #include <cmath>
 #include <random>

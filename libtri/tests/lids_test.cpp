@@ -300,8 +300,8 @@ TYPED_TEST(Lids, FollowScansThatCloseAndOpenAgain) {
 }
 
 /// Random clusters in a model of a scan are expanded and collapsed. After each change its surface
-/// must be that of its points, except where shapes depend on their history, and its lids must
-/// always be.
+/// must be the surface of its points, except where shapes depend on their history, and its lids
+/// must always be those of the definition.
 void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& random,
                            std::array<std::size_t, 2>& answers) {
   using Surface3 = DynamicSurface<std::int32_t>;

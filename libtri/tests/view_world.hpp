@@ -121,7 +121,7 @@ inline Demands own_demands(const View& view, const ViewOptions& options,
   return result;
 }
 
-/// The demand of each cluster, limited to that of the cluster above.
+/// The demand of each cluster, limited to the demand of the cluster above.
 inline std::map<ClusterId, Demands> all_demands(const WholeTree& tree, MemorySource& source,
                                                 const View& view, const ViewOptions& options) {
   std::map<ClusterId, Demands> result;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removes a set of vertices as one hole, after J. Skala, thesis, section 8.1, but by sets: all
-// triangles at the vertices are taken out first. If they leave a simple disc (or several), it is
-// filled at once. The thesis requires that a vertex is on the hole's boundary and that no boundary
-// vertex occurs twice; here these rules become one count (Euler's formula) and one comparison.
+// Removes a set of vertices as one hole, after J. Skala, thesis, section 8.1, but for the whole set
+// at once: all triangles at the vertices are taken out first. If they leave a simple disc (or
+// several), it is filled in one go. The thesis requires that a vertex is on the hole's boundary and
+// that no boundary vertex occurs twice; here these rules become one count (Euler's formula) and one
+// comparison.
+//
 // Vertices that stay but are inside the hole (islands) or touch its boundary twice (pinches) are
 // absorbed: taken out as well and reinserted into the filled hole.
 #include <algorithm>
@@ -83,9 +85,9 @@ void flood(Mesh<Kernel>& mesh) {
   Triangle* const triangle = mesh.triangle.data();
   const std::uint8_t* const mark = mesh.mark.data();
   std::uint32_t* const incident = mesh.incident.data();
-  const auto push = [&](Side side, bool really) {
+  const auto push = [&](Side side, bool keep) {
     out.queue[tail] = side;
-    tail += really ? 1 : 0;
+    tail += keep ? 1 : 0;
     __builtin_prefetch(&triangle[triangle_of(side)], 1);
   };
   // Starts from a triangle of every vertex, as the set need not be connected.

@@ -52,7 +52,8 @@ class Flips {
         const std::uint32_t other = beyond[i] == kNoTriangle ? kNone : number[slot(beyond[i])];
         t.mate[i] = kNoMate;
         if (other == kNone) continue;
-        // From there the edge is reversed: its first corner is this one's second.
+        // Seen from the other triangle the edge is reversed, so its first corner is this one's
+        // second.
         const auto& corner = mesh_.triangle[other].corner;
         const auto at = std::find(corner.begin(), corner.end(), t.corner[previous_index(i)]);
         t.mate[i] =
@@ -63,7 +64,7 @@ class Flips {
   }
 
   void run() {
-    // Numbers the triangles region by region.
+    // Lists the triangles of each region.
     std::vector<std::vector<std::uint32_t>> members(maps_.size());
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
       const std::uint32_t region = region_of(mesh_.triangle[t]);
@@ -137,7 +138,7 @@ class Flips {
   std::vector<std::uint32_t> region_;  // by vertex slot: index in maps_
   FlipMesh mesh_;
   std::vector<LinearMap2> maps_;
-  std::vector<bool> done_;  // regions whose metric is that of the triangulation
+  std::vector<bool> done_;  // true for regions with the metric of the triangulation
   std::uint32_t last_ = 0;
   std::vector<Side> pending_;
 };

@@ -362,7 +362,7 @@ void MultiresolutionModel<Triangulation>::Impl::insert_clusters(bool list_create
     }
     points_ += size;
   }
-  // The scratch memory of one cluster is worth keeping, but not that of a whole level.
+  // The scratch memory of one cluster is worth keeping, but the memory of a whole level is not.
   if (stage_.points.capacity() > kKeptPoints) stage_ = {};
 }
 

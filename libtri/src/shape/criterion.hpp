@@ -16,7 +16,7 @@
 
 namespace terrace::tri::shape {
 
-/// True if the mesh is in an elliptical metric, which is then that of the scope.
+/// True if the mesh is in an elliptical metric, which the current scope supplies.
 template <class Mesh>
 inline constexpr bool is_elliptical =
     std::is_same_v<typename Mesh::Kernel, spatial::EllipticalKernel>;

@@ -121,10 +121,10 @@ void find_exposed(const Mesh& mesh, State& state, const Changes& changes) {
   }
 }
 
-/// Updates the state after changes. The result equals that of flood() except for the paths. A
-/// removed tetrahedron stays removed if it still exists and its path did not lead through one that
-/// no longer exists, because its path is still valid. All others are tested, along with everything
-/// from which they could be reached, so all reachable ones are found.
+/// Updates the state after changes. The result equals the state after flood(), except for the
+/// paths. A removed tetrahedron stays removed if it still exists and its path did not lead through
+/// one that no longer exists, because its path is still valid. All others are tested, along with
+/// everything from which they could be reached, so all reachable ones are found.
 template <class Criterion, class Changes, class Mesh>
 void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
                   const Changes& changes) {

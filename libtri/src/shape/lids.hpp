@@ -37,8 +37,8 @@ class LidShare {
  public:
   void add(const LidFace& face) { change(face, 1); }
   void remove(const LidFace& face) { change(face, -1); }
-  /// True if more than a tenth of the area is in lids: 9 times their area exceeds that of the
-  /// others.
+  /// True if more than a tenth of the area is in lids: 9 times the area of the lids exceeds the
+  /// rest.
   [[nodiscard]] bool open() const {
     std::int64_t sum = 0;
     bool rest = false;  // true if there is a fraction below the current exponent

@@ -120,7 +120,7 @@ struct Turn {
   std::array<std::uint8_t, 4> from;  ///< old index of the corner at each new index
   std::array<std::uint8_t, 4> to;    ///< new index of the corner at each old index
 };
-/// Turns by the old index of the first corner, times 4, plus that of the second.
+/// Turns by the old index of the first corner, times 4, plus the old index of the second.
 inline constexpr std::array<Turn, 16> kTurns = [] {
   std::array<Turn, 16> turns{};
   for (std::uint8_t first = 0; first < 4; ++first) {

@@ -57,7 +57,7 @@ inline double tangent_of(double degrees) {
 class Ground {
  public:
   /// column_step, row_step: on the ground. extent: the greatest difference of coordinates. tangent:
-  /// that of the smallest angle for which wide() is true.
+  /// tangent of the smallest angle for which wide() is true.
   Ground(double column_step, double row_step, std::int64_t extent, double tangent)
       : tangent_(tangent) {
     const double x = std::fabs(column_step), y = std::fabs(row_step);

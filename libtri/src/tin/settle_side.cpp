@@ -71,7 +71,7 @@ std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const 
                                        std::span<const T> other_beside, double max_error) {
   for (const std::span<const T> other : {beside, other_beside})
     if (!other.empty() && other.size() != line.size())
-      throw std::invalid_argument("settle_side: lines of different lengths");
+      throw std::invalid_argument("settle_side: the lines must have equal lengths");
   if (!(max_error >= 0)) throw std::invalid_argument("settle_side: max_error must not be negative");
   for (const T z : line)
     if (std::isfinite(z) && std::fabs(static_cast<double>(z)) > 1e150)

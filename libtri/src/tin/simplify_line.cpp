@@ -17,7 +17,7 @@ using tin::valid;
 void check(std::span<const double> t, std::span<const double> heights, double max_error,
            const std::optional<TinLattice>& lattice) {
   if (t.size() != heights.size())
-    throw std::invalid_argument("simplify_line: arrays of different lengths");
+    throw std::invalid_argument("simplify_line: t and heights must have equal lengths");
   if (!(max_error >= 0)) throw std::invalid_argument("simplify_line: max_error must be at least 0");
   if (lattice && !valid(*lattice))
     throw std::invalid_argument("simplify_line: the lattice's step must be positive");
@@ -37,7 +37,8 @@ LineVertex vertex_of(double t, double height, std::size_t sample,
   return {to_whole(t), on_lattice(*lattice, height), number};
 }
 
-/// Beyond the ends, which rounding may reach, the height is that of the end.
+/// The height of the line at t. Beyond the ends, which rounding may reach, it is the height of the
+/// nearer end.
 double height_at(const LineVertex& a, const LineVertex& b, double t) {
   if (!(t > a.t)) return a.height;
   if (!(t < b.t)) return b.height;

@@ -35,7 +35,7 @@ class ViewColumns {
   void set_cone(std::size_t i, const NormalCone& cone);
   void set_error(std::size_t i, double error) { columns_[kError][i] = error; }
   void copy(std::size_t i, const ViewColumns& from, std::size_t j);
-  /// Extends the box of entry i to contain that of entry j.
+  /// Extends the box of entry i to contain the box of entry j.
   void join(std::size_t i, const ViewColumns& from, std::size_t j);
   [[nodiscard]] std::size_t memory() const;
 

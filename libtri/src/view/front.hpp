@@ -18,9 +18,9 @@ namespace terrace::tri {
 /// Decides by a view which clusters to expand and to collapse, and in what order. Depends on the
 /// tree of expanded clusters but not on a triangulation.
 ///
-/// The demand of a cluster is limited to that of the cluster above it, so the wanted clusters form
-/// a tree, whatever records and cones say. The error bound remains true: no descendant is farther
-/// from the head of the cluster above, which is present, than that cluster's error.
+/// The demand of a cluster is limited to the demand of the cluster above it, so the wanted clusters
+/// form a tree, whatever records and cones say. The error bound remains true: no descendant is
+/// farther from the head of the cluster above, which is present, than that cluster's error.
 ///
 /// A step measures the expanded clusters and one box around the collapsed children of each. It
 /// measures the children themselves only if that box may contain a wanted one.

@@ -64,8 +64,8 @@ class DynamicSurface {
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(std::span<const VertexId> vertices);
-  /// An estimate of the work of removing these vertices and following: the work is about that of
-  /// removing this many points in an ordinary place. Where fine detail ends, points have tetrahedra
+  /// An estimate of the work of removing these vertices and following, as a number of points that
+  /// would take as much work in an ordinary place. Where fine detail ends, points have tetrahedra
   /// with thousands of the fine points on the other side of a body. Based on the state at the last
   /// follow(). O(vertices).
   [[nodiscard]] std::size_t removal_work(std::span<const VertexId> vertices) const;
@@ -77,8 +77,8 @@ class DynamicSurface {
   /// Brings the surface up to date, in about 16 us per point inserted or removed. Starts from
   /// scratch if most tetrahedra are new.
   void follow();
-  /// Computes the surface from scratch, in 3 us per vertex. The result equals that of a new object
-  /// with the same points. threads: 0 for one per core; the result does not depend on it.
+  /// Computes the surface from scratch, in 3 us per vertex. The result equals a new object with the
+  /// same points. threads: 0 for one per core; the result does not depend on it.
   void restore(unsigned threads = 1);
 
   /// Starts recording and drops earlier records.

@@ -178,7 +178,7 @@ using TriangleFilter = std::function<bool(TriangleId)>;
 /// the flips; O(n^2) flips are possible, but there are few unless ellipses are extreme. Needs about
 /// 120 bytes per vertex while it runs, including the result.
 ///
-/// Triangulation: any Delaunay2, including that of a MultiresolutionModel.
+/// Triangulation: any Delaunay2, also one of a MultiresolutionModel.
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field,
@@ -227,7 +227,7 @@ struct MetricTetrahedra {
 /// whatever the field throws. The map is evaluated once per vertex. O(n log n) plus the flips, of
 /// which O(n^2) are possible. Needs about 450 bytes per vertex while it runs, including the result.
 ///
-/// Triangulation: any Delaunay3, including that of a MultiresolutionModel.
+/// Triangulation: any Delaunay3, also one of a MultiresolutionModel.
 template <class Triangulation>
 [[nodiscard]] MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation,
                                                  const MetricField3& field);

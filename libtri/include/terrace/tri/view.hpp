@@ -220,7 +220,7 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// all clusters delivered, steps converge to
 ///     { c : want(c) > 1 }  and  { c in S : keep(c) >= collapse_below }
 /// whatever interrupts them. Here want and keep are the demands of the view and of the view widened
-/// by the guard, each limited to that of the cluster above. A step therefore never undoes the
+/// by the guard, each limited to its value for the cluster above. A step therefore never undoes the
 /// previous one. (J. Skala, Algorithms for manipulating large geometric data, section 8.4, expands
 /// by closeness alone.)
 ///

@@ -153,7 +153,7 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
                           std::span<const double> z, std::span<const Point3> vertices,
                           std::span<const Corners> triangles) {
   if (x.size() != y.size() || x.size() != z.size())
-    throw std::invalid_argument("measure_surface: arrays of different lengths");
+    throw std::invalid_argument("measure_surface: x, y and z must have equal lengths");
   for (std::size_t t = 0; t < triangles.size(); ++t)
     for (const std::uint32_t v : triangles[t])
       if (v >= vertices.size())

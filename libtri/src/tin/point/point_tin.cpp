@@ -117,7 +117,7 @@ class Maker {
     result.stuck = measured_.above - measured_.to_mend;
     result.inserted = inserted_;
     result.removed = removed_;
-    // Frees the memory of the samples before allocating that of the result.
+    // Frees the memory of the samples before allocating the result.
     for (Vertex& vertex : span_of(mesh_.vertices))
       vertex.sample = vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]);
     samples_.release();

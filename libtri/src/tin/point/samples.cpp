@@ -78,7 +78,7 @@ void check(std::span<const double> values, const char* name) {
 Samples take_samples(std::span<const double> x, std::span<const double> y,
                      std::span<const double> z, PointDuplicates duplicates) {
   if (x.size() != y.size() || x.size() != z.size())
-    throw std::invalid_argument("point_tin: arrays of different lengths");
+    throw std::invalid_argument("point_tin: x, y and z must have equal lengths");
   if (x.size() > std::size_t{1} << 29) throw std::length_error("point_tin: more than 2^29 samples");
   check(x, "x");
   check(y, "y");

@@ -35,7 +35,7 @@ void check_sizes(const SampleRows& samples) {
 }
 void check_sizes(const SampleGrid& samples) {
   if (samples.x.size() != samples.z.size() || samples.y.size() != samples.z.size())
-    throw std::invalid_argument("point_tin: arrays of different lengths");
+    throw std::invalid_argument("point_tin: x, y and z must have equal lengths");
   if (samples.columns == 0 ? !samples.z.empty() : samples.z.size() % samples.columns != 0)
     throw std::invalid_argument("point_tin: z needs a height for each row and column");
 }
