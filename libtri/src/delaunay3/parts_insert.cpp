@@ -169,7 +169,7 @@ class alignas(128) Worker {
         ticks_(kTicksOfInsertion);
         if (insert(going[tried])) continue;
         if (out_of_room_) return;
-        put_off.push_back(going[tried]);
+        deferred.push_back(going[tried]);
       }
     } catch (...) {
       failure = std::current_exception();
@@ -177,7 +177,7 @@ class alignas(128) Worker {
   }
 
   Part part;
-  std::vector<std::uint32_t> put_off;
+  std::vector<std::uint32_t> deferred;
   std::size_t tried = 0;  ///< all vertices, unless slots ran out
   std::exception_ptr failure;
 
@@ -230,7 +230,7 @@ class Round {
                                             [&](std::uint32_t v) { return ranges_[0].has(v); });
     std::array<std::span<std::uint32_t>, kParts> lists = {std::span(going.begin(), split),
                                                           std::span(split, going.end())};
-    std::vector<std::uint32_t> put_off;
+    std::vector<std::uint32_t> deferred;
     while (!lists[0].empty() || !lists[1].empty()) {
       fill_block();
       const std::uint32_t base = mesh_.tetrahedron.size();
@@ -250,17 +250,17 @@ class Round {
       for (const auto* worker : {&first, &second}) {
         if (worker->failure) std::rethrow_exception(worker->failure);
         mesh_.finite_count = static_cast<std::uint32_t>(mesh_.finite_count + worker->part.finite());
-        put_off.insert(put_off.end(), worker->put_off.begin(), worker->put_off.end());
+        deferred.insert(deferred.end(), worker->deferred.begin(), worker->deferred.end());
       }
       close_gaps(base, first.part, second.part);
       lists = {lists[0].subspan(first.tried), lists[1].subspan(second.tried)};
       if (first.tried + second.tried > 0) continue;
       // A cavity needs more than all the room.
-      for (const auto& list : lists) put_off.insert(put_off.end(), list.begin(), list.end());
+      for (const auto& list : lists) deferred.insert(deferred.end(), list.begin(), list.end());
       break;
     }
-    std::sort(put_off.begin(), put_off.end());
-    return put_off;
+    std::sort(deferred.begin(), deferred.end());
+    return deferred;
   }
 
  private:

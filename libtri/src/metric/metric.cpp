@@ -16,14 +16,14 @@ namespace {
 void check_semi_axis(double length, const std::string& which) {
   if (length > 0.0 && std::isfinite(length) && std::isfinite(1.0 / length)) return;
   throw std::invalid_argument("semi-axis " + which + " is " + std::to_string(length) +
-                              ": it must be positive and finite, in the unit of the points");
+                              "; it must be positive and finite, in the unit of the points");
 }
 
 /// (cosine, sine) of an angle in degrees.
 std::array<double, 2> direction_of(double degrees) {
   if (!std::isfinite(degrees)) {
     throw std::invalid_argument(
-        "the angle of an ellipse is not finite: give it in degrees, counter-clockwise from +x");
+        "the angle of an ellipse is not finite; give it in degrees, counter-clockwise from +x");
   }
   const auto [s, c] = base::sin_cos_degrees(degrees);
   return {c, s};

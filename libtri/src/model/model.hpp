@@ -151,8 +151,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
   std::size_t points_ = 0;
   bool deltas_, old_heights_;
   bool open_ = false;                    // between open_step() and close_step()
-  Slot partial_ = ClusterTree::kNoSlot;  // the cluster of which collapse_to() has left `left_`
-                                         // points
+  Slot partial_ = ClusterTree::kNoSlot;  // has `left_` points after collapse_to()
   std::uint32_t left_ = 0;
   Delta delta_;
   Stage stage_;

@@ -17,7 +17,7 @@ namespace terrace::tri::shape {
 namespace {
 
 constexpr std::size_t kForestBlock = std::size_t{1} << 14;
-/// Number of iterations by which memory is prefetched.
+/// Number of iterations that memory is prefetched ahead.
 constexpr std::size_t kAhead = 8;
 
 /// A statement about two sets of tetrahedra. A facet states that its sides are alike, a vertex that

@@ -191,8 +191,7 @@ class Nearby {
   }
 
   void write(const std::vector<std::uint8_t>& inside) {
-    std::vector<std::array<bool, 2>> has(whole_.size());  // true if it has tetrahedra outside,
-                                                          // inside
+    std::vector<std::array<bool, 2>> has(whole_.size());  // outside, inside
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
       for (const std::uint32_t v : tetrahedra_[i].corner) has[v][inside[i]] = true;
       if (!spatial::is_finite(tetrahedra_[i].corner)) continue;
@@ -214,14 +213,11 @@ class Nearby {
   const Mesh& mesh_;
   State& state_;
   std::vector<std::uint32_t> slots_;              ///< of tetrahedra, by local number
-  std::vector<spatial::Tetrahedron> tetrahedra_;  ///< by local number; number_tetrahedra() makes
-                                                  ///< their contents local too
+  std::vector<spatial::Tetrahedron> tetrahedra_;  ///< by local number
   std::vector<std::uint32_t> examined_;           ///< see examined()
-  std::size_t sought_ = 0;                        ///< number of tetrahedra whose labels are
-                                                  ///< computed, which come first
+  std::size_t sought_ = 0;                        ///< number of tetrahedra to label
   std::vector<std::uint32_t> vertices_;           ///< slots, by local number - 1
-  std::vector<std::uint8_t> whole_;  ///< by local vertex: true if this part contains all tetrahedra
-                                     ///< at it
+  std::vector<std::uint8_t> whole_;               ///< by local vertex: all its tetrahedra are here
 };
 
 /// True if update_nearby() can follow the changes and costs less than starting from scratch.

@@ -24,8 +24,7 @@ inline constexpr double kPoleWeight = 2.0;
 struct Part {
   std::span<const std::uint8_t> label;  ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
   std::size_t unlabelled = 0;           ///< the number of unknown ones, which come first
-  std::span<const std::uint8_t> whole;  ///< of vertices: true if the part contains all tetrahedra
-                                        ///< at them
+  std::span<const std::uint8_t> whole;  ///< of vertices: all tetrahedra at them are here
 };
 
 /// The first step: returns labels by tetrahedron slot, 1 inside, 0 outside or not finite. The nodes

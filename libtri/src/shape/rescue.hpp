@@ -82,8 +82,7 @@ void rescue(const Mesh& mesh, State& state) {
       break;
     }
   });
-  std::vector<RescueKey> rest;  // candidates without a kept neighbour, used once there are no
-                                // others
+  std::vector<RescueKey> rest;  // candidates without a kept neighbour, used last
   std::size_t at = 0;
   const auto take = [&](std::uint32_t t) {
     state.of[t] |= kRescuedBit;

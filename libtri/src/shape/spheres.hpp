@@ -30,8 +30,7 @@ namespace terrace::tri::shape {
 /// In an elliptical metric it is mapped to where the metric is Euclidean.
 struct Place {
   Vector3 at;
-  std::uint32_t rank;  ///< position among all vertices in lexicographic order; the ghost is the
-                       ///< last
+  std::uint32_t rank;  ///< in lexicographic order; the ghost is last
 };
 inline constexpr Place kGhostPlace{{}, 0xFFFFFFFFu};
 

@@ -39,8 +39,8 @@ struct State {
   std::vector<std::uint32_t> queue;    ///< removed tetrahedra whose neighbours must be tested
   std::vector<std::uint32_t> pending;  ///< kept tetrahedra that must be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
-  /// By vertex slot: bit 1 if tetrahedra removed there were outside, bit 2 if they were inside. 0
-  /// between calls.
+  /// By vertex slot: 1 if tetrahedra removed there were outside, 2 if inside, 3 if both. 0 between
+  /// calls.
   std::vector<std::uint8_t> labels_gone;
   /// Local numbers by slot, see nearby.hpp; kNone between calls.
   Pool<std::uint32_t> local_tetrahedron, local_vertex;

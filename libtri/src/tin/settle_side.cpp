@@ -47,8 +47,7 @@ void simplify(std::span<const T> line, std::size_t a, std::size_t b, double limi
     const auto start = static_cast<double>(line[from]);
     const double rise = static_cast<double>(line[to]) - start;
     const auto length = static_cast<double>(to - from);
-    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // smaller errors may be due to
-                                                               // rounding
+    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // ignores rounding errors
     std::size_t worst = from;
     for (std::size_t i = from + 1; i < to; ++i) {
       const double error = std::fabs(static_cast<double>(line[i]) - start -

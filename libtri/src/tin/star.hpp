@@ -204,8 +204,7 @@ class Star {
   std::size_t size_ = 0;
   std::size_t used_ = 0;
   std::array<std::uint32_t, kMaxRing> ring_;
-  std::array<std::uint32_t, kMaxRing> outer_;  ///< the triangle across the side from ring i to ring
-                                               ///< i + 1
+  std::array<std::uint32_t, kMaxRing> outer_;  ///< across the side from ring i to ring i + 1
   std::array<std::uint8_t, kMaxRing> back_;    ///< the side of that triangle towards the star
   std::array<std::uint32_t, kMaxRing> slot_;
 };

@@ -85,8 +85,7 @@ struct ViewControl<Triangulation>::Impl {
   std::unordered_map<ClusterId, Asked> asked_;
   std::set<ClusterId> faulty_;
 
-  Slot partial_ = ClusterTree::kNoSlot;  // partly collapsed; collapsing it comes before all other
-                                         // operations
+  Slot partial_ = ClusterTree::kNoSlot;  // partly collapsed; must be finished first
   Step result_;
   StepMeter meter_;
   std::uint64_t number_ = 0;  // of the step

@@ -111,8 +111,7 @@ struct Geomorph<Triangulation>::Scratch {
   };
   std::vector<Mover> movers;
   std::vector<std::uint32_t> order;  ///< the triangles of `patches`
-  std::vector<std::uint32_t> index;  ///< index in `before`, by slot of a triangle; kNone between
-                                     ///< calls
+  std::vector<std::uint32_t> index;  ///< in `before`, by slot; kNone between calls
 
   std::uint32_t site(const Model& model, VertexId vertex) {
     std::uint32_t& n = number[slot(vertex)];

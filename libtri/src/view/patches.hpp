@@ -54,11 +54,9 @@ class Patches {
   };
   /// Boxes of nodes or triangles that are close together, stored axis by axis.
   struct Node {
-    std::array<std::array<double, kWidth>, kAxes> low, high;  ///< low is above high if there is no
-                                                              ///< child
+    std::array<std::array<double, kWidth>, kAxes> low, high;  ///< low > high: no child
     std::uint32_t first;                                      ///< of the children
-    bool leaf;                                                ///< true if the children are
-                                                              ///< triangles
+    bool leaf;                                                ///< the children are triangles
   };
   struct Part {
     std::uint32_t root = kNone, near = 0;  ///< near: the triangle on which a place was last found

@@ -38,8 +38,8 @@ class Fan {
 
   Vertex apex_{};
   bool open_ = false;
-  std::vector<Vertex> rays_;  ///< the first ray at least 180 degrees to the left of ray 0
-  std::size_t half_ = 0;      ///< the first ray at 180 degrees or more to the left of ray 0
+  std::vector<Vertex> rays_;  ///< end points of the rays
+  std::size_t half_ = 0;      ///< the first ray at least 180 degrees to the left of ray 0
   /// Directions of the rays in pairs, padded with zeros: 2 x, 2 y.
   std::vector<double> pairs_;
   std::vector<Plane> planes_;  ///< by sector

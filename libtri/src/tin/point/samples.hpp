@@ -24,8 +24,7 @@ struct Sample {
   double x;
   double y;
   double z;
-  std::uint32_t next;  ///< the next in the list, kNone at its end; or the reason why it is not in a
-                       ///< list
+  std::uint32_t next;  ///< next in the list, kNone at its end; or why it is not listed
   /// The caller's number, with kStuck set if it cannot become a vertex.
   std::uint32_t id;
 };

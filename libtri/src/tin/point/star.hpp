@@ -51,8 +51,7 @@ class StarSamples {
   std::vector<std::uint32_t> index_;
   std::size_t own_ = 0, beyond_ = 0;           ///< index_.size(): not found
   std::size_t words_ = 0;                      ///< number of words with a bit for each sample
-  std::array<std::uint16_t, kMaxRing> known_;  ///< [i]: bit j is set if the sides of i and j are
-                                               ///< known
+  std::array<std::uint16_t, kMaxRing> known_;  ///< [i]: bit j if the sides of i and j are known
   std::vector<std::uint64_t> sides_;           ///< left and right of all pairs of corners
   std::vector<std::uint64_t> rest_;
 };
