@@ -97,8 +97,8 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
   return others.open ? others : all;
 }
 
-/// Uses a two-sided sheet, thin and dense, sometimes with a hole. Other sets have lids only by
-/// chance.
+/// One to four dense patches of a curved sheet, far apart compared with their size, so that lids
+/// span the gaps between them. Other point sets have lids only by chance.
 template <class Coord>
 std::vector<std::array<Coord, 3>> dense_patches(std::mt19937_64& random) {
   std::vector<std::array<Coord, 3>> points;
@@ -299,9 +299,8 @@ TYPED_TEST(Lids, FollowScansThatCloseAndOpenAgain) {
   }
 }
 
-/// Random clusters in a model of a scan are expanded and collapsed. After each change its surface
-/// must be the surface of its points, except where shapes depend on their history, and its lids
-/// must always be those of the definition.
+/// Expands and collapses random clusters in a model of a scan. After restore() the surface and its
+/// lids must be those computed from the points alone.
 void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& random,
                            std::array<std::size_t, 2>& answers) {
   using Surface3 = DynamicSurface<std::int32_t>;

@@ -30,8 +30,8 @@ struct Slides {
   }
 };
 
-/// A position that has left the surface and slides onto it. `end` is on the triangle `on`; with
-/// kNoTriangle it is on none and stays so.
+/// A position that has left the surface and slides onto it. `end` is on the triangle `on`;
+/// kNoTriangle means that it is not on any triangle, permanently.
 struct Anchor {
   Point3 place{}, end{};
   TriangleId on = kNoTriangle;

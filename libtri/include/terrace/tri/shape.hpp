@@ -49,8 +49,9 @@ struct SurfaceMeasures {
   bool closed = true;
 };
 
-/// O(n log n). Sums run in the order of the faces. Throws std::invalid_argument naming a face with
-/// a corner that is not the index of a point, or with two equal corners.
+/// Measures a surface in O(n log n). Sums run in the order of the faces. Throws
+/// std::invalid_argument naming a face with a corner that is not the index of a point, or with two
+/// equal corners.
 SurfaceMeasures measure(const Surface& surface);
 
 /// Turns components (faces connected by edges) with negative volume inside out. The volume of a
@@ -130,8 +131,7 @@ struct ShapeSurface {
   std::vector<VertexId> vertices;     ///< the vertex of each point of the surface, sorted by slot
   std::vector<TetrahedronId> behind;  ///< the kept tetrahedron behind each face
   bool open = false;                  ///< lids were left out
-  std::size_t lids = 0;               ///< number of lids found by surface_without_lids(), left out
-                                      ///< or not
+  std::size_t lids = 0;               ///< number found by surface_without_lids()
 };
 
 /// The parts of a surface after separating it where solids touch in an edge or a vertex.
