@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-/// Bounding volume hierarchies from binary trees: a box per node, in one array in depth-first
-/// order. Queries are in point_hierarchy.hpp and triangle_hierarchy.hpp.
+/// Bounding volume hierarchies from binary trees: one box per node, stored in one array in
+/// depth-first order. For queries see point_hierarchy.hpp and triangle_hierarchy.hpp.
 
 namespace terrace::matching {
 
@@ -17,14 +17,14 @@ struct Box {
   std::array<double, D> lo, hi;
 };
 
-/// A row of a binary tree, numbered as in matching_tree.hpp: nodes 0 .. n-1 are the primitives,
-/// node n + r is made by row r from two earlier nodes.
+/// A row of a binary tree, numbered as in matching_tree.hpp: nodes 0 .. n-1 are the primitives, and
+/// row r makes node n + r from two earlier nodes.
 struct TreeChildren {
   std::uint32_t a, b;
 };
 
-/// Extracts the children from rows of any kind with members a and b: MatchingTree::rows, SciPy's
-/// linkage, a dendrogram.
+/// Extracts the children from any range of rows with members a and b: MatchingTree::rows, SciPy's
+/// linkage matrix, a dendrogram.
 template <class Rows>
 [[nodiscard]] std::vector<TreeChildren> tree_children(const Rows& rows) {
   std::vector<TreeChildren> children;
@@ -35,20 +35,20 @@ template <class Rows>
   return children;
 }
 
-/// The constants of the surface area heuristic: the cost of one step in the tree and of one test of
-/// a primitive.
+/// Constants of the surface area heuristic: the cost of visiting one node and of testing one
+/// primitive.
 struct SurfaceAreaCosts {
   double traversal = 1.0;
   double intersection = 1.0;
 };
 
 struct HierarchyOptions {
-  /// Subtrees of at most this many primitives become one leaf where that lowers the cost.
+  /// Turns subtrees of at most this many primitives into one leaf where that lowers the cost.
   std::uint32_t leaf_size = 8;
   SurfaceAreaCosts costs{};
 };
 
-/// 32 bytes in space, 24 in the plane.
+/// Takes 32 bytes in space and 24 in the plane.
 template <std::size_t D>
 struct HierarchyNode {
   std::array<float, D> lo, hi;  ///< in the frame of the hierarchy, rounded outward
@@ -57,10 +57,10 @@ struct HierarchyNode {
   std::uint32_t count;  ///< primitives of a leaf; 0 for an inner node
 };
 
-/// Boxes are stored in floats: coordinates * `scale` - `centre`, where centre is the middle of the
-/// scaled bounding box and scale is a power of two, 1 unless the largest magnitude is beyond 2^60
-/// or below 2^-60. So coordinates on the earth in metres keep their precision, and coordinates of
-/// 1e300 or 1e-300 work.
+/// Frame in which boxes are stored as floats: coordinates * `scale` - `centre`. `centre` is the
+/// middle of the scaled bounding box. `scale` is a power of two, and 1 unless the largest magnitude
+/// is above 2^60 or below 2^-60. Coordinates on the earth in metres thus keep their precision, and
+/// coordinates of 1e300 or 1e-300 work.
 template <std::size_t D>
 struct HierarchyFrame {
   double scale = 1.0;
@@ -68,7 +68,7 @@ struct HierarchyFrame {
   double reach = 0.0;  ///< the largest magnitude of a coordinate in the frame
 };
 
-/// The tree and its boxes. D: 2 or 3.
+/// A binary tree over primitives with the boxes of its nodes. D is 2 or 3.
 template <std::size_t D>
 class BoundingVolumeHierarchy {
  public:
@@ -76,25 +76,26 @@ class BoundingVolumeHierarchy {
 
   BoundingVolumeHierarchy() = default;
 
+  /// Builds the hierarchy.
   /// rows: a tree of any shape, with one row fewer than there are boxes.
   /// Throws: std::invalid_argument for a wrong number of rows, a row that names a node that does
-  /// not exist yet or already has a parent (the row is named), a box that is not finite or whose lo
-  /// exceeds its hi (its index is named), a leaf size of 0, and costs that are negative or not
-  /// finite.
+  /// not exist yet or already has a parent (the message names the row), a box that is not finite or
+  /// whose lo exceeds its hi (the message gives its index), a leaf size of 0, and costs that are
+  /// negative or not finite.
   /// Cost: O(n) time; 80 bytes per box while building.
   BoundingVolumeHierarchy(std::span<const TreeChildren> rows, std::span<const Box<D>> boxes,
                           const HierarchyOptions& options = {});
 
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }  ///< the root first
-  /// The primitives in the order of the leaves: a leaf holds those in its slots.
+  /// The primitives in the order of the leaves. Each leaf owns a range of slots in this order.
   [[nodiscard]] std::span<const std::uint32_t> order() const { return order_; }
   [[nodiscard]] const HierarchyFrame<D>& frame() const { return frame_; }
   [[nodiscard]] std::size_t depth() const { return depth_; }  ///< nodes above the deepest leaf
 
   /// Expected cost of a random ray that meets the root's box: (traversal * sum of the areas of the
   /// inner nodes + intersection * sum of area times primitives of the leaves) / area of the root.
-  /// Area is the surface; in the plane, the perimeter. Where the root's area is 0 (a point, or a
-  /// line along an axis in space) every node counts as if it were as large as the root.
+  /// Area means surface area in space and perimeter in the plane. If the root's area is 0 (a point,
+  /// or in space a line along an axis), every node counts as if it were as large as the root.
   /// Source: J. D. MacDonald and K. S. Booth, "Heuristics for ray tracing using space subdivision",
   /// 1990; I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
   [[nodiscard]] double surface_area_cost(const SurfaceAreaCosts& costs = {}) const;
@@ -106,11 +107,11 @@ class BoundingVolumeHierarchy {
   std::size_t depth_ = 0;
 };
 
-/// Lowers the cost of a tree over the same boxes by rotations, from the leaves upward: where it
-/// makes the boxes smaller, a child changes places with a child of its sibling, or two children of
-/// siblings change places. Passes repeat until one gains less than one part in a thousand, or
-/// `passes` are done. Pairs of primitives stay pairs. The cost of a tree of matchings falls by 2 to
-/// 5 % on uniform sets and by 23 % on clumps of points (measured).
+/// Lowers the cost of a tree over the same boxes by rotations, from the leaves upward. A child
+/// swaps places with a child of its sibling, or two children of siblings swap, where that makes the
+/// boxes smaller. Passes repeat until one gains less than one part in a thousand or `passes` are
+/// done. Pairs of primitives stay pairs. The cost of a matching tree falls by 2 to 5 % on uniform
+/// sets and by 23 % on clumps of points (measured).
 ///
 /// Returns: the same number of rows, children before parents.
 /// Throws: std::invalid_argument for bad rows and boxes, as BoundingVolumeHierarchy does.

@@ -5,7 +5,7 @@
 
 namespace terrace::matching {
 
-/// Points in the plane and in space: standard types, so that they are the same in every library.
+/// Points in the plane and in space. Standard types, so that they are the same in every library.
 using Point2 = std::array<double, 2>;
 using Point3 = std::array<double, 3>;
 
