@@ -21,10 +21,10 @@
 namespace terrace::matching {
 namespace {
 
-/// Fills in the distances from one point to some others.
+/// Writes the distances from one point to several others.
 using Row = std::function<void(std::uint32_t from, std::span<const std::uint32_t> to, double* out)>;
 
-/// Two halves; the second has one more if the number of points is odd.
+/// Two halves of the points. The second has one point more if their number is odd.
 struct Halves {
   std::vector<std::uint32_t> first, second;
 };
@@ -52,7 +52,7 @@ Halves ends_apart(const std::vector<std::uint32_t>& mate, std::mt19937_64& rando
   return halves;
 }
 
-/// The matching of one iteration.
+/// The matching that one iteration found.
 struct Trial {
   std::vector<std::uint32_t> mate;
   double cost = std::numeric_limits<double>::infinity();
@@ -63,7 +63,7 @@ class Matcher {
   Matcher(std::uint32_t count, const Row& row, const base::StopCheck& check_stop)
       : count_(count), row_(row), check_stop_(check_stop) {}
 
-  /// The least total distance between the halves.
+  /// Returns the matching of least total distance between the halves.
   Trial match(const Halves& halves) {
     const std::size_t rows = halves.first.size(), columns = halves.second.size();
     costs_.resize(rows * columns);
@@ -81,7 +81,7 @@ class Matcher {
       trial.mate[j] = i;
       distance[std::min(i, j)] = costs_[r * columns + assignment.column[r]];
     }
-    // Added in the order of the points, so that equal matchings have equal costs.
+    // Added in the order of the points, so that equal matchings have exactly equal costs.
     for (const double d : distance) trial.cost += d;
     return trial;
   }
@@ -98,21 +98,21 @@ class Search {
  public:
   Search(std::uint64_t total, const HalvingOptions& options) : total_(total), options_(options) {}
 
-  void take(Trial&& trial) {
+  void record(Trial&& trial) {
     ++result.iterations;
     if (!(trial.cost < best_)) return;
     best_ = trial.cost;
     result.mate = std::move(trial.mate);
     result.steps.push_back({result.iterations, best_});
   }
-  [[nodiscard]] bool goes_on() const {
+  [[nodiscard]] bool may_continue() const {
     if (result.iterations >= total_) return false;
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin_;
     if (result.iterations > 0 && taken.count() > options_.seconds) return false;
     return result.iterations == 0 || !options_.progress ||
            options_.progress(result.iterations, total_, best_);
   }
-  [[nodiscard]] std::uint64_t left() const { return total_ - result.iterations; }
+  [[nodiscard]] std::uint64_t remaining() const { return total_ - result.iterations; }
 
   HalvingMatching result;
 
@@ -127,24 +127,25 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
                  unsigned threads, Search& search) {
   std::vector<Matcher> matchers(threads, Matcher(count, row, options.check_stop));
   std::vector<Trial> trials(threads);
-  while (search.goes_on()) {
-    // A round of one iteration per thread; results are evaluated in iteration order.
-    const auto round = static_cast<unsigned>(std::min<std::uint64_t>(threads, search.left()));
+  while (search.may_continue()) {
+    // One round runs one iteration per thread; its results are recorded in iteration order.
+    const auto round = static_cast<unsigned>(std::min<std::uint64_t>(threads, search.remaining()));
     const std::uint64_t first = search.result.iterations;
     base::parallel_for(round, round, [&](std::size_t t) {
       std::mt19937_64 random(base::seed_of_run(options.seed, first + t));
       trials[t] = matchers[t].match(random_halves(count, random));
     });
-    for (unsigned t = 0; t < round; ++t) search.take(std::move(trials[t]));
+    for (unsigned t = 0; t < round; ++t) search.record(std::move(trials[t]));
   }
 }
 
 void monotone(std::uint32_t count, const Row& row, const HalvingOptions& options, Search& search) {
   Matcher matcher(count, row, options.check_stop);
-  while (search.goes_on()) {
+  while (search.may_continue()) {
     std::mt19937_64 random(base::seed_of_run(options.seed, search.result.iterations));
-    search.take(matcher.match(search.result.mate.empty() ? random_halves(count, random)
-                                                         : ends_apart(search.result.mate, random)));
+    search.record(matcher.match(search.result.mate.empty()
+                                    ? random_halves(count, random)
+                                    : ends_apart(search.result.mate, random)));
   }
 }
 

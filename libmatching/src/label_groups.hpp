@@ -10,8 +10,8 @@
 
 namespace terrace::matching {
 
-/// Points grouped by label: group g is order[begin[g]] .. order[begin[g + 1] - 1], indices
-/// ascending. Groups are by ascending label and not empty.
+/// Points grouped by label: group g is order[begin[g]] .. order[begin[g + 1] - 1], in ascending
+/// order of indices. Groups are in ascending order of labels and never empty.
 struct LabelGroups {
   std::vector<std::uint32_t> order;
   std::vector<std::uint32_t> begin;
@@ -22,7 +22,7 @@ struct LabelGroups {
   }
 };
 
-/// All points are one group if there are no labels.
+/// Groups points by label. Without labels all points form one group.
 inline LabelGroups group_by_label(std::uint32_t points, std::span<const std::uint32_t> labels) {
   LabelGroups groups;
   groups.begin.push_back(0);

@@ -68,7 +68,7 @@ class Windows {
       if (before - cost_ <= options_.tolerance * before) break;
     }
     result_.cost = cost_;
-    // Rounding alone can lift the bound above the cost.
+    // The bound can exceed the cost by rounding alone.
     result_.dual_bound =
         result_.optimal
             ? cost_
@@ -99,7 +99,7 @@ class Windows {
     return sum;
   }
 
-  // Matches each part, then the points left over in the odd ones, until at most one is left.
+  // Matches each part, then the points left over in odd parts, until at most one is left.
   void first_matching() {
     std::vector<std::uint32_t> all(points_.size());
     std::iota(all.begin(), all.end(), 0u);
@@ -129,7 +129,7 @@ class Windows {
     return parts;
   }
 
-  // A cluster with more points than four windows is cut: it would take too much time or memory.
+  // Cuts clusters with more points than four windows, which would take too much time or memory.
   Parts clusters() const {
     const LabelGroups groups =
         group_by_label(static_cast<std::uint32_t>(points_.size()), options_.labels);
@@ -146,7 +146,7 @@ class Windows {
     return parts;
   }
 
-  // Compact sets of the current pairs; the point left over is in one of them.
+  // Returns compact sets of the current pairs. The point left over is in one of them.
   Parts pairs_together(unsigned round) const {
     std::vector<Unit<D>> units;
     units.reserve(points_.size() / 2 + 1);
@@ -175,7 +175,7 @@ class Windows {
     return parts;
   }
 
-  // Sorts within parts: a cut leaves them in the order of the standard library's nth_element.
+  // Sorts each part, because cut() leaves it in the order of the standard library's nth_element.
   static void sort_within(Parts& parts) {
     std::size_t begin = 0;
     for (const std::size_t end : parts.ends) {
@@ -195,9 +195,9 @@ class Windows {
     return !stopped_ || cost_ == 0.0;
   }
 
-  /// Returns false if stopped before all parts were matched; those matched are in the matching.
+  /// Returns false if stopped before all parts were matched. The parts matched so far are kept.
   bool match_parts(const Parts& parts, bool first = false) {
-    // A round that is stopped has no duals for some points: those of the previous round are kept.
+    // A stopped round lacks the duals of some points, so the duals of the previous round are kept.
     Discs discs(keep_duals_ ? points_.size() : 0);
     if (keep_duals_) discs.start(parts.count());
     parts_ = parts.count();
@@ -229,7 +229,7 @@ class Windows {
     }
     const PointMatching matching = match_points(std::span<const Point>(points), options);
     if (keep_duals_) discs.take(k, members, matching);
-    // Matchings of equal cost are not exchanged: they might alternate for ever.
+    // A new matching of equal cost is rejected; otherwise two of them might alternate forever.
     if (!first && !(matching.cost < cost_of(members) * (1.0 - 1e-12))) return;
     for (std::size_t m = 0; m < members.size(); ++m) {
       const std::uint32_t mate = matching.mate[m];
@@ -266,7 +266,7 @@ LargeMatching match(std::span<const std::array<double, D>> points,
                  std::to_string(points.size()) + " points; give one for each");
   }
   if (options.window < 4)
-    refuse_large("window is " + std::to_string(options.window) + "; at least 4");
+    refuse_large("window is " + std::to_string(options.window) + "; it must be at least 4");
   if (!(options.tolerance >= 0.0)) refuse_large("tolerance must be a number and not negative");
   LargeMatching result;
   if (options.labels.empty() && points.size() <= std::max<std::size_t>(options.exact_limit, 3)) {

@@ -51,7 +51,7 @@ Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exp
   if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
   result.exponent = exponent;
-  // The cheapest of parallel edges is the matched one.
+  // Of parallel edges, the cheapest is the matched one.
   std::vector<std::size_t> chosen(vertex_count, edges.size());
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const AnyEdge& e = edges[k];
@@ -70,7 +70,7 @@ std::int64_t rounded(const WeightedEdge& e, int exponent) {
 }
 std::int64_t rounded(const IntegerEdge& e, int) { return e.weight; }
 
-/// Sums of duals along the chain of blossoms from a vertex outward, and the chain itself.
+/// Returns the chain of blossoms around a vertex, from the innermost outward.
 std::vector<std::uint32_t> chain_of(const Matching& m, std::uint32_t vertex) {
   std::vector<std::uint32_t> chain;
   for (std::uint32_t b = m.vertex_blossom[vertex]; b != kNobody; b = m.blossom_parent[b]) {
@@ -114,7 +114,8 @@ std::string shape_error(const Matching& m) {
   return {};
 }
 
-// Checks that sizes are odd and that one matched edge crosses the border where the dual is not 0.
+// Checks that blossoms have odd sizes and that one matched edge crosses the border if the dual is
+// not 0.
 std::string blossom_error(const Matching& m) {
   std::vector<std::size_t> size(m.blossom_dual.size(), 0), leaving(m.blossom_dual.size(), 0);
   for (std::uint32_t v = 0; v < m.mate.size(); ++v) {
@@ -147,7 +148,7 @@ std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
     const std::int64_t slack = 2 * rounded(e, m.exponent) - m.vertex_dual[e.i] -
                                m.vertex_dual[e.j] - separating_duals(m, e.i, e.j);
     if (slack < 0) {
-      return "edge " + std::to_string(k) + " is below its duals by " + std::to_string(-slack);
+      return "edge " + std::to_string(k) + " violates the duals by " + std::to_string(-slack);
     }
     if (slack == 0 && m.mate[e.i] == e.j) tight[e.i] = tight[e.j] = true;
   }
@@ -160,7 +161,7 @@ std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
 }  // namespace
 
 double Matching::dual_bound() const {
-  // Summed as integers in two parts, so that the sum is exact and cannot overflow.
+  // Summed as integers in two parts, which makes the sum exact and prevents overflow.
   double high = 0.0;
   std::int64_t low = 0;
   const auto add = [&](std::int64_t dual) {
@@ -179,7 +180,7 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const W
   double largest = 0.0;
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (!std::isfinite(edges[k].weight))
-      refuse_edges("edge " + std::to_string(k) + " has no finite weight");
+      refuse_edges("the weight of edge " + std::to_string(k) + " is not finite");
     largest = std::max(largest, std::abs(edges[k].weight));
   }
   int top = 0;

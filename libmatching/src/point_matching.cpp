@@ -114,8 +114,8 @@ class Problem {
     };
   }
 
-  // Nearest neighbours, the caller's edges, and pairs along the halving order; these pairs are a
-  // perfect matching and so make the graph feasible.
+  // Collects nearest neighbours, the caller's edges, and pairs along the halving order. The latter
+  // form a perfect matching, which makes the graph feasible.
   void set_candidates() {
     const auto n = static_cast<std::uint32_t>(points_.size());
     const BoxTree<D> tree(points_);
@@ -147,7 +147,7 @@ class Problem {
     std::vector<Edge> edges;
     edges.reserve(candidates_.size() + (n % 2 == 0 ? 0 : n));
     for (const auto& [i, j] : candidates_) edges.push_back({i, j, cost_(i, j)});
-    // An odd number of points gets a vertex for nobody, at cost 0 to all.
+    // An odd number of points gets an extra vertex "nobody" with edges of cost 0 to all points.
     const std::uint32_t nobody = n % 2 == 0 ? blossom::kNone : n;
     for (std::uint32_t i = 0; nobody != blossom::kNone && i < n; ++i) edges.push_back({i, n, 0});
     const base::StopTicks ticks(options_.check_stop);
@@ -187,7 +187,7 @@ class Problem {
       result.mate[i] = j;
       if (i < j) result.cost += cost_.distance(place_[i], place_[j]);
     }
-    // From the unit of the scaled points back to the caller's.
+    // Converts the unit of the scaled points back to the caller's.
     const int shift = options_.metric.distance ? 0 : shift_;
     result.cost = std::ldexp(result.cost, shift);
     proof.exponent = std::ilogb(cost_.scale) - shift;

@@ -11,24 +11,25 @@
 
 namespace terrace::matching {
 
-/// The least cost - label of a row, its column, and the second least (at least as large; equal if
-/// there is no other column).
+/// A row's bid: the column with the least cost - label, that least value, and the second least. The
+/// second is at least as large, and equal to the least if there is no other column.
 template <class Number>
 struct Offer {
   std::uint32_t column;
   Number least, second;
 };
 
-/// Initial labels where rows and columns are equally many: the rows bid for columns as in an
-/// auction (D. Bertsekas, "The auction algorithm", 1988), in rounds with a decreasing minimum
+/// Computes initial labels where rows and columns are equally many. The rows bid for columns as in
+/// an auction (D. Bertsekas, "The auction algorithm", 1988), in rounds with a decreasing minimum
 /// raise. The rounds only bring the labels near the optimal ones, so that the following searches
-/// grow small trees; the proof does not rest on them, and the number of bids is bounded.
+/// grow small trees. The proof does not depend on them, and the number of bids is bounded.
 ///
-/// look(row): an Offer;  fell(column): its label fell. Labels must be feasible at the start for
-/// some labels of rows, as 0 is, and remain so because they only fall.
+/// look(row) returns an Offer. fell(column) is called after the column's label fell. The labels
+/// must be feasible at the start for some row labels, as 0 is. They stay feasible because they only
+/// fall.
 template <class Number, class Look, class Fell>
 void bid(std::size_t rows, std::vector<Number>& labels, const Look& look, const Fell& fell) {
-  // Few rows have small trees anyway; and results with simple numbers stay simple.
+  // With few rows the trees are small anyway, and without bidding simple numbers stay simple.
   constexpr std::size_t kFewRows = 100, kRounds = 5, kBidsPerRow = 20;
   // The first minimum raise, as a multiple of the mean distance between a row's two best columns.
   constexpr Number kFirstRaise = 10;

@@ -20,8 +20,9 @@ class OptimalityCheck {
       : assignment_(assignment) {
     if (assignment.column.size() != rows || assignment.row_dual.size() != rows ||
         assignment.column_dual.size() != columns) {
-      throw std::invalid_argument("check: the assignment is not one of " + std::to_string(rows) +
-                                  " rows and " + std::to_string(columns) + " columns");
+      throw std::invalid_argument("check: the sizes of the assignment do not match " +
+                                  std::to_string(rows) + " rows and " + std::to_string(columns) +
+                                  " columns");
     }
     std::vector<bool> used(columns, false);
     std::size_t count = 0;

@@ -23,9 +23,9 @@ double distance_between(const std::array<double, D>& a, const std::array<double,
   return std::sqrt(sum);
 }
 
-/// A kd-tree of the columns that answers which columns have the least distance minus label.
+/// A kd-tree of the columns that finds those with the least distance minus label.
 ///
-/// Columns are numbered by their position in the tree; original() has the caller's number. Each
+/// Columns are numbered by their position in the tree; original() returns the caller's number. Each
 /// node holds the largest label below it.
 template <std::size_t D>
 class ColumnTree {
@@ -43,12 +43,13 @@ class ColumnTree {
   std::uint32_t original(std::uint32_t column) const { return original_[column]; }
   const Point& point(std::uint32_t column) const { return points_[column]; }
 
-  /// Hides columns from the next nearest().
+  /// Hides a column from the next call of nearest().
   void hide(std::uint32_t column) { mark_[column] = round_ + 1; }
 
-  /// The `count` columns (or all, if there are fewer) with the least distance - label that are
-  /// below `limit` and not hidden; appended to `found` in no particular order. Returns a lower
-  /// bound of distance - label for all others: the largest value found, or `limit`.
+  /// Appends to `found`, in no particular order, the `count` columns with the least distance -
+  /// label among those that are not hidden and below `limit`, or all of them if there are fewer.
+  /// Returns a lower bound of distance - label for all other columns: the largest value found, or
+  /// `limit`.
   double nearest(const Point& p, const std::vector<double>& labels, std::size_t count, double limit,
                  std::vector<Candidate>& found) {
     ++round_;
@@ -58,7 +59,7 @@ class ColumnTree {
     return best_.size() < count ? limit : best_.front().key;
   }
 
-  /// The nearest column that is not taken; kUnassigned if all are.
+  /// Returns the nearest column that is not taken, or kUnassigned if all are.
   Candidate nearest_free(const Point& p) const {
     Candidate best{kUnassigned, std::numeric_limits<double>::infinity()};
     if (!nodes_.empty()) descend_free(p, 0, best);
@@ -73,8 +74,8 @@ class ColumnTree {
     }
   }
 
-  /// To be called after the label of the column fell: lowers the bounds above it as far as they
-  /// change.
+  /// Must be called after the label of a column fell. Lowers the label bounds of the nodes above
+  /// it, up to the first one that does not change.
   void lowered(const std::vector<double>& labels, std::uint32_t column) {
     std::uint32_t n = leaf_[column];
     const auto first = labels.begin() + nodes_[n].begin, last = labels.begin() + nodes_[n].end;
@@ -89,7 +90,7 @@ class ColumnTree {
  private:
   static constexpr std::size_t kLeaf = 8;
 
-  /// The left child follows its parent.
+  /// A node. Its left child is the next one in the array.
   struct Node {
     Point low, high;
     double label = 0.0;
@@ -131,7 +132,7 @@ class ColumnTree {
     const auto at = [&](std::size_t k) {
       return original_.begin() + static_cast<std::ptrdiff_t>(k);
     };
-    // Ties in the order of the caller: the same tree with every standard library.
+    // Ties follow the caller's order, so every standard library builds the same tree.
     std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
       const double x = points[a][widest], y = points[b][widest];
       return x != y ? x < y : a < b;
@@ -166,7 +167,7 @@ class ColumnTree {
           best_.pop_back();
         }
         best_.push_back({key, distance, j});
-        // Becomes a heap only once it is full.
+        // Becomes a heap only when it is full.
         if (full) {
           std::push_heap(best_.begin(), best_.end());
         } else if (best_.size() == count) {

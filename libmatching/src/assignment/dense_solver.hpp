@@ -14,12 +14,12 @@
 
 namespace terrace::matching {
 
-/// Shortest augmenting paths on a matrix whose rows come from `Rows`: rows(i) points to the costs
-/// of row i and is valid until the next call.
+/// Shortest augmenting paths on a matrix whose rows come from `Rows`: rows(i) returns a pointer to
+/// the costs of row i, which is valid until the next call.
 ///
 /// Labels of columns start at 0 and only fall, and only for columns that have a row. When all
-/// columns have one and rows remain, labels are shifted so that those of rows are not positive;
-/// from then on a path may also end at a row, which gives up its column.
+/// columns have a row and rows remain, labels are shifted so that the labels of rows are at most 0.
+/// From then on a path may also end at a row, which then gives up its column.
 template <class Cost, class Rows>
 class DenseSolver {
  public:
@@ -65,7 +65,8 @@ class DenseSolver {
     Number distance, label;
   };
 
-  /// The first column of row `costs` with this value of cost - label, preferably one without a row.
+  /// Returns the first column of `costs` with this value of cost - label, preferably one without a
+  /// row.
   std::uint32_t column_at(const Cost* costs, Number value, bool look_for_free,
                           std::uint32_t except) const {
     std::uint32_t found = kUnassigned;
@@ -77,9 +78,9 @@ class DenseSolver {
     return found;
   }
 
-  /// Augmenting row reduction: a row takes its best column, whose label falls until the second best
-  /// is as good; the row that loses the column searches again. With real costs the falls get ever
-  /// smaller, so the number of steps is bounded. Returns the rows that remain.
+  /// Augmenting row reduction: a row takes its best column, and the column's label falls until the
+  /// second best is as good. A row that loses its column searches again. With real costs the steps
+  /// get ever smaller, so their number is bounded. Returns the rows that remain.
   std::vector<std::uint32_t> reduce_rows(std::size_t count) {
     std::vector<std::uint32_t> left;
     std::size_t steps = kReductionSteps * count;
@@ -101,7 +102,7 @@ class DenseSolver {
         if (steps != 0) --steps;
         if (columns_ > 1 && least < second) {
           const Number label = result_.column_dual[column] - (second - least);
-          // Rounding can absorb the difference; further steps would make no progress.
+          // Rounding can absorb the difference. Further steps would then make no progress.
           if (!free && !(label < result_.column_dual[column])) {
             left.push_back(row);
             break;
@@ -132,7 +133,7 @@ class DenseSolver {
       const std::size_t end = std::min(columns_, (b + 1) * kScanBlock);
       for (std::size_t j = b * kScanBlock; j < end; ++j) {
         if (distance_[j] != least) continue;
-        // Among equally near columns a free one ends the search immediately.
+        // Among equally near columns a free one ends the search at once.
         if (row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
         if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
       }
@@ -174,7 +175,7 @@ class DenseSolver {
       distance_[j] = kFar<Number>;
       row = row_of_[j];
     }
-    // Labels of the tree's rows rise and those of its columns fall, so that the path's edges become
+    // Labels of the tree's rows rise and labels of its columns fall, which makes the path's edges
     // tight.
     result_.row_dual[start] += reached;
     for (const Settled& s : settled_) {

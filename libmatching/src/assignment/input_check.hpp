@@ -17,11 +17,11 @@ inline void check_sizes(std::size_t rows, std::size_t columns) {
   if (rows >= kUnassigned || columns >= kUnassigned) {
     throw std::invalid_argument("assign: " + std::to_string(rows) + " rows and " +
                                 std::to_string(columns) +
-                                " columns; either must be below 2^32 - 1, split the problem");
+                                " columns: both must be below 2^32 - 1; split the problem");
   }
 }
 
-/// Throws std::invalid_argument naming the first entry that is not finite or too large.
+/// Throws std::invalid_argument that names the first entry that is not finite or too large.
 template <class Cost>
 void check_row(std::span<const Cost> costs, std::size_t row) {
   if constexpr (std::is_floating_point_v<Cost>) {
@@ -41,7 +41,7 @@ void check_row(std::span<const Cost> costs, std::size_t row) {
 template <class Cost>
 void check_matrix(std::span<const Cost> costs, std::size_t rows, std::size_t columns) {
   check_sizes(rows, columns);
-  // Below 2^32 each, so the product does not overflow.
+  // Both are below 2^32, so the product does not overflow.
   if (costs.size() != rows * columns) {
     throw std::invalid_argument("assign: the matrix has " + std::to_string(costs.size()) +
                                 " entries, not rows * columns = " + std::to_string(rows) + " * " +

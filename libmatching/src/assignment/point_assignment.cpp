@@ -19,13 +19,14 @@
 namespace terrace::matching {
 namespace {
 
-/// The number of columns a row starts with, and about how many it may get at a time.
+/// Number of columns that a row starts with, and roughly how many it gets at a time later.
 constexpr std::size_t kFirstCandidates = 12, kMoreCandidates = 32;
 
 template <std::size_t D>
 using Points = std::vector<std::array<double, D>>;
 
-/// The larger of `largest` and the magnitudes of the coordinates.
+/// Returns the larger of `largest` and the largest magnitude of a coordinate. Throws for bad
+/// points.
 template <std::size_t D>
 double magnitude(std::span<const std::array<double, D>> points, const char* set, double largest) {
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -42,7 +43,7 @@ double magnitude(std::span<const std::array<double, D>> points, const char* set,
   return largest;
 }
 
-/// Scales both sets by a power of two, which is exact, so that squares neither overflow nor
+/// Scales both sets by the same power of two, which is exact, so that squares neither overflow nor
 /// underflow.
 template <std::size_t D>
 struct Scaled {
@@ -63,7 +64,7 @@ struct Scaled {
   double back(double value) const { return std::ldexp(value, exponent); }
 };
 
-/// The candidates of SparseSolver, from a tree of the columns.
+/// The lists of candidates for SparseSolver, filled from a tree of the columns.
 template <std::size_t D>
 class NearCandidates {
  public:
@@ -76,7 +77,8 @@ class NearCandidates {
     for (std::size_t i = 0; i < rows.size(); ++i)
       threshold_[i] = tree_.nearest(rows[i], labels, kFirstCandidates, all, lists_[i]);
     step_ = threshold_;
-    // Finite even where a row has all columns from the start, and not 0 where they are equal.
+    // Keeps steps finite if a row has all columns from the start, and above 0 if all its first
+    // columns are at distance 0.
     for (double& step : step_) step = step > 0 ? std::min(step, 1.0) : 0.01;
   }
 
@@ -89,11 +91,11 @@ class NearCandidates {
                   [&](const Candidate& c) { return c.cost - labels[c.column] > threshold_[row]; });
     const std::size_t before = list.size(), count = std::max(kMoreCandidates, before);
     for (const Candidate& c : list) tree_.hide(c.column);
-    // Where many columns are equally near, the number of columns limits the batch; elsewhere the
+    // If many columns are equally near, the number of columns limits the batch. Otherwise the
     // distance does.
     const double aim = std::min(limit, threshold_[row] + step_[row]);
     const double reached = tree_.nearest(rows_[row], labels, count, aim, list);
-    // Steps grow while they add no column (they may be lost in rounding).
+    // A step that adds no column grows, because rounding may have swallowed it.
     if (list.size() == before) step_[row] *= 2;
     threshold_[row] = std::max(threshold_[row], reached);
     return before;
@@ -111,14 +113,14 @@ class NearCandidates {
   std::vector<double> threshold_, step_;
 };
 
-/// For rows.size() <= columns.size(); does not compute the cost.
+/// Requires rows.size() <= columns.size(). Does not compute the cost.
 template <std::size_t D>
 Assignment assign_wide(const Points<D>& rows, const Points<D>& columns,
                        const base::StopCheck& check_stop) {
   ColumnTree<D> tree(columns);
   NearCandidates<D> source(rows, tree, columns.size());
   SparseSolver<NearCandidates<D>> solver(rows.size(), columns.size(), source, check_stop);
-  // Every column is within reach of every row, so a path always exists.
+  // Every column can be reached from every row, so a path always exists.
   solver.solve();
   Assignment result = solver.result();
   for (std::uint32_t& j : result.column) j = tree.original(j);

@@ -15,8 +15,8 @@ namespace terrace::matching {
 template <class Cost>
 using LabelOf = std::conditional_t<std::is_integral_v<Cost>, std::int64_t, double>;
 
-/// kFar: larger than every distance. kSettled: the label that keeps a settled column there, as base
-/// + c - kSettled is at least kFar for any cost c.
+/// kFar is larger than every distance. kSettled is the label that keeps a settled column settled:
+/// base + c - kSettled is at least kFar for any cost c.
 template <class Number>
 inline constexpr Number kFar = std::numeric_limits<Number>::infinity();
 template <>
@@ -26,25 +26,26 @@ inline constexpr Number kSettled = -std::numeric_limits<Number>::infinity();
 template <>
 inline constexpr std::int64_t kSettled<std::int64_t> = -(std::int64_t{1} << 62);
 
-/// Columns that share one entry of `block_least`.
+/// Number of columns that share one entry of `block_least`.
 inline constexpr std::size_t kScanBlock = 128;
 
-/// The inner loops over a row of the matrix, compiled for each instruction set. All give the same
-/// numbers.
+/// The inner loops over a row of the matrix, compiled for each instruction set. All versions give
+/// the same numbers.
 template <class Cost>
 struct ScanKernels {
   using Number = LabelOf<Cost>;
-  /// For each column j: through = (base + costs[j]) - labels[j]; where that is below distance[j],
-  /// it replaces distance[j], and `row` replaces previous[j]. block_least gets the least distance
-  /// of each block of columns; returns the overall least.
+  /// For each column j computes through = (base + costs[j]) - labels[j]. Where that is below
+  /// distance[j], stores it in distance[j] and `row` in previous[j]. Writes the least distance of
+  /// each block of columns to block_least, and returns the least of all.
   Number (*relax)(const Cost* costs, const Number* labels, std::size_t columns, Number base,
                   std::int64_t row, Number* distance, std::int64_t* previous, Number* block_least);
-  /// The two least values of costs[j] - labels[j], equal if two columns tie; kFar if missing.
+  /// Computes the two least values of costs[j] - labels[j]. They are equal if two columns tie. A
+  /// missing value is kFar.
   void (*least_two)(const Cost* costs, const Number* labels, std::size_t columns, Number* first,
                     Number* second);
 };
 
-/// The kernels for the best instruction set of this processor.
+/// Returns the kernels for the best instruction set of this processor.
 template <class Cost>
 const ScanKernels<Cost>& scan_kernels();
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The loops of scan_kernels.hpp over vectors of TERRACE_VECTOR_BYTES, for a file that is compiled
-// for one instruction set. Everything is in an unnamed namespace and calls nothing outside, so that
-// no code for newer processors is shared with the rest of the program.
+// for one instruction set. Everything is in an unnamed namespace and calls nothing outside it, so
+// the rest of the program shares no code that needs a newer processor.
 #pragma once
 
 #include "assignment/scan_kernels.hpp"

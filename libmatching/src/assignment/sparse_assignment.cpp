@@ -18,7 +18,7 @@
 namespace terrace::matching {
 namespace {
 
-/// Compressed rows that we own; absent pairs must not be chosen.
+/// Compressed rows with their own storage. Absent pairs must not be chosen.
 struct EdgeLists {
   // With few edges, bidding for a column that only one row can have might never end.
   static constexpr bool kComplete = false;
@@ -43,7 +43,8 @@ struct EdgeLists {
 void check_edge(std::size_t k, std::uint32_t column, std::size_t columns, double cost) {
   if (column >= columns) {
     throw std::invalid_argument("assign_sparse: entry " + std::to_string(k) + " has column " +
-                                std::to_string(column) + " of only " + std::to_string(columns));
+                                std::to_string(column) + ", but there are only " +
+                                std::to_string(columns));
   }
   if (!(std::fabs(cost) <= kLargestCost)) {
     throw std::invalid_argument("assign_sparse: the cost of entry " + std::to_string(k) +
@@ -52,7 +53,8 @@ void check_edge(std::size_t k, std::uint32_t column, std::size_t columns, double
   }
 }
 
-/// `visit` calls its argument with row, column and cost of each edge, the same edges on each call.
+/// `visit` calls its argument with the row, column and cost of each edge, and with the same edges
+/// each time.
 template <class Visit>
 EdgeLists make_lists(std::size_t rows, std::size_t columns, std::size_t count, const Visit& visit) {
   EdgeLists lists;
@@ -81,8 +83,8 @@ EdgeLists lists_of(const SparseCosts& costs) {
   if (costs.begin.empty() || costs.begin.front() != 0 ||
       costs.begin.back() != costs.column.size() || costs.column.size() != costs.cost.size()) {
     throw std::invalid_argument(
-        "assign_sparse: the offsets must be rows + 1 numbers, from 0 to the number of columns "
-        "given, and that the number of costs");
+        "assign_sparse: the offsets must be rows + 1 numbers from 0 to the number of entries, and "
+        "columns and costs must be equally many");
   }
   const std::size_t rows = costs.begin.size() - 1;
   check_sizes(rows, costs.columns);
@@ -108,7 +110,7 @@ EdgeLists lists_of(std::span<const CostEdge> edges, std::size_t rows, std::size_
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (edges[k].row >= rows) {
       throw std::invalid_argument("assign_sparse: entry " + std::to_string(k) + " has row " +
-                                  std::to_string(edges[k].row) + " of only " +
+                                  std::to_string(edges[k].row) + ", but there are only " +
                                   std::to_string(rows));
     }
     check_edge(k, edges[k].column, columns, edges[k].cost);
@@ -118,7 +120,7 @@ EdgeLists lists_of(std::span<const CostEdge> edges, std::size_t rows, std::size_
   });
 }
 
-/// Finds the cheapest of the row's edges to its column; false if there is no such edge.
+/// Finds the cheapest of the row's edges to this column. Returns false if there is no such edge.
 bool chosen_cost(const EdgeLists& lists, std::size_t row, std::uint32_t column, double& cost) {
   bool found = false;
   for (const Candidate& c : lists.candidates(row)) {

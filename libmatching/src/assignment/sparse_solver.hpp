@@ -21,18 +21,20 @@ struct Candidate {
   double cost;
 };
 
-/// Shortest augmenting paths on lists of candidates, rows <= columns.
+/// Shortest augmenting paths on lists of candidates. Requires rows <= columns.
 ///
 /// `Source` holds the lists:
-///   kComplete: every column is within reach of every row, whether in the list or absent;
-///   std::span<const Candidate> candidates(row): changed by extend() only;
-///   double threshold(row): lower bound of cost - label for columns not in the list;
-///   size_t extend(row, labels, limit): raises the threshold, to `limit` at most, and adds the
-///     columns below it to the list, from the returned position on; columns that are not below the
+///   kComplete: whether every row can reach every column, listed or not;
+///   std::span<const Candidate> candidates(row): the list, which only extend() changes;
+///   double threshold(row): lower bound of cost - label for columns that are not in the list;
+///   size_t extend(row, labels, limit): raises the threshold, at most to `limit`, and adds the
+///     columns below it to the list, from the returned position on. Columns that are not below the
 ///     old threshold may leave the list;
-///   Candidate nearest_free(row): some near free column, kUnassigned if it knows none;
-///   void lowered(labels, column): its label fell;  void taken(column): it got its first row.
-/// Labels of columns start at 0 and only fall; with rows < columns only on columns that have a row.
+///   Candidate nearest_free(row): some near free column, or kUnassigned if it knows none;
+///   void lowered(labels, column): called when a label fell;
+///   void taken(column): called when a column gets its first row.
+/// Labels of columns start at 0 and only fall. With rows < columns, they fall only for columns that
+/// have a row.
 template <class Source>
 class SparseSolver {
  public:
@@ -51,8 +53,8 @@ class SparseSolver {
     result_.column_dual.assign(columns, 0.0);
   }
 
-  /// False if a row has no path to a free column; result() is then invalid, and tree_rows() are the
-  /// rows that reach only tree_rows().size() - 1 columns.
+  /// Returns false if a row has no path to a free column. result() is then invalid, and tree_rows()
+  /// are rows that together reach only tree_rows().size() - 1 columns.
   bool solve() {
     if (Source::kComplete && rows_ == row_of_.size()) {
       bid(
@@ -65,7 +67,7 @@ class SparseSolver {
     return true;
   }
 
-  /// The cost is not filled in.
+  /// Returns the assignment without its cost.
   Assignment result() { return std::move(result_); }
 
   std::vector<std::uint32_t> tree_rows() const {
@@ -87,7 +89,7 @@ class SparseSolver {
     double key;
     std::uint32_t id;
     bool row;
-    // std::push_heap keeps the largest in front. Ties have a fixed order.
+    // std::push_heap keeps the largest element in front. Ties have a fixed order.
     bool operator<(const Event& other) const {
       if (key != other.key) return key > other.key;
       if (row != other.row) return row;
@@ -111,13 +113,13 @@ class SparseSolver {
       }
       if (found.second == kInfinity) found.second = found.least;
       if (found.least <= found.second) return found;
-      // The best column may be absent.
+      // The best column may be absent from the list.
       source_.extend(row, result_.column_dual, kInfinity);
     }
   }
 
-  /// Augmenting row reduction as in DenseSolver; the threshold stands in for columns that are not
-  /// candidates.
+  /// Augmenting row reduction as in DenseSolver. The threshold stands in for all columns that are
+  /// not candidates.
   std::vector<std::uint32_t> reduce_rows() {
     std::vector<std::uint32_t> left;
     auto& labels = result_.column_dual;
@@ -182,7 +184,7 @@ class SparseSolver {
     std::push_heap(heap_.begin(), heap_.end());
   }
 
-  /// Relaxes the row's candidates from `first` on; absent ones matter if they are below `limit`.
+  /// Relaxes the row's candidates from `first` on. Absent columns matter if they are below `limit`.
   void relax(std::uint32_t row, std::size_t first, double limit) {
     const double base = row_distance_[row] - result_.row_dual[row];
     ticks_(source_.candidates(row).size());
@@ -227,14 +229,14 @@ class SparseSolver {
       }
       if (distance_[event.id] != event.key) continue;
       settled_.push_back({event.id, event.key});
-      // Settled: no distance is below.
+      // Marks the column as settled: no distance is below this.
       distance_[event.id] = -kInfinity;
       const std::uint32_t row = row_of_[event.id];
       row_distance_[row] = event.key;
       relax(row, 0, kInfinity);
     }
     if (sink_ == kUnassigned) return false;
-    // Labels of the tree's rows rise and those of its columns fall, so that the path's edges become
+    // Labels of the tree's rows rise and labels of its columns fall, which makes the path's edges
     // tight.
     result_.row_dual[start] += bound_;
     for (const Settled& s : settled_) {

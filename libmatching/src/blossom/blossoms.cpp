@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blossoms in the tree: shrinking an odd cycle of tight edges, expanding a minus blossom of dual 0.
+// Blossoms in the tree: shrinks odd cycles of tight edges and expands minus blossoms of dual 0.
 #include <algorithm>
 
 #include "blossom/solver.hpp"
@@ -11,7 +11,7 @@ std::uint32_t Solver::tree_parent(std::uint32_t plus) const {
   return mate == kNone ? kNone : top(nodes_[top(mate)].enter_from);
 }
 
-// The two walks alternate, so that the work is bounded by the shorter path.
+// The two walks alternate, which bounds the work by the length of the shorter path.
 std::uint32_t Solver::common_ancestor(std::uint32_t u, std::uint32_t v) {
   ++stamp_;
   std::uint32_t a = top(u), b = top(v);
@@ -29,7 +29,7 @@ void Solver::shrink(std::uint32_t u, std::uint32_t v) {
   const std::uint32_t apex = common_ancestor(u, v);
   const std::uint32_t blossom = new_blossom();
   std::vector<Part>& cycle = parts(blossom);
-  // From u up to the apex, then reversed: the links point the way down.
+  // Collected from u up to the apex, then reversed, because links point down the tree.
   std::uint32_t x = top(u), from = u, to = v;
   while (x != apex) {
     cycle.push_back({x, from, to});
@@ -86,7 +86,7 @@ void Solver::form(std::uint32_t blossom, std::uint32_t apex) {
         if (v == x.last) break;
       }
     }
-    // Parts stay contiguous in the list, so that they can be cut out again.
+    // Parts stay contiguous in the list, so that they can be split off again.
     if (last == kNone) {
       b.first = x.first;
     } else {
@@ -127,7 +127,8 @@ void Solver::expand(std::uint32_t blossom) {
   const std::uint32_t exit = nodes_[top(b.base)].place;
   match_parts(blossom, exit);
   // The parts on the even path from the entry to the exit stay in the tree. Parts that stay minus
-  // are not updated vertex by vertex: in a deep nest the next expansion would repeat that.
+  // are not updated vertex by vertex, because in a deep nest the next expansion would repeat the
+  // work.
   const std::uint32_t ahead = (entry + count - exit) % count;
   const bool forward = ahead % 2 == 1;
   std::uint32_t k = entry, from = b.enter_from, to = b.enter_to;

@@ -19,7 +19,7 @@ Nest::Nest(const Solver& solver) {
   for (std::uint32_t x = 0; x < count; ++x) {
     if (solver.in_use(x)) children_[fill[slot(x)]++] = x;
   }
-  // Depth first: a blossom is visited before its parts, where its range begins, and again after
+  // Depth first. A blossom is visited twice: before its parts, where its range begins, and after
   // them.
   ranges_.assign(count, {});
   std::vector<std::uint32_t> open;

@@ -10,14 +10,14 @@
 
 namespace terrace::matching::blossom {
 
-/// The nesting of a solution's nodes, from outside in: the children of each node, and its vertices
-/// as a range of one sequence.
+/// The nesting of a solution's nodes from the outside in: the children of each node, and its
+/// vertices as a range of one sequence.
 class Nest {
  public:
   Nest() = default;
   explicit Nest(const Solver& solver);
 
-  /// The parts of a blossom; for kNone, the top nodes.
+  /// Returns the parts of a blossom or, for kNone, the top nodes.
   std::span<const std::uint32_t> children_of(std::uint32_t node) const {
     const std::size_t k = node == kNone ? begin_.size() - 2 : node;
     return std::span(children_).subspan(begin_[k], begin_[k + 1] - begin_[k]);

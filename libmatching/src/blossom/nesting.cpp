@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blossoms outside the tree: allocating, opening, and repairing the duals after edges were added.
+// Blossoms outside the tree: allocates and opens them, and repairs the duals after edges were
+// added.
 #include <algorithm>
 
 #include "blossom/solver.hpp"
@@ -18,8 +19,8 @@ std::uint32_t Solver::new_blossom() {
   return blossom;
 }
 
-// The part with the base, `exit`, gets the blossom's matched edge; the others are paired around the
-// cycle.
+// The part that contains the base, `exit`, gets the blossom's matched edge. The other parts are
+// paired around the cycle.
 void Solver::match_parts(std::uint32_t blossom, std::uint32_t exit) {
   const std::vector<Part>& cycle = parts(blossom);
   const std::uint32_t count = static_cast<std::uint32_t>(cycle.size());
@@ -34,8 +35,8 @@ void Solver::match_parts(std::uint32_t blossom, std::uint32_t exit) {
   }
 }
 
-// Afterwards top() tells which part a vertex is in. (Walking up from the vertex would take time
-// proportional to the nesting depth.) Base and mate of the blossom stay readable.
+// Afterwards top() returns the part that contains a vertex. (Walking up from the vertex would take
+// time proportional to the nesting depth.) Base and mate of the blossom stay readable.
 void Solver::release_parts(std::uint32_t blossom) {
   Node& b = nodes_[blossom];
   for (const Part& part : parts(blossom)) {
@@ -61,9 +62,9 @@ void Solver::unmatch(std::uint32_t node) {
   nodes_[node].mate = kNone;
 }
 
-// Dissolves the blossoms around a vertex, whatever their duals: edges across their borders gain
+// Dissolves the blossoms around a vertex, whatever their duals. Edges across their borders gain
 // slack, so the blossoms' own matched edges must be dissolved too. In a deep nest each vertex is
-// touched once, where its part falls off.
+// touched only once, when its part is released.
 void Solver::uncover(std::uint32_t vertex) {
   std::int64_t sum = 0;
   while (top(vertex) != vertex) {
@@ -98,7 +99,7 @@ std::int64_t Solver::shared_duals(std::uint32_t i, std::uint32_t j) const {
   return sum;
 }
 
-// Lowers one end until the edge is feasible. That end must be a top vertex.
+// Lowers the potential of one end until the edge is feasible. That end must be a top vertex.
 void Solver::repair(const Edge& edge) {
   const auto slack = [&] {
     return edge.cost - vertices_[edge.i].potential - vertices_[edge.j].potential +

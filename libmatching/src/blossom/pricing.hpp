@@ -17,22 +17,22 @@
 
 namespace terrace::matching::blossom {
 
-/// The doubled integer cost of two points, and a lower bound from their Euclidean distance.
+/// The doubled integer cost of a pair of points, and a lower bound from its Euclidean distance.
 struct PairCost {
   static constexpr std::int64_t kFar = kLimit / 4;
   std::function<double(std::uint32_t, std::uint32_t)> distance;
   double factor = 1.0, offset = 0.0;
   double scale = 1.0;
 
-  /// kFar stands for everything farther.
+  /// Returns the cost, capped at kFar.
   std::int64_t operator()(std::uint32_t i, std::uint32_t j) const {
     const double scaled = distance(i, j) * scale;
     if (scaled >= static_cast<double>(kFar / 2)) return kFar;
     return 2 * std::llround(scaled);
   }
 
-  /// Whether points at this squared distance may cost less than the sum of their duals. Errs only
-  /// towards true: a part in 10^13 covers rounding.
+  /// Returns whether points at this squared distance may cost less than the sum of their duals. May
+  /// return true wrongly, but never false: a margin of 1e-13 covers rounding.
   bool may_violate(double apart2, std::int64_t duals) const {
     const double least = 2.0 * scale * (factor * std::sqrt(apart2) * (1.0 - 1e-13) - offset);
     const auto sum = static_cast<double>(duals);
@@ -42,22 +42,22 @@ struct PairCost {
 
 /// Finds pairs of points that are closer than the duals of a solution allow, on the complete graph.
 ///
-/// The blossoms of a pair with exactly one end inside are those below the innermost one around
-/// both. The nest of blossoms (with the whole set as the outermost) is divided into chains, each
-/// continuing into the largest part. One tree of boxes serves a whole chain: a point in a small
-/// part of a chain's blossom is tested against the points of the other parts, with potentials
-/// counted from that blossom inward; then each small part heads a chain of its own. So a point is
-/// tested O(log n) times, however deep the nest.
+/// For a pair, the blossoms with exactly one end inside are those below the innermost one around
+/// both. The nest of blossoms (with the whole set as the outermost) is divided into chains, each of
+/// which continues into the largest part. One tree of boxes serves a whole chain. A point in a
+/// small part of a chain's blossom is tested against the points of the other parts, with potentials
+/// counted from that blossom inward. Each small part is then the head of its own chain. So a point
+/// is tested O(log n) times, however deep the nest.
 template <std::size_t D>
 class Pricing {
  public:
   using Point = std::array<double, D>;
 
-  /// points: in halving order, as the solver's vertices 0 .. points.size() - 1.
+  /// points: in halving order; point i is the solver's vertex i.
   Pricing(std::span<const Point> points, const PairCost& cost, base::StopTicks ticks = {})
       : points_(points), cost_(cost), ticks_(ticks) {}
 
-  /// Some of the violated pairs: the worst few of each part, more for large parts.
+  /// Returns some of the violated pairs: the worst few of each part, and more for large parts.
   std::vector<Edge> violated(const Solver& solver) {
     nest_ = Nest(solver);
     found_.clear();
@@ -75,7 +75,7 @@ class Pricing {
  private:
   static constexpr std::size_t kMost = 8;
 
-  /// A blossom and the sum of the duals around it, not counting its own.
+  /// A blossom and the sum of the duals of the blossoms around it, without its own.
   struct Head {
     std::uint32_t node;
     std::int64_t around;
@@ -89,8 +89,8 @@ class Pricing {
     std::int64_t potential;
   };
 
-  // Follows the chain from a head: collects its levels, and as members the vertices with the level
-  // at which they leave it.
+  // Follows the chain from a head. Collects its levels, and its vertices with the level at which
+  // each leaves the chain.
   void follow(const Head& head, const Solver& solver) {
     members_.clear();
     around_.clear();
@@ -121,7 +121,7 @@ class Pricing {
   void add_part(std::uint32_t node, const Solver& solver) {
     const auto level = static_cast<std::uint32_t>(around_.size() - 1);
     for (const std::uint32_t v : nest_.vertices_of(node)) {
-      // The vertex for nobody already has all its edges.
+      // The vertex for nobody already has edges to all points.
       if (v < points_.size()) members_.push_back({v, node, level, solver.potential(v)});
     }
   }
@@ -142,13 +142,13 @@ class Pricing {
     if (worst.size() > kMost) worst.pop_back();
   }
 
-  // Each pair of different parts is tested once: from the end that leaves the chain first.
+  // Tests each pair of different parts once, from the end that leaves the chain first.
   bool faces(std::uint32_t i, std::uint32_t j) const {
     const Member &a = members_[i], &b = members_[j];
     return a.part != b.part && (b.level > a.level || (b.level == a.level && i < j));
   }
 
-  // Where two large parts are too close, all their pairs are: a few of them suffice.
+  // If two large parts are too close, so are all their pairs. A few of them suffice.
   void choose() {
     std::sort(wanted_.begin(), wanted_.end(), [](const Wanted& a, const Wanted& b) {
       return std::tie(a.part, a.excess, a.from, a.to) < std::tie(b.part, b.excess, b.from, b.to);
@@ -187,7 +187,7 @@ class Pricing {
     for (std::uint32_t k = 0; k < count; ++k) points[k] = points_[members_[k].vertex];
     const BoxTree<D> tree(std::move(points));
     const auto& nodes = tree.nodes();
-    // For each box the largest potential, and the part if all its points belong to one.
+    // For each box: the largest potential, and the part if all its points belong to the same one.
     std::vector<std::int64_t> most(nodes.size());
     std::vector<std::uint32_t> part(nodes.size()), deepest(nodes.size());
     for (std::size_t x = nodes.size(); x-- > 0;) {
@@ -241,7 +241,7 @@ class Pricing {
   Nest nest_;
   std::vector<Head> heads_;
   std::vector<Member> members_;
-  // for each level of the chain: the sum of the duals around, including its own
+  // for each level of the chain: the sum of the duals around it, including its own
   std::vector<std::int64_t> around_;
   std::vector<Wanted> wanted_;
   std::vector<Edge> found_;

@@ -25,8 +25,8 @@ Matching proof_of(Solver& solver) {
   }
   result.vertex_dual.resize(n);
   result.vertex_blossom.resize(n);
-  // A potential is the sum of the vertex's own dual and those of the blossoms around it. Sums are
-  // kept per blossom, as nests may be deep.
+  // A potential is the sum of the vertex's own dual and the duals of the blossoms around it. The
+  // sums are computed once per blossom, because nests may be deep.
   std::vector<std::int64_t> around(solver.node_count(), -1);
   std::vector<std::uint32_t> chain;
   for (std::uint32_t v = 0; v < n; ++v) {

@@ -6,11 +6,11 @@
 
 namespace terrace::matching::blossom {
 
-/// Converts the solver's result to the public one: partners and duals, with blossoms numbered from
-/// 0. The caller fills in cost and exponent.
+/// Converts the solver's result to the public type: partners and duals, with blossoms numbered from
+/// 0. Leaves cost and exponent to the caller.
 Matching proof_of(Solver& solver);
 
-/// The message for a vertex that solve() could not match.
+/// Returns the error message for a vertex that solve() could not match.
 std::string unmatchable(const Solver& solver, std::uint32_t vertex);
 
 }  // namespace terrace::matching::blossom

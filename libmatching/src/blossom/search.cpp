@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One alternating tree: it grows, shrinks and expands in the order of time (delta) until it reaches
-// an exposed node.
+// Grows, shrinks and expands one alternating tree, in order of time (delta), until it reaches an
+// exposed node.
 #include <algorithm>
 #include <stdexcept>
 #include <tuple>
@@ -32,7 +32,7 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
     heap_.pop_back();
     if (event.b == kGrow) {
       const Vertex& v = vertices_[event.a];
-      // A better edge, or another way into the tree, has invalidated the event.
+      // Skip events that a better edge, or another way into the tree, has made obsolete.
       if (v.label != Label::kFree || v.key - v.potential != event.time) continue;
       delta_ = event.time;
       if (nodes_[top(event.a)].mate == kNone) {
@@ -114,7 +114,8 @@ void Solver::scan(std::uint32_t vertex) {
     Vertex& w = vertices_[arc.to];
     const std::int64_t key = arc.cost - u.potential;
     if (w.label == Label::kPlus) {
-      // Both ends rise; the difference is even, since tree edges are tight and costs even.
+      // Both potentials rise. The difference is even, because tree edges are tight and costs are
+      // even.
       if (w.set != u.set) push((key - w.potential) / 2, vertex, arc.to);
       continue;
     }
@@ -126,7 +127,7 @@ void Solver::scan(std::uint32_t vertex) {
   }
 }
 
-// A free vertex may be grown to (or augmented to) when its best edge becomes tight.
+// Schedules the time at which a free vertex's best edge becomes tight, so that the tree can grow.
 void Solver::offer(std::uint32_t vertex) {
   const Vertex& w = vertices_[vertex];
   const std::int64_t time = w.key - w.potential;
@@ -180,8 +181,8 @@ void Solver::end_tree() {
   heap_.clear();
 }
 
-// No event is left: every minus node is a vertex, and each plus node becomes an odd component once
-// the minus nodes are removed. There is one more plus node than minus nodes.
+// No event is left. Every minus node is a vertex, and removing the minus nodes makes each plus node
+// an odd component. There is one more plus node than minus nodes.
 void Solver::collect_witness() {
   witness_.clear();
   for (const std::uint32_t node : labelled_) {

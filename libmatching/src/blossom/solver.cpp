@@ -42,8 +42,8 @@ void Solver::index_arcs() {
   }
 }
 
-// Half the least weight at each vertex is feasible; then each exposed vertex rises as far as it may
-// and takes a neighbour that is exposed and whose edge is tight.
+// Half the least weight at each vertex is feasible. Then the potential of each exposed vertex is
+// raised as far as possible, and the vertex takes an exposed neighbour if their edge is tight.
 void Solver::start_duals() {
   const auto arcs_of = [&](std::uint32_t v) {
     return std::span<const Arc>(arcs_).subspan(arc_begin_[v],
@@ -84,19 +84,21 @@ std::uint32_t Solver::solve() {
     if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed;
   }
   const auto is_exposed = [&](std::uint32_t v) { return nodes_[top(v)].mate == kNone; };
-  // Trees stop at a limit that grows from pass to pass: so the exposed vertices rise about evenly,
-  // their trees meet half way and stay small, and few remain for the searches without a limit.
+  // Trees stop at a limit that grows from pass to pass. The exposed vertices thus rise about
+  // evenly, their trees meet half way and stay small, and few are left for the searches without a
+  // limit.
   std::int64_t limit = first_limit();
   while (true) {
     const bool unlimited = exposed <= 2 || limit > kLimit / 16;
     const std::uint32_t before = exposed;
     for (std::uint32_t v = 0; v < n_; ++v) {
       ticks_();
-      // The base of an exposed blossom is its root, so that each pass searches from it once.
+      // Only the base of an exposed blossom is its root, so each pass searches from the blossom
+      // once.
       if (!is_exposed(v) || nodes_[top(v)].base != v) continue;
       const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
       if (v == late_ && !last) continue;
-      // When two remain, the late vertex is the root: its tree is one edge.
+      // When only two are exposed, the search starts at the late vertex, whose tree is one edge.
       const std::uint32_t root = top(last ? late_ : v);
       const Outcome outcome =
           search(root, unlimited || last ? std::numeric_limits<std::int64_t>::max() : limit);
@@ -108,7 +110,7 @@ std::uint32_t Solver::solve() {
   }
 }
 
-// A sixteenth of the mean over the vertices of the least cost at each.
+// Returns a sixteenth of the mean, over all vertices, of the least cost at each vertex.
 std::int64_t Solver::first_limit() const {
   double sum = 0.0;
   for (std::uint32_t v = 0; v < n_; ++v) {

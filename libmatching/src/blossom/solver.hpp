@@ -11,45 +11,45 @@
 namespace terrace::matching::blossom {
 
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-/// Bound of all potentials: sums of three fit into 64 bits.
+/// Bound of all potentials, chosen so that sums of three fit into 64 bits.
 inline constexpr std::int64_t kLimit = std::int64_t{1} << 60;
 
-/// An edge with its integer weight, doubled so that all duals are integers.
+/// An edge with its integer weight doubled, so that all duals are integers.
 struct Edge {
   std::uint32_t i, j;
   std::int64_t cost;
 };
 
-/// Minimum-weight perfect matching by the primal-dual blossom method, one alternating tree at a
-/// time, on a sparse graph to which edges may be added between two solutions.
+/// Minimum-weight perfect matching by the primal-dual blossom method on a sparse graph, one
+/// alternating tree at a time. Edges may be added between two solutions.
 ///
-/// A *node* is a vertex (id below n) or a blossom (id n and up). A node without a parent is a *top*
-/// node; only top nodes are matched, labelled and in the tree. The *potential* of a vertex is its
-/// own dual plus those of all blossoms around it, so between different top nodes the slack of an
-/// edge is cost - potential(i) - potential(j), whatever the nesting.
+/// A *node* is a vertex (id below n) or a blossom (id n and above). A node without a parent is a
+/// *top* node; only top nodes are matched, labelled and in the tree. The *potential* of a vertex is
+/// its own dual plus the duals of all blossoms around it. So between different top nodes the slack
+/// of an edge is cost - potential(i) - potential(j), whatever the nesting.
 ///
-/// While a tree exists, the potential of a vertex labelled plus is stored less `delta_`, that of
-/// one labelled minus is stored plus `delta_`, and likewise the duals of labelled blossoms: a dual
-/// change of the whole tree is one addition to `delta_`.
+/// While a tree exists, the potential of a vertex labelled plus is stored minus `delta_`, and that
+/// of a vertex labelled minus is stored plus `delta_`. The duals of labelled blossoms are stored in
+/// the same way. A dual change of the whole tree is then one addition to `delta_`.
 class Solver {
  public:
   /// Takes n vertices and edges (ends below n, i != j, |cost| below kLimit / 4). Vertex `late`, if
-  /// given, may have edges to all others: it is matched last, so that its many edges are not
+  /// given, may have edges to all others. It is matched last, so that its many edges are not
   /// scanned repeatedly.
   Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone,
          base::StopTicks ticks = {});
 
   /// Computes a perfect matching of least weight.
-  /// Returns kNone, or an exposed vertex that cannot be matched (then witness() proves it).
-  /// Throws std::overflow_error if a potential exceeds kLimit, and what the check of `ticks`
-  /// throws; the solver can then only be destroyed.
+  /// Returns: kNone, or an exposed vertex that cannot be matched (then witness() proves it).
+  /// Throws: std::overflow_error if a potential exceeds kLimit, and whatever the stop check of
+  /// `ticks` throws. After either, the solver can only be destroyed.
   std::uint32_t solve();
 
-  /// Adds edges; where they violate the duals these are repaired, which may expose vertices.
+  /// Adds edges and repairs the duals that they violate, which may expose vertices.
   void add(std::span<const Edge> edges);
 
-  /// After a failed solve(): the vertices whose removal leaves more odd components than there are
-  /// of them.
+  /// After a failed solve(): a set of vertices whose removal leaves more odd components than the
+  /// set has vertices.
   const std::vector<std::uint32_t>& witness() const { return witness_; }
 
   /// The partner of each vertex; kNone where exposed.
@@ -59,7 +59,7 @@ class Solver {
   std::uint32_t node_count() const { return static_cast<std::uint32_t>(nodes_.size()); }
   std::int64_t potential(std::uint32_t vertex) const { return vertices_[vertex].potential; }
   std::uint32_t parent(std::uint32_t node) const { return nodes_[node].parent; }
-  /// The dual value of a blossom in use; 0 for vertices.
+  /// Returns the dual of a blossom in use; 0 for vertices.
   std::int64_t blossom_dual(std::uint32_t node) const { return nodes_[node].dual; }
   bool in_use(std::uint32_t node) const { return nodes_[node].first != kNone; }
   std::size_t edge_count() const { return edges_.size(); }
@@ -94,7 +94,8 @@ class Solver {
     std::uint32_t node, from, to;
   };
 
-  /// Grow: a is a vertex. Expand: a is a node. Shrink: a and b are the ends of an edge.
+  /// The meaning of a and b depends on the event. Grow: a is a vertex. Expand: a is a node. Shrink:
+  /// a and b are the ends of an edge.
   struct Event {
     std::int64_t time;
     std::uint32_t a, b;
@@ -156,8 +157,8 @@ class Solver {
 
   // The current tree.
   std::int64_t delta_ = 0;
-  // Events from this delta on are not needed: an augmentation or the limit comes first. And whether
-  // an event was dropped for that reason.
+  // Events at or after this delta are dropped: an augmentation or the limit comes first. left_out_
+  // records whether any event was dropped.
   std::int64_t bound_ = 0;
   bool left_out_ = false;
   std::vector<Event> heap_;

@@ -21,7 +21,8 @@ using tree::area_of;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// The nearest float not above x, one step lower where the subtraction that gave x was rounded up.
+// Returns the nearest float at or below x, one step lower if the subtraction that gave x rounded
+// up.
 float rounded_down(double x) {
   const double lower = x - std::abs(x) * 0x1p-51;
   const auto f = static_cast<float>(lower);
@@ -30,7 +31,7 @@ float rounded_down(double x) {
 
 float rounded_up(double x) { return -rounded_down(-x); }
 
-/// A box in floats; the union of two is exact.
+/// A box in floats. The union of two such boxes is exact.
 template <std::size_t D>
 struct FloatBox {
   std::array<float, D> lo, hi;
@@ -76,7 +77,7 @@ HierarchyFrame<D> frame_of(std::span<const Box<D>> boxes) {
   return frame;
 }
 
-/// The boxes of all nodes, and which nodes become leaves.
+/// Computes the boxes of all nodes and decides which nodes become leaves.
 template <std::size_t D>
 class Plan {
  public:
@@ -115,7 +116,8 @@ class Plan {
   }
   [[nodiscard]] const FloatBox<D>& box(std::uint32_t v) const { return boxes_[v]; }
 
-  /// The larger child first: it is visited more often, and the next node is in the cache.
+  /// Puts the larger child first: it is visited more often, and the next node is likely in the
+  /// cache.
   [[nodiscard]] TreeChildren children(std::uint32_t v) const {
     const auto [a, b] = rows_[v - count_];
     if (area_of(boxes_[a]) >= area_of(boxes_[b])) return {a, b};

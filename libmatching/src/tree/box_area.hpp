@@ -7,7 +7,7 @@
 
 namespace terrace::matching::tree {
 
-/// The surface of a box; in the plane, its perimeter.
+/// Returns the surface area of a box, or its perimeter in the plane.
 template <class AnyBox>
 double area_of(const AnyBox& box) {
   std::array<double, std::tuple_size_v<decltype(box.lo)>> side;

@@ -12,7 +12,7 @@
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
 
-/// Preconditions of a caller's tree over boxes.
+/// Checks of the trees and boxes that callers pass in.
 
 namespace terrace::matching::tree {
 

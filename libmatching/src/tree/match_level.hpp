@@ -13,8 +13,8 @@
 
 namespace terrace::matching::tree {
 
-/// The default matcher of a level's nodes in matching trees: the partner of each, kNobody for the
-/// one left over. The result must not depend on the number of threads.
+/// The default matcher for a level of a matching tree. Returns the partner of each node, kNobody
+/// for the one left over. The result must not depend on the number of threads.
 template <std::size_t D>
 std::vector<std::uint32_t> match_level(std::span<const std::array<double, D>> points,
                                        unsigned threads, const base::StopCheck& check_stop) {

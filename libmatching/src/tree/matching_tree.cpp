@@ -21,10 +21,10 @@ namespace {
   throw std::invalid_argument("make_matching_tree: " + what);
 }
 
-/// Thrown to abandon the work when the caller has ended it.
+/// Thrown to abandon the work after the caller has stopped it.
 struct Stopped {};
 
-// Squares of values between the limits neither overflow nor underflow.
+// Between these limits, squares neither overflow nor underflow.
 template <std::size_t D>
 double distance(const std::array<double, D>& p, const std::array<double, D>& q) {
   double largest = 0.0;
@@ -39,7 +39,7 @@ double distance(const std::array<double, D>& p, const std::array<double, D>& q) 
   return std::ldexp(std::sqrt(sum), shift);
 }
 
-// Never outside the segment between the two, so that pairs of equal points stay where they are.
+// The result never leaves the segment between p and q, so pairs of equal points stay in place.
 template <std::size_t D>
 std::array<double, D> midpoint(const std::array<double, D>& p, double p_weight,
                                const std::array<double, D>& q, double q_weight) {
@@ -101,7 +101,7 @@ class Builder {
     };
     differ(options_.labels.size(), "labels", "label");
     differ(options_.weights.size(), "weights", "weight");
-    // The tree, the clusters, and what is kept per node of a level.
+    // The tree, the clusters, and the data kept per node of a level.
     const double needed = static_cast<double>(n) *
                           (sizeof(MatchingTreeRow) + 2.0 * sizeof(Point) + 4 * sizeof(double));
     const bool fits =
@@ -138,7 +138,7 @@ class Builder {
     return std::max(1u, std::thread::hardware_concurrency());
   }
 
-  // A cluster of m points makes m - 1 rows, so the place of every row is known before any is built.
+  // A cluster of m points makes m - 1 rows, so the position of every row is known in advance.
   void build_clusters(const LabelGroups& groups, std::vector<Node>& roots) {
     std::vector<std::uint32_t> by_size(groups.count());
     std::iota(by_size.begin(), by_size.end(), 0u);
@@ -169,7 +169,7 @@ class Builder {
       try {
         for (unsigned t = 1; t < clusters; ++t) others.emplace_back(work, t);
       } catch (const std::system_error&) {
-        // The system grants no more threads. The existing ones do the same work.
+        // No more threads are available. The existing ones do all the work.
       }
       work(0);
     }
@@ -189,7 +189,7 @@ class Builder {
     return nodes;
   }
 
-  /// Matches repeatedly; rows are written from `row` on. Returns the one node that remains.
+  /// Matches repeatedly until one node is left and returns it. Writes rows from `row` on.
   Node join(std::vector<Node>& nodes, std::uint32_t row, std::uint32_t level, unsigned threads,
             bool callers_thread) {
     while (nodes.size() > 1) {

@@ -13,11 +13,11 @@
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
 
-/// Branch and bound through a hierarchy, the nearer child first.
+/// Branch-and-bound traversal of a hierarchy, nearer child first.
 
 namespace terrace::matching::tree {
 
-/// Nodes still to be visited. Trees of matchings are shallow; others may have any depth.
+/// Stack of nodes to visit. Matching trees are shallow, but other trees may have any depth.
 template <class Entry>
 class WalkStack {
  public:
@@ -40,8 +40,8 @@ class WalkStack {
   std::size_t size_ = 0;
 };
 
-/// Factor for comparisons with a box's bound, so that rounding prunes nothing wrongly: the squared
-/// distances of a box and of a primitive inside are both accurate to some 2^-50.
+/// Factor for comparisons with a box's bound. It keeps rounding from pruning wrongly: the squared
+/// distances of a box and of a primitive inside it are both accurate to about 2^-50.
 inline constexpr double kSlack = 1.0 - 0x1p-47;
 
 template <class AnyBox, std::size_t D>
@@ -56,7 +56,7 @@ double squared_distance(const AnyBox& box, const std::array<double, D>& p) {
   return sum;
 }
 
-/// A point in the units of the primitives and in those of the boxes.
+/// A point in the units of the primitives and in the units of the boxes.
 template <std::size_t D>
 struct FramedPlace {
   std::array<double, D> scaled, framed;
@@ -77,7 +77,7 @@ struct FramedPlace {
   }
 };
 
-/// Calls leaf(node) for each leaf whose squared distance is not above bound(), near ones first.
+/// Calls leaf(node) for each leaf whose squared distance is at most bound(), nearer leaves first.
 template <std::size_t D, class Leaf, class Bound>
 void walk_near(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
                Leaf&& leaf, Bound&& bound) {

@@ -15,10 +15,12 @@
 
 namespace terrace::matching::tree {
 
-/// A primitive with its squared distance in the hierarchy's scale; ties by index.
+/// A squared distance in the hierarchy's scale and the index of its primitive. Ties go to the lower
+/// index.
 using Candidate = std::pair<double, std::uint32_t>;
 
-/// The nearest primitive; squared(slot) is the squared distance of the primitive in that slot.
+/// Returns the nearest primitive. squared(slot) is the squared distance of the primitive in that
+/// slot.
 template <std::size_t D, class Squared>
 std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
                                      const std::array<double, D>& framed, Squared&& squared) {
@@ -37,14 +39,14 @@ std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
   return Neighbour{best.second, std::sqrt(best.first) / tree.frame().scale};
 }
 
-/// The k nearest, in `found`.
+/// Writes the k nearest primitives to `found`.
 template <std::size_t D, class Squared>
 void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
                  std::size_t k, Squared&& squared, std::vector<Neighbour>& found) {
   found.clear();
   k = std::min(k, tree.order().size());
   if (k == 0) return;
-  // A heap with the farthest on top. Distances are squared until the end.
+  // A heap with the farthest primitive on top. Distances stay squared until the end.
   const auto nearer = [](const Neighbour& p, const Neighbour& q) {
     return p.distance != q.distance ? p.distance < q.distance : p.index < q.index;
   };

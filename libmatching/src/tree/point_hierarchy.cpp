@@ -27,8 +27,8 @@ double squared_distance(const std::array<double, D>& p, const std::array<double,
 
 double dot(const Point3& p, const Point3& q) { return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]; }
 
-// Computed from the point of the ray nearest to the centre, so that distant balls keep their shape
-// (E. Haines et al., "Precision improvements for ray/sphere intersection", 2019).
+// Starts from the point of the ray nearest to the centre, which keeps distant balls accurate (E.
+// Haines et al., "Precision improvements for ray/sphere intersection", 2019).
 std::optional<double> meets(const tree::FramedRay& ray, const Point3& centre, double radius) {
   const Point3& along = ray.direction;
   const Point3 to{centre[0] - ray.origin[0], centre[1] - ray.origin[1], centre[2] - ray.origin[2]};
@@ -73,7 +73,7 @@ void PointHierarchy<D>::nearest(const Point& query, std::size_t k,
 
 template <std::size_t D>
 std::optional<RayHit> PointHierarchy<D>::hit(const Ray& ray, double radius) const requires(D == 3) {
-  // Clang 14 instantiates this in the plane too.
+  // Clang 14 also instantiates this in the plane.
   if constexpr (D == 3) {
     const double scaled = radius * tree_.frame().scale;
     if (!(radius >= 0.0) || !(scaled <= 0x1p460)) {

@@ -17,12 +17,12 @@
 
 namespace terrace::matching::tree {
 
-/// A ray in the units of the primitives, its direction's largest coordinate from 1/2 to 1, with the
-/// values that box tests need.
+/// A ray in the units of the primitives, scaled so that the largest coordinate of its direction is
+/// between 1/2 and 1, with the values that box tests need.
 class FramedRay {
  public:
-  /// margin: how far outside a box the ray may still hit the primitives in it, in the caller's
-  /// unit.
+  /// margin: how far outside a box the ray may be and still hit the primitives in it, in the
+  /// caller's unit.
   FramedRay(const Ray& ray, const HierarchyFrame<3>& frame, double margin = 0.0) {
     const FramedPlace<3> place(ray.origin, frame);
     origin = place.scaled;
@@ -33,7 +33,7 @@ class FramedRay {
       largest = std::max(largest, std::abs(ray.direction[d]));
       far = std::max(far, std::abs(framed_origin_[d]));
     }
-    if (largest == 0.0) fail("direction has no length");
+    if (largest == 0.0) fail("direction has length 0");
     if (std::isnan(ray.t_min) || std::isnan(ray.t_max)) fail("t_min or t_max is not a number");
     const int exponent = std::ilogb(largest) + 1;
     unit_ = std::ldexp(frame.scale, exponent);
@@ -42,7 +42,7 @@ class FramedRay {
     }
     t_min = ray.t_min * unit_;
     t_max = ray.t_max * unit_;
-    // Hits have errors of some 2^-51 of all coordinates involved.
+    // Hits have errors of about 2^-51 of all coordinates involved.
     const double wide = margin * frame.scale + 0x1p-48 * (far + margin * frame.scale);
     for (std::size_t d = 0; d < 3; ++d) {
       direction[d] = std::ldexp(ray.direction[d], -exponent);
@@ -53,7 +53,7 @@ class FramedRay {
     }
   }
 
-  /// Converts t of this ray to t of the caller's.
+  /// Converts t of this ray to the caller's t.
   [[nodiscard]] double callers_t(double t) const { return t / unit_; }
 
   struct Range {
@@ -61,9 +61,9 @@ class FramedRay {
     [[nodiscard]] bool empty() const { return !(enter <= leave); }
   };
 
-  /// The interval in which the ray is within the box, from t_min to `last`. Where a coordinate of
-  /// the direction is 0 and the origin on the box's border, 0 times infinity is ignored: that axis
-  /// excludes nothing.
+  /// Returns the interval from t_min to `last` in which the ray is inside the box. If a coordinate
+  /// of the direction is 0 and the origin is on the box's border, 0 times infinity is ignored: that
+  /// axis excludes nothing.
   template <class AnyBox>
   [[nodiscard]] Range within(const AnyBox& box, double last) const {
     Range range{t_min, last};
@@ -78,10 +78,10 @@ class FramedRay {
     return range;
   }
 
-  /// Moves t to where the ray is within the box of the primitive that was hit at t; nullopt if that
-  /// is nowhere. So no enclosing node is skipped because of an earlier hit, and all trees answer
-  /// the same. The change is a few roundings, except for triangles seen nearly edge-on. The box's
-  /// coordinates are in the units of the primitives.
+  /// Moves the t of a hit to the nearest t at which the ray is inside the primitive's box; nullopt
+  /// if there is none. So an earlier hit never makes the walk skip a node around this one, and all
+  /// trees give the same answer. The change is a few roundings, except for triangles seen nearly
+  /// edge-on. The box's coordinates are in the units of the primitives.
   [[nodiscard]] std::optional<double> moved_into(Box<3> box, const HierarchyFrame<3>& frame,
                                                  double t) const {
     for (std::size_t d = 0; d < 3; ++d) {
@@ -107,8 +107,8 @@ class FramedRay {
   double unit_;
 };
 
-/// Calls leaf(node, best) for each leaf that the ray enters no later than the best hit so far, near
-/// ones first; leaf() lowers best.t, in the ray's own t.
+/// Calls leaf(node, best) for each leaf that the ray enters no later than the best hit so far,
+/// nearer leaves first. leaf() lowers best.t, which is in the ray's own t.
 template <class Leaf>
 RayHit walk_ray(const BoundingVolumeHierarchy<3>& tree, const FramedRay& ray, Leaf&& leaf) {
   RayHit best{kNobody, ray.t_max};

@@ -18,7 +18,7 @@ class Rotation {
       : count_(static_cast<std::uint32_t>(boxes.size())),
         children_(rows.begin(), rows.end()),
         boxes_(boxes.begin(), boxes.end()) {
-    // Scaled by a power of two, so that areas neither overflow nor underflow.
+    // Scale by a power of two, so that areas neither overflow nor underflow.
     double largest = 0.0;
     for (const Box<D>& box : boxes_) {
       for (std::size_t d = 0; d < D; ++d) {
@@ -40,7 +40,7 @@ class Rotation {
     set_order();
   }
 
-  /// One pass; returns whether it gained enough to go on.
+  /// Makes one pass. Returns whether it gained enough for another one.
   bool pass() {
     double gained = 0.0;
     for (const std::uint32_t v : order_) gained += rotate(v);
@@ -49,7 +49,7 @@ class Rotation {
     return gained > 1e-3 * cost_;
   }
 
-  /// The rows in the order of a walk that leaves each node after its children.
+  /// Returns the rows in postorder.
   [[nodiscard]] std::vector<TreeChildren> rows() const {
     std::vector<std::uint32_t> number(boxes_.size());
     for (std::uint32_t i = 0; i < count_; ++i) number[i] = i;
@@ -73,14 +73,14 @@ class Rotation {
     return box;
   }
 
-  // An inner node that is not a pair of primitives.
+  // Returns whether v is an inner node other than a pair of primitives.
   [[nodiscard]] bool may_change(std::uint32_t v) const {
     if (v < count_) return false;
     const auto [a, b] = children_[v - count_];
     return a >= count_ || b >= count_;
   }
 
-  /// Two nodes that change places: `first` is a child of `first_parent`, and so on.
+  /// Two nodes that swap places: `first` is a child of `first_parent`, `second` of `second_parent`.
   struct Swap {
     std::uint32_t first_parent = 0, first = 0, second_parent = 0, second = 0;
     double gain = 0.0;
@@ -90,7 +90,7 @@ class Rotation {
     return children.a == child ? children.b : children.a;
   }
 
-  // Makes the best of the swaps below v that shrink the boxes of its children.
+  // Makes the best of those swaps below v that shrink the boxes of v's children. Returns the gain.
   double rotate(std::uint32_t v) {
     const auto [a, b] = children_[v - count_];
     Swap best;
@@ -114,7 +114,7 @@ class Rotation {
         if (gain > best.gain) best = {a, left.a, b, child, gain};
       }
     }
-    // Smaller gains would be rounding.
+    // A smaller gain would be rounding error.
     if (!(best.gain > 1e-12 * tree::area_of(boxes_[v]))) return 0.0;
     replace(best.first_parent, best.first, best.second);
     replace(best.second_parent, best.second, best.first);
@@ -131,7 +131,7 @@ class Rotation {
     (children.a == child ? children.a : children.b) = by;
   }
 
-  // Parents before children from the root, then reversed.
+  // Lists parents before children from the root, then reverses the list.
   void set_order() {
     order_.clear();
     if (children_.empty()) return;
@@ -152,7 +152,7 @@ class Rotation {
   std::uint32_t count_;
   std::vector<TreeChildren> children_;
   std::vector<Box<D>> boxes_;
-  std::vector<std::uint32_t> order_;  // the inner nodes, children first, the root last
+  std::vector<std::uint32_t> order_;  // inner nodes, children before parents
   double cost_ = 0.0;                 // sum of the inner nodes' areas
 };
 

@@ -45,7 +45,7 @@ std::vector<Box<3>> boxes_of(std::span<const Point3> corners, std::span<const Tr
   for (std::size_t k = 0; k < triangles.size(); ++k) {
     const tree::Corners own = corners_of(corners, triangles[k]);
     boxes.push_back(box_of(own));
-    // std::min and std::max of NaN and numbers may return numbers.
+    // If one argument is NaN, std::min and std::max may return the other.
     for (const Point3& p : own) {
       for (const double c : p) {
         if (std::isnan(c)) boxes.back().lo[0] = c;
@@ -63,7 +63,7 @@ std::vector<Point3> centroids(std::span<const Point3> corners,
   std::vector<Point3> means(triangles.size());
   for (std::size_t k = 0; k < triangles.size(); ++k) {
     for (const std::uint32_t corner : triangles[k]) {
-      // Divided one by one, so that the sum does not overflow.
+      // Divides each corner before adding, so that the sum does not overflow.
       for (std::size_t d = 0; d < 3; ++d) means[k][d] += corners[corner][d] / 3.0;
     }
   }
@@ -105,7 +105,8 @@ std::optional<RayHit> TriangleHierarchy::hit(const Ray& ray) const {
 std::optional<Neighbour> TriangleHierarchy::nearest(const Point3& query) const {
   const tree::FramedPlace<3> place(query, tree_.frame());
   return tree::nearest_one(tree_, place.framed, [&](std::uint32_t slot) {
-    // Never below the distance of the box, by which nodes are pruned, whatever the rounding.
+    // The result is never less than the distance to the box, which prunes nodes, whatever the
+    // rounding.
     return std::max(tree::squared_distance(place.scaled, corners_[slot]),
                     tree::squared_distance(box_of(corners_[slot]), place.scaled));
   });

@@ -15,7 +15,7 @@ namespace terrace::matching::tree {
 
 using Corners = std::array<Point3, 3>;
 
-/// The ray as the z axis: the part of the test that all triangles share.
+/// A ray transformed to the z axis: the part of the test that all triangles share.
 /// Source: S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
 class TriangleTest {
  public:
@@ -30,8 +30,9 @@ class TriangleTest {
     stretch_ = 1.0 / direction[z_];
   }
 
-  /// t of the crossing. The signs of u, v, w are correct or 0 for the sheared corners, as products
-  /// are rounded monotonically. So one of two triangles at an edge is hit.
+  /// Returns t of the crossing. The signs of u, v and w are correct, or 0, for the sheared corners,
+  /// because products are rounded monotonically. So at a shared edge one of the two triangles is
+  /// hit.
   [[nodiscard]] std::optional<double> operator()(const Corners& corners) const {
     std::array<double, 3> x, y, z;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -62,7 +63,7 @@ inline double inner(const Point3& p, const Point3& q) {
   return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
 }
 
-/// Squared distance of a point to the segment from p to q.
+/// Returns the squared distance of a point to the segment from p to q.
 inline double squared_distance(const Point3& place, const Point3& p, const Point3& q) {
   const Point3 side = difference(q, p), to = difference(place, p);
   const double length2 = inner(side, side);
@@ -71,9 +72,9 @@ inline double squared_distance(const Point3& place, const Point3& p, const Point
   return inner(aside, aside);
 }
 
-/// Squared distance of a point to a triangle: to its plane if the foot is inside, otherwise to the
-/// nearest side. For triangles of nearly no area the sides are tested as well, so that none is
-/// missed.
+/// Returns the squared distance of a point to a triangle: to its plane if the foot is inside,
+/// otherwise to the nearest side. For triangles of nearly zero area the sides are tested as well,
+/// so that none is missed.
 inline double squared_distance(const Point3& place, const Corners& corners) {
   const Point3 first = difference(corners[1], corners[0]);
   const Point3 second = difference(corners[2], corners[0]);

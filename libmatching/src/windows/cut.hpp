@@ -14,19 +14,19 @@
 
 namespace terrace::matching::windows {
 
-/// An item that windows do not divide: a point, or a pair at its midpoint.
+/// A point, or a pair at its midpoint. Windows never divide it.
 template <std::size_t D>
 struct Unit {
   std::array<double, D> centre;
   std::uint32_t name;
 };
 
-/// Reorders units so that consecutive ranges are compact windows of at most `most` units, and
-/// appends the end of each range, counted from `first`, to `ends`.
+/// Reorders units so that consecutive ranges are compact windows of at most `most` units. Appends
+/// the end of each range, counted from `first`, to `ends`.
 ///
-/// Ranges are split across the longest side of their bounding box, at a share between 3/8 and 5/8
-/// that the seed determines for each split: with another seed the windows have other borders. With
-/// `even`, every part except the last of a range has an even number of units.
+/// Each range is split across the longest side of its bounding box, at a fraction between 3/8 and
+/// 5/8 that depends on the seed. Different seeds thus give windows with different borders. With
+/// `even`, every part except the last has an even number of units.
 /// Cost: O(n log(n / most)).
 template <std::size_t D>
 void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t seed,
@@ -66,7 +66,7 @@ void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t se
                      [axis](const Unit<D>& a, const Unit<D>& b) {
                        return std::tie(a.centre[axis], a.name) < std::tie(b.centre[axis], b.name);
                      });
-    // The left part comes first.
+    // The left part is processed first, so it is pushed last.
     open.emplace_back(begin + part, end);
     open.emplace_back(begin, begin + part);
   }

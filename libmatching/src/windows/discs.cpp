@@ -23,8 +23,8 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
   const Matching& proof = matching.proof;
   const std::size_t blossoms = proof.blossom_dual.size();
   const double unit = std::ldexp(1.0, -1 - proof.exponent);
-  // Where a point is left over, the blossoms around the vertex for nobody hold an even number of
-  // points and cannot be used alone.
+  // If a point is left over, the blossoms around the vertex for nobody contain an even number of
+  // points and cannot be used on their own.
   std::vector<bool> dropped(blossoms, false);
   if (proof.mate.size() > points.size()) {
     for (std::uint32_t b = proof.vertex_blossom.back(); b != kNobody; b = proof.blossom_parent[b]) {
@@ -32,10 +32,10 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
     }
   }
   Window& window = windows_[w];
-  // Blossoms are renumbered as they are met on the way outward from the points, the outermost of
-  // each path first. Nests may be deep, so each blossom is visited once.
+  // Blossoms are renumbered in the order in which the walks outward from the points reach them, the
+  // outermost of each path first. Nests may be deep, so each blossom is visited only once.
   std::vector<std::uint32_t> number(blossoms, kNobody), chain;
-  std::vector<double> around;  // for each moat: its width plus those outside it
+  std::vector<double> around;  // for each moat: its width plus the widths of all moats around it
   for (std::size_t k = 0; k < points.size(); ++k) {
     std::uint32_t b = proof.vertex_blossom[k];
     for (; b != kNobody && !dropped[b] && number[b] == kNobody; b = proof.blossom_parent[b]) {
@@ -57,10 +57,10 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
   }
 }
 
-// A moat shrinks for all points inside at once, the outer moats first; the discs shrink by the
-// rest.
-void Discs::give_way(const std::vector<double>& excess) {
-  // For each moat, the amount its points need; then the amount that it and the moats outside give.
+// A moat shrinks for all points inside it at once, outer moats first. The discs shrink by the rest.
+void Discs::shrink(const std::vector<double>& excess) {
+  // First collects, for each moat, the amount its points need; then the amount given by it and the
+  // moats around it.
   std::vector<std::vector<double>> given(windows_.size());
   for (std::size_t w = 0; w < windows_.size(); ++w) given[w].assign(windows_[w].moats.size(), 0.0);
   for (std::size_t i = 0; i < radius_.size(); ++i) {
@@ -93,7 +93,7 @@ void Discs::give_way(const std::vector<double>& excess) {
 
 namespace {
 
-/// Computes how much of a point's radius is too much for the points of other windows.
+/// Computes by how much each point's radius is too large for the points of other windows.
 template <std::size_t D>
 class Excess {
  public:
@@ -123,7 +123,7 @@ class Excess {
     }
   }
 
-  /// Each point's distance to its nearest neighbour, but at most `most`.
+  /// Returns each point's distance to its nearest neighbour, capped at `most`.
   std::vector<double> nearest(std::span<const double> most) const {
     std::vector<double> result(points_.size(), 0.0);
     for_each_chunk([&](std::uint32_t k, std::vector<std::uint32_t>&) {
@@ -136,8 +136,8 @@ class Excess {
     return result;
   }
 
-  /// For each point i the largest share * (own[i] + others[j] - distance) over the points j of
-  /// other windows, at least 0.
+  /// Returns, for each point i, the largest share * (own[i] + others[j] - distance) over the points
+  /// j of other windows, or 0 if that is negative.
   std::vector<double> operator()(std::span<const double> own, std::span<const double> others,
                                  double share) {
     const auto& nodes = tree_.nodes();
@@ -214,8 +214,8 @@ class Excess {
   const base::StopCheck& check_stop_;
   std::vector<std::uint32_t> order_;
   BoxTree<D> tree_;
-  std::vector<std::uint32_t> owner_;  // for each box: the window, if all its points are in one
-  std::vector<double> largest_;       // for each box
+  std::vector<std::uint32_t> owner_;  // for each box: its window, if all its points are in the same
+  std::vector<double> largest_;       // for each box: the largest of `others` in it
 };
 
 }  // namespace
@@ -224,15 +224,15 @@ template <std::size_t D>
 double Discs::bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
                     unsigned threads, const base::StopCheck& check_stop) {
   Excess<D> excess(points, metric, window_, threads, check_stop);
-  // First shrink those that reach far beyond their window, as if the radii of all others were at
-  // most the distance to their nearest neighbour: otherwise one wide moat would lower a thousand
-  // small discs. Then shrink both of each pair, by half each.
-  give_way(excess(radius_, excess.nearest(radius_), 1.0));
-  give_way(excess(radius_, radius_, 0.5));
+  // First shrink the radii that reach far beyond their window, as if all other radii were at most
+  // the distance to the nearest neighbour. Otherwise one wide moat would shrink a thousand small
+  // discs. Then shrink both points of each remaining pair, by half each.
+  shrink(excess(radius_, excess.nearest(radius_), 1.0));
+  shrink(excess(radius_, radius_, 0.5));
   double sum = 0.0;
   for (const Window& window : windows_) sum += window.sum;
   if (radius_.size() % 2 == 0) return sum;
-  // The vertex for nobody is at distance 0 from all: a point may be left over at the price of its
+  // The vertex for nobody is at distance 0 from all points, so leaving a point over costs its
   // radius.
   return sum - *std::max_element(radius_.begin(), radius_.end());
 }

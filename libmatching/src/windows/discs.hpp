@@ -13,26 +13,27 @@
 
 namespace terrace::matching::windows {
 
-/// The duals of points that were matched window by window, as lengths: each point is the centre of
-/// a disc, and each blossom has a moat of some width around the discs and moats inside. The duals
-/// of two points of different windows are feasible if the sum of their radii, moats included, is at
+/// The duals of points that were matched window by window, as lengths. Each point is the centre of
+/// a disc. Each blossom has a moat of some width around the discs and moats inside it. The duals of
+/// two points of different windows are feasible if the sum of their radii, moats included, is at
 /// most their distance.
 class Discs {
  public:
   explicit Discs(std::size_t points) : radius_(points, 0.0), moat_(points, kNobody) {}
 
-  /// Forgets all windows and prepares for this many.
+  /// Discards all windows and prepares for this many.
   void start(std::size_t windows);
-  /// Takes the duals of window `w` with these points. May be called concurrently for different
-  /// windows.
+  /// Stores the duals of window `w`, which contains these points. Different windows may be stored
+  /// concurrently.
   void take(std::size_t w, std::span<const std::uint32_t> points, const PointMatching& matching);
 
-  /// Lowers discs and moats until no pair from different windows is too close. Consumes the
+  /// Shrinks discs and moats until no pair from different windows is too close. Consumes the
   /// windows.
   ///
-  /// points: positions, in the unit of the radii. metric: as given to match_points() for them.
-  /// Returns: a lower bound of the cost of every perfect matching; if n is odd, of every matching
-  /// that leaves one point over.
+  /// points: positions, in the unit of the radii.
+  /// metric: as given to match_points() for these points.
+  /// Returns: a lower bound of the cost of every perfect matching or, if n is odd, of every
+  /// matching that leaves one point over.
   /// Cost: O(n log n) if radii are of the order of the distances between neighbours.
   template <std::size_t D>
   double bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
@@ -41,14 +42,14 @@ class Discs {
  private:
   struct Moat {
     double width;
-    std::uint32_t parent;  // the next one outward
+    std::uint32_t parent;  // the next moat outward
   };
   struct Window {
-    double sum = 0.0;         // over all discs and moats except the vertex for nobody
+    double sum = 0.0;         // of all discs and moats except the disc of the vertex for nobody
     std::vector<Moat> moats;  // parents first
   };
 
-  void give_way(const std::vector<double>& excess);
+  void shrink(const std::vector<double>& excess);
 
   std::vector<double> radius_;       // for each point, moats included
   std::vector<std::uint32_t> moat_;  // for each point: the innermost moat around it, in its window
