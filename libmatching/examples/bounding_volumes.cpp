@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tree of repeated matching over points and over the triangles of a roof, queried for nearest
-// neighbours and for the first hit of a ray.
+// Builds trees of repeated matching over points and over the triangles of a roof, then queries them
+// for the nearest point and for the first hit of a ray.
 #include <cstdio>
 #include <vector>
 

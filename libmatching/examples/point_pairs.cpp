@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Five points, paired so that the total distance is minimal; one is left over.
+// Pairs five points so that the total distance is minimal. One point is left over.
 #include <cstdio>
 #include <vector>
 

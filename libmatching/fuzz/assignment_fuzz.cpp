@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small matrices of a few distinct values against brute force over all permutations.
+// Compares assignments of small matrices with few distinct values with brute force over all
+// permutations.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>

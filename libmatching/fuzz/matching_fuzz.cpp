@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small graphs, and small sets of points with many ties, against dynamic programming over subsets.
+// Compares matchings of small graphs, and of small point sets with many ties, with dynamic
+// programming over subsets.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trees of small sets with many duplicates and ties: the laws of the tree, each level against
-// dynamic programming over subsets, and queries against all points and against a tree of another
-// shape.
+// Builds trees of small sets with many duplicates and ties. Checks the invariants of the tree, each
+// level against dynamic programming over subsets, and queries against all points and against a tree
+// of another shape.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -82,7 +82,7 @@ void check_queries(const std::vector<Point3>& points, const std::vector<TreeChil
 
 }  // namespace
 
-// First byte: what is tested; then two bytes per point.
+// The first byte selects the coordinates' scale. Two bytes per point follow.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 1) return 0;
   std::vector<Point2> flat;
