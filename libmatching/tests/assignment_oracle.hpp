@@ -13,10 +13,10 @@
 
 namespace terrace::matching {
 
-/// The least cost over all ways to assign min(rows, columns) rows to columns.
+/// Returns the least cost over all ways to assign min(rows, columns) rows to columns.
 template <class Number>
 double brute_force(const std::vector<Number>& costs, std::size_t rows, std::size_t columns) {
-  // The longer side is permuted; its first elements are matched to the shorter side.
+  // Permutes the longer side; its first elements are matched to the shorter side.
   const bool tall = rows > columns;
   std::vector<std::size_t> permutation(tall ? rows : columns);
   std::iota(permutation.begin(), permutation.end(), std::size_t{0});
@@ -32,12 +32,12 @@ double brute_force(const std::vector<Number>& costs, std::size_t rows, std::size
   return best;
 }
 
-/// In [0, 1).
+/// Returns a random number in [0, 1).
 inline double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-/// The message of the std::invalid_argument that `call` throws.
+/// Returns the message of the std::invalid_argument that `call` throws.
 inline std::string message_of(const auto& call) {
   try {
     call();

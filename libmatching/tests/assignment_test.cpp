@@ -28,7 +28,7 @@ TYPED_TEST(AssignTyped, EqualsBruteForceOnSmallMatrices) {
     std::mt19937_64 random(seed);
     const std::size_t columns = 1 + random() % 7, rows = 1 + random() % 7;
     std::vector<TypeParam> costs(rows * columns);
-    // A few distinct values, so that ties are common; negative ones too.
+    // A few distinct values make ties common; some are negative.
     for (auto& c : costs) c = static_cast<TypeParam>(static_cast<int>(random() % 9) - 3);
     const auto a = assign(std::span<const TypeParam>(costs), rows, columns);
     EXPECT_EQ(static_cast<double>(a.cost), brute_force(costs, rows, columns));
@@ -58,7 +58,7 @@ TYPED_TEST(AssignTyped, ProvesItselfOptimalOnLargerMatrices) {
   }
 }
 
-TYPED_TEST(AssignTyped, TakesEqualCosts) {
+TYPED_TEST(AssignTyped, HandlesEqualCosts) {
   for (const auto& [rows, columns] : {std::pair{70, 70}, {40, 300}, {300, 40}}) {
     const auto r = static_cast<std::size_t>(rows), c = static_cast<std::size_t>(columns);
     for (const int value : {0, -7}) {
@@ -70,8 +70,8 @@ TYPED_TEST(AssignTyped, TakesEqualCosts) {
   }
 }
 
-// Points on a small grid, each several times: all ties and zeros.
-TEST(Assign, TakesGridsWithDuplicates) {
+// Points on a small grid, each several times: many ties and zeros.
+TEST(Assign, HandlesGridsWithDuplicates) {
   for (const std::size_t columns : {120u, 90u, 150u}) {
     const std::size_t rows = 120;
     const Assignment a = assign_pairs(rows, columns, [](std::size_t i, std::size_t j) {
@@ -89,7 +89,7 @@ TEST(Assign, TakesGridsWithDuplicates) {
   }
 }
 
-TEST(Assign, IsRightFromTheTiniestToTheHugestCosts) {
+TEST(Assign, HandlesTinyAndHugeCosts) {
   for (const double scale : {1e-300, 1e300}) {
     std::mt19937_64 random(5);
     const std::size_t rows = 60, columns = 70;
@@ -105,7 +105,7 @@ TEST(Assign, IsRightFromTheTiniestToTheHugestCosts) {
   }
 }
 
-TEST(Assign, ExactForTheExtremesOf32Bits) {
+TEST(Assign, IsExactForTheExtremesOf32Bits) {
   constexpr auto low = std::numeric_limits<std::int32_t>::min();
   constexpr auto high = std::numeric_limits<std::int32_t>::max();
   std::mt19937_64 random(3);
@@ -117,7 +117,7 @@ TEST(Assign, ExactForTheExtremesOf32Bits) {
   }
 }
 
-TEST(Assign, FromAFunctionEqualsFromAMatrix) {
+TEST(Assign, CostsFromAFunctionEqualCostsFromAMatrix) {
   for (const std::size_t rows : {1u, 33u, 100u, 130u}) {
     std::mt19937_64 random(rows);
     const std::size_t columns = 100;
@@ -135,7 +135,7 @@ TEST(Assign, FromAFunctionEqualsFromAMatrix) {
   }
 }
 
-TEST(Assign, SaysWhichRowsStayWithoutAColumn) {
+TEST(Assign, ReportsUnassignedRows) {
   const std::vector<double> costs{5, 1, 7};
   const Assignment a = assign(costs, 3, 1);
   EXPECT_EQ(a.column, (std::vector<std::uint32_t>{kUnassigned, 0, kUnassigned}));
@@ -151,7 +151,7 @@ TEST(Assign, AcceptsTheEmptyProblem) {
   EXPECT_EQ(check(assign(none, 2, 0), none, 2, 0), 0);
 }
 
-TEST(Assign, NamesWhatIsWrong) {
+TEST(Assign, NamesBadInput) {
   std::vector<double> costs{1, 2, 3, 4};
   EXPECT_THROW(assign(costs, 1, 3), std::invalid_argument);
   EXPECT_NE(message_of([&] { assign(costs, 1, 3); }).find("4 entries"), std::string::npos);
@@ -168,7 +168,7 @@ TEST(Assign, NamesWhatIsWrong) {
   EXPECT_THROW(assign_rows(2, 2, CostRow()), std::bad_function_call);
 }
 
-TEST(Check, SeesEveryBrokenCondition) {
+TEST(Check, DetectsEveryViolation) {
   const std::vector<double> costs{1, 5, 9, 4, 2, 9};
   const Assignment right = assign(costs, 2, 3);
   ASSERT_EQ(check(right, costs, 2, 3), 0);
@@ -190,7 +190,7 @@ TEST(Check, SeesEveryBrokenCondition) {
 }
 
 // The published optimum of an OR-Library instance.
-TEST(Assign, FindsTheKnownOptimum) {
+TEST(Assign, FindsThePublishedOptimum) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA names no data folder";
   std::ifstream file(std::string(data) + "/matching/assignment/assign500.txt");

@@ -48,7 +48,7 @@ void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<Box<
   };
   std::vector<Open> open{{0, 0}};
   std::size_t seen = 0, slots = 0, deepest = 0;
-  // Nodes and slots are consecutive in a walk that visits the first child first.
+  // Nodes and slots must be consecutive in a walk that visits the first child first.
   while (!open.empty()) {
     const auto [at, depth] = open.back();
     open.pop_back();
@@ -97,7 +97,8 @@ double area(const Box<D>& box) {
   return sum;
 }
 
-/// The least cost below a node, times area, over all choices of leaves, by brute force.
+/// Returns the cost below node v, times area, of every choice of leaves. Also computes v's box and
+/// size.
 template <std::size_t D>
 std::vector<double> all_costs(const std::vector<TreeChildren>& rows,
                               const std::vector<Box<D>>& boxes, std::uint32_t v,
@@ -149,14 +150,14 @@ void test_random(std::uint64_t seed) {
               *std::min_element(all.begin(), all.end()), 1e-5 * root);
 }
 
-TEST(BoundingVolumeHierarchy, IsSoundAndOfLeastCostForItsTree) {
+TEST(BoundingVolumeHierarchy, IsValidAndOfLeastCostForItsTree) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     test_random<2>(seed);
     test_random<3>(seed);
   }
 }
 
-TEST(BoundingVolumeHierarchy, CountsTheSurfaceAreaHeuristic) {
+TEST(BoundingVolumeHierarchy, ComputesTheSurfaceAreaCost) {
   std::vector<Box<3>> cubes;
   for (int k = 0; k < 4; ++k) {
     const auto x = static_cast<double>(k);
@@ -166,23 +167,23 @@ TEST(BoundingVolumeHierarchy, CountsTheSurfaceAreaHeuristic) {
   HierarchyOptions options;
   options.leaf_size = 1;
   const BoundingVolumeHierarchy<3> tree(rows, cubes, options);
-  // Areas: 18 for the root, 10 for each node below it, 6 for each cube.
+  // Areas: 18 for the root, 10 for each node below it, and 6 for each cube.
   EXPECT_NEAR(tree.surface_area_cost(), (18.0 + 2 * 10.0 + 4 * 6.0) / 18.0, 1e-5);
   EXPECT_NEAR(tree.surface_area_cost({2.0, 0.5}), (2 * (18.0 + 2 * 10.0) + 0.5 * 24.0) / 18.0,
               1e-5);
-  // A single leaf is possible with leaf_size 4; it wins if a step costs 10.
+  // With leaf_size 4 the whole tree may be one leaf. It is, if a step costs 10.
   options.leaf_size = 4;
   options.costs.traversal = 10.0;
   const BoundingVolumeHierarchy<3> flat(rows, cubes, options);
   EXPECT_EQ(flat.nodes().size(), 1u);
   EXPECT_NEAR(flat.surface_area_cost(), 4.0, 1e-5);
-  // No area at all: every node counts in full.
+  // If all areas are 0, every node counts in full.
   const std::vector<Box<3>> equal(4, Box<3>{{1, 2, 3}, {1, 2, 3}});
   options.leaf_size = 1;
   EXPECT_EQ(BoundingVolumeHierarchy<3>(rows, equal, options).surface_area_cost(), 7.0);
 }
 
-TEST(BoundingVolumeHierarchy, TakesDeepTreesAndAnyScale) {
+TEST(BoundingVolumeHierarchy, HandlesDeepTreesAndAnyScale) {
   std::mt19937_64 random(3);
   const auto plain = random_boxes<3>(20000, 0.01, random);
   const auto rows = oracles::chain(plain.size());
@@ -204,7 +205,7 @@ TEST(BoundingVolumeHierarchy, TakesDeepTreesAndAnyScale) {
     expect_sound(scaled, boxes, 8);
     EXPECT_GT(scaled.surface_area_cost(), 1.0);
   }
-  // Georeferenced: the boxes are small compared to the coordinates.
+  // Georeferenced boxes are small compared to their coordinates.
   auto far = random_boxes<3>(100, 0.001, random);
   for (Box<3>& box : far) {
     for (auto* corner : {&box.lo, &box.hi}) {
@@ -261,7 +262,7 @@ void test_rotation(std::uint64_t seed) {
   }
 }
 
-TEST(BoundingVolumeHierarchy, LosesCostByRotations) {
+TEST(BoundingVolumeHierarchy, RotationsLowerTheCost) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     test_rotation<2>(seed);
     test_rotation<3>(seed);

@@ -25,7 +25,7 @@ double distance(const Point3& p, const Point3& q) {
   return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
 }
 
-/// The optimum over all matchings, with one point left over if their number is odd.
+/// Returns the optimum over all matchings, with one point left over if their number is odd.
 double optimum(const std::vector<Point3>& points) {
   const auto n = points.size();
   std::vector<double> best(std::size_t{1} << n, std::numeric_limits<double>::infinity());
@@ -93,7 +93,7 @@ TEST(Halving, MonteCarloFindsTheOptimumOfVeryFewPoints) {
   }
 }
 
-// The thesis's method falls short of this at the same number of assignments.
+// Both methods make the same number of assignments.
 TEST(Halving, MonotoneIsFarBelowMonteCarlo) {
   std::mt19937_64 random(4);
   const std::vector<Point3> points = uniform(100, random);
@@ -123,7 +123,7 @@ TEST(Halving, ThreadsNeverChangeTheResult) {
   EXPECT_NE(match_by_halving(points, other).mate, one.mate);
 }
 
-TEST(Halving, DegenerateInputs) {
+TEST(Halving, HandlesDegenerateInput) {
   for (const Halving method : {Halving::monte_carlo, Halving::monotone}) {
     const HalvingOptions options{.method = method, .iterations = 20};
     EXPECT_TRUE(match_by_halving(std::span<const Point3>{}, options).mate.empty());
@@ -138,7 +138,7 @@ TEST(Halving, DegenerateInputs) {
   }
 }
 
-TEST(Halving, ProgressCanStopIt) {
+TEST(Halving, ProgressCallbackCanStopTheSearch) {
   std::mt19937_64 random(6);
   const std::vector<Point3> points = uniform(20, random);
   std::uint64_t calls = 0;
@@ -153,7 +153,7 @@ TEST(Halving, ProgressCanStopIt) {
   EXPECT_EQ(match_by_halving(points, {.seconds = 0.0}).iterations, 1u);
 }
 
-TEST(Halving, BadInputIsNamed) {
+TEST(Halving, NamesBadInput) {
   const auto message = [](const auto& run) -> std::string {
     try {
       run();

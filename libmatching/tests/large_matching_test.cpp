@@ -28,8 +28,8 @@ double length(const std::array<double, D>& p, const std::array<double, D>& q) {
   return std::sqrt(sum);
 }
 
-/// Kinds of sets: uniform, clumps of very different density, a grid (all ties), a line, few places
-/// with many duplicates.
+/// Makes sets of several kinds: uniform, clumps of very different density, a grid (all ties), a
+/// line, and few places with many duplicates.
 template <std::size_t D>
 Points<D> points_of_kind(int kind, std::size_t n, std::mt19937_64& random) {
   Points<D> points(n);
@@ -80,7 +80,7 @@ void expect_bounds(const LargeMatching& m, const Points<D>& points) {
   EXPECT_LE(m.dual_bound, m.cost);
 }
 
-TEST(LargeMatching, EnclosesTheOptimumOfSmallSets) {
+TEST(LargeMatching, BoundsEncloseTheOptimumOfSmallSets) {
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
@@ -94,7 +94,7 @@ TEST(LargeMatching, EnclosesTheOptimumOfSmallSets) {
     expect_bounds(match_large(flat, options), flat);
     const auto solid = points_of_kind<3>(kind, n, random);
     expect_bounds(match_large(solid, options), solid);
-    // Clusters unrelated to position.
+    // Clusters that are unrelated to position.
     std::vector<std::uint32_t> labels(n);
     for (std::uint32_t& label : labels) label = static_cast<std::uint32_t>(random() % 3) * 1000u;
     options.labels = labels;
@@ -112,7 +112,8 @@ TEST(LargeMatching, WindowsComeNearTheOptimum) {
     const auto flat = points_of_kind<2>(kind, 6001, random);
     const LargeMatching m = match_large(flat, options);
     expect_bounds(m, flat);
-    // Where many points coincide most pairs cost nothing, and a few far ones are all the cost.
+    // Where many points coincide, most pairs cost nothing and a few far pairs make up the whole
+    // cost.
     if (kind < 2) {
       EXPECT_LE(m.cost, 1.03 * match_points(flat).cost);
       EXPECT_LE(m.gap(), 0.12);
@@ -200,7 +201,7 @@ TEST(LargeMatching, ClustersAreMatchedWithinThemselvesFirst) {
   }
   EXPECT_EQ(2 * across, odd);
   EXPECT_NEAR(within, expected, 1e-12 * expected);
-  // Windows then compensate for the borders.
+  // Windows then repair the pairs at the borders.
   options.rounds = 8;
   options.window = 200;
   EXPECT_LT(match_large(points, options).cost, m.cost);
@@ -221,7 +222,7 @@ TEST(LargeMatching, RoundsNeverRaiseTheCost) {
   }
 }
 
-TEST(LargeMatching, TakesTheCallersMetric) {
+TEST(LargeMatching, UsesTheCallersMetric) {
   std::mt19937_64 random(11);
   const auto points = points_of_kind<2>(0, 2001, random);
   LargeMatchingOptions options;
@@ -260,7 +261,7 @@ TEST(LargeMatching, HugeAndTinyCoordinatesScale) {
   }
 }
 
-TEST(LargeMatching, SetsWithoutAPair) {
+TEST(LargeMatching, HandlesFewerThanThreePoints) {
   LargeMatchingOptions options;
   options.exact_limit = 0;
   for (std::size_t n = 0; n < 2; ++n) {
@@ -276,7 +277,7 @@ TEST(LargeMatching, SetsWithoutAPair) {
   EXPECT_EQ(two.cost, 5.0);
 }
 
-TEST(LargeMatching, StopsWhenAskedWithAWholeMatching) {
+TEST(LargeMatching, StopsWithACompleteMatching) {
   std::mt19937_64 random(19);
   const auto points = points_of_kind<2>(0, 3000, random);
   LargeMatchingOptions options;
@@ -300,7 +301,7 @@ TEST(LargeMatching, StopsWhenAskedWithAWholeMatching) {
   EXPECT_THROW((void)match_large(points, options), std::runtime_error);
 }
 
-TEST(LargeMatching, NamesWhatIsWrong) {
+TEST(LargeMatching, NamesBadInput) {
   const auto message = [](Points<2> points, const LargeMatchingOptions& options) -> std::string {
     try {
       (void)match_large(points, options);

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-/// LEMON's blossom algorithm as an oracle. Its headers do not compile as C++20, so this header
+/// LEMON's blossom algorithm as an oracle. LEMON's headers do not compile as C++20, so this header
 /// hides them and lemon_oracle.cpp is compiled as C++17.
 class LemonOracle {
  public:
@@ -19,7 +19,7 @@ class LemonOracle {
   LemonOracle(const LemonOracle&) = delete;
   LemonOracle& operator=(const LemonOracle&) = delete;
 
-  /// Whether there is a perfect matching; if so, its least weight in `cost`.
+  /// Returns whether there is a perfect matching and, if so, stores its least weight in `cost`.
   bool solve(std::int64_t& cost);
 
  private:

@@ -17,9 +17,9 @@ inline double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-/// Least weight of a perfect matching by dynamic programming over subsets: the lowest vertex of
-/// each set is paired with every other. Infinite if there is none. weight: n x n, infinite for
-/// absent edges.
+/// Returns the least weight of a perfect matching by dynamic programming over subsets: the lowest
+/// vertex of each set is paired with every other. Returns infinity if there is no perfect matching.
+/// weight: n x n, infinite for absent edges.
 inline double subset_optimum(const std::vector<double>& weight, std::size_t n) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   std::vector<double> best(std::size_t{1} << n, kNever);
@@ -43,7 +43,8 @@ double distance(const std::array<double, D>& a, const std::array<double, D>& b) 
   return std::sqrt(sum);
 }
 
-/// All pairs of points with their distances; for odd n an extra vertex, at cost 0 to all.
+/// Returns all pairs of points with their distances. If n is odd, an extra vertex has edges of cost
+/// 0 to all points.
 template <std::size_t D>
 std::vector<WeightedEdge> complete_graph(const std::vector<std::array<double, D>>& points) {
   std::vector<WeightedEdge> edges;
@@ -57,7 +58,7 @@ std::vector<WeightedEdge> complete_graph(const std::vector<std::array<double, D>
   return edges;
 }
 
-/// Least cost of matching the points, one left over if n is odd; at most 17 points.
+/// Returns the least cost of matching at most 17 points, with one point left over if n is odd.
 template <std::size_t D>
 double point_optimum(const std::vector<std::array<double, D>>& points) {
   const std::size_t n = points.size() + points.size() % 2;

@@ -41,13 +41,13 @@ double subset_optimum(std::size_t n, const std::vector<IntegerEdge>& edges) {
   return oracles::subset_optimum(weight, n);
 }
 
-TEST(Matching, EqualsSubsetProgrammingOnSmallGraphs) {
+TEST(Matching, EqualsDynamicProgrammingOnSmallGraphs) {
   int infeasible = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
     const auto n = static_cast<std::uint32_t>(2 * (1 + random() % 6));
-    // Few values make ties and blossoms of dual 0; negative ones are allowed.
+    // Few distinct values cause ties and blossoms of dual 0. Negative values are allowed.
     const auto values = static_cast<std::int64_t>(1 + random() % 20);
     const auto edges = random_graph(n, 0.2 + 0.8 * oracles::uniform(random), values,
                                     -static_cast<std::int64_t>(random() % 10), random);
@@ -65,8 +65,9 @@ TEST(Matching, EqualsSubsetProgrammingOnSmallGraphs) {
   EXPECT_GT(infeasible, 100);
 }
 
-// Dense graphs of many triangles and few values: nests of blossoms that shrink and expand.
-TEST(Matching, ProvesItselfOnLargerGraphs) {
+// Dense graphs with many triangles and few distinct values make nested blossoms that shrink and
+// expand.
+TEST(Matching, ProvesItselfOptimalOnLargerGraphs) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
@@ -86,11 +87,11 @@ TEST(Matching, ProvesItselfOnLargerGraphs) {
 #endif
   }
 #ifndef TERRACE_HAS_LEMON
-  GTEST_SKIP() << "proven by duals alone: LEMON is not installed";
+  GTEST_SKIP() << "LEMON is not installed: only the duals were checked";
 #endif
 }
 
-TEST(Matching, RoundsDoublesAsItSays) {
+TEST(Matching, RoundsDoublesAsDocumented) {
   for (const double unit : {1.0, 1e-300, 1e290, 5e-324}) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
       SCOPED_TRACE(testing::Message() << "seed " << seed << " unit " << unit);
@@ -119,7 +120,7 @@ TEST(Matching, TakesTheLeastOfParallelEdges) {
   EXPECT_EQ(matching_error(m, edges), "");
 }
 
-TEST(Matching, AcceptsNoVertices) {
+TEST(Matching, AcceptsAnEmptyGraph) {
   EXPECT_TRUE(min_weight_perfect_matching(0, std::span<const WeightedEdge>{}).mate.empty());
 }
 
@@ -132,7 +133,7 @@ std::string matching_message(std::size_t n, const std::vector<WeightedEdge>& edg
   return "no error";
 }
 
-TEST(Matching, NamesWhatIsWrong) {
+TEST(Matching, NamesBadInput) {
   EXPECT_NE(matching_message(3, {{0, 1, 1}}).find("odd"), std::string::npos);
   EXPECT_NE(matching_message(2, {{0, 1, 1}, {1, 1, 1}}).find("edge 1 joins 1 and 1"),
             std::string::npos);
@@ -149,9 +150,9 @@ TEST(Matching, NamesWhatIsWrong) {
   EXPECT_THROW(min_weight_perfect_matching(2, heavy), std::invalid_argument);
 }
 
-// Tests the checker itself: each violated condition is detected.
-TEST(Matching, TheProofCannotBeForged) {
-  // Two triangles joined by one long edge: each is a blossom with a dual.
+// Tests the checker itself: it must detect each violated condition.
+TEST(Matching, DetectsForgedProofs) {
+  // Two triangles joined by one long edge. Each triangle is a blossom with a dual.
   const std::vector<IntegerEdge> edges{{0, 1, 2}, {1, 2, 2}, {0, 2, 2}, {3, 4, 2},
                                        {4, 5, 2}, {3, 5, 2}, {2, 3, 9}};
   const Matching good = min_weight_perfect_matching(6, edges);

@@ -43,8 +43,8 @@ double least_cost(const std::vector<Point>& points) {
 }
 
 /// Checks everything that does not depend on clusters: sizes, positions, and that each level is
-/// matched at the least cost, given the nodes of that level as derived from the rows alone. `nodes`
-/// is the first level.
+/// matched at the least cost. The nodes of each level are derived from the rows alone; `nodes` is
+/// the first level.
 template <class Point>
 void expect_levels_optimal(const MatchingTree<Point>& tree, const std::vector<Point>& points,
                            std::vector<std::uint32_t> nodes, std::uint32_t first,
@@ -81,7 +81,8 @@ void expect_levels_optimal(const MatchingTree<Point>& tree, const std::vector<Po
   EXPECT_EQ(nodes.size(), 1u);
 }
 
-/// Every leaf once, children before parents and of lower level, sizes summed, positions the means.
+/// Checks that every leaf occurs once, that children come before parents and have lower levels,
+/// that sizes add up, and that positions are means.
 template <class Point>
 void expect_tree(const MatchingTree<Point>& tree, const std::vector<Point>& points,
                  std::span<const double> weights = {}, double unit = 1.0) {
@@ -146,7 +147,7 @@ TEST(MatchingTree, MatchesEachLevelAtTheLeastCost) {
     std::mt19937_64 random(seed);
     const std::size_t n = seed <= 40 ? random() % 13 : 100 + random() % 300;
     auto flat = uniform_points<Point2>(n, random);
-    // Small integers too, for ties and duplicates.
+    // Every second seed uses small integers, for ties and duplicates.
     if (seed % 2 == 0) {
       for (Point2& p : flat) p = {std::floor(4 * p[0]), std::floor(4 * p[1])};
     }
@@ -155,7 +156,7 @@ TEST(MatchingTree, MatchesEachLevelAtTheLeastCost) {
   }
 }
 
-TEST(MatchingTree, TakesLinesEqualPointsAndGrids) {
+TEST(MatchingTree, HandlesLinesEqualPointsAndGrids) {
   std::mt19937_64 random(7);
   std::vector<Point2> line(101), equal(77, Point2{0.1, -0.7}), grid;
   for (Point2& p : line) p = {uniform(random), 0.3};
@@ -169,7 +170,7 @@ TEST(MatchingTree, TakesLinesEqualPointsAndGrids) {
   for (const Point2& p : tree_of(equal).positions) EXPECT_EQ(p, equal[0]);
 }
 
-TEST(MatchingTree, TakesHugeAndTinyCoordinates) {
+TEST(MatchingTree, HandlesHugeAndTinyCoordinates) {
   for (const double unit : {1e300, 1e-300, 1e155, 1e-160}) {
     SCOPED_TRACE(testing::Message() << "unit " << unit);
     std::mt19937_64 random(3);
@@ -196,7 +197,7 @@ TEST(MatchingTree, PutsPairsAtTheirWeightedMidpoints) {
   MatchingTreeOptions<Point2> options;
   options.weights = weights;
   expect_tree(tree_of(points, options), points, weights);
-  // Only the ratios of weights matter.
+  // Only the ratios of the weights matter.
   const MatchingTree<Point2> tree = tree_of(points, options);
   std::vector<double> scaled = weights;
   for (double& w : scaled) w *= 0x1p900;
@@ -205,13 +206,13 @@ TEST(MatchingTree, PutsPairsAtTheirWeightedMidpoints) {
   EXPECT_EQ(tree_of(points, options).positions, tree.positions);
 }
 
-TEST(MatchingTree, MatchesWithinClustersThenTheClusters) {
+TEST(MatchingTree, MatchesWithinClustersThenBetweenThem) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
     const auto points = uniform_points<Point3>(400, random);
     const auto n = static_cast<std::uint32_t>(points.size());
-    // Dense labels, labels with gaps, labels beyond the number of points, and one per point.
+    // Dense labels, labels with gaps, labels beyond the number of points, and one label per point.
     std::vector<std::uint32_t> labels(n);
     for (std::uint32_t i = 0; i < n; ++i) {
       const auto drawn = static_cast<std::uint32_t>(random() % 9);
@@ -282,7 +283,7 @@ TEST(MatchingTree, ReportsProgressAndStops) {
     EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
     EXPECT_EQ(seen.back(), 199u);
     std::size_t calls = 0;
-    // The caller's thread reports at least the last levels, so it stops before the end.
+    // The caller's thread reports at least the last levels, so the work stops before the end.
     options.progress = [&](std::size_t, std::size_t) { return ++calls < 2; };
     const MatchingTree<Point2> stopped = tree_of(points, options);
     EXPECT_EQ(calls, 2u);
@@ -292,11 +293,11 @@ TEST(MatchingTree, ReportsProgressAndStops) {
   }
 }
 
-TEST(MatchingTree, TakesTheCallersMatcher) {
+TEST(MatchingTree, UsesTheCallersMatcher) {
   std::mt19937_64 random(5);
   const auto points = uniform_points<Point2>(37, random);
   MatchingTreeOptions<Point2> options;
-  // Pairs neighbours in the given order; the last one is left over.
+  // Pairs neighbours in the given order. The last node is left over.
   options.matcher = [](std::span<const Point2> present) {
     std::vector<std::uint32_t> mate(present.size());
     for (std::uint32_t i = 0; i < mate.size(); ++i) mate[i] = i ^ 1u;
@@ -366,7 +367,7 @@ TEST(MatchingTree, RefusesBadInput) {
   refuse(options, "3 weights for 5 points");
   options.weights = heavy;
   refuse(options, "sum overflows a double");
-  // Nothing is read before the number is checked.
+  // The size is checked before anything is read.
   const std::span<const Point3> many(points.data(), std::size_t{1} << 31);
   EXPECT_NE(refusal(many).find("MiB"), std::string::npos);
 }

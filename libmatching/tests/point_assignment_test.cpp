@@ -42,7 +42,7 @@ class AssignPointsTyped : public testing::Test {};
 using PointTypes = testing::Types<Point2, Point3>;
 TYPED_TEST_SUITE(AssignPointsTyped, PointTypes);
 
-// Uniform points, and a few places of a grid many times over, so that most distances tie.
+// Uniform points, and a few grid places used many times over, so that most distances tie.
 TYPED_TEST(AssignPointsTyped, EqualsTheMatrix) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     std::mt19937_64 random(seed);
@@ -71,7 +71,7 @@ TYPED_TEST(AssignPointsTyped, EqualsBruteForce) {
   }
 }
 
-TYPED_TEST(AssignPointsTyped, TakesManyEqualPointsInNoTime) {
+TYPED_TEST(AssignPointsTyped, HandlesManyEqualPoints) {
   const std::vector<TypeParam> rows(20000), columns(20000);
   const Assignment a = assign_points(rows, columns);
   EXPECT_EQ(a.cost, 0);
@@ -82,8 +82,8 @@ TYPED_TEST(AssignPointsTyped, TakesManyEqualPointsInNoTime) {
   }
 }
 
-// All rows on one side of all columns: far from every candidate.
-TYPED_TEST(AssignPointsTyped, TakesSetsThatAreApartAndUneven) {
+// All rows are on one side of all columns, far from every candidate.
+TYPED_TEST(AssignPointsTyped, HandlesDistantSetsOfDifferentSizes) {
   for (const std::size_t r : {120u, 60u, 200u}) {
     std::mt19937_64 random(r);
     const auto near = [&] { return uniform(random); };
@@ -93,7 +93,7 @@ TYPED_TEST(AssignPointsTyped, TakesSetsThatAreApartAndUneven) {
   }
 }
 
-TYPED_TEST(AssignPointsTyped, TakesLinesAndTheExtremesOfCoordinates) {
+TYPED_TEST(AssignPointsTyped, HandlesLinesAndExtremeCoordinates) {
   for (const double scale : {1e-300, 1e-160, 1e160, 1e300}) {
     SCOPED_TRACE(testing::Message() << "scale " << scale);
     std::mt19937_64 random(2);
@@ -107,7 +107,7 @@ TYPED_TEST(AssignPointsTyped, TakesLinesAndTheExtremesOfCoordinates) {
   }
 }
 
-TYPED_TEST(AssignPointsTyped, AcceptsNoneAndOne) {
+TYPED_TEST(AssignPointsTyped, AcceptsEmptySetsAndSinglePoints) {
   const std::vector<TypeParam> none, one(1), two(2);
   EXPECT_TRUE(assign_points(none, none).column.empty());
   EXPECT_TRUE(assign_points(none, one).column.empty());
@@ -116,7 +116,7 @@ TYPED_TEST(AssignPointsTyped, AcceptsNoneAndOne) {
   EXPECT_EQ(check_points(assign_points(two, one), two, one), 0);
 }
 
-TYPED_TEST(AssignPointsTyped, NamesTheBadPoint) {
+TYPED_TEST(AssignPointsTyped, NamesABadPoint) {
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -1e301}) {
     std::vector<TypeParam> good(4), spoiled(4);
     spoiled[3][1] = bad;

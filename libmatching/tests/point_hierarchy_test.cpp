@@ -18,7 +18,8 @@ namespace {
 
 using oracles::uniform;
 
-/// Uniform, on a small grid (ties and duplicates), on a line, and far from the origin.
+/// Draws points that are uniform, on a small grid (ties and duplicates), on a line, or far from the
+/// origin.
 template <std::size_t D>
 std::array<double, D> draw(std::uint64_t kind, std::mt19937_64& random) {
   std::array<double, D> p;
@@ -69,7 +70,7 @@ TEST(PointHierarchy, FindsTheNearest) {
   }
 }
 
-TEST(PointHierarchy, TakesAnyScaleAndDepth) {
+TEST(PointHierarchy, HandlesAnyScaleAndDepth) {
   std::mt19937_64 random(8);
   std::vector<Point3> plain(150);
   for (Point3& p : plain) p = draw<3>(0, random);
@@ -122,7 +123,7 @@ TEST(PointHierarchy, FindsTheFirstBall) {
         ray.direction[d] = draw<3>(0, random)[d] - (grid ? 0.0 : ray.origin[d]);
       }
       if (grid) {
-        // Along an axis through the grid, some tangential.
+        // Along an axis through the grid; some rays are tangential.
         ray.origin = {-1.0, 0.25 * static_cast<double>(random() % 17),
                       0.25 * static_cast<double>(random() % 17)};
         ray.direction = {2.0, 0.0, -0.0};
@@ -155,7 +156,7 @@ TEST(PointHierarchy, FindsTheFirstBall) {
   EXPECT_GT(hits, 500u);
 }
 
-TEST(PointHierarchy, AnswersWithoutPoints) {
+TEST(PointHierarchy, HandlesFewerThanTwoPoints) {
   const PointHierarchy<3> none, built({}, std::vector<Point3>{});
   std::vector<Neighbour> found(2);
   for (const auto* hierarchy : {&none, &built}) {

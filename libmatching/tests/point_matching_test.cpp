@@ -44,7 +44,7 @@ void expect_pairs(const PointMatching& m, std::size_t n) {
   EXPECT_EQ(alone, n % 2);
 }
 
-/// The proof of the sparse graph holds on the complete graph: the promise of pricing.
+/// Checks that the proof of the sparse graph holds on the complete graph, as pricing must ensure.
 template <std::size_t D>
 void expect_optimal(const PointMatching& m, const std::vector<std::array<double, D>>& points) {
   expect_pairs(m, points.size());
@@ -52,7 +52,7 @@ void expect_optimal(const PointMatching& m, const std::vector<std::array<double,
   EXPECT_NEAR(m.cost, m.dual_bound, 1e-12 * m.cost);
 }
 
-TEST(PointMatching, EqualsSubsetProgramming) {
+TEST(PointMatching, EqualsDynamicProgramming) {
   for (std::uint64_t seed = 1; seed <= 150; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
@@ -60,7 +60,7 @@ TEST(PointMatching, EqualsSubsetProgramming) {
     PointMatchingOptions options;
     options.neighbours = 1 + seed % 4;
     std::vector<Point2> flat = uniform_points(n, random);
-    // Small integers too, for ties and duplicates.
+    // Every second seed uses small integers, for ties and duplicates.
     if (seed % 2 == 0) {
       for (Point2& p : flat) p = {std::floor(4 * p[0]), std::floor(4 * p[1])};
     }
@@ -88,7 +88,7 @@ TEST(PointMatching, IsOptimalOnTheCompleteGraph) {
   }
 }
 
-TEST(PointMatching, CostsWhatLemonFinds) {
+TEST(PointMatching, EqualsTheCostOfLemon) {
 #ifndef TERRACE_HAS_LEMON
   GTEST_SKIP() << "LEMON is not installed";
 #else
@@ -117,27 +117,27 @@ TEST(PointMatching, CostsWhatLemonFinds) {
 #endif
 }
 
-TEST(PointMatching, TakesEqualPoints) {
+TEST(PointMatching, HandlesEqualPoints) {
   const std::vector<Point2> points(1001, Point2{3.0, -7.0});
   const PointMatching m = match_points(points);
   expect_pairs(m, points.size());
   EXPECT_EQ(m.cost, 0.0);
 }
 
-TEST(PointMatching, TakesPointsOnALine) {
+TEST(PointMatching, HandlesPointsOnALine) {
   std::mt19937_64 random(1);
   std::vector<Point2> points(400);
   for (std::size_t k = 0; k < points.size(); ++k) points[k] = {uniform(random), 0.25};
   const PointMatching m = match_points(points);
   expect_optimal(m, points);
-  // On a line, pairing neighbours by rank is optimal.
+  // On a line, pairing neighbours in sorted order is optimal.
   std::sort(points.begin(), points.end());
   double cost = 0.0;
   for (std::size_t k = 0; k < points.size(); k += 2) cost += points[k + 1][0] - points[k][0];
   EXPECT_NEAR(m.cost, cost, 1e-12);
 }
 
-TEST(PointMatching, TakesGridsOfTies) {
+TEST(PointMatching, HandlesGridsOfTies) {
   for (const std::size_t side : {20u, 21u}) {
     SCOPED_TRACE(testing::Message() << "side " << side);
     std::vector<Point2> points;
@@ -150,7 +150,7 @@ TEST(PointMatching, TakesGridsOfTies) {
   }
 }
 
-// Odd clusters far apart: no neighbour list joins them, so pricing must.
+// Odd clusters far apart: no list of neighbours joins them, so pricing must.
 TEST(PointMatching, JoinsOddClusters) {
   std::size_t rounds = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -173,7 +173,7 @@ TEST(PointMatching, JoinsOddClusters) {
   EXPECT_GT(rounds, 10u);
 }
 
-TEST(PointMatching, TakesHugeAndTinyCoordinates) {
+TEST(PointMatching, HandlesHugeAndTinyCoordinates) {
   for (const double unit : {1e300, 1e-300, 1e155, 1e-160}) {
     SCOPED_TRACE(testing::Message() << "unit " << unit);
     std::mt19937_64 random(3);
@@ -189,7 +189,7 @@ TEST(PointMatching, TakesHugeAndTinyCoordinates) {
   EXPECT_THROW(match_points(ends), std::invalid_argument);
 }
 
-TEST(PointMatching, TakesTheCallersEdgesAndMetric) {
+TEST(PointMatching, UsesTheCallersEdgesAndMetric) {
   std::mt19937_64 random(5);
   const auto points = uniform_points(150, random);
   const auto manhattan = [&](std::uint32_t i, std::uint32_t j) {
@@ -213,13 +213,13 @@ TEST(PointMatching, TakesTheCallersEdgesAndMetric) {
   EXPECT_EQ(complete.rounds, 1u);
   EXPECT_EQ(complete.edges, all.size());
   EXPECT_NEAR(priced.cost, complete.cost, 1e-12);
-  // A factor of 0 says nothing about the metric; the result is the same.
+  // A factor of 0 gives no bound on the metric. The result must be the same.
   options.candidates = {};
   options.metric.factor = 0.0;
   EXPECT_NEAR(match_points(points, options).cost, complete.cost, 1e-12);
 }
 
-TEST(PointMatching, TakesFewPoints) {
+TEST(PointMatching, HandlesFewPoints) {
   EXPECT_TRUE(match_points(std::span<const Point2>{}).mate.empty());
   const std::vector<Point3> one{{1, 2, 3}};
   EXPECT_EQ(match_points(one).left_over, 0u);
@@ -229,7 +229,7 @@ TEST(PointMatching, TakesFewPoints) {
   EXPECT_EQ(match_points(three).cost, 1.0);
 }
 
-TEST(PointMatching, NamesWhatIsWrong) {
+TEST(PointMatching, NamesBadInput) {
   std::vector<Point2> points{{0, 0}, {1, 1}, {2, std::nan("")}};
   try {
     match_points(points);
@@ -238,7 +238,7 @@ TEST(PointMatching, NamesWhatIsWrong) {
     EXPECT_NE(std::string(error.what()).find("point 2"), std::string::npos) << error.what();
   }
   try {
-    // Refused before any point is read.
+    // The size is checked before any point is read.
     match_points(std::span<const Point2>(points.data(), std::size_t{1} << 30));
     ADD_FAILURE();
   } catch (const std::invalid_argument& error) {
@@ -260,7 +260,7 @@ TEST(PointMatching, NamesWhatIsWrong) {
   EXPECT_THROW(match_points(points, options), std::invalid_argument);
 }
 
-TEST(PointMatching, IsTheSameEveryTime) {
+TEST(PointMatching, IsDeterministic) {
   std::mt19937_64 random(7);
   const auto points = uniform_points(2001, random);
   const PointMatching a = match_points(points), b = match_points(points);
@@ -279,7 +279,7 @@ TEST(PointMatching, EqualsTheKnownOptimaOfTsplib) {
   for (const auto& [name, optimum] : tsplib::read_optima(list)) {
     SCOPED_TRACE(name);
     std::ifstream file(folder + "tsplib/" + name + ".tsp");
-    if (!file) continue;  // the three largest are compressed: only the benchmark reads them
+    if (!file) continue;  // only the benchmark reads the three largest, which are compressed
     const tsplib::Instance instance = tsplib::read(file);
     PointMatchingOptions options;
     options.metric = tsplib::metric_of(instance);

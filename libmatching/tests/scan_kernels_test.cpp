@@ -16,8 +16,8 @@ class ScanKernelsTyped : public testing::Test {};
 using CostTypes = testing::Types<double, float, std::int32_t>;
 TYPED_TEST_SUITE(ScanKernelsTyped, CostTypes);
 
-// Each instruction set against the definition, column by column.
-TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
+// Compares each instruction set with the definition, column by column.
+TYPED_TEST(ScanKernelsTyped, MatchTheDefinitionOnEveryInstructionSet) {
   using Number = LabelOf<TypeParam>;
   for (const base::SimdPath path :
        {base::SimdPath::portable, base::SimdPath::avx2, base::SimdPath::avx512}) {
@@ -66,7 +66,7 @@ TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
   }
 }
 
-// The tests of all paths skip instruction sets that the machine lacks; this one reports it.
+// The other tests silently skip instruction sets that the machine lacks. These two report it.
 TEST(InstructionSets, Avx2IsTested) {
   if (!base::supports(base::SimdPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }

@@ -15,10 +15,10 @@
 namespace terrace::matching {
 namespace {
 
-// Stands in a matrix for a pair that must not be chosen.
+// Cost in the matrix of a pair that must not be chosen.
 constexpr double kAbsent = 1e6;
 
-TEST(AssignSparse, EqualsBruteForceOrSaysThatThereIsNone) {
+TEST(AssignSparse, EqualsBruteForceOrReportsInfeasibility) {
   int solved = 0, infeasible = 0;
   for (std::uint64_t seed = 1; seed <= 600; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -29,7 +29,7 @@ TEST(AssignSparse, EqualsBruteForceOrSaysThatThereIsNone) {
     std::vector<CostEdge> edges;
     for (std::size_t k = 0; k < rows * columns; ++k) {
       if (random() % 5 > density) continue;
-      // Some pairs more than once; the cheapest counts.
+      // Some pairs occur more than once; the cheapest counts.
       const std::size_t entry = random() % costs.size();
       const double cost = static_cast<double>(random() % 9) - 3.0;
       costs[entry] = std::min(costs[entry], cost);
@@ -72,7 +72,7 @@ TEST(AssignSparse, AllPairsEqualTheMatrix) {
   }
 }
 
-// A band: each row has its own column and those of its neighbours.
+// A band: each row has its own column and its neighbours' columns.
 TEST(AssignSparse, ProvesItselfOptimalOnABand) {
   for (const double scale : {1e-300, 1.0, 1e300}) {
     std::mt19937_64 random(9);
@@ -109,7 +109,7 @@ TEST(AssignSparse, NamesARowOfAHallViolator) {
             std::string::npos);
 }
 
-TEST(AssignSparse, NamesWhatIsWrong) {
+TEST(AssignSparse, NamesBadInput) {
   const auto with = [](CostEdge edge) {
     return message_of([&] { assign_sparse(std::vector<CostEdge>{{0, 0, 1}, edge}, 2, 2); });
   };
@@ -132,7 +132,7 @@ TEST(AssignSparse, AcceptsTheEmptyProblem) {
   EXPECT_EQ(assign_sparse(none, 1, 0).column, std::vector<std::uint32_t>{kUnassigned});
 }
 
-TEST(CheckSparse, RefusesAPairThatIsAbsent) {
+TEST(CheckSparse, RejectsAnAbsentPair) {
   const std::vector<CostEdge> edges{{0, 0, 1}, {0, 1, 2}, {1, 1, 1}};
   Assignment a = assign_sparse(edges, 2, 2);
   EXPECT_EQ(check(a, edges, 2, 2), 0);

@@ -12,11 +12,11 @@
 #include "terrace/matching/matching_tree.hpp"
 #include "terrace/matching/triangle_hierarchy.hpp"
 
-/// Trees of any shape, and the answers to queries by brute force.
+/// Trees of any shape, and answers to queries by brute force.
 
 namespace terrace::matching::oracles {
 
-/// Joins any two roots until one is left.
+/// Joins random pairs of roots until one is left.
 inline std::vector<TreeChildren> random_tree(std::size_t n, std::mt19937_64& random) {
   std::vector<std::uint32_t> roots(n);
   for (std::uint32_t i = 0; i < n; ++i) roots[i] = i;
@@ -35,7 +35,7 @@ inline std::vector<TreeChildren> random_tree(std::size_t n, std::mt19937_64& ran
   return rows;
 }
 
-/// A tree of the greatest possible depth.
+/// Returns a tree of the greatest possible depth.
 inline std::vector<TreeChildren> chain(std::size_t n) {
   std::vector<TreeChildren> rows;
   for (std::uint32_t i = 1; i < n; ++i) {
@@ -49,7 +49,7 @@ std::vector<TreeChildren> matching_rows(const std::vector<Point>& points) {
   return tree_children(make_matching_tree(std::span<const Point>(points)).rows);
 }
 
-/// All points, nearest first, ties by index.
+/// Returns all points, nearest first, ties by index.
 template <std::size_t D>
 std::vector<Neighbour> by_distance(const std::vector<std::array<double, D>>& points,
                                    const std::array<double, D>& query) {
@@ -81,8 +81,8 @@ inline Wide dot(const WidePoint& p, const WidePoint& q) {
   return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
 }
 
-/// Where a ray crosses a triangle (T. Möller and B. Trumbore, 1997); barycentric coordinates down
-/// to -margin count as inside.
+/// Returns where a ray crosses a triangle (T. Möller and B. Trumbore, 1997). Barycentric
+/// coordinates down to -margin count as inside.
 inline std::optional<double> crossing(const Ray& ray, const std::array<Point3, 3>& corners,
                                       Wide margin) {
   const WidePoint along{ray.direction[0], ray.direction[1], ray.direction[2]};
@@ -98,7 +98,7 @@ inline std::optional<double> crossing(const Ray& ray, const std::array<Point3, 3
   return static_cast<double>(t);
 }
 
-/// Where a ray first enters a ball.
+/// Returns where a ray first enters a ball.
 inline std::optional<double> ball(const Ray& ray, const Point3& centre, Wide radius) {
   const WidePoint along{ray.direction[0], ray.direction[1], ray.direction[2]};
   const WidePoint to = wide_difference(ray.origin, centre);

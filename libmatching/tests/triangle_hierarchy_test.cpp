@@ -29,7 +29,8 @@ struct Mesh {
   }
 };
 
-/// Triangles of any shape; on a small grid many have no area, are equal, or lie in planes of rays.
+/// Makes triangles of any shape. On a small grid many have no area, coincide, or lie in a ray's
+/// plane.
 Mesh random_mesh(std::size_t n, bool grid, std::mt19937_64& random) {
   Mesh mesh;
   mesh.corners.resize(3 * n);
@@ -49,7 +50,8 @@ Mesh random_mesh(std::size_t n, bool grid, std::mt19937_64& random) {
   return mesh;
 }
 
-/// A closed surface around the origin: a subdivided octahedron with its corners on a bumpy sphere.
+/// Makes a closed surface around the origin: a subdivided octahedron with corners on a bumpy
+/// sphere.
 Mesh ball_mesh(int divisions, std::mt19937_64& random) {
   Mesh mesh;
   mesh.corners = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
@@ -123,7 +125,7 @@ TEST(TriangleHierarchy, FindsTheFirstTriangle) {
       if (q % 4 == 0) ray.t_max = uniform(random);
       const auto hit = hierarchy.hit(ray);
       EXPECT_EQ(other.hit(ray), hit);
-      // which of two touching triangles comes first is tested above for the trees
+      // Which of two touching triangles comes first is tested above, by comparing trees.
       if (grid) continue;
       double sure = kInfinity, possible = kInfinity;
       for (std::uint32_t k = 0; k < mesh.triangles.size(); ++k) {
@@ -147,9 +149,9 @@ TEST(TriangleHierarchy, FindsTheFirstTriangle) {
   EXPECT_GT(hits, 300u);
 }
 
-// Rays within the plane of all triangles, up to rounding: where such a triangle is hit is up to the
+// Rays in the plane of all triangles, up to rounding. Where such a triangle is hit depends on the
 // implementation, but it must be the same for every tree.
-TEST(TriangleHierarchy, AnswersTheSameForEveryTreeWhenEdgeOn) {
+TEST(TriangleHierarchy, EdgeOnHitsDoNotDependOnTheTree) {
   std::size_t hits = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -181,7 +183,7 @@ TEST(TriangleHierarchy, AnswersTheSameForEveryTreeWhenEdgeOn) {
   EXPECT_GT(hits, 1000u);
 }
 
-// On integers below 2^20 and along an axis the test is exact, and so is this one.
+// With integers below 2^20 and rays along an axis the computation is exact, so the test can be too.
 TEST(TriangleHierarchy, HitsEdgesAndCornersOfAGrid) {
   Mesh mesh;
   for (std::uint32_t y = 0; y < 9; ++y) {
@@ -214,14 +216,14 @@ TEST(TriangleHierarchy, HitsEdgesAndCornersOfAGrid) {
   }
 }
 
-TEST(TriangleHierarchy, LetsNoRayOutOfAClosedSurface) {
+TEST(TriangleHierarchy, RaysNeverLeaveAClosedSurface) {
   std::mt19937_64 random(4);
   const Mesh mesh = ball_mesh(3, random);
   const TriangleHierarchy hierarchy = by_matching(mesh);
   for (int q = 0; q < 20000; ++q) {
     Ray ray;
     for (double& c : ray.origin) c = 0.4 * (uniform(random) - 0.5);
-    // At corners and edge midpoints as rounded, and anywhere.
+    // Aims at corners and edge midpoints, as rounded, and at other places.
     const Triangle& triangle = mesh.triangles[random() % mesh.triangles.size()];
     for (std::size_t d = 0; d < 3; ++d) {
       const double first = mesh.corners[triangle[0]][d], second = mesh.corners[triangle[1]][d];
@@ -233,7 +235,7 @@ TEST(TriangleHierarchy, LetsNoRayOutOfAClosedSurface) {
   }
 }
 
-/// Distance to a triangle by searching ever smaller parts around the best one.
+/// Finds the distance to a triangle by searching ever smaller regions around the best place.
 double distance_by_search(const Point3& place, const std::array<Point3, 3>& corners) {
   double best = kInfinity, u0 = 0.0, v0 = 0.0, width = 1.0;
   for (int round = 0; round < 60; ++round, width *= 0.6) {
@@ -281,7 +283,7 @@ TEST(TriangleHierarchy, FindsTheNearestTriangle) {
   }
 }
 
-TEST(TriangleHierarchy, TakesAnyScale) {
+TEST(TriangleHierarchy, HandlesAnyScale) {
   std::mt19937_64 random(6);
   const Mesh plain = random_mesh(80, false, random);
   const TriangleHierarchy usual = by_matching(plain);

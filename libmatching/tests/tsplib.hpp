@@ -13,7 +13,7 @@
 
 namespace terrace::matching::tsplib {
 
-/// Points of a TSPLIB file with the file's own rounded distances.
+/// The points of a TSPLIB file with the file's own rounded distances.
 struct Instance {
   std::string type;  // EUC_2D, CEIL_2D or ATT
   std::vector<Point2> points;
@@ -39,7 +39,7 @@ inline Instance read(std::istream& in) {
   return instance;
 }
 
-/// The points must outlive the metric.
+/// Returns the file's metric. The instance must outlive it.
 inline PointMetric metric_of(const Instance& instance) {
   const auto apart = [&points = instance.points](std::uint32_t i, std::uint32_t j) {
     const double dx = points[i][0] - points[j][0], dy = points[i][1] - points[j][1];
@@ -66,7 +66,7 @@ inline PointMetric metric_of(const Instance& instance) {
   return metric;
 }
 
-/// Name to optimum, in the order of the file (by size).
+/// Reads pairs of name and optimum, in the order of the file (by size).
 inline std::vector<std::pair<std::string, double>> read_optima(std::istream& in) {
   std::vector<std::pair<std::string, double>> optima;
   std::string line;
