@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Assignment between two sets of uniform points in the unit square, Euclidean costs.
+// Assigns two sets of uniform points in the unit square to each other at Euclidean costs.
 //
-// matching_assignment_bench --peer MATRIX N prints three times in seconds and the cost for a file
-// of N * N doubles, for comparison by assignment_peers.py.
+// matching_assignment_bench --peer POINTS N reads a file of 2 N points (4 N doubles) and prints,
+// for each method, three times in seconds and the cost, for assignment_peers.py.
 #include <chrono>
 #include <cmath>
 #include <cstdio>

@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares assignment with SciPy, both on one thread, on the same points: two sets of n uniform
-points in the unit square with Euclidean costs. The matrix and the candidates (the 40 nearest
-columns of each row) are made before the clock starts; `points` makes its own. Needs numpy and
-scipy. Exit status 0 if the matrix is never slower and the points are 10 times as fast from
-n = 4000 on.
+"""Compares assignment with SciPy on the same points, both on one thread.
+
+The points are two sets of n uniform points in the unit square with Euclidean costs. The matrix and
+the candidates (the 40 nearest columns of each row) are made before the clock starts; `points` makes
+its own. Needs numpy and scipy. The exit status is 0 if `matrix` is never slower than SciPy and
+`points` is at least 10 times as fast from n = 4000 on.
 
 assignment_peers.py BENCH [N...]
 BENCH  the program matching_assignment_bench
-N      sizes, 500 1000 2000 4000 if not given
+N      sizes; 500 1000 2000 4000 by default
 """
 
 import os
@@ -27,7 +28,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 
-BARS = {'matrix': 1, 'points': 10}  # the latter at 4,000 points and more
+BARS = {'matrix': 1, 'points': 10}  # least speed-up over SciPy; for points from n = 4000 on
 
 
 def main(bench, *sizes):

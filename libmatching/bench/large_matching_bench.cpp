@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Matching of large sets: time, the proven gap, and the excess over the exact optimum within random
-// windows of 10,000 points: the 5,000 pairs nearest to a place.
+// Matches large sets and reports the time, the proven gap, and the excess over the exact optimum
+// within random windows of 10,000 points (the 5,000 pairs nearest to a place).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,7 +21,7 @@ bool small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 
 double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
-/// Uniform, or in clumps whose density falls off outward.
+/// Makes points that are uniform or in clumps whose density falls off outward.
 template <std::size_t D>
 std::vector<std::array<double, D>> make_points(std::size_t n, bool clumps) {
   std::mt19937_64 random(1);
@@ -45,7 +45,7 @@ double distance(const std::array<double, D>& p, const std::array<double, D>& q) 
   return std::sqrt(sum);
 }
 
-/// The excess over the optimum in each window, as a share.
+/// Returns the excess over the optimum in each window, as a fraction.
 template <std::size_t D>
 std::vector<double> above_in_windows(const std::vector<std::array<double, D>>& points,
                                      const LargeMatching& matching, std::size_t pairs) {

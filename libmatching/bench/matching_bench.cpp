@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exact Euclidean matching of uniform points compared with LEMON's blossom on the complete graph
-// (building its graph is not timed), and of TSPLIB sets where TERRACE_DATA names the data folder.
+// Compares exact Euclidean matching of uniform points with LEMON's blossom algorithm on the
+// complete graph (building its graph is not timed). Also matches TSPLIB sets if TERRACE_DATA names
+// the data folder.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -73,7 +74,7 @@ void lemon_complete_graph(benchmark::State& state) {
 }
 #endif
 
-// The largest sets are compressed; gzip reads plain files too.
+// The largest sets are compressed. gzip reads plain files too.
 std::string unpacked(const std::string& path) {
   std::FILE* pipe = popen(("gzip -dcf '" + path + "'").c_str(), "r");
   if (pipe == nullptr) throw std::runtime_error("cannot run gzip");

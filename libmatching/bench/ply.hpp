@@ -12,8 +12,9 @@
 
 #include "terrace/matching/triangle_hierarchy.hpp"
 
-/// Points and triangles of text or binary PLY, as far as the benchmark's files need it: elements of
-/// numbers and lists; polygons are divided into fans, other elements are skipped.
+/// Reads points and triangles from text or binary PLY files, as far as the benchmark's files
+/// require: elements of numbers and lists. Polygons are divided into fans, and other elements are
+/// skipped.
 
 namespace terrace::matching::ply {
 
@@ -66,7 +67,7 @@ class Reader {
         return;
       }
     }
-    throw std::runtime_error("a PLY file without end_header");
+    throw std::runtime_error("the PLY file has no end_header");
   }
 
   bool next_line(std::string& line) {
@@ -80,7 +81,7 @@ class Reader {
   template <class Value, class Bits>
   double binary() {
     static_assert(sizeof(Value) == sizeof(Bits));
-    if (at_ + sizeof(Bits) > bytes_.size()) throw std::runtime_error("a PLY file that ends early");
+    if (at_ + sizeof(Bits) > bytes_.size()) throw std::runtime_error("the PLY file is truncated");
     Bits bits = 0;
     for (std::size_t k = 0; k < sizeof(Bits); ++k) {
       const std::size_t place = format_ == "binary_big_endian" ? sizeof(Bits) - 1 - k : k;
@@ -96,7 +97,7 @@ class Reader {
     if (format_ == "ascii") {
       char* end = nullptr;
       const double value = std::strtod(bytes_.c_str() + at_, &end);
-      if (end == bytes_.c_str() + at_) throw std::runtime_error("a PLY file that ends early");
+      if (end == bytes_.c_str() + at_) throw std::runtime_error("the PLY file is truncated");
       at_ = static_cast<std::size_t>(end - bytes_.c_str());
       return value;
     }
@@ -108,7 +109,7 @@ class Reader {
     if (type == "uint" || type == "uint32") return binary<std::uint32_t, std::uint32_t>();
     if (type == "float" || type == "float32") return binary<float, std::uint32_t>();
     if (type == "double" || type == "float64") return binary<double, std::uint64_t>();
-    throw std::runtime_error("a PLY file with numbers of type " + type);
+    throw std::runtime_error("the PLY file has numbers of unknown type " + type);
   }
 
   void read_one(const Element& element, Mesh& mesh) {

@@ -2,7 +2,7 @@
 // The thesis, rerun: J. Skála, Algorithms for manipulating large geometric data, figures 7.21 to
 // 7.24 (section 7.5.2), on uniform random points, with our monotone method and the optimum for
 // comparison. thesis_plots.py plots the output.
-// TERRACE_BENCH_SMALL: everything once on tiny inputs.
+// With TERRACE_BENCH_SMALL set, runs everything once on tiny inputs.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -29,10 +29,11 @@ constexpr std::array kParts{Part{"figure7.21", figure_7_21}, Part{"figure7.22", 
 
 constexpr const char* kUsage =
     "usage: matching_thesis_bench [--full] [--out DIR] [--tables LIST] [--threads N]\n"
-    "  --full        50,000 iterations of 500 points as in the thesis, not 20,000; larger n\n"
-    "  --out DIR     write the figures as CSV there\n"
-    "  --tables LIST of figure7.21,figure7.22,figure7.23,figure7.24; all by default\n"
-    "  --threads N   for the Monte Carlo method (all processors); never changes the costs\n";
+    "  --full        50,000 iterations for 500 points as in the thesis (default 20,000); larger n\n"
+    "  --out DIR     write the figures as CSV files to DIR\n"
+    "  --tables LIST some of figure7.21,figure7.22,figure7.23,figure7.24; all by default\n"
+    "  --threads N   for the Monte Carlo method; all processors by default; never changes the "
+    "costs\n";
 
 struct Options {
   Setting setting;
@@ -47,7 +48,8 @@ void choose(std::string_view list, std::array<bool, kParts.size()>& wanted) {
     list.remove_prefix(std::min(comma + 1, list.size()));
     std::size_t part = 0;
     while (part < kParts.size() && kParts[part].name != name) ++part;
-    if (part == kParts.size()) throw std::invalid_argument("no part " + std::string(name));
+    if (part == kParts.size())
+      throw std::invalid_argument("--tables: unknown figure " + std::string(name));
     wanted[part] = true;
   }
 }

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Plots of figures 7.21 to 7.24 of the thesis from the CSV files of matching_thesis_bench.
+"""Plots figures 7.21 to 7.24 of the thesis from the CSV files of matching_thesis_bench.
 
-J. Skála, Algorithms for manipulating large geometric data, section 7.5.2. Each of the
-four figure_7_*.csv in the folder becomes an .svg next to it; the same numbers give the same bytes.
+J. Skála, Algorithms for manipulating large geometric data, section 7.5.2. Each of the four
+figure_7_*.csv in the folder becomes an .svg next to it. The same numbers give the same bytes.
 Needs matplotlib.
 
 usage: thesis_plots.py DIR
@@ -19,7 +19,7 @@ matplotlib.use('svg')
 from matplotlib import pyplot
 from matplotlib.ticker import LogLocator, NullFormatter
 
-# Ids in the files are hashes of this, not of the time.
+# Makes ids in the files depend on this string instead of on the time.
 matplotlib.rcParams.update({
     'svg.hashsalt': 'terrace-matching', 'svg.fonttype': 'path', 'font.size': 10.5,
     'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True,
@@ -27,7 +27,7 @@ matplotlib.rcParams.update({
     'grid.color': '#e4e4e4', 'grid.linewidth': 0.7, 'legend.frameon': False,
     'figure.constrained_layout.use': True})
 
-# The thesis's colours: blue, purple and brown for its sets of 100 points, green for that of 500.
+# The thesis's colours: blue, purple and brown for its sets of 100 points, green for the set of 500.
 COLOURS = {'100a': '#2563b0', '100b': '#8e3fa8', '100c': '#96602a', '500': '#1f8a4c'}
 
 
@@ -51,13 +51,13 @@ def names(rows, key):
 def figure_7_21(rows):
     figure, axes = pyplot.subplots(figsize=(7.2, 4.6))
     kinds = {'euclidean': ('#2563b0', 'distances of uniform points'),
-             'product': ('#b5462f', 'cost(i, j) = i j, a hard one')}
+             'product': ('#b5462f', 'cost(i, j) = i j, a hard matrix')}
     for kind, (colour, label) in kinds.items():
         mine = chosen(rows, matrix=kind)
         axes.plot(column(mine, 'n'), column(mine, 'seconds'), 'o-', color=colour, markersize=4.5,
                   label=f'{label}: ' rf'$n^{{{float(mine[0]["fitted_exponent"]):.2f}}}$')
         axes.plot(column(mine, 'n'), column(mine, 'cubic_seconds'), ':', color=colour,
-                  label=r'$n^3$, the slope of the thesis' if kind == 'product' else None)
+                  label=r'$n^3$, as in the thesis' if kind == 'product' else None)
     axes.set(xscale='log', yscale='log', xlabel='n rows, n columns', ylabel='seconds',
              title='Figure 7.21: running time of the Kuhn-Munkres algorithm')
     sizes = sorted({int(row['n']) for row in rows})
@@ -93,7 +93,7 @@ def log_iterations(axes, **more):
 
 def figure_7_23(rows):
     figure, panels = pyplot.subplots(1, 2, figsize=(9.6, 4.6), width_ratios=[1, 1])
-    figure.suptitle('Figure 7.23: the least cost known after so many iterations', x=0.01, ha='left',
+    figure.suptitle('Figure 7.23: the least cost after N iterations', x=0.01, ha='left',
                     fontsize=11.5)
     for axes, points in zip(panels, names(rows, 'points')):
         for name in names(chosen(rows, points=points), 'set'):
@@ -108,7 +108,7 @@ def figure_7_23(rows):
     panels[0].set_ylabel('sum of distances')
     grey = '#444'
     for style, width, label in (('-', 1.9, 'Monte Carlo, as published'),
-                                ('-', 0.9, 'monotone: our step beyond'),
+                                ('-', 0.9, 'monotone, our extension'),
                                 ('--', 1.1, 'the optimum')):
         panels[1].plot([], [], style, color=grey, linewidth=width, label=label)
     panels[1].legend(loc='lower left')
@@ -117,7 +117,7 @@ def figure_7_23(rows):
 
 def figure_7_24(rows):
     figure, panels = pyplot.subplots(1, 2, figsize=(9.6, 4.6), sharey=True)
-    figure.suptitle('Figure 7.24: decrease of the least cost in per cent of the one before', x=0.01,
+    figure.suptitle('Figure 7.24: decrease of the least cost, per cent of the previous one', x=0.01,
                     ha='left', fontsize=11.5)
     titles = {'monte_carlo': 'Monte Carlo, as published', 'monotone': 'monotone'}
     for axes, (method, title) in zip(panels, titles.items()):
@@ -139,12 +139,12 @@ def main(folder):
                          ('7_24', figure_7_24)):
         if not os.path.exists(os.path.join(folder, f'figure_{figure}.csv')):
             continue
-        # No date: the bytes depend on the numbers only.
+        # No date, so that the bytes depend on the numbers only.
         draw(rows_of(folder, figure)).savefig(os.path.join(folder, f'figure_{figure}.svg'),
                                               metadata={'Date': None})
         drawn += 1
     if drawn == 0:
-        sys.exit(f'{folder}: no figure_7_21.csv to figure_7_24.csv: run matching_thesis_bench '
+        sys.exit(f'{folder}: no figure_7_21.csv to figure_7_24.csv; run matching_thesis_bench '
                  '--out there first')
 
 

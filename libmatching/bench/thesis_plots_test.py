@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Draws the figures of a small run twice: all four must exist and have the same bytes.
+"""Draws the figures of a small run twice. All four must exist and have the same bytes.
 
-thesis_plots_test.py BENCH    exit status 77 (skipped) without matplotlib
+thesis_plots_test.py BENCH    exits with status 77 (skipped) if matplotlib is missing
 """
 import importlib.util
 import os
@@ -30,11 +30,11 @@ def draw(folder):
 
 with tempfile.TemporaryDirectory() as folder:
     empty = subprocess.run([sys.executable, '-B', PLOTS, folder], capture_output=True)
-    assert empty.returncode == 1, 'a folder without figures is no error'
+    assert empty.returncode == 1, 'a folder without figures was accepted'
     subprocess.run([os.path.abspath(sys.argv[1]), '--out', folder], check=True,
                    stdout=subprocess.DEVNULL, env={**os.environ, 'TERRACE_BENCH_SMALL': '1'})
     pictures = draw(folder)
-    assert draw(folder) == pictures, 'another run has other bytes'
+    assert draw(folder) == pictures, 'a second run wrote different bytes'
     for name, picture in zip(FIGURES, pictures):
         curves = [element for element in xml.etree.ElementTree.fromstring(picture).iter()
                   if element.get('id', '').startswith('line2d')]

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The matching tree as a bounding volume hierarchy, with and without rotations (rotate_tree),
-// compared with a kD-tree split at medians and a binned build by the surface area heuristic over
-// the same points and triangles. All trees go down to single primitives; then leaves of at most 8
-// are made by cost, with the same constants, layout and queries, so that only the tree differs.
-// Points and synthetic meshes, and scans where TERRACE_DATA names the data folder.
+// Compares the matching tree as a bounding volume hierarchy, with and without rotations
+// (rotate_tree), with a kD-tree split at medians and a binned build by the surface area heuristic,
+// over the same points and triangles. All trees go down to single primitives. Leaves of at most 8
+// are then made by cost, with the same constants, layout and queries, so that only the tree
+// differs. The inputs are points, synthetic meshes and, if TERRACE_DATA names the data folder,
+// scans.
 //
-// Counters: the cost by the heuristic with both constants 1, primitives per leaf, depth.
+// Counters: the cost by the heuristic with both constants 1, primitives per leaf, and depth.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -37,7 +38,7 @@ bool small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 
 double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
-/// Approximately normal: the sum of twelve.
+/// Returns an approximately normal random number, the sum of twelve uniform ones.
 double spread(std::mt19937_64& random) {
   double sum = -6.0;
   for (int k = 0; k < 12; ++k) sum += uniform(random);
@@ -53,7 +54,7 @@ std::vector<Point3> uniform_points(std::size_t n) {
   return points;
 }
 
-/// Clumps of different widths.
+/// Makes clumps of different widths.
 std::vector<Point3> clustered_points(std::size_t n) {
   std::mt19937_64 random(2);
   std::vector<Point3> middles = uniform_points(100), points(n);
@@ -65,7 +66,7 @@ std::vector<Point3> clustered_points(std::size_t n) {
   return points;
 }
 
-/// A torus of 2 * side * side triangles with noise along its radius.
+/// Makes a torus of 2 * side * side triangles with noise along its radius.
 Mesh noisy_torus(std::uint32_t side) {
   std::mt19937_64 random(3);
   constexpr double kTurn = 6.283185307179586;
@@ -82,7 +83,7 @@ Mesh noisy_torus(std::uint32_t side) {
   return mesh;
 }
 
-// Large inputs are matched in the boxes of a median split.
+// Large inputs are matched within the parts of a median split.
 constexpr std::size_t kCluster = 10000;
 
 std::vector<TreeChildren> matching_tree(const std::vector<Point3>& places) {
@@ -117,15 +118,15 @@ std::vector<TreeChildren> build(std::size_t builder, const std::vector<Point3>& 
   return builder == 2 ? peers::median_split(boxes) : peers::binned_sah(boxes);
 }
 
-/// The same for all trees.
+/// The queries, which are the same for all trees.
 struct Queries {
   std::vector<Point3> anywhere, near;
   std::vector<Ray> rays;
   double size = 0.0;  ///< the diagonal of the bounding box
 };
 
-/// Rays from an enclosing sphere to places in the box; query points anywhere in the box, and close
-/// to the data, off by one part in a thousand of its size.
+/// Makes rays from an enclosing sphere to places in the box, and query points both anywhere in the
+/// box and close to the data, off by one part in a thousand of its size.
 Queries queries_for(const std::vector<Point3>& places) {
   std::mt19937_64 random(4);
   Point3 lo = places[0], hi = places[0];
@@ -161,7 +162,7 @@ Queries queries_for(const std::vector<Point3>& places) {
   return queries;
 }
 
-/// A set of points, or of triangles if there are any; its trees are built when first needed.
+/// A set of triangles, or of points if there are no triangles. Its trees are built on first use.
 class Scene {
  public:
   Scene(std::string name, std::function<Mesh()> make)
@@ -171,7 +172,7 @@ class Scene {
   bool triangles() { return load(), !mesh_.triangles.empty(); }
   const Queries& queries() { return load(), queries_; }
   const std::vector<Point3>& points() { return load(), mesh_.corners; }
-  /// Radius of the balls around points: less than half their spacing in a full cube.
+  /// Returns the radius of the balls around points, less than half their spacing in a full cube.
   double radius() {
     load();
     return queries_.size / std::sqrt(3.0) * 0.3 / std::cbrt(static_cast<double>(points().size()));
@@ -308,7 +309,7 @@ void add(const std::shared_ptr<Scene>& scene, bool points) {
   }
 }
 
-// Some are compressed; gzip reads plain files too.
+// Some files are compressed. gzip reads plain files too.
 std::string unpacked(const std::string& path) {
   std::FILE* pipe = popen(("gzip -dcf '" + path + "'").c_str(), "r");
   if (pipe == nullptr) throw std::runtime_error("cannot run gzip");
@@ -328,7 +329,7 @@ void add_scenes() {
   add(std::make_shared<Scene>("torus", [] { return noisy_torus(small() ? 15 : 220); }), false);
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr || small()) return;
-  // Files without triangles are point sets.
+  // Files without triangles are used as point sets.
   for (const auto& [name, points] : {std::pair{"bun_zipper.ply", false},
                                      {"horse.ply", false},
                                      {"lucy_100k.ply", false},

@@ -14,15 +14,15 @@
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
 
-/// The peers of the matching tree: two common top-down builds, both to single primitives, so that
-/// leaves by cost, layout and queries are the same for all trees.
+/// The peers of the matching tree: two common top-down builds. Both go down to single primitives,
+/// so that leaves by cost, layout and queries are the same for all trees.
 
 namespace terrace::matching::peers {
 
 using Boxes = std::span<const Box<3>>;
 
-/// Divides until all parts are single; `Split` reorders a range of primitives and returns the
-/// middle.
+/// Divides until every part is a single primitive. `Split` reorders a range of primitives and
+/// returns its middle.
 template <class Split>
 std::vector<TreeChildren> divide(std::size_t n, Split&& split) {
   std::vector<std::uint32_t> order(n);
@@ -86,7 +86,7 @@ inline std::size_t halve(Boxes boxes, std::span<std::uint32_t> range) {
   return middle;
 }
 
-/// A kD-tree: splits at the median along the longest side of the bounding box of the centres.
+/// Builds a kD-tree that splits at the median along the longest side of the box around the centres.
 inline std::vector<TreeChildren> median_split(Boxes boxes) {
   return divide(boxes.size(), [&](std::span<std::uint32_t> range) { return halve(boxes, range); });
 }
@@ -108,8 +108,8 @@ struct Bin {
   }
 };
 
-/// The least sum of area times primitives over kBins bins along each axis (I. Wald, 2007); the
-/// median where all centres coincide.
+/// Splits where the sum of area times primitives is least over kBins bins along each axis (I. Wald,
+/// 2007), or at the median where all centres coincide.
 inline std::vector<TreeChildren> binned_sah(Boxes boxes) {
   constexpr std::size_t kBins = 16;
   return divide(boxes.size(), [&](std::span<std::uint32_t> range) {
@@ -128,7 +128,7 @@ inline std::vector<TreeChildren> binned_sah(Boxes boxes) {
         bin.add(boxes[i]);
         ++bin.count;
       }
-      std::array<double, kBins> cost{};  // cost of bins k and above
+      std::array<double, kBins> cost{};  // cost of bins k and up
       Bin sum;
       for (std::size_t k = kBins; k-- > 1;) {
         if (bins[k].count > 0) sum.add(bins[k].box);

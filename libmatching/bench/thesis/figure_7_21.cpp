@@ -12,7 +12,8 @@
 namespace terrace::matching::thesis {
 namespace {
 
-/// Distances from n uniform points to n others: one iteration of the Monte Carlo method.
+/// Returns distances from n uniform points to n others, as in one iteration of the Monte Carlo
+/// method.
 std::vector<double> distances(std::size_t n) {
   const std::vector<Point3> points = uniform_points(2 * n, 21);
   std::vector<double> costs;
@@ -26,8 +27,8 @@ std::vector<double> distances(std::size_t n) {
   return costs;
 }
 
-/// cost(i, j) = i * j, from R. E. Machol and M. Wien, "A hard assignment problem", 1976: nearly
-/// every row has to examine all rows assigned before it.
+/// Returns cost(i, j) = i * j, from R. E. Machol and M. Wien, "A hard assignment problem", 1976:
+/// nearly every row has to examine all rows assigned before it.
 std::vector<double> products(std::size_t n) {
   std::vector<double> costs;
   costs.reserve(n * n);
@@ -37,7 +38,7 @@ std::vector<double> products(std::size_t n) {
   return costs;
 }
 
-/// Median of three runs, or of more where these are short.
+/// Returns the median of three runs, or of more if these are short.
 double seconds_of(const std::vector<double>& costs, std::size_t n, bool once) {
   std::vector<double> times;
   double sum = 0.0;
@@ -45,7 +46,7 @@ double seconds_of(const std::vector<double>& costs, std::size_t n, bool once) {
     const auto start = std::chrono::steady_clock::now();
     const Assignment assignment = assign(costs, n, n);
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    if (!(assignment.cost > 0.0)) throw std::logic_error("an assignment of no cost");
+    if (!(assignment.cost > 0.0)) throw std::logic_error("the assignment costs 0");
     times.push_back(taken.count());
     sum += taken.count();
   }
@@ -58,7 +59,7 @@ struct Time {
   double seconds;
 };
 
-/// The exponent k of seconds = c * n^k, by least squares of the logarithms.
+/// Returns the exponent k of seconds = c * n^k, by least squares on the logarithms.
 double exponent(const std::vector<Time>& times) {
   const auto count = static_cast<double>(times.size());
   double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
@@ -76,7 +77,7 @@ double exponent(const std::vector<Time>& times) {
 
 void figure_7_21(Setting& setting) {
   std::printf("\nFigure 7.21: seconds of an assignment of n rows to n columns, one thread.\n");
-  // Times of a microsecond or two say nothing about growth.
+  // Times of one or two microseconds say nothing about growth.
   std::vector<std::size_t> sizes{50, 100, 200, 400, 800, 1600};
   if (setting.is_small()) {
     sizes = {20, 40};
@@ -89,7 +90,7 @@ void figure_7_21(Setting& setting) {
     const std::string name = hard ? "product" : "euclidean";
     std::vector<Time> times;
     for (const std::size_t n : sizes) {
-      // Half a minute and more, without new information.
+      // These take half a minute or more and show nothing new.
       if (hard && n > (setting.size == Setting::Size::full ? 3200u : 1600u)) continue;
       times.push_back({n, seconds_of(hard ? products(n) : distances(n), n, setting.is_small())});
       std::printf("%-10s n = %4zu  %.6f s\n", name.c_str(), n, times.back().seconds);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figures 7.22 to 7.24: how the cost of the Monte Carlo method decreases, compared with our
-// monotone method and the optimum.
+// Figures 7.22 to 7.24: how the cost of the Monte Carlo method falls, compared with our monotone
+// method and the optimum.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,7 +13,7 @@ namespace {
 
 double percent_above(double cost, double optimum) { return 100.0 * (cost / optimum - 1.0); }
 
-/// The lag-1 autocorrelation of the costs: 0 for independent costs.
+/// Returns the lag-1 autocorrelation of the costs, which is 0 for independent costs.
 double correlation_of_neighbours(const std::vector<double>& costs, double mean) {
   double both = 0.0, own = 0.0;
   for (std::size_t i = 0; i < costs.size(); ++i) {
@@ -26,7 +26,7 @@ double correlation_of_neighbours(const std::vector<double>& costs, double mean) 
 SearchRun search(const Setting& setting, const std::string& set, std::size_t points,
                  std::uint64_t iterations, std::uint64_t set_seed) {
   const std::vector<Point3> places = uniform_points(points, set_seed);
-  // With a hundred points an iteration is shorter than starting a thread.
+  // With a hundred points an iteration takes less time than starting a thread.
   const HalvingOptions options{.method = Halving::monte_carlo,
                                .iterations = iterations,
                                .threads = points < 300 ? 1 : setting.threads};
@@ -40,8 +40,8 @@ SearchRun search(const Setting& setting, const std::string& set, std::size_t poi
           match_by_halving(places, monotone)};
 }
 
-/// The thesis's three sets of 100 points and one of 500, with as many iterations as there; two
-/// fifths of them for 500 points unless --full is given.
+/// Returns searches on the thesis's three sets of 100 points and one of 500, with as many
+/// iterations as in the thesis. For 500 points it is two fifths of them unless --full is given.
 const std::vector<SearchRun>& search_runs(Setting& setting) {
   if (!setting.runs.empty()) return setting.runs;
   const bool small = setting.is_small();
@@ -62,7 +62,7 @@ struct Method {
 constexpr Method kMethods[]{{"monte_carlo", &SearchRun::monte_carlo},
                             {"monotone", &SearchRun::monotone}};
 
-/// Means over more sets than a plot can show.
+/// Prints means over more sets than a plot can show.
 void print_means(const Setting& setting, std::size_t points, std::uint64_t sets,
                  std::uint64_t iterations) {
   double sums[2][3]{};
@@ -102,8 +102,8 @@ void figure_7_22(Setting& setting) {
   std::vector<double> costs;
   double sum = 0.0, least = 0.0;
   for (std::uint64_t i = 1; i <= iterations; ++i) {
-    // Iterations depend only on the points and their random halves: run one by one, each with its
-    // own seed, they show costs that the search does not report.
+    // Each iteration depends only on the points and its random halves. Run one by one, each with
+    // its own seed, the iterations show costs that the search does not report.
     costs.push_back(
         match_by_halving(points, {.method = Halving::monte_carlo, .iterations = 1, .seed = i})
             .cost);
