@@ -12,13 +12,13 @@
 #define TERRACE_CLUSTER_HOST_DEVICE
 #endif
 
-/// The band-shaped half of a symmetric n x n matrix without its diagonal: row i holds the floor(n /
-/// 2) entries (i, i+1), (i, i+2), .. with columns modulo n. Rows are equally long, so equal shares
-/// of rows are equal shares of work. For odd n each pair occurs once; for even n the n / 2 pairs
-/// {i, i + n/2} occur twice, in row i and in row i + n/2.
-/// Source: J. Skála, Algorithms for manipulating large geometric data, 7.6.2. Its (7.10) as printed
-/// does not invert (7.9); band_place() does. The functions on places compile as CUDA, for host and
-/// device.
+/// The band-shaped half of a symmetric n x n matrix without its diagonal. Row i holds the floor(n /
+/// 2) entries (i, i+1), (i, i+2), .. with columns modulo n. All rows have the same length, so equal
+/// shares of rows are equal shares of work. For odd n each pair occurs once. For even n the n / 2
+/// pairs {i, i + n/2} occur twice, in row i and in row i + n/2.
+/// Source: J. Skála, Algorithms for manipulating large geometric data, 7.6.2. Equation 7.10 as
+/// printed does not invert 7.9; band_place() does. The functions on places compile as CUDA code for
+/// host and device.
 
 namespace terrace::cluster {
 
@@ -32,21 +32,23 @@ TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_width(std::uint6
   return n / 2;
 }
 
-/// The column of the square matrix to which an entry of the band belongs; its row is place.row.
+/// Returns the column of the square matrix to which an entry of the band belongs. Its row is
+/// place.row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_partner(std::uint64_t n,
                                                                         BandPlace place) {
   const std::uint64_t j = place.row + place.column + 1;
   return j < n ? j : j - n;
 }
 
-/// The place of the pair {i, j}, i != j, both below n. If it occurs twice: in row i.
+/// Returns the place of the pair {i, j}, with i != j and both below n. If it occurs twice, the one
+/// in row i.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr BandPlace band_place(std::uint64_t n, std::uint64_t i,
                                                                   std::uint64_t j) {
   const std::uint64_t ahead = j > i ? j - i : j + n - i;  // (j - i) mod n
   return ahead > n / 2 ? BandPlace{j, n - ahead - 1} : BandPlace{i, ahead - 1};
 }
 
-/// The index of that entry, counted row by row.
+/// Returns the index of that entry, counted row by row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_entry(std::uint64_t n,
                                                                       std::uint64_t i,
                                                                       std::uint64_t j) {
@@ -54,12 +56,12 @@ TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_entry(std::uint6
   return place.row * band_width(n) + place.column;
 }
 
-/// Bytes of the entries of a band matrix. Throws: std::invalid_argument, naming that number, if it
-/// exceeds `memory_limit` (0: no limit).
+/// Returns the size of a band matrix's entries in bytes. Throws: std::invalid_argument, with the
+/// number of bytes, if it exceeds `memory_limit` (0: no limit).
 [[nodiscard]] std::uint64_t checked_band_bytes(std::size_t n, std::size_t bytes_per_entry,
                                                std::uint64_t memory_limit);
 
-/// n * floor(n / 2) entries of type T, float or double; not initialised.
+/// A matrix of n * floor(n / 2) uninitialised entries of type T, float or double.
 template <class T>
 class BandMatrix {
  public:
@@ -70,14 +72,14 @@ class BandMatrix {
 
   [[nodiscard]] std::size_t size() const { return n_; }
   [[nodiscard]] std::size_t width() const { return n_ / 2; }
-  /// The width() entries (i, i + 1), (i, i + 2), .. with columns modulo n.
+  /// Returns the width() entries (i, i + 1), (i, i + 2), .. with columns modulo n.
   [[nodiscard]] T* row(std::size_t i) { return data_.get() + i * width(); }
   [[nodiscard]] const T* row(std::size_t i) const { return data_.get() + i * width(); }
   [[nodiscard]] T at(std::size_t i, std::size_t j) const {
     assert(i < n_ && j < n_ && i != j);
     return data_[band_entry(n_, i, j)];
   }
-  /// Sets the pair, both copies if there are two.
+  /// Sets the entry of a pair, or both copies if there are two.
   void set(std::size_t i, std::size_t j, T value) {
     assert(i < n_ && j < n_ && i != j);
     data_[band_entry(n_, i, j)] = value;

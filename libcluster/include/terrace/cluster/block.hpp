@@ -13,15 +13,15 @@
 #include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// Facility location on one block of points: choose representatives (facilities) among the points
-/// and assign every point to one, at low total cost
+/// Facility location on one block of points: chooses representatives (facilities) among the points
+/// and assigns every point to one, at low total cost
 ///     Q = k * fc + sum of weight(i) * distance(i, facility of i)
-/// where k is the number of facilities and fc, the facility cost, a multiple of the diagonal of the
-/// block's bounding box.
-/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3, 7.1, 7.3. It differs
-/// from that in: the start (equal distances along a space-filling curve instead of Meyerson's),
+/// where k is the number of facilities and fc, the facility cost, is a multiple of the diagonal of
+/// the block's bounding box.
+/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3, 7.1, 7.3. Differences
+/// from the thesis: the start (equal distances along a space-filling curve instead of Meyerson's),
 /// candidates along that curve instead of random ones, facilities moved to the median of their
-/// clients, an exact last assignment. The thesis's own search is in facility_location.hpp.
+/// clients, and a final exact assignment. The thesis's own search is in facility_location.hpp.
 
 namespace terrace::cluster {
 
@@ -33,13 +33,14 @@ struct BlockOptions {
   base::StopCheck check_stop = {};
 };
 
-/// Facilities in the order of their cluster numbers, which is that of a space-filling curve:
-/// clusters with close numbers are close to each other. assignment[i] is the cluster number of
-/// point i; the facility of a cluster is assigned to itself.
+/// A clustering. Facilities are in the order of their cluster numbers, which follows a
+/// space-filling curve, so clusters with close numbers are close to each other. assignment[i] is
+/// the cluster number of point i. The facility of a cluster is assigned to itself.
+///
 /// Every point is assigned to the nearest facility (a weight multiplies all its distances alike),
-/// as computed in single precision in the unit of the block's bounding box: another facility may be
-/// nearer by at most a millionth of the diagonal. On ties, duplicates included, the lowest number
-/// wins.
+/// as computed in single precision in the unit of the block's bounding box. So another facility may
+/// be nearer by at most a millionth of the diagonal. On ties, duplicates included, the lowest
+/// number wins.
 struct BlockClustering {
   std::vector<std::uint32_t> facilities;
   std::vector<std::uint32_t> assignment;
@@ -51,13 +52,13 @@ struct BlockClustering {
   }
 };
 
-/// The instruction sets among which a caller may choose; all give the same bytes.
+/// The SIMD code path. All paths give the same bytes.
 using base::best_simd_path;
 using base::SimdPath;
 
-/// Clusters blocks one after another, keeping its memory in between. One object per thread. The
-/// result depends only on the points, their order, the weights and the options: not on the machine,
-/// on threads, or on previous blocks.
+/// Clusters blocks one after another and keeps its memory in between. Use one object per thread.
+/// The result depends only on the points, their order, the weights and the options, but not on the
+/// machine, threads, or previous blocks.
 class BlockClusterer {
  public:
   /// Throws: std::invalid_argument if `path` is not available on this machine.
@@ -66,14 +67,16 @@ class BlockClusterer {
   BlockClusterer(BlockClusterer&&) noexcept;
   BlockClusterer& operator=(BlockClusterer&&) noexcept;
 
-  /// points: n positions in one Cartesian frame, finite, any offset and scale; duplicates and
-  /// degenerate blocks are ordinary (all points equal: one facility).
+  /// points: n positions in one Cartesian frame, finite, of any offset and scale. Duplicates and
+  /// degenerate blocks are allowed (if all points are equal there is one facility).
   /// weights: n positive finite numbers, or empty for 1 each. They multiply distances.
-  /// Blocks of fewer than 2500 points get Effort::full whatever the options (there a reduced search
-  /// is up to 30 % worse, thesis table 7.5). Requires n < 2^24. n = 0 gives an empty result.
-  /// Costs are infinite if they overflow a double; the clustering is correct even then.
-  /// Time: for blocks of 10 000 points at standard effort and with AVX-512, 0.05 to 0.1 us per
-  /// point; O(n k) for large n. Memory: about 140 bytes per point, kept for the next block.
+  /// Requires: n < 2^24. n = 0 gives an empty result.
+  ///
+  /// Blocks of fewer than 2500 points always get Effort::full, because a reduced search is up to 30
+  /// % worse there (thesis table 7.5). Costs are infinite if they overflow a double; the clustering
+  /// is correct even then.
+  /// Cost: for blocks of 10 000 points at standard effort and with AVX-512, 0.05 to 0.1 us per
+  /// point; O(n k) for large n. About 140 bytes of memory per point, kept for the next block.
   void run(std::span<const Point3> points, std::span<const double> weights,
            const BlockOptions& options, BlockClustering& result);
 

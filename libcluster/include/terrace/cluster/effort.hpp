@@ -5,14 +5,15 @@
 
 namespace terrace::cluster {
 
-/// How long to search for facilities: in blocks (block.hpp, hierarchy.hpp) and in
+/// How long to search for facilities, both in blocks (block.hpp, hierarchy.hpp) and in
 /// facility_location.hpp.
 ///
-/// Blocks of points: the figures are mean costs over blocks of 10 000 points relative to the
-/// thesis's full search, the first for surfaces, the second for volumes.
-/// Local search over n points or entities: the number of random candidates. Source: J. Skála,
-/// Algorithms for manipulating large geometric data, 7.3.1, whose full search is `fine`.
-/// Interchange on a matrix: restarts, and perturbations per restart.
+/// For blocks of points, the figures are mean costs over blocks of 10 000 points relative to the
+/// thesis's full search, the first for surfaces, the second for volumes. For local search over n
+/// points or entities, they are numbers of random candidates. For interchange on a matrix, they are
+/// restarts and perturbations per restart.
+/// Source: J. Skála, Algorithms for manipulating large geometric data, 7.3.1, whose full search is
+/// `fine`.
 enum class Effort : std::uint8_t {
   /// Blocks: at least one candidate per 32 points; 1.2 to 2.9 % above. Local search: 0.1 n, at
   /// least 1. Interchange: 2 restarts, 50 perturbations.
@@ -23,8 +24,8 @@ enum class Effort : std::uint8_t {
   /// Blocks: three sweeps of one candidate per 16 points; 0.4 to 1.2 % above. Local search:
   /// n ceil(log10 n). Interchange: 8 restarts, 1000 perturbations.
   fine,
-  /// Blocks: n ceil(log2 n) random candidates, 3.5 times the thesis's; equal to it within 0.1 %.
-  /// Local search: n ceil(log2 n). Interchange: 32 restarts, 1000 perturbations.
+  /// Blocks: n ceil(log2 n) random candidates, 3.5 times as many as in the thesis; within 0.1 % of
+  /// its cost. Local search: n ceil(log2 n). Interchange: 32 restarts, 1000 perturbations.
   full,
 };
 

@@ -17,13 +17,13 @@
 #include "terrace/cluster/point.hpp"
 
 /// The streaming cluster hierarchy: one pass over any number of points in constant memory, by
-/// divide and conquer over blocks; every level is kept. Source: J. Skála, Algorithms for
-/// manipulating large geometric data, 4.3, 7.1.2, 7.2. It differs from that in: blocks are
-/// clustered in parallel; distances are ground distances, under any metric; a level that fits one
-/// block becomes the top without being clustered; a facility cost that is too low to reduce a block
-/// is raised.
+/// divide and conquer over blocks, with every level kept.
+/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.3, 7.1.2, 7.2. Differences
+/// from the thesis: blocks are clustered in parallel; distances are ground distances, under any
+/// metric; a level that fits one block becomes the top without being clustered; a facility cost
+/// that is too low to reduce a block is raised.
 ///
-/// Points arrive at level 0. Each block of a level is clustered on its own; the representative of
+/// Points arrive at level 0. Each block of a level is clustered separately. The representative of
 /// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
 /// input point ends in exactly one place: as a member, not a representative, of a cluster on the
 /// highest level that it reached, or as a point of the root.
@@ -31,16 +31,15 @@
 namespace terrace::cluster {
 
 /// A linear map, row-major: ground = map * position. Clustering measures distances on the ground
-/// (metres); positions are stored unchanged. Entries must be finite and not all zero. A map may be
-/// singular: a row of zeros leaves that direction out of all distances.
+/// (metres), but positions are stored unchanged. Entries must be finite and not all zero. A map may
+/// be singular: a row of zeros excludes that direction from all distances.
 using GroundMap = LinearMap;
 
-/// Over all descendants of a cluster down to level 0, including the representative.
-/// error: an upper bound of the ground distance from the representative to a descendant; at level 0
-/// the largest distance, rounded up, above it the smaller of the bounds from the triangle
-/// inequality and the box. Distances use the map of the block; those within the levels below, which
-/// the triangle inequality adds up, use the maps of the blocks there.
-/// the triangle inequality adds up, by the maps of the blocks there.
+/// Summary of all descendants of a cluster down to level 0, including the representative. `error`
+/// is an upper bound of the ground distance from the representative to a descendant. At level 0 it
+/// is the largest distance, rounded up; above, it is the smaller of the bounds from the triangle
+/// inequality and from the box. Distances use the map of the block. Distances within the levels
+/// below, which the triangle inequality adds up, use the maps of the blocks there.
 struct Summary {
   Box3 box;                       ///< of the unmapped positions
   double error = 0.0;             ///< ground units
@@ -48,13 +47,13 @@ struct Summary {
   friend bool operator==(const Summary&, const Summary&) = default;
 };
 
-/// Instead of a representative, which the root does not have.
+/// Marks the missing representative of the root.
 inline constexpr std::uint32_t kNoRepresentative = 0xffffffff;
 
 /// A finished block as the sink receives it. Points are numbered within the block. Cluster c has
 /// the points order[first[c]] ... order[first[c + 1] - 1], including the representative, in
-/// ascending number. children has `level` ordinals per point: the clusters that it heads on levels
-/// 0, 1, ... The spans are valid until the call returns.
+/// ascending order. `children` has `level` ordinals per point: the clusters that the point heads on
+/// levels 0, 1, ... The spans are valid until the call returns.
 struct FinishedBlock {
   unsigned level = 0;
   std::uint64_t block = 0;  ///< ordinal of the block on its level
@@ -67,15 +66,14 @@ struct FinishedBlock {
   std::span<const Summary> summaries;  ///< one per cluster
 };
 
-/// Receives the hierarchy. `prepare` is called by several threads at once, as soon as a block is
-/// clustered; `commit` by one thread at a time, in the order of blocks within each level, with what
-/// prepare returned. Cluster ordinals follow from that order: the first block's clusters are 0, 1,
-/// ... Blocks of different levels are committed in no fixed order relative to each other. An
-/// exception from either ends the build and is thrown by push() or finish(), once, when no call to
-/// the sink is running any more.
+/// Receives the hierarchy. Several threads call `prepare` at once, as soon as a block is clustered.
+/// One thread at a time calls `commit` with what prepare returned, in the order of blocks within
+/// each level. Cluster ordinals follow that order: the first block's clusters are 0, 1, ... The
+/// commits of different levels have no fixed order relative to each other. An exception from either
+/// ends the build. push() or finish() throws it once, when no call to the sink is running any more.
 class HierarchySink {
  public:
-  /// What the sink makes of a block before its turn has come.
+  /// What the sink makes of a block before it can be committed.
   struct Prepared {
     virtual ~Prepared() = default;
   };
@@ -83,106 +81,108 @@ class HierarchySink {
   virtual ~HierarchySink() = default;
   virtual std::unique_ptr<Prepared> prepare(const FinishedBlock& block) = 0;
   virtual void commit(unsigned level, std::unique_ptr<Prepared> prepared) = 0;
-  /// The points of the top level, once, at the end, from finish(): one cluster without a
-  /// representative (representatives[0] is kNoRepresentative, its error is 0), order = 0, 1, ... If
-  /// there was no input it has no points and an empty box.
+  /// Receives the points of the top level once, at the end, from finish(), as one cluster without a
+  /// representative: representatives[0] is kNoRepresentative, the error is 0, and order is 0, 1,
+  /// ... Without input the cluster has no points and an empty box.
   virtual void root(const FinishedBlock& block) = 0;
 };
 
-/// Attributes (colour, intensity) in the payload of a point, as further axes of distances.
+/// Attributes (colour, intensity) in the payload of a point that become further axes of distances.
 struct PayloadChannels {
   std::vector<double> weights;  ///< ground units per unit of each channel; not negative, finite
-  /// Reads the channels of one point, as many as weights. Called from any thread.
+  /// Reads the channels of one point, one per weight. May be called on any thread.
   std::function<void(std::span<const std::byte> payload, std::span<double> values)> read;
 };
 
-/// Entities of several corners (segments, triangles, polylines of k vertices) instead of points:
-/// the position of a "point" is its first corner, its payload holds the others. Distances are those
-/// of facility_location.hpp, on the ground. (thesis chapter 9)
+/// Entities of several corners (segments, triangles, polylines of k vertices) instead of points.
+/// The position of a "point" is its first corner, and its payload holds the others. Distances are
+/// those of facility_location.hpp, on the ground. (thesis chapter 9)
 struct PayloadCorners {
-  std::size_t count = 1;  ///< total, including the position; 1: points
-  /// Polylines: corners keep their order or its reverse. Otherwise any correspondence of corners
-  /// counts; then there are at most three corners.
+  std::size_t count = 1;  ///< corners per entity, including the position; 1: points
+  /// True for polylines: corners keep their order or its reverse. Otherwise every correspondence of
+  /// corners is allowed, and there are at most three corners.
   bool ordered = false;
-  /// Fills in the corners of one entity, `count` of them; the first is already there. Called from
-  /// any thread.
+  /// Writes the `count` corners of one entity. The first is already filled in. May be called on any
+  /// thread.
   std::function<void(std::span<const std::byte> payload, std::span<Point3> corners)> read;
 };
 
 struct HierarchyOptions {
   std::size_t block_size = 10000;  ///< maximum number of points clustered together; 2 to 2^24 - 1
-  /// Each block has its own seed, mixed from this one, its level and its ordinal. At most half of a
-  /// block's points, rounded up, become representatives; otherwise the levels might never end. If
+  /// Each block has its own seed, mixed from this seed, its level and its ordinal. At most half of
+  /// a block's points, rounded up, become representatives; otherwise the levels might never end. If
   /// the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
-  /// Distances on the ground, after `ground`; the boxes of a field are in that frame.
+  /// Distances on the ground, after `ground` is applied. The boxes of a field are in that frame.
   /// Summary::error remains a Euclidean ground distance.
   Metric metric = Euclidean{};
-  /// How blocks are clustered. automatic: by BlockClusterer if the metric is linear in the bounding
-  /// box of the block (Euclidean, elliptical, a field with one region there) and there are no
-  /// channels, otherwise by the local search that solve() of facility_location.hpp chooses. Any
-  /// other: solve() with that strategy. A local search is ten to a hundred times slower. Its effort
-  /// is that of `block`; with `automatic`, at least Effort::fine in blocks of fewer than 2500
-  /// points. Clusters are in the order of their representatives.
+  /// How blocks are clustered. `automatic` uses BlockClusterer if the metric is linear in the
+  /// bounding box of the block (Euclidean, elliptical, or a field with one region there) and there
+  /// are no channels. Otherwise it uses the local search that solve() of facility_location.hpp
+  /// chooses. Any other value: solve() with that strategy. A local search is ten to a hundred times
+  /// slower. Its effort is that of `block`, but with `automatic` at least Effort::fine in blocks of
+  /// fewer than 2500 points. Clusters are in the order of their representatives.
   FacilityStrategy strategy = FacilityStrategy::automatic;
   /// As in FacilityOptions: threads that work on one block, and candidates evaluated at once.
   unsigned search_threads = 1;
   std::size_t batch = 1;
   /// The cost of leaving out a point of level 0, as a multiple of the diagonal like the facility
-  /// cost, and in blocks of n < block_size points (the last one, tiles) multiplied by
-  /// sqrt(block_size / n); infinite: no point is left out. Outliers are found and removed until
+  /// cost. In blocks of n < block_size points (the last one, tiles) it is multiplied by
+  /// sqrt(block_size / n). If infinite, no point is left out. Outliers are found and removed until
   /// there are none, with the diagonal of the remaining points, so they affect neither positions
-  /// nor sizes of clusters. Then each becomes a member of the cluster with the nearest
-  /// representative (its box, error and count include it) and `mark_outlier` is called on its
-  /// payload. Representatives are ordinary points: above level 0 nothing is left out. (thesis
+  /// nor sizes of clusters. Each outlier then becomes a member of the cluster with the nearest
+  /// representative, whose box, error and count include it, and `mark_outlier` is called on its
+  /// payload. Representatives are ordinary points: nothing is left out above level 0. (thesis
   /// 7.1.3, figure 7.3)
   double outlier_price = std::numeric_limits<double>::infinity();
-  std::function<void(std::span<std::byte> payload)> mark_outlier;  ///< called from any thread
-  /// Overrides `metric`: the metric for a block with these bounds. A field needs it if `ground`,
-  /// and with it the frame of the boxes, depends on the block. Called from any thread.
+  std::function<void(std::span<std::byte> payload)> mark_outlier;  ///< may be called on any thread
+  /// Returns the metric for a block with these bounds, and overrides `metric`. A field needs it if
+  /// `ground`, and thus the frame of the boxes, depends on the block. May be called on any thread.
   std::function<Metric(const Box3&)> metric_of;
   PayloadChannels channels;  ///< empty: position only
-  /// If more than one: blocks are clustered by the local search for entities (strategies automatic,
-  /// full_scan, facilities), and the facility cost is a multiple of the diagonal of the bounding
-  /// box of all corners. The metric must be Euclidean, without channels and outliers. Summaries are
-  /// those of the positions: the sink must keep the bounds of the other corners itself.
+  /// With more than one corner, blocks are clustered by the local search for entities (strategies
+  /// automatic, full_scan, facilities), and the facility cost is a multiple of the diagonal of the
+  /// bounding box of all corners. The metric must be Euclidean, without channels and outliers.
+  /// Summaries cover only the positions, so the sink must keep the bounds of the other corners
+  /// itself.
   PayloadCorners corners;
   std::size_t payload_size = 0;  ///< bytes that travel with each point
-  /// Working threads, including the caller's, which clusters blocks while it would have to wait.
-  /// Any number gives the same hierarchy; 1 (or 0) does everything in the caller's thread.
+  /// Number of working threads, including the caller's, which clusters blocks instead of waiting.
+  /// Does not change the hierarchy. With 1 (or 0) everything runs on the caller's thread.
   unsigned threads = 1;
-  /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
+  /// Returns the ground map for a block with these bounds. If empty, the identity. May be called on
+  /// any thread.
   std::function<GroundMap(const Box3&)> ground;
   SimdPath simd = SimdPath::automatic;
-  /// Once it is requested, the local search of a block ends with what it has found so far: for work
-  /// that is given up, whose sink then throws.
+  /// After a stop request, the local search of a block ends with the best result so far. For work
+  /// that is abandoned and whose sink then throws.
   std::stop_token stop;
-  /// Called once when the work has failed, from the thread in which it failed: for an owner who
-  /// waits for input and would see the exception only in the next push(). Must neither throw nor
-  /// call the builder.
+  /// Called once when the work has failed, on the thread in which it failed. For an owner who waits
+  /// for input and would see the exception only at the next push(). Must neither throw nor call the
+  /// builder.
   std::function<void()> on_failure;
 };
 
 struct HierarchyResult {
   std::uint64_t points = 0;
   unsigned top = 0;
-  /// Per level, 0 to top: the number of points whose highest level is this or above, and of
-  /// clusters. The root counts as one cluster.
+  /// For each level from 0 to the top: the number of points whose highest level is this one or
+  /// above, and the number of clusters. The root counts as one cluster.
   std::vector<std::uint64_t> level_points, level_clusters;
   std::uint64_t outliers = 0;
 };
 
-/// Builds the hierarchy. Memory: a few blocks per thread and one per level. The result depends only
-/// on the input, the seed and the options other than threads and simd.
+/// Builds the hierarchy in the memory of a few blocks per thread and one per level. The result
+/// depends only on the input, the seed and the options other than threads and simd.
 class HierarchyBuilder {
  public:
   /// The sink must outlive the builder.
   /// Throws: std::invalid_argument if block_size, facility_cost, outlier_price, the metric, a
-  /// channel's weight or the number of corners is out of range, channels, corners or outliers have
-  /// no function, corners are combined with another metric, channels or outliers, or the SIMD path
-  /// is not available.
+  /// channel's weight or the number of corners is out of range, if channels, corners or outliers
+  /// have no function, if corners are combined with another metric, channels or outliers, or if the
+  /// SIMD path is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
-  /// Stops without finishing: waits for the blocks that are being clustered; after that the sink
+  /// Stops without finishing. Waits for the blocks that are being clustered, after which the sink
   /// gets no more calls.
   ~HierarchyBuilder();
   HierarchyBuilder(const HierarchyBuilder&) = delete;
@@ -190,19 +190,20 @@ class HierarchyBuilder {
 
   /// Appends points. A batch that fits into one block is never split: if it does not fit into the
   /// rest of the current block, that block is closed first, so raster tiles stay whole. A larger
-  /// batch is treated as a stream: it fills the current block, and is cut wherever one is full. An
-  /// empty batch only reports failures.
-  /// Throws: std::invalid_argument for a coordinate that is not finite, naming its index in the
-  /// batch, and for a payload whose size is not payload_size bytes per point (the builder is
-  /// unchanged). In the following cases the builder has ended, and further calls throw
-  /// std::logic_error: what the sink or `ground` threw, and std::invalid_argument for a ground map
-  /// that is not finite, is zero, or makes distances beyond 1e150, a channel or corner that is not
-  /// finite, a custom distance that is negative or not finite, and a strategy that a block does not
-  /// admit.
+  /// batch is treated as a stream, which fills the current block and is cut wherever a block is
+  /// full. An empty batch only reports failures.
+  /// Throws: std::invalid_argument for a coordinate that is not finite (the message gives its index
+  /// in the batch), and for a payload whose size is not payload_size bytes per point. The builder
+  /// is then unchanged. In the following cases the builder has ended, and further calls throw
+  /// std::logic_error: whatever the sink or `ground` throws, and std::invalid_argument for a ground
+  /// map that is not finite, is zero, or makes distances beyond 1e150, a channel or corner that is
+  /// not finite, a custom distance that is negative or not finite, and a strategy that a block does
+  /// not admit.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 
-  /// Clusters the rest, from level 0 upward; the top is the first level that fits one block.
-  /// Weights go up as counts of level-0 points and are scaled to mean 1 in each block's own copy.
+  /// Clusters the remaining points, from level 0 upward. The top is the first level that fits one
+  /// block. Weights go up as counts of level-0 points and are scaled to mean 1 in each block's
+  /// copy.
   /// Throws: as push(). May be called once.
   HierarchyResult finish();
 
@@ -211,13 +212,15 @@ class HierarchyBuilder {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Clusters of about `size` points by facility location: the hierarchy is built in memory, and the
-/// level is taken whose clusters come nearest to `size` on average (as a factor). Blocks are
-/// compact sets of the points, whatever their order. The facility cost decides where clusters of
-/// about 100 points end, so smaller sizes give these, and up to 10,000 points are one cluster.
-/// Returns the cluster of each point, numbered from 0 without gaps; the same for any number of
-/// threads. progress, if any, is called with the points done; what it throws ends the work. Throws:
-/// std::invalid_argument unless size is above 0; as HierarchyBuilder::push(). O(n log n).
+/// Returns the cluster of each point, for clusters of about `size` points by facility location.
+/// Clusters are numbered from 0 without gaps, and are the same for any number of threads.
+///
+/// The hierarchy is built in memory, and the level is taken whose mean cluster size is nearest to
+/// `size` (as a ratio). Blocks are compact sets of points, whatever the order of the input. The
+/// facility cost gives clusters of about 100 points, so smaller sizes give these too, and up to
+/// 10,000 points form one cluster. Takes O(n log n). progress, if given, is called with the number
+/// of points done; what it throws ends the work.
+/// Throws: std::invalid_argument unless size is positive; as HierarchyBuilder::push().
 [[nodiscard]] std::vector<std::uint32_t> clusters_of_size(
     std::span<const Point3> points, double size, std::uint64_t seed, unsigned threads = 1,
     const std::function<void(std::uint64_t)>& progress = {});

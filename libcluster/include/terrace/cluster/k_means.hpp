@@ -10,11 +10,12 @@
 
 #include "terrace/cluster/point.hpp"
 
-/// k-means: k centres, not necessarily points of the input, at a low sum of squared distances
+/// k-means: finds k centres, not necessarily points of the input, with a low sum of squared
+/// distances
 ///     SSE = sum of weight(i) * |point i - its centre|^2.
 /// Lloyd's iteration (assign each point to the nearest centre, move each centre to the mean of its
-/// points) from seeds by k-means++ or from the caller's centres. Exact: a filter over a tree of
-/// boxes rules out only centres that cannot be nearest to any point of a box.
+/// points) starts from k-means++ seeds or from the caller's centres. It is exact: a filter over a
+/// tree of boxes rules out only centres that cannot be nearest to any point of a box.
 /// Sources: S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28 (1982);
 /// D. Arthur, S. Vassilvitskii, k-means++: the advantages of careful seeding, SODA 2007;
 /// T. Kanungo et al., An efficient k-means clustering algorithm: analysis and implementation, IEEE
@@ -25,10 +26,10 @@ namespace terrace::cluster {
 struct KMeansOptions {
   std::size_t clusters = 8;          ///< k, from 1 to the number of points
   std::uint64_t seed = 1;            ///< seed of k-means++
-  std::size_t restarts = 1;          ///< runs from different seeds; the best counts
+  std::size_t restarts = 1;          ///< runs from different seeds; the best one is returned
   std::size_t max_iterations = 300;  ///< per run; 0 only assigns
-  /// A run ends when no centre moves by more than this share of the diagonal of the points'
-  /// bounding box. 0: when no assignment changes.
+  /// A run ends when no centre moves by more than this fraction of the diagonal of the points'
+  /// bounding box. With 0 it ends when no assignment changes.
   double tolerance = 0.0;
   unsigned threads = 1;  ///< 0 counts as 1
   base::StopCheck check_stop = {};
@@ -36,7 +37,7 @@ struct KMeansOptions {
 
 struct KMeansResult {
   std::vector<Point3> centres;
-  /// the nearest centre of point i; the lowest number on ties
+  /// The nearest centre of each point, the one with the lowest number on ties.
   std::vector<std::uint32_t> assignment;
   double sse = 0.0;            ///< in the square of the points' unit
   std::size_t iterations = 0;  ///< number of times the points were assigned and centres moved
@@ -44,34 +45,37 @@ struct KMeansResult {
 };
 
 /// points: n positions, finite, any offset and scale; 2D data has z = 0. n < 2^32.
-/// weights: n positive finite numbers, or empty for 1 each. A weight below 2^-500 of the greatest
-/// counts as 2^-500 of it.
-/// Seeds: greedy k-means++, which tries 2 + 0.7 log2(k) points per centre and takes the best. A
-/// cluster that loses all its points takes, lowest number first, the point that costs most (weight
-/// times squared distance; the lowest index on ties) from a cluster of at least two. Points at
-/// their centre (within 2^-36 of the bounding box's longest side) are not taken: with fewer than k
-/// distinct points the surplus clusters stay empty, with their centres at some point.
+/// weights: n positive finite numbers, or empty for 1 each. A weight below 2^-500 times the
+/// greatest counts as 2^-500 times the greatest.
+///
+/// Seeds come from greedy k-means++, which tries 2 + 0.7 log2(k) points per centre and takes the
+/// best. A cluster that loses all its points gets the point that costs most (weight times squared
+/// distance; the lowest index on ties) from a cluster of at least two. Empty clusters are served in
+/// order of their numbers. Points at their centre (within 2^-36 of the bounding box's longest side)
+/// are not taken. So with fewer than k distinct points the surplus clusters stay empty, with their
+/// centres at some point.
+///
 /// The result depends on points, their order, weights and options, but not on threads. Assignments
-/// equal those of plain Lloyd from the same centres; the centres are equal up to rounding, as the
-/// sums of boxes are reused.
-/// Throws: std::invalid_argument if a point or weight is out of range (naming its index), k is 0 or
-/// above n, restarts is 0, or tolerance is negative or NaN.
-/// Time: O(n log n) once, then per iteration O(n) at worst along the borders of clusters and O(k)
-/// boxes inside them: 100 000 points in the plane with k = 100 take below a millisecond per
-/// iteration. Memory: about 80 bytes per point.
+/// equal those of plain Lloyd from the same centres. The centres are equal up to rounding, because
+/// the sums of boxes are reused.
+/// Throws: std::invalid_argument if a point or weight is out of range (the message gives its
+/// index), k is 0 or above n, restarts is 0, or tolerance is negative or NaN.
+/// Cost: O(n log n) once, then per iteration at worst O(n) along the borders of clusters and O(k)
+/// boxes inside them. 100 000 points in the plane with k = 100 take less than a millisecond per
+/// iteration. About 80 bytes of memory per point.
 [[nodiscard]] KMeansResult k_means(std::span<const Point3> points, std::span<const double> weights,
                                    const KMeansOptions& options);
 
-/// The same from the given centres, at least one and at most n, finite. options.clusters, seed and
-/// restarts are ignored.
+/// As k_means(), from the given centres: at least one and at most n, finite. options.clusters, seed
+/// and restarts are ignored.
 [[nodiscard]] KMeansResult k_means_from(std::span<const Point3> centres,
                                         std::span<const Point3> points,
                                         std::span<const double> weights,
                                         const KMeansOptions& options);
 
-/// A point to stand for each of `clusters` flat clusters that have no point of their own: the one
-/// nearest to the mean of its cluster, the first of equals; 0 for a cluster without points.
-/// labels: the cluster of each point, below `clusters`. O(n).
+/// Returns the index of a representative point for each of `clusters` flat clusters: the point
+/// nearest to the mean of its cluster, the first one on ties, or 0 for a cluster without points.
+/// labels: the cluster of each point, below `clusters`. Takes O(n).
 [[nodiscard]] std::vector<std::uint32_t> nearest_to_means(std::span<const Point3> points,
                                                           std::span<const std::uint32_t> labels,
                                                           std::size_t clusters);

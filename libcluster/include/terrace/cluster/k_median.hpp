@@ -8,9 +8,10 @@
 
 #include "terrace/cluster/facility_location.hpp"
 
-/// k-median: exactly k facilities, which cost nothing, and the least sum of connection costs. As in
-/// the original method of stream clustering: a binary search over the facility cost for a facility
-/// location solution with k facilities, then exchanges of facilities to a local optimum.
+/// k-median: opens exactly k facilities, which cost nothing, for the least sum of connection costs.
+/// As in the original method of stream clustering, a binary search over the facility cost finds a
+/// facility location solution with k facilities, and exchanges of facilities lead to a local
+/// optimum.
 /// Sources: L. O'Callaghan, N. Mishra, A. Meyerson, S. Guha, R. Motwani, Streaming-data algorithms
 /// for high-quality clustering, ICDE 2002; M. Charikar, S. Guha, Improved combinatorial algorithms
 /// for the facility location and k-median problems, FOCS 1999; R. Whitaker, A fast algorithm for
@@ -19,31 +20,32 @@
 namespace terrace::cluster {
 
 struct KMedianOptions {
-  /// Descents by exchanges: the first from the result of the binary search, each further one from
-  /// that with half of the facilities replaced at random. At least 1; the best counts.
+  /// Number of descents by exchanges, at least 1; the best result is returned. The first starts
+  /// from the result of the binary search, each further one from that result with half of the
+  /// facilities replaced at random.
   std::uint32_t restarts = 32;
-  /// Subgradient steps for lower_bound, each O(facilities * clients); 0: no bound.
+  /// Number of subgradient steps for lower_bound, each O(facilities * clients); 0: no bound.
   std::uint32_t bound_steps = 300;
   std::uint64_t seed = 1;
   unsigned threads = 1;  ///< 0: one per core. Does not change the result.
   base::StopCheck check_stop = {};
 };
 
-/// Opening costs of the problem are ignored, and 0 in the solution. Exactly k facilities are
-/// listed, some without clients if necessary. No exchange of one of them for another improves the
-/// solution by more than rounding.
-/// If no facility cost gives exactly k, the closest number is brought to k greedily: the facility
-/// that saves most opens, or the one that costs least to close closes.
+/// Ignores the opening costs of the problem; they are 0 in the solution. The solution lists exactly
+/// k facilities, some without clients if necessary. No exchange of one of them for another improves
+/// it by more than rounding. If no facility cost gives exactly k, the closest number is brought to
+/// k greedily: the facility that saves most opens, or the one that costs least to close closes.
 /// Cost: O(facilities * clients) per round of exchanges, some rounds per restart.
 /// Throws: std::invalid_argument as check() does, if k is 0 or above the number of facilities, or
 /// if restarts is 0.
 [[nodiscard]] FacilitySolution k_median(const FacilityMatrix& problem, std::size_t k,
                                         const KMedianOptions& options = {});
 
-/// The same for points. facility_cost is ignored. Clients farther than outlier_price diagonals from
-/// all facilities are left out and pay that. Distances are computed as needed, in O(points) memory:
-/// a round of exchanges takes points^2 of them, seconds for 20,000 points. For large sets the
-/// binary search considers a random sample of at least 4 k places. A facility always serves itself.
+/// As above for points. Ignores facility_cost. Clients farther than outlier_price diagonals from
+/// all facilities are left out and pay that price. Distances are computed as needed, in O(points)
+/// memory. A round of exchanges takes points^2 of them, which is seconds for 20,000 points. For
+/// large sets the binary search considers a random sample of at least 4 k places. A facility always
+/// serves itself.
 /// Throws: as above, and for a custom distance that is negative or NaN.
 [[nodiscard]] FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
                                         const KMedianOptions& options = {.restarts = 1,

@@ -11,9 +11,9 @@
 
 #include "terrace/cluster/point.hpp"
 
-/// Distances between points. A distance is always measured *from a facility to a client*: in a
-/// field of metrics it belongs to the region of the facility, so it need not be symmetric. Source:
-/// J. Skála, Algorithms for manipulating large geometric data, 4.1 and 7.4.
+/// Distances between points. A distance is always measured *from a facility to a client*. In a
+/// field of metrics it uses the map of the facility's region, so it need not be symmetric.
+/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.1 and 7.4.
 
 namespace terrace::cluster {
 
@@ -22,37 +22,41 @@ using LinearMap = std::array<double, 9>;
 
 inline constexpr LinearMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/// sqrt(sum of squares). The thesis's metric unless it names another.
+/// sqrt(sum of squares). The thesis uses this metric unless it names another.
 struct Euclidean {};
 
-/// The square of the Euclidean distance, as summed by k-means. No triangle inequality.
+/// The square of the Euclidean distance, as summed by k-means. Violates the triangle inequality.
 struct SquaredEuclidean {};
 
-/// (|dx|^p + |dy|^p + |dz|^p)^(1/p); 4.2 of the thesis omits the absolute values and the sum. p = 1
-/// is the city-block distance, p = infinity the maximum distance. Below 1 there is no triangle
-/// inequality.
+/// (|dx|^p + |dy|^p + |dz|^p)^(1/p). Equation 4.2 of the thesis omits the absolute values and the
+/// sum. p = 1 is the city-block distance, p = infinity the maximum distance. Below 1 the triangle
+/// inequality does not hold.
 struct Minkowski {
   double p = 2.0;  ///< positive; may be infinite
 };
 
-/// |M (client - facility)| where M maps an ellipsoid onto the unit sphere: each of its radii has
+/// M (client - facility)|, where M maps an ellipsoid onto the unit sphere, so each of its radii has
 /// length 1. A metric (symmetric, with triangle inequality) in ground units divided by the units of
 /// the semi-axes.
 class Elliptical {
  public:
   /// The ellipse with semi-axis `a` along the direction `angle_degrees`, counter-clockwise from +x,
   /// and `b` across it (both in the unit of the points), axis-parallel in z with `c` along it. So
-  /// M12 is (1/a - 1/b) sin cos; 4.5 of the thesis as printed has the opposite sign, that of a
-  /// clockwise angle. Throws: std::invalid_argument for a semi-axis that is not positive and finite
-  /// or whose reciprocal is infinite, or an angle that is not finite.
+  /// M12 is (1/a - 1/b) sin cos. Equation 4.5 of the thesis as printed has the opposite sign, which
+  /// belongs to a clockwise angle.
+  /// Throws: std::invalid_argument for a semi-axis that is not positive and finite or whose
+  /// reciprocal is infinite, or an angle that is not finite.
   Elliptical(double a, double b, double angle_degrees, double c = 1.0);
-  /// The ellipsoid whose semi-axis i points along row i of `axes`, three orthonormal vectors.
+  /// The ellipsoid whose semi-axis i points along row i of `axes`, which must be three orthonormal
+  /// vectors.
   /// Throws: std::invalid_argument as above, and if the rows are not orthonormal to 1e-9.
   Elliptical(const Point3& semi_axes, const LinearMap& axes);
 
-  /// M: symmetric and positive definite. For the Euclidean metric it is the identity.
+  /// Returns M, which is symmetric and positive definite. For the Euclidean metric M is the
+  /// identity.
   [[nodiscard]] const LinearMap& map() const { return map_; }
-  /// For every vector v, |M v| is at least this times |v|: the reciprocal of the longest semi-axis.
+  /// Returns the reciprocal of the longest semi-axis. For every vector v, |M v| is at least this
+  /// times v|.
   [[nodiscard]] double least_scale() const { return least_scale_; }
 
  private:
@@ -60,33 +64,34 @@ class Elliptical {
   double least_scale_;
 };
 
-/// An elliptical metric in each region, the Euclidean metric outside (7.4). Where regions overlap,
-/// the first in the list applies. A distance is measured with the map of the region of its
-/// *facility*; so distances between regions are not symmetric and violate the triangle inequality.
+/// An elliptical metric in each region and the Euclidean metric elsewhere (7.4). Where regions
+/// overlap, the first in the list applies. A distance is measured with the map of the region of its
+/// *facility*, so distances between regions are not symmetric and violate the triangle inequality.
 class EllipticalField {
  public:
   struct Region {
     Box3 box;  ///< closed
     Elliptical metric;
   };
-  /// The coordinate frame of the boxes, if it is not that of the points: map * point + offset.
+  /// The coordinate frame of the boxes, if it differs from that of the points: map * point +
+  /// offset.
   struct Frame {
     LinearMap map = kIdentityMap;
     Point3 offset{};
   };
-  /// Throws: std::invalid_argument for a box that is empty or has a NaN (infinite sides are
-  /// allowed), naming its index.
+  /// Throws: std::invalid_argument for a box that is empty or contains a NaN (infinite sides are
+  /// allowed). The message gives its index.
   explicit EllipticalField(std::vector<Region> regions,
                            const std::optional<Frame>& frame = std::nullopt);
 
-  /// The map at a position: the field as a function from position to symmetric matrix.
+  /// Returns the map at a position: the field as a function from positions to symmetric matrices.
   [[nodiscard]] const LinearMap& operator()(const Point3& position) const;
-  /// Like Elliptical::least_scale() at that position; 1 outside all regions.
+  /// Returns Elliptical::least_scale() at that position, or 1 outside all regions.
   [[nodiscard]] double least_scale(const Point3& position) const;
-  /// The map that applies in all of `box`, nullopt if there are several: with one map distances
-  /// within the box are symmetric and obey the triangle inequality, and a linear map of the points
-  /// makes them Euclidean. With a frame a uniform box may be missed if a region's border passes
-  /// close by.
+  /// Returns the map that applies in all of `box`, or nullopt if there are several. With one map,
+  /// distances within the box are symmetric and obey the triangle inequality, and a linear map of
+  /// the points makes them Euclidean. With a frame, a uniform box may be missed if the border of a
+  /// region passes close by.
   [[nodiscard]] std::optional<LinearMap> uniform_in(const Box3& box) const;
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
 
@@ -97,8 +102,8 @@ class EllipticalField {
   std::optional<Frame> frame_;
 };
 
-/// A distance supplied by the caller. It must be finite, not negative, and 0 from a point to
-/// itself.
+/// A distance function supplied by the caller. Distances must be finite, not negative, and 0 from a
+/// point to itself.
 struct CustomMetric {
   std::function<double(const Point3& facility, const Point3& client)> distance;
   bool symmetric = false;            ///< distance(a, b) == distance(b, a) always
@@ -108,35 +113,38 @@ struct CustomMetric {
 using Metric =
     std::variant<Euclidean, SquaredEuclidean, Minkowski, Elliptical, EllipticalField, CustomMetric>;
 
-/// Properties that a strategy may rely on.
+/// Properties of a metric on which a strategy may rely.
 [[nodiscard]] bool is_symmetric(const Metric& metric);
 [[nodiscard]] bool obeys_triangle_inequality(const Metric& metric);
-/// The map that makes all distances between points of `box` Euclidean; nullopt if there is none.
+/// Returns the map that makes all distances between points of `box` Euclidean, or nullopt if there
+/// is none.
 [[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Box3& box);
-/// The points as that map of their bounding box has them.
+/// Returns the points as mapped by the linear_map() of their bounding box, or nullopt without one.
 [[nodiscard]] std::optional<std::vector<Point3>> linear_points(const Metric& metric,
                                                                std::span<const Point3> points);
 
-/// The name for messages and files: "euclidean", "squared", "minkowski:P", "elliptical",
-/// "elliptical field", "custom".
+/// Returns the name for messages and files: "euclidean", "squared", "minkowski:P", "elliptical",
+/// "elliptical field" or "custom".
 [[nodiscard]] std::string name_of(const Metric& metric);
 
-/// Throws: std::invalid_argument for a Minkowski p that is not positive, or a missing function.
+/// Throws: std::invalid_argument for a Minkowski p that is not positive, and for a missing
+/// function.
 void check(const Metric& metric);
 
 [[nodiscard]] double distance(const Metric& metric, const Point3& facility, const Point3& client);
 
-/// Length of the diagonal of a box in the metric, for a field in the Euclidean metric; if its four
-/// diagonals differ, the longest. The facility cost is a multiple of it. 0 for an empty box.
+/// Returns the length of the diagonal of a box in the metric, or in the Euclidean metric for a
+/// field. If the four diagonals differ, returns the longest. The facility cost is a multiple of it.
+/// 0 for an empty box.
 [[nodiscard]] double diagonal(const Metric& metric, const Box3& box);
 
-/// Columns of attributes besides the positions (colour, intensity, curvature), each with a weight:
-/// how many ground units a unit of the attribute is worth. They add to the distance as further
-/// axes: under the root for Euclidean and elliptical distances, to the sum of squares or of p-th
-/// powers for the others. Symmetry and the triangle inequality are preserved.
+/// Columns of attributes in addition to the positions (colour, intensity, curvature). Each has a
+/// weight: the number of ground units that one unit of the attribute is worth. Channels are further
+/// axes of the distance: under the root for Euclidean and elliptical distances, in the sum of
+/// squares or of p-th powers for the others. Symmetry and the triangle inequality are preserved.
 struct Channels {
   std::span<const double> values;   ///< points x weights.size(), row by row; finite
-  std::span<const double> weights;  ///< one per channel; not negative, finite
+  std::span<const double> weights;  ///< one per channel; finite and not negative
   [[nodiscard]] std::size_t size() const { return weights.size(); }
 };
 

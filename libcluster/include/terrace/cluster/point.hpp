@@ -3,7 +3,7 @@
 
 #include <terrace/base/box.hpp>
 
-/// Points and boxes, in a Cartesian frame and a unit chosen by the caller.
+/// Points and boxes in a Cartesian frame and a unit chosen by the caller.
 
 namespace terrace::cluster {
 
