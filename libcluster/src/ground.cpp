@@ -8,13 +8,13 @@
 namespace terrace::cluster {
 namespace {
 
-// Points are processed four at a time: twelve independent lanes that the compiler vectorises.
+// Points are processed four at a time, in twelve independent lanes that the compiler vectorises.
 constexpr std::size_t kGroup = 4;
 
 }  // namespace
 
 std::size_t first_not_finite(std::span<const Point3> positions) {
-  // 0 * x is zero for finite x and NaN for all others; a NaN stays in the sum.
+  // 0 * x is zero for finite x and NaN otherwise. A NaN stays in the sum.
   std::array<double, 3 * kGroup> sum{};
   std::size_t i = 0;
   for (; i + kGroup <= positions.size(); i += kGroup) {

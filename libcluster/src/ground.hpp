@@ -23,16 +23,16 @@ inline Point3 mapped(const GroundMap& m, const Point3& v) {
           m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
 }
 
-/// Whether axes stay apart: mapped() then multiplies them by the diagonal alone, up to the signs of
-/// zeros, if all is finite.
+/// Returns whether the map keeps axes separate. For finite values mapped() then only multiplies by
+/// the diagonal, up to the signs of zeros.
 inline bool is_diagonal(const GroundMap& m) {
   return m[1] == 0.0 && m[2] == 0.0 && m[3] == 0.0 && m[5] == 0.0 && m[6] == 0.0 && m[7] == 0.0;
 }
 
 inline double squared_length(const Point3& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
-/// The sum of the ground extents of a box, with the absolute values of the map's entries: no vector
-/// between two points of the box is longer on the ground, and nothing is squared.
+/// Returns the sum of the ground extents of a box, with the absolute values of the map's entries.
+/// No vector between two points of the box is longer on the ground, and nothing is squared.
 inline double ground_extent(const GroundMap& m, const Box3& box) {
   const Point3 size = difference(box.max, box.min);
   double sum = 0.0;
@@ -42,14 +42,14 @@ inline double ground_extent(const GroundMap& m, const Box3& box) {
   return sum;
 }
 
-/// The index of the first point with a coordinate that is not finite, or positions.size().
+/// Returns the index of the first point with a coordinate that is not finite, or positions.size().
 std::size_t first_not_finite(std::span<const Point3> positions);
 
-/// Throws std::invalid_argument, naming the block, if the map is not finite or zero, or if ground
-/// distances within the box are beyond 1e150 (their squares would overflow).
+/// Throws std::invalid_argument if the map is not finite or zero, or if ground distances within the
+/// box are beyond 1e150, so that their squares would overflow. The message names the block.
 void check_ground_map(const GroundMap& map, const Box3& box, unsigned level, std::uint64_t block);
 
-/// out[i] = map * (positions[i] - origin).
+/// Sets out[i] = map * (positions[i] - origin).
 void to_ground(std::span<const Point3> positions, const Point3& origin, const GroundMap& map,
                std::span<Point3> out);
 

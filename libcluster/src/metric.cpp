@@ -56,7 +56,7 @@ double minkowski(double p, double x, double y, double z) {
   const double largest = std::max({x, y, z});
   if (largest == 0.0 || std::isinf(p)) return largest;
   if (p == 1.0) return x + y + z;
-  // Relative to the largest, so that powers neither overflow nor underflow.
+  // Relative to the largest component, so that powers neither overflow nor underflow.
   return largest * base::pow(base::pow(x / largest, p) + base::pow(y / largest, p) +
                                  base::pow(z / largest, p),
                              1.0 / p);
@@ -87,7 +87,7 @@ Elliptical::Elliptical(const Point3& semi_axes, const LinearMap& axes) : map_{},
       }
     }
   }
-  // M = sum over the axes of e e^T / semi-axis: rotating back makes it symmetric.
+  // M = sum over the axes of e e^T / semi-axis. Rotating back makes it symmetric.
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -140,7 +140,7 @@ double EllipticalField::least_scale(const Point3& position) const {
 }
 
 std::optional<LinearMap> EllipticalField::uniform_in(const Box3& box) const {
-  // The bounding box of the box as transformed to the frame.
+  // The bounding box of `box` after its transformation to the frame.
   Box3 around = box;
   if (frame_ && box.min[0] <= box.max[0]) {
     around = Box3{};
@@ -226,7 +226,7 @@ void check(const Metric& metric) {
                                 ": it must be positive (1 and above give a metric)");
   }
   if (const auto* custom = std::get_if<CustomMetric>(&metric); custom && !custom->distance) {
-    throw std::invalid_argument("a custom metric without a function");
+    throw std::invalid_argument("the custom metric has no distance function");
   }
 }
 

@@ -17,14 +17,14 @@ Scaling::Scaling(std::span<const Point3> points) {
     }
   }
   corner = low;
-  // Uses halves, as the difference of two finite numbers may be infinite.
+  // Halves are used, because the difference of two finite numbers may be infinite.
   Point3 half{};
   double longest = 0.0;
   for (unsigned axis = 0; axis < 3; ++axis) {
     half[axis] = high[axis] * 0.5 - low[axis] * 0.5;
     longest = std::max(longest, half[axis]);
   }
-  // Denormal sides: halving may have rounded them to zero.
+  // Halving may have rounded denormal sides to zero.
   if (longest < 0x1p-1000) {
     for (unsigned axis = 0; axis < 3; ++axis) {
       half[axis] = high[axis] - low[axis];

@@ -9,7 +9,7 @@
 namespace terrace::cluster {
 namespace {
 
-// Enough that a thread seldom waits for the turn of a slow block; a block is some 100 kB.
+// Enough that threads seldom wait for a slow block to be committed. A block takes about 100 kB.
 constexpr std::size_t kBlocksPerThread = 4;
 
 }  // namespace
@@ -20,9 +20,9 @@ BlockPipeline::BlockPipeline(unsigned threads, Stages stages)
   try {
     for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this, i] { run_thread(i); });
   } catch (const std::system_error&) {
-    // The system grants no more threads. Those there are do the same work, only later.
+    // No more threads are available. The existing ones do the same work more slowly.
   } catch (const std::bad_alloc&) {
-    // Nor memory for one. Not thrown: those that run would never be joined.
+    // No memory for a thread. Not rethrown, because the running threads would never be joined.
   }
 }
 
@@ -110,7 +110,7 @@ void BlockPipeline::run_one(Lock& lock, unsigned thread) {
 }
 
 void BlockPipeline::commit_ready(Lock& lock) {
-  if (committing_) return;  // that thread looks again before it stops
+  if (committing_) return;  // the committing thread checks again before it stops
   committing_ = true;
   while (BlockPtr block = next_ready()) {
     lock.unlock();
@@ -148,7 +148,7 @@ BlockPipeline::BlockPtr BlockPipeline::next_ready() {
 
 void BlockPipeline::fail(std::exception_ptr failure) {
   queue_.clear();
-  if (failed_) return;  // the first one counts
+  if (failed_) return;  // only the first failure is kept
   failed_ = true;
   failure_ = std::move(failure);
   if (stages_.failed) stages_.failed();

@@ -14,17 +14,17 @@
 
 #include "hierarchy/hierarchy_block.hpp"
 
-/// Blocks processed by several threads and committed in order. Private to the hierarchy.
+/// Processes blocks on several threads and commits them in order. Private to the hierarchy.
 
 namespace terrace::cluster {
 
-/// Passes blocks through two stages: `process`, by all threads concurrently, and `commit`, by one
-/// thread at a time and, within each level, in the order of block numbers 0, 1, ... The owner's
-/// thread is one of the threads: it works whenever it would have to wait, so that with one thread
-/// everything happens there, immediately.
+/// Passes blocks through two stages. All threads run `process` concurrently. One thread at a time
+/// runs `commit`, for each level in the order of block numbers 0, 1, ... The owner's thread is one
+/// of the threads and works whenever it would have to wait. With one thread everything happens
+/// there, immediately.
 ///
-/// The first exception of a stage ends the work: queued blocks are dropped, and the next waiting
-/// call of the owner throws it, once, when all threads are idle.
+/// The first exception of a stage ends the work: queued blocks are dropped, and the owner's next
+/// waiting call throws it, once, when all threads are idle.
 class BlockPipeline {
  public:
   using BlockPtr = std::unique_ptr<HierarchyBlock>;
@@ -36,21 +36,21 @@ class BlockPipeline {
     std::function<void()> failed{};
   };
 
-  /// Starts threads - 1 threads, or as many as the system grants. thread is below `threads`.
+  /// Starts threads - 1 threads, or fewer if the system grants fewer. `thread` is below `threads`.
   BlockPipeline(unsigned threads, Stages stages);
   /// Drops queued blocks and waits for running ones.
   ~BlockPipeline();
   BlockPipeline(const BlockPipeline&) = delete;
   BlockPipeline& operator=(const BlockPipeline&) = delete;
 
-  /// An empty block of that level, recycled or new.
+  /// Returns an empty block of that level, recycled or new.
   BlockPtr take(unsigned level);
-  /// Never waits, so that commit may call it. After a failure it drops the block.
+  /// Never waits, so commit may call it. Drops the block after a failure.
   void submit(BlockPtr block);
 
-  // Only on the owner's thread:
+  // Only for the owner's thread:
 
-  /// Returns when there is room for another block: a few per thread may be in progress.
+  /// Returns when another block may be submitted: a few per thread may be in progress.
   void wait_for_room() { wait_below(limit_); }
   /// Returns when all blocks are committed, including those submitted by commit.
   void wait_for_all() { wait_below(1); }
@@ -65,7 +65,7 @@ class BlockPipeline {
   BlockPtr next_ready();
   void fail(std::exception_ptr failure);
 
-  // Processed blocks whose turn has not come. Few, hence not sorted.
+  // Processed blocks that cannot be committed yet. They are few, so they are not sorted.
   struct Lane {
     std::uint64_t next = 0;
     std::vector<BlockPtr> ready;
@@ -74,12 +74,12 @@ class BlockPipeline {
   const Stages stages_;
   std::size_t limit_;
 
-  std::mutex mutex_;  // guards everything below except threads_
+  std::mutex mutex_;  // guards all members below except threads_
   std::condition_variable work_, progress_;
   std::deque<BlockPtr> queue_;
   std::vector<Lane> lanes_;     // by level
   std::vector<BlockPtr> free_;  // for reuse
-  std::size_t under_way_ = 0;   // submitted, not yet committed
+  std::size_t under_way_ = 0;   // blocks submitted but not yet committed
   std::size_t running_ = 0;     // threads inside run_one()
   bool committing_ = false;
   bool stop_ = false;

@@ -12,7 +12,8 @@
 namespace terrace::cluster {
 namespace {
 
-/// Which cluster each cluster of the level below belongs to, or each point on level 0.
+/// Records the cluster of each point on level 0 and, above, the cluster of each cluster one level
+/// below.
 class ParentSink final : public HierarchySink {
  public:
   explicit ParentSink(std::size_t points) : parents_(1) { parents_[0].resize(points); }
@@ -42,7 +43,7 @@ class ParentSink final : public HierarchySink {
 
   void root(const FinishedBlock&) override {}
 
-  /// The number of clusters on each level below the root.
+  /// Returns the number of clusters on each level below the root.
   [[nodiscard]] const std::vector<std::size_t>& counts() const { return counts_; }
   [[nodiscard]] const std::vector<std::uint32_t>& parents(std::size_t level) const {
     return parents_[level];
@@ -54,7 +55,7 @@ class ParentSink final : public HierarchySink {
     std::size_t count = 0;
   };
 
-  // On level 0 the payload numbers the points; above, a point stands for the cluster that it heads
+  // On level 0 the payload numbers the points. Above, a point represents the cluster that it heads
   // on the level below.
   static std::size_t child(const FinishedBlock& block, std::uint32_t point) {
     if (block.level > 0) {
@@ -69,7 +70,8 @@ class ParentSink final : public HierarchySink {
   std::vector<std::size_t> counts_;
 };
 
-/// Ends of consecutive ranges of `order` that are compact sets of at most `most` points.
+/// Returns the ends of consecutive ranges of `order` that are compact sets of at most `most`
+/// points.
 std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::size_t most,
                                         std::vector<std::uint32_t>& order) {
   std::vector<std::size_t> ends;
@@ -92,7 +94,7 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
     }
     const auto axis =
         static_cast<std::size_t>(std::max_element(extent.begin(), extent.end()) - extent.begin());
-    // Whole blocks on the left.
+    // Splits at whole blocks.
     const std::size_t blocks = (end - begin + most - 1) / most;
     const std::size_t middle = begin + blocks / 2 * most;
     const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
@@ -110,7 +112,7 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
 std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, double size,
                                             std::uint64_t seed, unsigned threads,
                                             const std::function<void(std::uint64_t)>& progress) {
-  if (!(size > 0)) throw std::invalid_argument("the size of clusters must be above 0");
+  if (!(size > 0)) throw std::invalid_argument("the cluster size must be positive");
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   HierarchyOptions options;
@@ -124,7 +126,7 @@ std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, doub
     std::vector<Point3> block;
     std::size_t begin = 0;
     for (const std::size_t end : ends) {
-      // The order within a block is that of the input, not what the selection left.
+      // Restores the input order within a block, which the selection has changed.
       const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
       std::sort(at(begin), at(end));
       block.clear();
@@ -135,9 +137,9 @@ std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, doub
     }
     builder.finish();
   }
-  // All in one block: the root is the only cluster.
+  // If all points fit one block, the root is the only cluster.
   std::vector<std::uint32_t> labels(points.size(), 0);
-  // How many times as large as wanted, or as small.
+  // By which factor the mean size is too large or too small.
   const auto ratio = [size](double mean) { return std::max(mean / size, size / mean); };
   double nearest = ratio(static_cast<double>(std::max<std::size_t>(points.size(), 1)));
   std::size_t levels = 0;

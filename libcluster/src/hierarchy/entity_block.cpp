@@ -33,7 +33,7 @@ void EntityBlockClusterer::run(std::span<const Point3> corners, std::size_t coun
   };
   problem.symmetric = problem.triangle_inequality = true;
   problem.weights = weights;
-  // Where all entities are equal any cost does, but it must be positive.
+  // If all entities are equal any cost works, but it must be positive.
   problem.facility_cost =
       std::clamp(facility_cost * scaling.diagonal, std::numeric_limits<double>::min(), 0x1p1000);
   FacilityOptions search = options;

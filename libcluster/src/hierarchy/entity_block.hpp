@@ -14,9 +14,10 @@ namespace terrace::cluster {
 /// object per thread.
 class EntityBlockClusterer {
  public:
-  /// corners: on the ground, `count` contiguous ones per entity; `ordered` as in PayloadCorners.
-  /// facility_cost: times the diagonal of the bounding box of all corners. The costs in `result`
-  /// are not filled in. Throws: std::invalid_argument as solve(FacilityEntities).
+  /// corners: on the ground, `count` contiguous ones per entity. `ordered` is as in PayloadCorners.
+  /// facility_cost: multiple of the diagonal of the bounding box of all corners. The costs in
+  /// `result` are not filled in.
+  /// Throws: std::invalid_argument as solve(FacilityEntities) does.
   void run(std::span<const Point3> corners, std::size_t count, bool ordered,
            std::span<const double> weights, double facility_cost, const FacilityOptions& options,
            BlockClustering& result);

@@ -15,7 +15,7 @@ struct HierarchyBuilder::Impl {
 HierarchyBuilder::HierarchyBuilder(HierarchyOptions options, HierarchySink& sink) {
   const SimdPath path = options.simd;
   const auto make_cluster = [path]() -> ClusterFunction {
-    // A std::function is copied, a clusterer is not.
+    // Shared, because a std::function must be copyable and a clusterer is not.
     const auto clusterer = std::make_shared<BlockClusterer>(path);
     return [clusterer](std::span<const Point3> points, std::span<const double> weights,
                        const BlockOptions& block_options, BlockClustering& result) {

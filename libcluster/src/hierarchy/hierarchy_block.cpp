@@ -18,7 +18,7 @@
 namespace terrace::cluster {
 namespace {
 
-// Counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
+// Returns counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
 void normalised_weights(std::span<const Summary> heads, std::vector<double>& weights) {
   std::uint64_t total = 0;
   for (const Summary& head : heads) total += head.descendants;
@@ -29,19 +29,19 @@ void normalised_weights(std::span<const Summary> heads, std::vector<double>& wei
   }
 }
 
-// When a block must be clustered again, with four times the facility cost, and at least with that
-// at which neighbours in a block of 10,000 points on a surface are no longer worth a facility each.
+// Each further attempt to cluster a block uses four times the facility cost, and at least the cost
+// at which neighbours in a block of 10,000 points on a surface no longer deserve a facility each.
 // The last attempt's cost exceeds the sum of all weighted distances in any block.
 constexpr int kAttempts = 20;
 constexpr double kLeastRaisedCost = 0x1p-8;
 
-// By counting; the points of each cluster come in ascending order.
+// Counting sort of the points by cluster, in ascending order within each cluster.
 void group_by_cluster(const BlockClustering& clustering, std::vector<std::uint32_t>& first,
                       std::vector<std::uint32_t>& order) {
   const std::vector<std::uint32_t>& cluster_of = clustering.assignment;
   const std::size_t clusters = clustering.facilities.size();
-  // first[c + 2] counts cluster c, then first[c + 1] is where its next point goes; when all points
-  // are placed, that is where the next cluster begins.
+  // first[c + 2] counts the points of cluster c; after summing, first[c + 1] is where its next
+  // point goes. When all points are placed, that is where the next cluster begins.
   first.assign(clusters + 2, 0);
   for (const std::uint32_t c : cluster_of) ++first[c + 2];
   for (std::size_t c = 2; c < first.size(); ++c) first[c] += first[c - 1];
@@ -50,7 +50,7 @@ void group_by_cluster(const BlockClustering& clustering, std::vector<std::uint32
   first.pop_back();
 }
 
-// Points 2 i and 2 i + 1 make cluster i.
+// Makes cluster i of points 2 i and 2 i + 1.
 void pair_up(std::size_t points, BlockClustering& clustering) {
   clustering.facilities.clear();
   for (std::uint32_t i = 0; i < points; i += 2) clustering.facilities.push_back(i);
@@ -116,8 +116,8 @@ void BlockProcessor::process(HierarchyBlock& block) {
   } else if (map == kIdentityMap) {
     cluster(block, block.positions);
   } else {
-    // The minimum is taken off first, so that large offsets cost no digits in the product; not
-    // where the metric depends on the place.
+    // The minimum is subtracted first, so that large offsets cost no digits in the product. That is
+    // not possible if the metric depends on the place.
     const bool anywhere = !std::holds_alternative<EllipticalField>(metric_) &&
                           !std::holds_alternative<CustomMetric>(metric_);
     ground_.resize(block.size());
@@ -177,8 +177,8 @@ void BlockProcessor::read_corners(const HierarchyBlock& block, const Point3& ori
   to_ground(corners_, origin, map, corners_);
 }
 
-// In a block of fewer points they lie farther apart, relative to its diagonal: on a surface as the
-// root of their number.
+// In a block with fewer points they are farther apart relative to its diagonal: on a surface, by
+// the square root of the ratio.
 double BlockProcessor::outlier_price(const HierarchyBlock& block) const {
   if (block.level > 0) return std::numeric_limits<double>::infinity();
   return options_.outlier_price *
@@ -225,7 +225,7 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   pair_up(block.size(), block.clustering);
 }
 
-// What was left out joins the nearest representative, as a member with a mark.
+// Makes each outlier a marked member of the cluster with the nearest representative.
 void BlockProcessor::place_outliers(HierarchyBlock& block, std::span<const Point3> ground) {
   BlockClustering& clustering = block.clustering;
   for (std::size_t i = 0; i < block.size(); ++i) {

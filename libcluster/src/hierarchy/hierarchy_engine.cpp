@@ -55,7 +55,8 @@ HierarchyOptions checked(HierarchyOptions options) {
     throw std::invalid_argument("outlier_price must be positive");
   }
   if (std::isfinite(options.outlier_price) && !options.mark_outlier) {
-    throw std::invalid_argument("there is an outlier_price but no function that marks outliers");
+    throw std::invalid_argument(
+        "outlier_price is set, but there is no function that marks outliers");
   }
   check_corners(options);
   options.threads = std::clamp(options.threads, 1u, kMostBlocksAtOnce);
@@ -73,7 +74,7 @@ HierarchyEngine::HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
       pipeline_(options_.threads,
                 {[this](HierarchyBlock& block, unsigned thread) { process(block, thread); },
                  [this](HierarchyBlock& block) { commit(block); }, options_.on_failure}) {
-  // No thread looks at the processors before the first block is submitted.
+  // No thread uses the processors before the first block is submitted.
   processors_.reserve(options_.threads);
   for (unsigned i = 0; i < options_.threads; ++i) {
     processors_.emplace_back(options_, make_cluster());
@@ -81,7 +82,7 @@ HierarchyEngine::HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
 }
 
 void HierarchyEngine::check_open() {
-  if (ended_) throw std::logic_error("the hierarchy is finished or has failed; it takes no more");
+  if (ended_) throw std::logic_error("the hierarchy has ended or failed; it accepts no points");
 }
 
 void HierarchyEngine::push(std::span<const Point3> positions, std::span<const std::byte> payload) {
@@ -98,7 +99,7 @@ void HierarchyEngine::push(std::span<const Point3> positions, std::span<const st
   }
   const std::size_t held = base_.open ? base_.open->size() : 0;
   const bool fits_a_block = positions.size() <= options_.block_size;
-  ended_ = true;  // should anything below throw
+  ended_ = true;  // in case anything below throws
   if (positions.empty()) pipeline_.wait_for_room();
   if (fits_a_block && held + positions.size() > options_.block_size) submit(base_);
   while (!positions.empty()) {
@@ -151,8 +152,8 @@ void HierarchyEngine::commit(HierarchyBlock& block) {
 HierarchyResult HierarchyEngine::finish() {
   check_open();
   ended_ = true;
-  // A level that has submitted a block has an open one as well. wait_for_all() makes the level
-  // above complete; it exists then.
+  // A level that has submitted a block also has an open one. wait_for_all() completes the level
+  // above, which exists by then.
   unsigned top = 0;
   for (; levels_[top].blocks > 0; ++top) {
     submit(levels_[top]);
@@ -173,10 +174,10 @@ HierarchyResult HierarchyEngine::finish() {
 }
 
 void HierarchyEngine::deliver_root(Level& level) {
-  if (!level.open) level.open = pipeline_.take(level.level);  // no points at all
+  if (!level.open) level.open = pipeline_.take(level.level);  // there were no points
   HierarchyBlock& block = *level.open;
   if (block.level == 0 && block.size() > 0 && std::isfinite(options_.outlier_price)) {
-    processors_.front().process(block);  // only for the marks: nothing else is kept of it
+    processors_.front().process(block);  // only to mark outliers; other results are discarded
     outliers_ += block.outliers;
   }
   block.clustering.facilities.assign(1, kNoRepresentative);

@@ -19,7 +19,7 @@ namespace terrace::cluster {
 
 class HierarchyEngine {
  public:
-  /// make_cluster is called once per thread of the options.
+  /// Calls make_cluster once per thread of the options.
   HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
                   const std::function<ClusterFunction()>& make_cluster);
 
@@ -30,15 +30,15 @@ class HierarchyEngine {
  private:
   using BlockPtr = BlockPipeline::BlockPtr;
 
-  // A level is a stream of points cut into blocks. `open` is the block for the next point; it is
-  // submitted when a point arrives that does not fit, so that a level of a single block becomes the
-  // root.
+  // A level is a stream of points cut into blocks. `open` is the block for the next point. It is
+  // submitted only when a point arrives that does not fit, so that a level of a single block
+  // becomes the root.
   struct Level {
     unsigned level = 0;
     BlockPtr open;
     std::uint64_t points = 0;
-    std::uint64_t blocks = 0;    // submitted
-    std::uint64_t clusters = 0;  // committed
+    std::uint64_t blocks = 0;    // blocks submitted
+    std::uint64_t clusters = 0;  // clusters committed
   };
 
   void append(std::span<const Point3> positions, std::span<const std::byte> payload);
@@ -50,14 +50,14 @@ class HierarchyEngine {
 
   const HierarchyOptions options_;
   HierarchySink& sink_;
-  std::vector<BlockProcessor> processors_;  // by thread
-  // Level 0 belongs to the caller of push(), except `clusters`; that and the levels above belong to
-  // the committing thread. A deque, so that adding a level does not move `base_`.
+  std::vector<BlockProcessor> processors_;  // one per thread
+  // Level 0 belongs to the caller of push(), except for `clusters`. That and the higher levels
+  // belong to the committing thread. This is a deque, so that adding a level does not move `base_`.
   std::deque<Level> levels_;
   Level& base_;
-  std::uint64_t outliers_ = 0;  // in committed blocks
+  std::uint64_t outliers_ = 0;  // outliers in committed blocks
   bool ended_ = false;
-  BlockPipeline pipeline_;  // last: its threads use all of the above
+  BlockPipeline pipeline_;  // last, because its threads use all members above
 };
 
 }  // namespace terrace::cluster

@@ -17,10 +17,10 @@
 namespace terrace::cluster {
 namespace {
 
-// Each round takes points out of the block; nearly all blocks are done after two.
+// Each round removes outliers from the block. Nearly all blocks need only two.
 constexpr int kRounds = 16;
 
-// Drops the points that the clustering leaves out. False if there were none.
+// Drops the points that the clustering leaves out. Returns false if there were none.
 bool drop_outliers(const BlockClustering& clustering, std::size_t channel_count,
                    std::vector<Point3>& points, std::vector<double>& channels,
                    std::vector<std::uint32_t>& numbers) {
@@ -63,7 +63,7 @@ void MetricBlockClusterer::run(const FacilityPoints& problem, const FacilityOpti
   }
   if (numbers_.size() == count) return;
 
-  // Back to the numbers of the block.
+  // Converts the result back to the numbers of the block.
   for (std::uint32_t& facility : result.facilities) facility = numbers_[facility];
   std::vector<std::uint32_t> assignment(count, kOutlier);
   for (std::size_t i = 0; i < numbers_.size(); ++i) assignment[numbers_[i]] = result.assignment[i];

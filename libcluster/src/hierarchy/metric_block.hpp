@@ -11,17 +11,17 @@
 
 namespace terrace::cluster {
 
-/// Clusters the blocks of a hierarchy under any metric, with channels and outliers: by
-/// BlockClusterer if that is possible and no other strategy is requested, otherwise by solve(). One
+/// Clusters the blocks of a hierarchy under any metric, with channels and outliers. Uses
+/// BlockClusterer if that is possible and no other strategy is requested, otherwise solve(). One
 /// object per thread.
 class MetricBlockClusterer {
  public:
   explicit MetricBlockClusterer(SimdPath path) : clusterer_(path) {}
 
-  /// problem: points on the ground; its costs are multiples of the diagonal of the points that are
-  /// not left out. Weights must be empty if it has an outlier price. assignment is kOutlier for
-  /// points left out. The costs in `result` are not filled in. Throws: std::invalid_argument as
-  /// solve().
+  /// problem: points on the ground. Its costs are multiples of the diagonal of the points that are
+  /// not left out. Weights must be empty if it has an outlier price. Points left out are assigned
+  /// to kOutlier. The costs in `result` are not filled in.
+  /// Throws: std::invalid_argument as solve() does.
   void run(const FacilityPoints& problem, const FacilityOptions& options, BlockClustering& result);
 
  private:
@@ -29,9 +29,9 @@ class MetricBlockClusterer {
                 BlockClustering& result);
 
   BlockClusterer clusterer_;
-  std::vector<Point3> points_;  // those not left out
+  std::vector<Point3> points_;  // the points that are not left out
   std::vector<double> channels_;
-  std::vector<std::uint32_t> numbers_;  // of points_ in the block
+  std::vector<std::uint32_t> numbers_;  // for each of points_, its number in the block
 };
 
 }  // namespace terrace::cluster

@@ -17,7 +17,7 @@ namespace terrace::cluster {
 void leave_out(const FacilityPoints& problem, BlockClustering& clustering) {
   if (std::isinf(problem.outlier_price)) return;
   const SearchFrame frame = make_frame(problem);
-  const double weight = frame.weights.front();  // all are equal
+  const double weight = frame.weights.front();  // all weights are equal
   const double price = frame.outlier_price;
   const double facility_cost = frame.facility_cost / weight;
   const std::vector<std::uint32_t>& facilities = clustering.facilities;
@@ -36,7 +36,7 @@ void leave_out(const FacilityPoints& problem, BlockClustering& clustering) {
     if (d > price) clustering.assignment[i] = kOutlier;
   }
 
-  // Clusters that would rather not be, the smallest first.
+  // Clusters that cost more than leaving out all their members, smallest first.
   std::vector<std::uint32_t> doubtful;
   std::vector<char> listed(facilities.size(), 0);
   for (std::uint32_t c = 0; c < facilities.size(); ++c) {

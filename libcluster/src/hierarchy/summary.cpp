@@ -4,27 +4,28 @@
 #include "ground.hpp"
 
 // A distance is computed as |map * (a - b)|. With u = 2^-53 the difference is off by at most u,
-// each row of the product by 4 u, the length by 3 u more, all relative to the sum of the absolute
-// terms, which ground_extent() of a box around both points bounds. So 16 u times that extent, added
-// to the result, makes it a bound from above; where all points are equal it adds nothing.
+// each row of the product by 4 u, and the length by 3 u more, all relative to the sum of the
+// absolute terms, which ground_extent() of a box around both points bounds. So adding 16 u times
+// that extent makes the result an upper bound. It adds nothing if all points are equal.
 
 namespace terrace::cluster {
 namespace {
 
 constexpr double kRounding = 0x1p-49;
 
-// Below this, the square of a distance may have lost digits or all of itself.
+// Below this, the square of a distance may have lost some or all of its digits.
 constexpr double kSmallestSquare = 1e-280;
-constexpr double kSmallestLength = 1e-139;  // more than its root
+constexpr double kSmallestLength = 1e-139;  // more than the square root of kSmallestSquare
 
-// The length whose square is `squared`, never too small, if it is one between points of `box`.
+// Returns an upper bound of the length whose square is `squared`, between two points of `box`.
 double length_bound(double squared, const GroundMap& map, const Box3& box) {
   const double extent = ground_extent(map, box);
   const double length = squared < kSmallestSquare ? kSmallestLength : std::sqrt(squared);
   return std::min(extent, length + kRounding * extent);
 }
 
-// From `from` to the farthest corner of the box: no point of the box is farther.
+// Returns the distance from `from` to the farthest corner of the box. No point of the box is
+// farther.
 double farthest_corner(const Point3& from, const GroundMap& map, const Box3& box) {
   const Point3 low = difference(box.min, from);
   const Point3 high = difference(box.max, from);
@@ -37,7 +38,7 @@ double farthest_corner(const Point3& from, const GroundMap& map, const Box3& box
   return length_bound(squared, map, box);
 }
 
-// ground: of a difference
+// ground: returns the ground length of a difference vector.
 template <class Ground>
 Summary summarise(std::span<const Point3> positions, std::span<const std::uint32_t> members,
                   std::uint32_t representative, const GroundMap& map, Ground ground) {

@@ -27,7 +27,7 @@ std::uint64_t checked_band_bytes(std::size_t n, std::size_t bytes_per_entry,
                                 " points are too many for a matrix of distances: it may have at "
                                 "most 2^31 - 1 rows");
   }
-  // Below 2^31 * 2^30 * 8, so it cannot overflow.
+  // The product is below 2^31 * 2^30 * 8, so it cannot overflow.
   const std::uint64_t bytes = std::uint64_t{n} * band_width(n) * bytes_per_entry;
   constexpr std::uint64_t kAddressable = std::numeric_limits<std::size_t>::max() / 2;
   if (memory_limit == 0 || memory_limit > kAddressable) memory_limit = kAddressable;
@@ -35,7 +35,7 @@ std::uint64_t checked_band_bytes(std::size_t n, std::size_t bytes_per_entry,
     throw std::invalid_argument("the distances of " + std::to_string(n) + " points would need " +
                                 std::to_string(bytes) + " bytes of memory, but the limit is " +
                                 std::to_string(memory_limit) +
-                                "; take float entries or fewer points, for example one of each "
+                                "; use float entries or fewer points, for example one from each "
                                 "cluster of a finer clustering");
   }
   return bytes;
@@ -46,11 +46,12 @@ T* BandMatrix<T>::allocate(std::uint64_t bytes) {
   if (bytes == 0) return nullptr;
   const std::size_t alignment = bytes < kHugePage ? 64 : kHugePage;
   const std::size_t rounded = (static_cast<std::size_t>(bytes) + 63) / 64 * 64;
-  // aligned_alloc() requires a multiple of the alignment, which would waste up to two megabytes.
+  // Not aligned_alloc(), which requires a multiple of the alignment and would waste up to two
+  // megabytes.
   void* data = nullptr;
   if (posix_memalign(&data, alignment, rounded) != 0) throw std::bad_alloc();
 #ifdef __linux__
-  // Columns are read as well as rows: with small pages each entry of a column would miss the TLB.
+  // Columns are read as well as rows. With small pages each entry of a column would miss the TLB.
   if (alignment == kHugePage) madvise(data, rounded, MADV_HUGEPAGE);
 #endif
   return static_cast<T*>(data);

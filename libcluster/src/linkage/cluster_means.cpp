@@ -7,8 +7,8 @@ namespace {
 /// The factor of a squared distance in Ward's method: 2 |a| |b| / (|a| + |b|). Exactly symmetric.
 double ward_factor(double a, double b) { return 2.0 * a * b / (a + b); }
 
-/// Subtracts the least coordinate of an axis if that is exact for all: the mean of places far from
-/// the origin would lose digits that their differences have.
+/// Subtracts the least coordinate of an axis if that is exact for all points. Otherwise means of
+/// places far from the origin would lose digits that their differences have.
 void move_to_origin(std::vector<double>& axis) {
   if (axis.empty()) return;
   const double low = *std::min_element(axis.begin(), axis.end());
@@ -52,7 +52,7 @@ NearCluster ClusterMeans::nearest(std::uint32_t x, std::uint32_t begin, std::uin
   kernels_.distances(axis_[0].data() + begin, axis_[1].data() + begin, axis_[2].data() + begin,
                      count, axis_[0][x], axis_[1][x], axis_[2][x], row_.data());
   if (method_ == LinkageMethod::ward) {
-    // Dead ones become NaN, which is not nearer than anything.
+    // Dead slots become NaN, which is never nearer than anything.
     const double own = points(x);
     const double* const others = points() + begin;
     for (std::size_t k = 0; k < count; ++k) row_[k] *= ward_factor(others[k], own);
@@ -68,7 +68,7 @@ void ClusterMeans::join(std::uint32_t low, std::uint32_t high, double /*between*
   const bool middle = method_ == LinkageMethod::median;
   const double a = middle ? 1.0 : points(low), b = middle ? 1.0 : points(high);
   for (std::vector<double>& axis : axis_) {
-    // Equal places stay where they are.
+    // Equal places do not move.
     axis[high] = axis[low] == axis[high] ? axis[high] : (a * axis[low] + b * axis[high]) / (a + b);
     axis[low] = std::numeric_limits<double>::infinity();
   }

@@ -8,12 +8,14 @@
 #include "linkage/linkage_points.hpp"
 #include "terrace/cluster/linkage.hpp"
 
-/// Clusters of points, each represented by one place: no matrix of distances. Private to linkage.
+/// Clusters of points, each represented by one place instead of a matrix of distances. Private to
+/// linkage.
 
 namespace terrace::cluster {
 
-/// Distances are squares, of the scaled points. Ward: the mean, and the growth of the sum of
-/// squares; centroid: the mean; median: the middle between the places of the two parts.
+/// Distances are squares, of the scaled points. For ward the place is the mean, and the distance is
+/// the growth of the sum of squares. For centroid the place is the mean. For median it is midway
+/// between the places of the two parts.
 class ClusterMeans : public ClusterSlots {
  public:
   ClusterMeans(const LinkagePoints& points, LinkageMethod method, const LinkageOptions& options);
@@ -29,7 +31,7 @@ class ClusterMeans : public ClusterSlots {
   const LinkagePoints& points_of_;
   const LinkageMethod method_;
   const LinkageKernels<double>& kernels_;
-  std::vector<double> axis_[3];  ///< infinite if dead
+  std::vector<double> axis_[3];  ///< infinite for dead slots
   std::vector<double> row_;      ///< scratch memory
 };
 

@@ -12,15 +12,17 @@
 
 #include "terrace/cluster/dendrogram.hpp"
 
-/// Agglomeration by nearest clusters, over any distances of clusters. Private to linkage.
+/// Agglomeration of nearest clusters, for any distances between clusters. Private to linkage.
 ///
-/// Clusters are in slots, at first one point each. When two merge, the higher slot holds both and
-/// the lower one is dead, as in SciPy. A type of clusters derives from ClusterSlots and has:
+/// Clusters are in slots, initially one point each. When two merge, the higher slot holds the
+/// result and the lower one is dead, as in SciPy. A type of clusters derives from ClusterSlots and
+/// has:
 /// - distance(a, b), symmetric to the last bit;
-/// - nearest(x, begin, end, best): the nearest live slot to x within [begin, end) if it is strictly
-///   nearer than `best`, else `best`; the first one of equally near ones;
-/// - join(low, high, between): updates the distances of `high` for both, `between` apart;
-/// - move(kept): the slots `kept` become 0, 1, ..;
+/// - nearest(x, begin, end, best): returns the nearest live slot to x within [begin, end) if it is
+///   strictly nearer than `best`, otherwise `best`. On ties the first slot wins.
+/// - join(low, high, between): updates the distances of `high` for the merged cluster. `between` is
+///   the distance of the two.
+/// - move(kept): the slots `kept` become 0, 1, ..
 /// - height(distance), as in the dendrogram.
 
 namespace terrace::cluster {
@@ -41,10 +43,10 @@ class ClusterSlots {
   }
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(name_.size()); }
   [[nodiscard]] bool alive(std::uint32_t slot) const { return points_[slot] > 0.0; }
-  /// The number of points; 0 if dead.
+  /// Returns the number of points, or 0 for a dead slot.
   [[nodiscard]] double points(std::uint32_t slot) const { return points_[slot]; }
   [[nodiscard]] const double* points() const { return points_.data(); }
-  /// A point of the cluster.
+  /// Returns a point of the cluster.
   [[nodiscard]] std::uint32_t name(std::uint32_t slot) const { return name_[slot]; }
 
   /// To be called once per so many distances; throws what the check throws.
@@ -69,7 +71,7 @@ class ClusterSlots {
   base::StopTicks ticks_;
 };
 
-/// Merges two slots. Returns the link, at the given height.
+/// Merges two slots. Returns the link with its height.
 template <class Clusters>
 Link merge_slots(Clusters& clusters, std::uint32_t a, std::uint32_t b, double distance) {
   const auto [low, high] = std::minmax({a, b});
@@ -79,8 +81,8 @@ Link merge_slots(Clusters& clusters, std::uint32_t a, std::uint32_t b, double di
   return link;
 }
 
-/// The live slots, if at least half of the slots are dead and there are enough to be worth moving;
-/// else empty.
+/// Returns the live slots if at least half of the slots are dead and there are enough to be worth
+/// moving, otherwise an empty list.
 template <class Clusters>
 std::vector<std::uint32_t> slots_to_keep(const Clusters& clusters, std::uint32_t alive) {
   constexpr std::uint32_t kWorthMoving = 64;
@@ -93,10 +95,11 @@ std::vector<std::uint32_t> slots_to_keep(const Clusters& clusters, std::uint32_t
   return kept;
 }
 
-/// All merges where a merge never brings the new cluster nearer to others than its parts were: a
-/// chain leads from cluster to nearest cluster until two are each other's nearest; these merge.
-/// O(n^2) distances. Equally near: the cluster before in the chain, then the lowest slot; a chain
-/// begins at the lowest live slot. Links are in no particular order, parts before wholes.
+/// Returns all merges, for methods in which a merge never brings the new cluster nearer to others
+/// than its parts were. A chain leads from cluster to nearest cluster until two are each other's
+/// nearest; these merge. Takes O(n^2) distances. On ties the previous cluster of the chain is
+/// preferred, then the lowest slot. A chain begins at the lowest live slot. Links are in no
+/// particular order, except that parts come before wholes.
 template <class Clusters>
 std::vector<Link> chain_links(Clusters& clusters) {
   std::vector<Link> links;
@@ -132,7 +135,7 @@ std::vector<Link> chain_links(Clusters& clusters) {
     cut(chain.size() - 2);
     const auto [low, high] = std::minmax({x, near.cluster});
     Link link = merge_slots(clusters, low, high, near.distance);
-    // Rounding must not sort a whole before its parts.
+    // Keeps rounding from sorting a whole before its parts.
     link.height = height[high] = std::max({link.height, height[low], height[high]});
     links.push_back(link);
     --alive;
@@ -152,14 +155,14 @@ std::vector<Link> chain_links(Clusters& clusters) {
   return links;
 }
 
-/// All merges in their order, for any distances: each joins the two nearest clusters; of equally
-/// near pairs that of the lowest slots. O(n^2) distances if each cluster is the nearest of few
-/// others, which is always so for places in space.
+/// Returns all merges in their order, for any distances. Each joins the two nearest clusters, on
+/// ties the pair of the lowest slots. Takes O(n^2) distances if each cluster is the nearest of few
+/// others, which always holds for places in space.
 template <class Clusters>
 std::vector<Link> nearest_pair_links(Clusters& clusters) {
   std::vector<Link> links;
-  // The first nearest slot after each slot, cyclically: so equal points form a chain, of which a
-  // merge concerns few, and the least pair is found first.
+  // The first nearest slot after each slot, cyclically. So equal points form a chain in which a
+  // merge affects few entries, and the least pair is found first.
   std::vector<NearCluster> nearest(clusters.size());
   const auto find = [&](std::uint32_t x) {
     clusters.tick(clusters.size());

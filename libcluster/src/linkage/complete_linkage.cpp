@@ -22,7 +22,7 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   const LinkagePoints linkage_points(points);
   BandMatrix<T> matrix(points.size(), options.memory_limit);
   if (points.size() < 2) return make_dendrogram(points.size(), {});
-  // In the order of a kD-tree most clusters that merge have nearby rows in the matrix.
+  // In the order of a kD-tree, most clusters that merge have nearby rows in the matrix.
   std::vector<std::uint32_t> all(points.size());
   std::iota(all.begin(), all.end(), 0u);
   const LinkageTree tree(linkage_points.scaled(), all, options.threads, options.check_stop);
@@ -41,8 +41,8 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   return make_dendrogram(points.size(), links, options.check_stop);
 }
 
-/// An order in which close things are close: recursive halving by which of two distant things is
-/// nearer. Three calls of `distance` per thing and level.
+/// Sorts items so that close ones are close in the order. Halves recursively by which of two
+/// distant items is nearer. Calls `distance` three times per item and level.
 void order_by_distance(std::span<std::uint32_t> things, const PairDistance& distance) {
   constexpr std::size_t kEnough = 8;
   if (things.size() <= kEnough) return;
@@ -89,7 +89,7 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
     check_distance(value, std::numeric_limits<T>::max(), i, j);
     return value;
   };
-  // As for points: clusters that merge should have nearby rows in the matrix.
+  // As for points, clusters that merge should have nearby rows in the matrix.
   std::vector<std::uint32_t> thing(count);
   std::iota(thing.begin(), thing.end(), 0u);
   base::StopTicks ticks(options.check_stop);
@@ -99,7 +99,7 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
   });
   CompleteRounds<T> rounds(matrix, kernels, options);
   std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
-    // The second copies are never read.
+    // Second copies of a pair are never read.
     const bool second_copy = count % 2 == 0 && i >= count / 2;
     for (std::size_t k = 0; k < matrix.width() - (second_copy ? 1 : 0); ++k) {
       row[k] = static_cast<T>(checked(thing[i], thing[band_partner(count, {i, k})]));

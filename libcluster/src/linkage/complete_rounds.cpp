@@ -12,8 +12,8 @@ namespace terrace::cluster {
 namespace {
 
 constexpr std::size_t kRowsPerBlock = 32;
-constexpr std::size_t kThreadsFrom = 512;  ///< with fewer clusters threads cost more than they save
-/// a round that merges less than 1/8 is followed by the chain
+constexpr std::size_t kThreadsFrom = 512;  ///< with fewer clusters threads do not pay off
+/// After a round that merges less than 1/8 of the clusters, the chain takes over.
 constexpr std::size_t kChainBelow = 8;
 
 constexpr std::uint32_t kPairsPerCheck = 256;
@@ -89,7 +89,7 @@ void CompleteRounds<T>::begin_minima(std::size_t count) {
   }
 }
 
-/// For cluster c out of `count`.
+/// Records the minima of the row of cluster c, one of `count` clusters.
 template <class T>
 void CompleteRounds<T>::note_minima(std::uint32_t c, const Cluster& cluster, std::uint32_t count,
                                     Columns& columns) {
@@ -107,7 +107,8 @@ void CompleteRounds<T>::note_minima(std::uint32_t c, const Cluster& cluster, std
   ahead_[c] = {least, place};
 }
 
-/// Each thread took rows in ascending order, so the first on ties is that of least number.
+/// Combines the threads' minima. Each thread took rows in ascending order, so the first on ties is
+/// the one with the lowest number.
 template <class T>
 void CompleteRounds<T>::end_minima() {
   behind_.assign(ahead_.size(), {std::numeric_limits<T>::infinity(), kNone});
@@ -128,9 +129,9 @@ const typename CompleteRounds<T>::Nearest& CompleteRounds<T>::nearest(std::uint3
   return behind_[c].distance < ahead_[c].distance ? behind_[c] : ahead_[c];
 }
 
-/// Pairs up clusters that are each other's nearest. At equal distances, which are everywhere on
-/// regular grids, a cluster can choose between the first ahead and the first behind, and takes
-/// whichever is left: if all insisted on one of their nearest, few pairs would agree.
+/// Pairs up clusters that are each other's nearest. On ties, which are everywhere on regular grids,
+/// a cluster can choose between the first ahead and the first behind, and takes whichever is free.
+/// If all insisted on one of their nearest, few pairs would agree.
 template <class T>
 std::size_t CompleteRounds<T>::match() {
   partner_.assign(size(), kNone);
@@ -154,7 +155,7 @@ bool CompleteRounds<T>::pair_up(std::uint32_t c, const Nearest& candidate) {
   return true;
 }
 
-/// The new clusters, in the order of their first parts.
+/// Lists the new clusters in the order of their first parts.
 template <class T>
 void CompleteRounds<T>::list_parts() {
   first_.clear();
@@ -178,14 +179,14 @@ void CompleteRounds<T>::list_parts() {
   firsts_before_[size()] = static_cast<std::uint32_t>(first_.size());
 }
 
-/// The row of the new cluster k, after bring_in().
+/// Makes the row of the new cluster k. bring_in() must have run.
 template <class T>
 typename CompleteRounds<T>::Cluster CompleteRounds<T>::shrunk(std::uint32_t k, Columns& columns) {
   const std::uint32_t a = first_[k];
   const std::uint32_t m = size();
   const Pieces own = pieces(a);
   T* const wide = columns.buffer.data();
-  // Zero where the row of a has no entry, so that it is never the larger one.
+  // Zero where the row of a has no entry, so that the zero is never the larger value.
   std::fill(wide + own.wrapped.end, wide + a + 1, T{0});
   std::fill(wide + own.after.end, wide + m, T{0});
   std::copy_n(own.after.values, own.after.end - own.after.begin, wide + own.after.begin);
@@ -232,13 +233,13 @@ void CompleteRounds<T>::shrink() {
   end_minima();
 }
 
-// Entries of merged clusters that are in the rows of others: if close clusters have close rows
-// these are few, but each is in a different row.
+// Entries of merged clusters can be in the rows of other clusters. If close clusters have close
+// rows these are few, but each is in a different row.
 
-/// shrunk() makes the row of the new cluster k from those of its parts. Entries that it needs from
-/// rows of others are brought in here, into the row of the first part. This only reads entries with
-/// a second part, and only writes entries of two first parts, so all clusters may do it
-/// concurrently.
+/// shrunk() makes the row of the new cluster k from the rows of its parts. This function copies the
+/// entries that shrunk() needs from rows of other clusters into the row of the first part. It only
+/// reads entries with a second part, and only writes entries of two first parts, so all clusters
+/// may do it concurrently.
 template <class T>
 void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
   std::vector<std::uint32_t>& others = columns.others;
@@ -251,7 +252,7 @@ void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
     action(entry(second_[k], c));
     if (second_[other] != c) action(entry(second_[k], second_[other]));
   };
-  // Each is in another row, far from the last.
+  // Each entry is in another row, far from the last.
   for (std::size_t i = 0; i < others.size(); ++i) {
     if (i + kPrefetch < others.size()) {
       for_entries(others[i + kPrefetch], [](const T& from) { __builtin_prefetch(&from); });
@@ -262,8 +263,9 @@ void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
   }
 }
 
-/// New clusters whose entry belongs to the row of k and that have an entry of their parts neither
-/// in the row of the first part of k nor, in a column of that row, in the row of the second.
+/// Lists the new clusters whose entry belongs to the row of k and for which an entry of their parts
+/// is neither in the row of the first part of k nor, in a column of that row, in the row of the
+/// second.
 template <class T>
 void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const {
   others.clear();
@@ -289,7 +291,7 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
       list(end - m + 1, std::min(length, begin));
     }
   }
-  // Pairs of which one is in the row of a and the other is not.
+  // Pairs with one cluster in the row of a and the other not.
   for (std::size_t p = 0; p < pair_first_.size(); p += kPairsPerCheck) {
     const std::size_t count = std::min<std::size_t>(kPairsPerCheck, pair_first_.size() - p);
     if (kernels_.straddling(pair_first_.data() + p, pair_second_.data() + p, count, a, length, m) ==
@@ -304,13 +306,13 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
   }
 }
 
-// The nearest-neighbour chain: from any cluster to its nearest, on to the nearest of that, until
-// two are each other's nearest and merge. Each step examines m distances, half of them one per row,
-// so it is used only if rounds would merge too few clusters.
+// The nearest-neighbour chain goes from any cluster to its nearest, from there to the next nearest,
+// and so on, until two are each other's nearest and merge. Each step examines m distances, half of
+// them in different rows, so it is used only if rounds would merge too few clusters.
 
-/// Merges until three quarters of the clusters are left, and lists those. Entries of clusters that
-/// are gone are infinite. O(m^2): a cluster joins the chain once for itself and at most twice for
-/// each merge.
+/// Merges until three quarters of the clusters are left, and lists those. Entries of merged
+/// clusters become infinite. Takes O(m^2): a cluster joins the chain once for itself and at most
+/// twice for each merge.
 template <class T>
 void CompleteRounds<T>::chain() {
   const std::uint32_t m = size();
@@ -326,7 +328,7 @@ void CompleteRounds<T>::chain() {
       chain.push_back(start);
     }
     const std::uint32_t c = chain.back();
-    // On ties take the last one on the chain: otherwise it might never end.
+    // On ties takes the previous cluster of the chain. Otherwise the chain might never end.
     Nearest best{std::numeric_limits<T>::infinity(), kNone};
     if (chain.size() > 1) best = {entry(c, chain[chain.size() - 2]), chain[chain.size() - 2]};
     best = nearest_of(c, best);
@@ -351,7 +353,7 @@ void CompleteRounds<T>::chain() {
   second_ = first_;
 }
 
-/// The nearest to c, or `best` if none is nearer than that.
+/// Returns the cluster nearest to c, or `best` if no cluster is nearer than that.
 template <class T>
 typename CompleteRounds<T>::Nearest CompleteRounds<T>::nearest_of(std::uint32_t c, Nearest best) {
   const Pieces own = pieces(c);
@@ -361,7 +363,7 @@ typename CompleteRounds<T>::Nearest CompleteRounds<T>::nearest_of(std::uint32_t 
       if (distance < best.distance) best = {distance, j};
     }
   }
-  // All others have c in their rows.
+  // All other clusters have c in their rows.
   const auto look = [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t j = begin; j < end; ++j) {
       const T distance = clusters_[j].row[offset(j, c)];

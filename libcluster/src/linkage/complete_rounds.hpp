@@ -19,21 +19,21 @@ namespace terrace::cluster {
 /// Complete linkage over a band matrix, which it consumes.
 ///
 /// Clusters are numbered 0..m-1 along the matrix. The row of cluster c holds its distances to the
-/// `length` clusters that follow, modulo m. When clusters merge or disappear, rows shrink in place:
-/// a pair always stays in the row of the same cluster, so lengths begin to differ, but no entry
+/// `length` clusters that follow, modulo m. When clusters merge or disappear, rows shrink in place.
+/// A pair always stays in the row of the same cluster, so lengths begin to differ, but no entry
 /// ever moves to another row. A new cluster takes the place of the first of its two parts.
 template <class T>
 class CompleteRounds {
  public:
-  /// Makes the entries of row i of the matrix, or checks them; called for several rows
-  /// concurrently, in any order.
+  /// Makes or checks the entries of row i of the matrix. Called for several rows concurrently, in
+  /// any order.
   using FillRow = std::function<void(std::size_t i, T* row)>;
 
-  /// options: outlive this object.
+  /// options: must outlive this object.
   CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels,
                  const LinkageOptions& options);
-  /// All merges, by the first rows of the clusters. If a pair has two copies (even n), only the
-  /// copy in the upper half of the matrix counts.
+  /// Returns all merges, numbered by the first rows of the clusters. If a pair has two copies (even
+  /// n), only the copy in the upper half of the matrix counts.
   std::vector<Link> run(const FillRow& fill);
 
  private:
@@ -43,7 +43,7 @@ class CompleteRounds {
   struct Cluster {
     T* row;
     std::uint32_t length;
-    std::uint32_t name;  ///< of one of its points
+    std::uint32_t name;  ///< number of one of its points
   };
   struct Nearest {
     T distance;
@@ -57,7 +57,7 @@ class CompleteRounds {
   struct Pieces {
     Piece after, wrapped;
   };
-  /// A thread's results on columns, and its scratch memory.
+  /// A thread's results per column, and its scratch memory.
   struct Columns {
     std::vector<T> best;
     std::vector<Index> row;
@@ -66,7 +66,8 @@ class CompleteRounds {
   };
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(clusters_.size()); }
-  /// Steps from a to b, less one, modulo their number: the position of b in the row of a.
+  /// Returns the position of b in the row of a: the number of steps from a to b modulo their
+  /// number, minus one.
   [[nodiscard]] std::uint32_t offset(std::uint32_t a, std::uint32_t b) const {
     return b > a ? b - a - 1 : b + size() - a - 1;
   }
@@ -83,7 +84,7 @@ class CompleteRounds {
     if (check_stop_) check_stop_();
   }
 
-  // Nearest clusters, row by row.
+  // Finds nearest clusters, row by row.
   void begin_minima(std::size_t count);
   void note_minima(std::uint32_t c, const Cluster& cluster, std::uint32_t count, Columns& columns);
   void end_minima();
@@ -109,11 +110,11 @@ class CompleteRounds {
   std::vector<Cluster> clusters_;
   std::vector<Columns> columns_;         ///< by thread
   std::vector<Nearest> ahead_, behind_;  ///< nearest in the own row, and in the own column
-  std::vector<std::uint32_t> partner_;   ///< the partner with which a cluster merges, or kNone
-  /// New clusters: their parts, twice the same if there is only one; and for each old cluster the
-  /// new one, and the number of first parts before it.
+  std::vector<std::uint32_t> partner_;   ///< the cluster with which a cluster merges, or kNone
+  /// The parts of each new cluster, twice the same if there is only one. For each old cluster, the
+  /// new one and the number of first parts before it.
   std::vector<std::uint32_t> first_, second_, new_cluster_, firsts_before_;
-  std::vector<std::uint32_t> pair_first_, pair_second_;  ///< those with two parts
+  std::vector<std::uint32_t> pair_first_, pair_second_;  ///< parts of new clusters that have two
   std::vector<Link> links_;
 };
 

@@ -19,7 +19,7 @@ std::string text_of(const Link& link) {
   return "points " + std::to_string(link.i) + " and " + std::to_string(link.j);
 }
 
-/// Indices of the links by height, ties in their original order.
+/// Returns the indices of the links sorted by height, with ties in their original order.
 std::vector<std::uint32_t> by_height(std::span<const Link> links, base::StopTicks& ticks) {
   struct Key {
     double height;
@@ -36,7 +36,7 @@ std::vector<std::uint32_t> by_height(std::span<const Link> links, base::StopTick
   return order;
 }
 
-/// Returns the greatest height in the subtree of each merge, its own included.
+/// Returns the greatest height in the subtree of each merge, including its own.
 std::vector<double> crests_of(const Dendrogram& dendrogram) {
   const std::size_t n = dendrogram.points;
   std::vector<double> crest;
@@ -51,11 +51,11 @@ std::vector<double> crests_of(const Dendrogram& dendrogram) {
   return crest;
 }
 
-/// Flat clusters of the merges whose crest is not above `height`.
+/// Returns the flat clusters formed by the merges whose crest is at most `height`.
 std::vector<std::uint32_t> labels_below(const Dendrogram& dendrogram,
                                         const std::vector<double>& crest, double height) {
   const std::size_t n = dendrogram.points;
-  // A cluster that is not merged further names itself, others get the name from above.
+  // A cluster that is not merged further gets its own name. Others get the name from above.
   std::vector<std::uint32_t> name(n + crest.size(), kNoLabel);
   for (std::size_t r = crest.size(); r-- > 0;) {
     if (crest[r] > height) continue;
@@ -75,7 +75,7 @@ std::vector<std::uint32_t> labels_below(const Dendrogram& dendrogram,
   return result;
 }
 
-/// The dendrogram of links that are taken in the given order.
+/// Makes the dendrogram of links taken in the given order.
 Dendrogram join(std::size_t points, std::span<const Link> links,
                 std::span<const std::uint32_t> order, base::StopTicks& ticks) {
   constexpr std::size_t kTicksOfJoin = 64;
@@ -110,7 +110,8 @@ void check_links(std::size_t points, std::span<const Link> links) {
   }
   if (links.size() != (points == 0 ? 0 : points - 1)) {
     throw std::invalid_argument(std::to_string(links.size()) + " links for " +
-                                std::to_string(points) + " points; there must be one fewer");
+                                std::to_string(points) +
+                                " points; give one link fewer than points");
   }
   for (std::size_t r = 0; r < links.size(); ++r) {
     const Link& link = links[r];
@@ -149,12 +150,12 @@ std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double heigh
 std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t count) {
   const std::size_t n = dendrogram.points;
   if (count == 0 || count > n) {
-    throw std::invalid_argument("a cut into " + std::to_string(count) + " clusters of " +
-                                std::to_string(n) + " points; it must be from 1 to their number");
+    throw std::invalid_argument(std::to_string(n) + " points cannot be cut into " +
+                                std::to_string(count) + " clusters; give from 1 to their number");
   }
   const std::vector<double> crest = crests_of(dendrogram);
   if (count == n) return labels_below(dendrogram, crest, -1.0);
-  // The lowest height up to which there are enough merges.
+  // The lowest height at which there are enough merges.
   std::vector<double> sorted = crest;
   const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(n - count - 1);
   std::nth_element(sorted.begin(), last, sorted.end());
@@ -175,8 +176,8 @@ std::string dendrogram_fault(const Dendrogram& dendrogram) {
     const Merge& merge = dendrogram.merges[r];
     const std::string row = "row " + std::to_string(r) + ": ";
     if (!(merge.a < merge.b)) return row + "a is not below b";
-    if (merge.b >= n + r) return row + "a cluster that does not exist yet";
-    if (merged[merge.a] || merged[merge.b]) return row + "a cluster that is already merged";
+    if (merge.b >= n + r) return row + "a cluster does not exist yet";
+    if (merged[merge.a] || merged[merge.b]) return row + "a cluster is merged twice";
     merged[merge.a] = merged[merge.b] = true;
     if (merge.size != size_of(merge.a) + size_of(merge.b)) return row + "the size is wrong";
     if (!(merge.height >= 0.0)) return row + "the height is negative or NaN";

@@ -14,7 +14,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kRowsOfTriangle = 32;  ///< filled by a thread at once
+constexpr std::size_t kRowsOfTriangle = 32;  ///< rows that a thread fills at a time
 
 bool works_on_squares(LinkageMethod method) {
   return method == LinkageMethod::ward || method == LinkageMethod::centroid ||
@@ -27,7 +27,7 @@ template <class T>
 DistanceTriangle<T>::DistanceTriangle(std::size_t count, LinkageMethod method,
                                       const LinkageOptions& options)
     : ClusterSlots(count, options.check_stop), method_(method), squares_(works_on_squares(method)) {
-  // As a band, whose size is the same up to half a row.
+  // The limit is checked for a band, which has the same size up to half a row.
   (void)checked_band_bytes(count, sizeof(T), options.memory_limit);
   if (count > 1) entries_ = std::make_unique_for_overwrite<T[]>(count * (count - 1) / 2);
 }
@@ -136,7 +136,7 @@ void DistanceTriangle<T>::join(std::uint32_t low, std::uint32_t high, double bet
     if (!alive(k) || k == low || k == high) continue;
     T& to_high = k < high ? row(high)[k] : row(k)[high];
     T& to_low = k < low ? row(low)[k] : row(k)[low];
-    // Not negative: the two that merge are at most as far from each other as from others.
+    // Not negative, because the two that merge are at most as far from each other as from others.
     to_high = static_cast<T>(combined(to_low, to_high, between, count_low, count_high, points(k)));
     if (k > low) to_low = std::numeric_limits<T>::infinity();
   }

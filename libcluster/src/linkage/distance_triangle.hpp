@@ -8,19 +8,20 @@
 #include "linkage/linkage_points.hpp"
 #include "terrace/cluster/linkage.hpp"
 
-/// Clusters of anything, with the distances of all pairs. Private to linkage.
+/// Clusters of any items, with the distances of all pairs. Private to linkage.
 
 namespace terrace::cluster {
 
-/// n (n - 1) / 2 entries, scaled by a power of two. When clusters merge, the distances of the new
-/// one follow from those of its parts, by the formulas of G. Lance and W. Williams, 1967.
+/// A matrix of n (n - 1) / 2 entries, scaled by a power of two. When clusters merge, the distances
+/// of the new one follow from the distances of its parts, by the formulas of G. Lance and W.
+/// Williams, 1967.
 template <class T>
 class DistanceTriangle : public ClusterSlots {
  public:
   /// Throws: std::invalid_argument if the entries need more than options.memory_limit.
   DistanceTriangle(const LinkagePoints& points, LinkageMethod method,
                    const LinkageOptions& options);
-  /// Throws also, naming the pair, for a distance that is negative or not finite.
+  /// Throws: also for a distance that is negative or not finite. The message names the pair.
   DistanceTriangle(std::size_t count, const PairDistance& distance, LinkageMethod method,
                    const LinkageOptions& options);
 
@@ -35,7 +36,7 @@ class DistanceTriangle : public ClusterSlots {
 
  private:
   DistanceTriangle(std::size_t count, LinkageMethod method, const LinkageOptions& options);
-  /// The distances to the slots before.
+  /// Returns the distances to the preceding slots.
   [[nodiscard]] T* row(std::size_t slot) { return entries_.get() + slot * (slot - 1) / 2; }
   [[nodiscard]] const T* row(std::size_t slot) const {
     return entries_.get() + slot * (slot - 1) / 2;

@@ -23,7 +23,7 @@ Dendrogram agglomerate(Clusters&& clusters, LinkageMethod method,
   return make_dendrogram(points, chain_links(clusters), check_stop);
 }
 
-/// What clusters, their nearest ones, links and the dendrogram take for a point.
+/// Memory per point for clusters, their nearest ones, links and the dendrogram.
 constexpr std::uint64_t kBytesOfMean = 120;
 
 void check_means(std::size_t points, std::uint64_t memory_limit) {
@@ -31,7 +31,7 @@ void check_means(std::size_t points, std::uint64_t memory_limit) {
   if (memory_limit == 0 || bytes <= memory_limit) return;
   throw std::invalid_argument("the linkage of " + std::to_string(points) + " points would need " +
                               std::to_string(bytes) + " bytes of memory, but the limit is " +
-                              std::to_string(memory_limit) + "; take fewer points");
+                              std::to_string(memory_limit) + "; use fewer points");
 }
 
 }  // namespace

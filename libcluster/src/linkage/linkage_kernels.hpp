@@ -7,30 +7,30 @@
 
 #include "terrace/cluster/block.hpp"
 
-/// The inner loops of linkage. Private to it. All instruction sets give the same bytes.
+/// The inner loops of linkage. Private to linkage. All instruction sets give the same bytes.
 
 namespace terrace::cluster {
 
-/// Integers as wide as the entries, for vectors.
+/// Integers as wide as the entries, so that vectors can hold either.
 template <class T>
 using LaneIndex = std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t>;
 
 template <class T>
 struct LinkageKernels {
-  /// out[k] = squared distance of (px, py, pz) and (x[k], y[k], z[k]), rounded once to T.
+  /// Sets out[k] to the squared distance of (px, py, pz) and (x[k], y[k], z[k]), rounded once to T.
   void (*distances)(const double* x, const double* y, const double* z, std::size_t count, double px,
                     double py, double pz, T* out);
   /// Where v[k] < best[k], sets best[k] = v[k] and best_row[k] = row. Returns the first position of
-  /// the least v, and stores that v in `least`; returns count if none is below the `least` given.
+  /// the least v and stores that v in `least`. Returns count if no v is below the given `least`.
   std::size_t (*minima)(const T* v, std::size_t count, LaneIndex<T> row, T* best,
                         LaneIndex<T>* best_row, T* least);
-  /// to[k] = max(to[k], from[k])
+  /// Sets to[k] = max(to[k], from[k]).
   void (*raise)(T* to, const T* from, std::size_t count);
-  /// out[k] = max(from[first[k]], from[second[k]])
+  /// Sets out[k] = max(from[first[k]], from[second[k]]).
   void (*pick)(const T* from, const std::uint32_t* first, const std::uint32_t* second,
                std::size_t count, T* out);
-  /// The number of k < count for which first[k] is one of the `length` numbers after a, modulo m,
-  /// and second[k] is not. All numbers are below m.
+  /// Returns the number of k < count for which first[k] is one of the `length` numbers after a,
+  /// modulo m, and second[k] is not. All numbers are below m.
   std::uint32_t (*straddling)(const std::uint32_t* first, const std::uint32_t* second,
                               std::size_t count, std::uint32_t a, std::uint32_t length,
                               std::uint32_t m);

@@ -3,9 +3,9 @@
 
 #include "linkage/linkage_kernels.hpp"
 
-/// Included once for each instruction set, with TERRACE_VECTOR_BYTES the size of its registers.
-/// Everything is local to the object, see tests/check_symbols.sh; so nothing of the standard
-/// library is called either.
+/// Included once for each instruction set, with TERRACE_VECTOR_BYTES as the size of its registers.
+/// Everything is local to the object (see tests/check_symbols.sh), so functions of the standard
+/// library are not called either.
 
 namespace terrace::cluster {
 namespace {

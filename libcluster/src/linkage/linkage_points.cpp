@@ -29,7 +29,7 @@ LinkagePoints::LinkagePoints(std::span<const Point3> points) {
   }
   scaled_.assign(points.begin(), points.end());
   if (largest > 0.0) std::frexp(largest, &exponent_);
-  // In two steps: the factor itself may overflow a double. The sum turns -0 into 0.
+  // Scales in two steps, because the factor itself may overflow a double. The sum turns -0 into 0.
   const double half = std::ldexp(1.0, -(exponent_ / 2));
   const double rest = std::ldexp(1.0, -(exponent_ - exponent_ / 2));
   for (Point3& p : scaled_) {

@@ -18,17 +18,17 @@ namespace terrace::cluster {
 inline constexpr std::size_t kTicksOfDistance = 64;
 
 /// Copies of points, scaled by a power of two so that squares of distances do not overflow, nor
-/// underflow above 1e-150 of the largest coordinate. Scaling is exact: distances are those of the
-/// points to the last bit.
+/// underflow above 1e-150 of the largest coordinate. Scaling is exact, so distances equal those of
+/// the given points to the last bit.
 class LinkagePoints {
  public:
   /// Throws std::invalid_argument for coordinates that are not finite or beyond 1e307, and for too
   /// many points.
   explicit LinkagePoints(std::span<const Point3> points);
   [[nodiscard]] const std::vector<Point3>& scaled() const { return scaled_; }
-  /// The distance whose square after scaling is given.
+  /// Returns the unscaled distance for the square of a scaled one.
   [[nodiscard]] double height(double square) const;
-  /// Lengths are 2^exponent times those after scaling.
+  /// Returns e such that lengths are 2^e times the scaled lengths.
   [[nodiscard]] int exponent() const { return exponent_; }
 
  private:
@@ -36,13 +36,14 @@ class LinkagePoints {
   int exponent_ = 0;
 };
 
-/// "the distance of 3 and 5": for messages.
+/// Returns "the distance of 3 and 5", for messages.
 [[nodiscard]] std::string pair_text(std::size_t i, std::size_t j);
 
-/// Throws std::invalid_argument, naming the pair, unless the distance is from 0 to `most`.
+/// Throws std::invalid_argument unless the distance is from 0 to `most`. The message names the
+/// pair.
 void check_distance(double value, double most, std::size_t i, std::size_t j);
 
-/// Symmetric to the last bit.
+/// Returns the squared distance, symmetric to the last bit.
 [[nodiscard]] inline double squared_distance(const Point3& p, const Point3& q) {
   const double dx = p[0] - q[0];
   const double dy = p[1] - q[1];

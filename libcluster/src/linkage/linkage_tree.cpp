@@ -7,7 +7,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr unsigned kSharedLevels = 6;  ///< their nodes are split one level after the other
+constexpr unsigned kSharedLevels = 6;  ///< levels whose nodes are split one level after the other
 
 }  // namespace
 
@@ -41,7 +41,7 @@ LinkageTree::LinkageTree(std::span<const Point3> points, std::span<const std::ui
   });
 }
 
-/// Sets the box of a node; divides its points among its children, if it has any.
+/// Sets the box of a node and divides its points among its children, if it has any.
 void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& records) {
   const std::size_t q = node - (std::size_t{1} << level);
   const std::size_t begin = (q * size()) >> level;

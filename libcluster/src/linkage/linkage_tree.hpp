@@ -15,9 +15,9 @@
 
 namespace terrace::cluster {
 
-/// A kD-tree over points in its own order: the points of a node are consecutive. Nodes are numbered
-/// as in a heap (root 1, children 2v and 2v + 1); all leaves are on one level, and node q of a
-/// level with 2^t nodes has the points from floor(q n / 2^t) on.
+/// A kD-tree over points in its own order, in which the points of a node are consecutive. Nodes are
+/// numbered as in a heap (root 1, children 2v and 2v + 1). All leaves are on one level, and node q
+/// of a level with 2^t nodes has the points from floor(q n / 2^t) on.
 class LinkageTree {
  public:
   static constexpr std::size_t kLeaf = 8;  ///< maximum points per leaf
@@ -26,7 +26,7 @@ class LinkageTree {
     Point3 low, high;
   };
 
-  /// The order depends on the points alone. O(n log n).
+  /// The order depends on the points alone. Takes O(n log n).
   LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
               unsigned threads, const base::StopCheck& check_stop = {});
 
@@ -35,15 +35,15 @@ class LinkageTree {
   [[nodiscard]] std::size_t nodes() const { return 2 * leaves(); }  ///< 1 .. nodes() - 1
   [[nodiscard]] std::size_t leaf_node(std::size_t leaf) const { return leaves() + leaf; }
   [[nodiscard]] bool is_leaf(std::size_t node) const { return node >= leaves(); }
-  /// The first point of a leaf; leaf_begin(leaf + 1) is its end.
+  /// Returns the position of the first point of a leaf. leaf_begin(leaf + 1) is its end.
   [[nodiscard]] std::size_t leaf_begin(std::size_t leaf) const { return (leaf * size()) >> depth_; }
   [[nodiscard]] const Box& box(std::size_t node) const { return boxes_[node]; }
-  /// Coordinates in tree order; kLeaf extra entries follow, which may be read.
+  /// Returns coordinates in tree order. kLeaf extra entries follow, which may be read.
   [[nodiscard]] const double* axis(unsigned a) const { return axes_[a].data(); }
   [[nodiscard]] Point3 point(std::size_t i) const {
     return {axes_[0][i], axes_[1][i], axes_[2][i]};
   }
-  /// The input index of the point at position i.
+  /// Returns the input index of the point at position i.
   [[nodiscard]] std::uint32_t number(std::size_t i) const { return number_[i]; }
 
  private:
@@ -61,8 +61,8 @@ class LinkageTree {
   std::vector<std::uint32_t> number_;
 };
 
-/// A lower bound of squared_distance(p, q) for all q in the box, including rounding: all operations
-/// are monotone and in the same order as there.
+/// Returns a lower bound of squared_distance(p, q) for all q in the box. The bound includes
+/// rounding, because all operations are monotone and in the same order as there.
 [[nodiscard]] inline double squared_distance(const Point3& p, const LinkageTree::Box& box) {
   double sum[3];
   for (unsigned a = 0; a < 3; ++a) {
@@ -72,7 +72,7 @@ class LinkageTree {
   return sum[0] + sum[1] + sum[2];
 }
 
-/// The same for two boxes.
+/// As above, for two boxes.
 [[nodiscard]] inline double squared_distance(const LinkageTree::Box& p, const LinkageTree::Box& q) {
   double sum[3];
   for (unsigned a = 0; a < 3; ++a) {

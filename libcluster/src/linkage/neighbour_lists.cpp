@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kLeavesPerListBlock = 64;
 
-/// The best found so far for one point, ascending.
+/// The best edges found so far for one point, in ascending order.
 struct Best {
   TreeEdge edge[NeighbourLists::kMost];
   unsigned length;
@@ -44,7 +44,7 @@ NeighbourLists::NeighbourLists(const LinkageTree& tree, unsigned threads,
                         });
 }
 
-/// All points of a leaf search together: they mostly need the same nodes.
+/// All points of a leaf search together, because they mostly need the same nodes.
 void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   const std::size_t first = tree.leaf_begin(leaf);
   const std::size_t count = tree.leaf_begin(leaf + 1) - first;
@@ -98,7 +98,7 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   stack[waiting++] = {0.0, 1};
   while (waiting > 0) {
     const Waiting top = stack[--waiting];
-    // Ties count: among several neighbours at one distance the positions decide.
+    // Ties are not skipped: among several neighbours at one distance the positions decide.
     if (top.square > reach || top.node == own) continue;
     if (tree.is_leaf(top.node)) {
       visit(top.node);

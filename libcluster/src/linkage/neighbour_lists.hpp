@@ -13,7 +13,7 @@
 namespace terrace::cluster {
 
 /// A pair of positions in a tree with the square of its length. Pairs are ordered by length, then
-/// by their positions, so that no two are equal and the minimum spanning tree is unique.
+/// by position. So no two are equal, and the minimum spanning tree is unique.
 struct TreeEdge {
   double square;
   std::uint32_t low, high;  ///< low < high
@@ -27,13 +27,13 @@ struct TreeEdge {
   }
 };
 
-/// For each position of a tree the nearest others in the order of TreeEdge.
+/// The nearest other points of each position of a tree, in the order of TreeEdge.
 class NeighbourLists {
  public:
   static constexpr unsigned kMost = 8;
 
   NeighbourLists(const LinkageTree& tree, unsigned threads, const base::StopCheck& check_stop);
-  /// The length of each list: kMost, or the number of all other points if less.
+  /// Returns the length of each list: kMost, or the number of all other points if that is less.
   [[nodiscard]] unsigned length() const { return length_; }
   [[nodiscard]] std::uint32_t* of(std::size_t place) { return lists_.data() + place * length_; }
 

@@ -15,8 +15,8 @@
 namespace terrace::cluster {
 namespace {
 
-/// The first point at each position; the others at the position are linked to it, at height 0. The
-/// tree over the distinct points then has only geometric ties.
+/// Returns the first point at each position. The other points at the position are linked to it at
+/// height 0, so the tree over the distinct points has only geometric ties.
 std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vector<Link>& links,
                                     const base::StopCheck& check_stop) {
   constexpr std::size_t kTicksOfLookup = 64;
@@ -81,7 +81,7 @@ Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointP
     const auto [i, j] = candidates[e];
     if (i >= points.size() || j >= points.size()) {
       throw std::invalid_argument("candidate " + std::to_string(e) + " names point " +
-                                  std::to_string(std::max(i, j)) + "; there are " +
+                                  std::to_string(std::max(i, j)) + ", but there are only " +
                                   std::to_string(points.size()));
     }
     edges[e] = TreeEdge::of(squared_distance(scaled[i], scaled[j]), i, j);
@@ -97,7 +97,7 @@ Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointP
   for (std::uint32_t i = 1; i < points.size(); ++i) {
     if (sets.find(i) != 0) {
       throw std::invalid_argument("the candidate pairs do not connect point " + std::to_string(i) +
-                                  " with point 0; the edges of a Delaunay triangulation would");
+                                  " with point 0; add the edges of a Delaunay triangulation");
     }
   }
   return make_dendrogram(points.size(), links);

@@ -137,8 +137,8 @@ bool SpanningTree::must_search(std::uint32_t place) {
   return own != largest_ && used_[place] == lists_.length() && bound_[place] <= limit(own);
 }
 
-/// Finds the shortest edge from the group to other components, unless it is longer than what its
-/// own component has found by then.
+/// Finds the shortest edge from the group to other components, unless it is longer than an edge
+/// that its own component has already found.
 void SpanningTree::search_from(const Group& group, std::uint32_t own) {
   TreeEdge best{limit(own), kMixed, kMixed};
   std::uint32_t best_place = kMixed;
@@ -190,7 +190,7 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
 void SpanningTree::merge() {
   for (const std::uint32_t root : roots_) {
     const TreeEdge& edge = shortest_[root];
-    // Two components may have chosen each other: the first one unites them.
+    // Two components may have chosen each other. The first of the two unites them.
     if (root != largest_ && sets_.unite(edge.low, edge.high)) edges_.push_back(edge);
   }
   for (const std::uint32_t root : roots_) sets_.flatten(root);

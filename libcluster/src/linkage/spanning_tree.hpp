@@ -20,11 +20,12 @@ namespace terrace::cluster {
 
 /// The Euclidean minimum spanning tree of the points of a kD-tree, all of them different.
 ///
-/// Borůvka: in each round every component but the largest takes its shortest edge to another one. A
-/// point's candidate is the first neighbour in its list in another component. When its list is
-/// exhausted it has a bound instead, and searches the tree only if that is below what its component
-/// has found so far, together with others of its leaf; the search skips nodes that lie entirely in
-/// the component. The largest component, which would search longest, is found by the others.
+/// Uses Borůvka's method: in each round every component except the largest takes its shortest edge
+/// to another one. A point's candidate is the first neighbour in its list that is in another
+/// component. When its list is exhausted, the point has a bound instead. It searches the tree only
+/// if that bound is below the best edge that its component has found so far, together with other
+/// points of its leaf. The search skips nodes that are entirely in the component. The largest
+/// component does not search, as that would take longest; the others find its edges.
 class SpanningTree {
  public:
   SpanningTree(const LinkageTree& tree, unsigned threads, const base::StopCheck& check_stop);
@@ -36,7 +37,7 @@ class SpanningTree {
    public:
     void lock(std::uint32_t key) {
       while (flags_[key % kCount].test_and_set(std::memory_order_acquire)) {
-        std::this_thread::yield();  // the holder may be waiting for a processor
+        std::this_thread::yield();  // the holder of the lock may be waiting for a processor
       }
     }
     void unlock(std::uint32_t key) { flags_[key % kCount].clear(std::memory_order_release); }
@@ -46,7 +47,7 @@ class SpanningTree {
     std::array<std::atomic_flag, kCount> flags_{};
   };
 
-  /// Points of one leaf and one component, and their box.
+  /// Points of one leaf and one component, with their box.
   struct Group {
     LinkageTree::Box box;
     std::uint32_t place[LinkageTree::kLeaf];
@@ -74,14 +75,14 @@ class SpanningTree {
   const unsigned threads_;
   const std::uint32_t count_;
   NeighbourLists lists_;
-  std::vector<std::uint8_t> used_;  ///< list entries that are in the point's own component
-  std::vector<double> bound_;       ///< no other component is nearer once the list is exhausted
+  std::vector<std::uint8_t> used_;  ///< number of leading list entries in the own component
+  std::vector<double> bound_;       ///< after the list is exhausted: no other component is nearer
   std::vector<std::uint32_t> component_;  ///< by position: the lowest position of its component
   std::vector<std::uint32_t> label_;      ///< by node: its component, or kMixed
-  std::vector<TreeEdge> shortest_;        ///< found so far for a component, at its lowest position
-  Locks locks_;                           ///< protect shortest_, which several threads lower
+  std::vector<TreeEdge> shortest_;        ///< by a component's lowest position: its best edge
+  Locks locks_;                           ///< protect shortest_, which several threads update
   std::vector<std::uint32_t> roots_;      ///< the components
-  std::uint32_t largest_ = 0;             ///< largest component, kMixed at first
+  std::uint32_t largest_ = 0;             ///< the largest component; kMixed at first
   base::UnionFind sets_;
   std::vector<TreeEdge> edges_;
 };
