@@ -10,11 +10,11 @@
 
 namespace terrace::cluster {
 
-/// The root mean square of the distances between corresponding corners of two entities, under the
-/// best of the correspondences that the entities admit. square(i, j) is the squared distance of
+/// Returns the root mean square of the distances between corresponding corners of two entities,
+/// under the best correspondence that the entities admit. square(i, j) is the squared distance of
 /// corner i of one from corner j of the other. The result is symmetric to the last bit.
-/// ordered: vertices keep their order (polylines), so the correspondences are forward and backward;
-/// otherwise any counts, for at most three corners.
+/// ordered: vertices keep their order (polylines), so the correspondences are forward and backward.
+/// Otherwise every correspondence is allowed, for at most three corners.
 template <class Square>
 double corner_distance(std::size_t corners, bool ordered, const Square& square) {
   assert(corners > 0 && (ordered || corners <= 3));
@@ -30,7 +30,8 @@ double corner_distance(std::size_t corners, bool ordered, const Square& square) 
         const double a = squares[0][first];
         const double b = squares[1][(first + step) % 3];
         const double c = squares[2][(first + 2 * step) % 3];
-        // Added in ascending order: seen from the other entity the terms come in a different order.
+        // Added in ascending order, because the terms come in a different order for the other
+        // entity.
         const double low = std::min(a, b), high = std::max(a, b);
         const double sum =
             (std::min(low, c) + std::max(low, std::min(high, c))) + std::max(high, c);
@@ -38,7 +39,7 @@ double corner_distance(std::size_t corners, bool ordered, const Square& square) 
       }
     }
   } else {
-    // Adds both ends together: seen from the other entity, "backward" is read from the other end.
+    // Adds both ends together, because for the other entity "backward" starts from the other end.
     double forward = 0.0, backward = 0.0;
     for (std::size_t i = 0, j = corners - 1; i <= j; ++i, --j) {
       forward += i == j ? square(i, i) : square(i, i) + square(j, j);

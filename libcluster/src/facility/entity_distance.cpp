@@ -10,7 +10,8 @@ namespace terrace::cluster {
 namespace {
 
 double distance_of(std::span<const Point3> a, std::span<const Point3> b, bool ordered) {
-  // Uses halves, as differences may overflow; relative to the largest, as squares may.
+  // Halves are used because differences may overflow; the scale is the largest, because squares
+  // may.
   double largest = 0.0;
   for (const Point3& p : a) {
     for (const Point3& q : b) {

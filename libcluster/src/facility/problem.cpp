@@ -14,7 +14,7 @@ bool is_cost(double value) { return value >= 0.0 && std::isfinite(value); }
 
 void check_count(std::size_t count, const char* what) {
   constexpr std::size_t kMost = 0xfffffffe;
-  if (count == 0) fail(std::string("facility location without ") + what);
+  if (count == 0) fail(std::string("facility location needs ") + what);
   if (count > kMost) {
     fail(std::to_string(count) + " " + what + ": at most " + std::to_string(kMost) +
          " are possible; cluster them in blocks (hierarchy.hpp)");
@@ -24,8 +24,7 @@ void check_count(std::size_t count, const char* what) {
 void check_weights(std::span<const double> weights, std::size_t count, const std::string& one,
                    const std::string& many) {
   if (!weights.empty() && weights.size() != count) {
-    fail("weights: " + std::to_string(weights.size()) + " for " + std::to_string(count) + " " +
-         many);
+    fail(std::to_string(weights.size()) + " weights for " + std::to_string(count) + " " + many);
   }
   for (std::size_t i = 0; i < weights.size(); ++i) {
     if (weights[i] > 0.0 && std::isfinite(weights[i])) continue;
@@ -40,12 +39,12 @@ void check(const FacilityMatrix& problem) {
   check_count(problem.facilities, "facilities");
   check_count(problem.clients, "clients");
   if (problem.opening.size() != problem.facilities) {
-    fail("opening costs: " + std::to_string(problem.opening.size()) + " for " +
+    fail(std::to_string(problem.opening.size()) + " opening costs for " +
          std::to_string(problem.facilities) + " facilities");
   }
   if (problem.connection.size() / problem.facilities != problem.clients ||
       problem.connection.size() % problem.facilities != 0) {
-    fail("connection costs: " + std::to_string(problem.connection.size()) + " for " +
+    fail(std::to_string(problem.connection.size()) + " connection costs for " +
          std::to_string(problem.facilities) + " facilities times " +
          std::to_string(problem.clients) + " clients");
   }
@@ -59,7 +58,7 @@ void check(const FacilityMatrix& problem) {
       if (is_cost(problem.cost(j, i))) continue;
       fail("the cost of connecting client " + std::to_string(i) + " to facility " +
            std::to_string(j) + " is " + std::to_string(problem.cost(j, i)) +
-           ": costs must be finite and not negative; for a connection that is impossible give a "
+           ": costs must be finite and not negative; for an impossible connection give a "
            "cost above every other");
     }
   }
@@ -84,7 +83,7 @@ void check(const FacilityPoints& problem) {
          std::to_string(problem.channels.weights[c]) + ": it must be finite and not negative");
   }
   if (problem.channels.values.size() != count * channels) {
-    fail("channel values: " + std::to_string(problem.channels.values.size()) + " for " +
+    fail(std::to_string(problem.channels.values.size()) + " channel values for " +
          std::to_string(count) + " points with " + std::to_string(channels) + " channels");
   }
   for (std::size_t k = 0; k < problem.channels.values.size(); ++k) {
@@ -104,7 +103,7 @@ void check(const FacilityPoints& problem) {
 
 void check(const FacilityEntities& problem) {
   check_count(problem.count, "entities");
-  if (!problem.distance) fail("facility location of entities without a distance function");
+  if (!problem.distance) fail("the entities have no distance function");
   check_weights(problem.weights, problem.count, "entity", "entities");
   if (!(problem.facility_cost > 0.0) || !std::isfinite(problem.facility_cost)) {
     fail("the facility cost is " + std::to_string(problem.facility_cost) +

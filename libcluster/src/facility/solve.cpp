@@ -15,7 +15,7 @@ namespace terrace::cluster {
 namespace {
 
 [[noreturn]] void refuse(FacilityStrategy strategy, const std::string& why,
-                         const std::string& remedy = "take automatic") {
+                         const std::string& remedy = "use automatic") {
   throw std::invalid_argument(std::string("the strategy \"") + name_of(strategy) + "\" " + why +
                               ": " + remedy);
 }
@@ -28,7 +28,7 @@ FacilitySolution solve_matrix(const FacilityMatrix& problem, const FacilityOptio
   report.strategy = options.strategy == FacilityStrategy::automatic ? FacilityStrategy::interchange
                                                                     : options.strategy;
   if (!needs_matrix(report.strategy)) {
-    refuse(report.strategy, "is for points and entities, and the problem is a matrix");
+    refuse(report.strategy, "needs points or entities, but the problem is a matrix");
   }
   if (options.start) refuse(report.strategy, "does not start from a solution");
   switch (report.strategy) {
@@ -49,7 +49,7 @@ FacilitySolution solve_by_matrix(const Problem& problem, const FacilityOptions& 
   const CostMatrix matrix = cost_matrix(problem, options.memory_limit, options.check_stop);
   FacilitySolution solution = solve_matrix(matrix.view(), options, report);
   if (std::isfinite(problem.outlier_price)) {
-    // In the matrix an outlier is a client whose connection costs the price.
+    // In the matrix, an outlier is a client whose connection costs the price.
     const double lower_bound = solution.lower_bound;
     const auto engine = make_search(problem, FacilityStrategy::full_scan, 1, options.check_stop);
     engine->start(solution);
@@ -63,15 +63,15 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
                             FacilityReport* report) {
   constexpr FacilityStrategy kFast = FacilityStrategy::fast;
   if (problem.points.size() >= (std::size_t{1} << 24)) {
-    refuse(kFast, "takes fewer than 2^24 points", "cluster them in blocks (hierarchy.hpp)");
+    refuse(kFast, "accepts fewer than 2^24 points", "cluster them in blocks (hierarchy.hpp)");
   }
   if (!linear_map(problem.metric, base::box_of(problem.points))) {
     refuse(kFast, "needs a metric that a linear map of the points makes Euclidean, and \"" +
                       name_of(problem.metric) + "\" is not one on these points");
   }
-  if (problem.channels.size() > 0) refuse(kFast, "has no channels");
+  if (problem.channels.size() > 0) refuse(kFast, "does not support channels");
   if (std::isfinite(problem.outlier_price)) refuse(kFast, "cannot leave clients out");
-  if (options.start) refuse(kFast, "has a start of its own");
+  if (options.start) refuse(kFast, "does not start from a solution");
 
   BlockClusterer clusterer;
   BlockClustering clustering;
@@ -81,7 +81,7 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
   FacilitySolution solution;
   solution.facilities = std::move(clustering.facilities);
   solution.assignment = std::move(clustering.assignment);
-  // Costs in double precision, clusters by ascending facility.
+  // Computes costs in double precision and clusters by ascending facility.
   const auto engine = make_search(problem, FacilityStrategy::full_scan, 1, options.check_stop);
   engine->start(solution);
   if (report) {
@@ -92,7 +92,7 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
   return engine->solution();
 }
 
-/// By a matrix of costs or a local search.
+/// Solves by a matrix of costs or a local search.
 template <class Problem>
 FacilitySolution solve_any(const Problem& problem, const FacilityOptions& options,
                            FacilityReport* report) {

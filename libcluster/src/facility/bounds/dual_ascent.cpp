@@ -50,7 +50,7 @@ void DualAscent::lower_one(std::uint32_t client) {
   const double* const costs = order_->cost(client);
   const std::uint32_t* const facilities = order_->facility(client);
   std::uint32_t& reach = reach_[client];
-  // Facilities that cost exactly the dual are not paid and drop out of reach.
+  // Facilities that cost exactly the dual are not paid, so they drop out of reach.
   std::uint32_t paid = reach;
   while (paid > 0 && costs[paid - 1] >= duals_[client]) --paid;
   const double target = costs[paid - 1];
@@ -73,8 +73,8 @@ void DualAscent::raise(std::span<const std::uint32_t> clients) {
 void DualAscent::find_support() {
   for (std::size_t j = 0; j < slack_.size(); ++j) tight_[j] = slack_[j] <= 0.0;
   std::fill(support_.begin(), support_.end(), char{0});
-  // First those that are the only tight one within reach of some client, then the cheapest for the
-  // rest.
+  // First takes facilities that are the only tight one within reach of some client, then the
+  // cheapest for the remaining clients.
   for (const bool essential : {true, false}) {
     for (std::uint32_t i = 0; i < duals_.size(); ++i) {
       const std::uint32_t* const facilities = order_->facility(i);

@@ -12,13 +12,13 @@ namespace terrace::cluster {
 /// Erlenkotter's procedure, which improves feasible duals.
 class DualAscent {
  public:
-  /// Begins with the least cost of each client. O(facilities * clients).
+  /// Starts from the least cost of each client. Takes O(facilities * clients).
   DualAscent(const ClientOrder& order, const MatrixRows& costs);
 
   /// Raises the duals of these clients in turn until none can be raised. Throws, as adjust() does,
   /// what the check of the costs throws.
   void raise(std::span<const std::uint32_t> clients);
-  /// One round of dual adjustment. Returns whether the sum of the duals has grown.
+  /// Makes one round of dual adjustment. Returns whether the sum of the duals has grown.
   bool adjust();
 
   [[nodiscard]] const std::vector<double>& duals() const { return duals_; }
@@ -42,7 +42,7 @@ class DualAscent {
   std::vector<std::uint32_t> reach_;  // per client: number of facilities that cost at most its dual
   std::vector<std::uint32_t> all_;
   std::vector<char> tight_;    // by facility: its slack is used up
-  std::vector<char> support_;  // a few tight facilities, one of them within reach of every client
+  std::vector<char> support_;  // by facility: in a small tight set that reaches every client
 };
 
 }  // namespace terrace::cluster

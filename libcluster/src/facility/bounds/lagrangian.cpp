@@ -9,8 +9,8 @@ double ascend(DualFunction& function, std::vector<double>& duals, double target,
               const LowerBoundOptions& options) {
   const std::size_t patience = std::clamp<std::size_t>(options.steps / 30, 4, 30);
   constexpr double kShortest = 1e-4;
-  // The share that a direction keeps of the previous one: without it the duals oscillate between
-  // two facilities.
+  // The fraction of the previous direction that a direction keeps. Without it the duals would
+  // oscillate between two facilities.
   constexpr double kMemory = 0.7;
   const std::size_t n = duals.size();
   std::vector<double> now = duals, slope(n), direction(n, 0.0);

@@ -11,20 +11,19 @@
 
 namespace terrace::cluster {
 
-/// L(v) as computed, and an upper bound of how far rounding may have raised it above its true
-/// value.
+/// L(v) as computed, and an upper bound of the amount by which rounding may have raised it.
 struct DualValue {
   double value = 0.0;
   double error = 0.0;
   [[nodiscard]] double safe() const { return value - error; }
 };
 
-/// Adds up L(v) = sum v_i + sum_j min(0, opening_j - paid_j), and bounds the rounding errors, which
-/// are at most (terms) epsilon/2 times the sum of absolute values for each of the sums; twice that
+/// Adds up L(v) = sum v_i + sum_j min(0, opening_j - paid_j) and bounds the rounding errors. For
+/// each of the sums they are at most (terms) epsilon/2 times the sum of absolute values. Twice that
 /// is subtracted.
 class DualSum {
  public:
-  /// `terms`: the maximum number of differences v_i - c_ij that make up a `paid`.
+  /// `terms`: the largest number of differences v_i - c_ij in one value of `paid`.
   explicit DualSum(std::size_t terms) : terms_(static_cast<double>(terms) + 8.0) {}
   void client(double dual) {
     value_ += dual;
@@ -32,7 +31,7 @@ class DualSum {
     count_ += 1.0;
   }
   void facility(double opening, double paid) {
-    // A facility that seems not quite paid for may be paid, up to rounding.
+    // Up to rounding, a facility that seems not quite paid for may be paid.
     paid_ += paid + opening;
     if (paid > opening) value_ += opening - paid;
     count_ += 1.0;
@@ -52,16 +51,16 @@ class DualSum {
 class DualFunction {
  public:
   virtual ~DualFunction() = default;
-  /// slope[i] = weight of client i times (1 - number of paid facilities that connect it for less
-  /// than its dual).
+  /// Evaluates L. Sets slope[i] to the weight of client i times (1 - number of paid facilities that
+  /// connect it for less than its dual).
   virtual DualValue evaluate(std::span<const double> duals, std::span<double> slope) = 0;
-  /// Clamps duals to the range in which the maximum lies.
+  /// Clamps duals to the range that contains the maximum.
   virtual void clamp(std::span<double> duals) const = 0;
 };
 
-/// Subgradient steps that aim at `target`, the cost of a solution, from `duals`, which become the
-/// best ones found; returns the safe value there. The step is Polyak's, halved after a number of
-/// steps without gain. Of the options it uses steps and progress.
+/// Makes subgradient steps from `duals` towards `target`, the cost of a solution. Replaces `duals`
+/// by the best ones found and returns the safe value there. The step is Polyak's, halved after a
+/// number of steps without gain. Of the options it uses `steps` and `progress`.
 double ascend(DualFunction& function, std::vector<double>& duals, double target,
               const LowerBoundOptions& options);
 

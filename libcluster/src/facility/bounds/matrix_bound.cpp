@@ -15,7 +15,7 @@
 namespace terrace::cluster {
 namespace {
 
-// The value at scaled duals, in the unit of the problem, rounded down.
+// Returns the value at scaled duals, in the unit of the problem, rounded down.
 double finished(const MatrixRows& costs, const std::vector<double>& duals) {
   RowDual function(costs, costs.opening(), {}, 1);
   std::vector<double> slope(duals.size());
@@ -45,7 +45,7 @@ double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
                   const base::StopCheck& check_stop) {
   check(problem);
   if (duals.size() != problem.clients) {
-    throw std::invalid_argument("duals: " + std::to_string(duals.size()) + " for " +
+    throw std::invalid_argument(std::to_string(duals.size()) + " duals for " +
                                 std::to_string(problem.clients) + " clients");
   }
   for (std::size_t i = 0; i < duals.size(); ++i) {
@@ -68,18 +68,18 @@ LowerBound lower_bound(const FacilityMatrix& problem, const FacilitySolution& st
     FacilityReport report;
     const FacilitySolution target =
         start.facilities.empty() ? greedy_stars(problem, report, options.check_stop) : start;
-    double cost = 0.0;  // scaled, as the sum of large costs may be infinite
+    double cost = 0.0;  // scaled, because the sum of large costs may be infinite
     for (const std::uint32_t j : target.facilities) {
       if (j >= problem.facilities) {
-        throw std::invalid_argument("the solution has facility " + std::to_string(j) + " of " +
-                                    std::to_string(problem.facilities));
+        throw std::invalid_argument("the solution has facility " + std::to_string(j) +
+                                    ", but there are only " + std::to_string(problem.facilities));
       }
       cost += costs.opening()[j];
     }
     if (target.assignment.size() != problem.clients) {
       throw std::invalid_argument("the solution assigns " +
-                                  std::to_string(target.assignment.size()) + " of " +
-                                  std::to_string(problem.clients) + " clients");
+                                  std::to_string(target.assignment.size()) +
+                                  " clients, but there are " + std::to_string(problem.clients));
     }
     for (std::size_t i = 0; i < problem.clients; ++i) {
       const std::uint32_t c = target.assignment[i];

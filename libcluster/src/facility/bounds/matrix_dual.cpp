@@ -11,9 +11,10 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kFacilitiesPerBlock = 64;  // facilities
+constexpr std::size_t kFacilitiesPerBlock = 64;
 
-// Eight parallel sums: the order of addition is fixed, and a processor can do several at once.
+// Adds up eight parallel sums. The order of addition is fixed, and a processor can do several at
+// once.
 double paid(const double* duals, const double* costs, std::size_t n) {
   std::array<double, 8> sums{};
   std::size_t i = 0;
@@ -105,8 +106,8 @@ DualValue MedianDual::evaluate(std::span<const double> duals, std::span<double> 
     sum.client(duals[i]);
     slope[i] = 1.0;
   }
-  // Rounding may have omitted one that is paid more than the least of them, but by no more than the
-  // uncertainty of the sums.
+  // Rounding may have omitted a facility that is paid more than the least of them, but by no more
+  // than the uncertainty of the sums.
   std::vector<double> scratch;
   for (std::size_t r = 0; r < k_; ++r) {
     sum.facility(0.0, paid_[order_[r]]);

@@ -12,17 +12,17 @@
 
 namespace terrace::cluster {
 
-/// L(v) of a problem whose rows are stored or computed one by one. O(facilities * clients) per
-/// evaluation.
+/// L(v) of a problem whose rows are stored or computed one by one. An evaluation takes O(facilities
+/// * clients).
 class RowDual final : public DualFunction {
  public:
-  /// `ceiling`: what a client pays at most (the price of leaving it out), or empty.
+  /// `ceiling`: the most that each client pays (the price of leaving it out), or empty.
   RowDual(const CostRows& costs, std::span<const double> opening, std::span<const double> ceiling,
           unsigned threads);
 
   DualValue evaluate(std::span<const double> duals, std::span<double> slope) override;
   void clamp(std::span<double> duals) const override;
-  /// The cheapest connection of each client: smaller duals make no sense.
+  /// Returns the cheapest connection of each client. Smaller duals make no sense.
   [[nodiscard]] std::span<const double> floor() const { return floor_; }
 
  private:
@@ -32,13 +32,14 @@ class RowDual final : public DualFunction {
   std::vector<double> floor_, paid_;
 };
 
-/// L(v), rounded down so that no solution costs less; 0 if it would be negative. O(facilities *
-/// clients). Throws: std::invalid_argument as check() does, if there is not one dual per client, or
-/// if one is not finite, naming it.
+/// Returns L(v), rounded down so that no solution costs less, or 0 if it would be negative. Takes
+/// O(facilities * clients).
+/// Throws: std::invalid_argument as check() does, if there is not one dual per client, or if a dual
+/// is not finite (the message names the client).
 [[nodiscard]] double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
                                 const base::StopCheck& check_stop = {});
 
-/// L of k-median: facilities cost nothing, and the k that are paid most are open,
+/// L of k-median. Facilities cost nothing, and the k that are paid most are open:
 ///     L(v) = sum_i v_i - sum of the k greatest of sum_i max(0, v_i - c_ij).
 class MedianDual final : public DualFunction {
  public:

@@ -25,16 +25,16 @@ namespace terrace::cluster {
 namespace {
 
 /// L(v) of points, where all facilities cost the same and only nearby clients pay for a facility:
-/// those closer to it than their payment per weight. A leaf of facilities searches for the leaves
-/// with such clients together.
+/// those closer to it than their payment per weight. A leaf of facilities searches together for the
+/// leaves that contain such clients.
 ///
-/// The variables are u * sqrt(w), where u = v / w is the payment per weight: in terms of v light
-/// clients would hardly move, in terms of u heavy ones.
+/// The variables are u * sqrt(w), where u = v / w is the payment per weight. With v as the
+/// variables light clients would hardly move, with u heavy ones.
 template <class Space>
 class PointDual final : public DualFunction {
  public:
-  /// Space and weights are in the order of the tree's leaves. `price`: what a client of weight 1
-  /// pays at most, or infinite.
+  /// Space and weights are in the order of the tree's leaves. `price` is the most that a client of
+  /// weight 1 pays; it may be infinite.
   PointDual(const BoxTree& tree, const Space& space, std::span<const double> weights,
             double facility_cost, double price, const LowerBoundOptions& options)
       : tree_(&tree),
@@ -63,7 +63,7 @@ class PointDual final : public DualFunction {
       count_[i].store(0, std::memory_order_relaxed);
     }
     read_longest();
-    constexpr std::size_t kBlock = 64;  // leaves
+    constexpr std::size_t kBlock = 64;  // leaves per block
     std::atomic<std::size_t> most{0};
     base::parallel_for((leaves_.size() + kBlock - 1) / kBlock, threads_, [&](std::size_t block) {
       Work work;
@@ -107,7 +107,7 @@ class PointDual final : public DualFunction {
   }
 
  private:
-  // A weight may underflow compared to others.
+  // A weight may underflow compared with others.
   [[nodiscard]] double payment(double variable, std::size_t i) const {
     return root_[i] > 0.0 ? variable / root_[i] : 0.0;
   }
@@ -116,7 +116,7 @@ class PointDual final : public DualFunction {
     std::vector<std::uint32_t> stack, leaves, near;
   };
 
-  // Children come after their parents.
+  // Goes backwards, because children come after their parents.
   void read_longest() {
     const auto& nodes = tree_->nodes();
     for (std::size_t n = nodes.size(); n-- > 0;) {
@@ -134,7 +134,7 @@ class PointDual final : public DualFunction {
     }
   }
 
-  // Returns the maximum number of clients that a facility of the leaf has examined.
+  // Returns the largest number of clients that a facility of the leaf has examined.
   std::size_t visit(std::uint32_t leaf, Work& work) {
     const auto& nodes = tree_->nodes();
     const std::uint32_t first = nodes[leaf].first, end = first + nodes[leaf].count;
@@ -155,7 +155,7 @@ class PointDual final : public DualFunction {
     return most;
   }
 
-  // Whether some facility of the leaf may be closer to the node's box than a payment there.
+  // Returns whether some facility of the leaf may be closer to the node's box than a payment there.
   [[nodiscard]] bool is_near(std::uint32_t leaf, std::uint32_t node) const {
     const BoxTree::Node& from = tree_->nodes()[leaf];
     const Box3& box = tree_->nodes()[node].box;
@@ -165,8 +165,8 @@ class PointDual final : public DualFunction {
       }
       return false;
     } else {
-      // The distance of two boxes is that of any point of the one from the other, enlarged by the
-      // extent of the first around the point.
+      // The distance of two boxes is the distance of any point of the first from the second,
+      // enlarged by the extent of the first around that point.
       const Point3& p = space_->points()[from.first];
       Box3 grown = box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -194,7 +194,7 @@ class PointDual final : public DualFunction {
     return looked;
   }
 
-  // Few facilities are worth opening, so their distances are recomputed.
+  // Few facilities are worth opening, so their distances are simply recomputed.
   void count_payers(std::uint32_t facility, const Work& work) {
     const auto from = space_->from(facility);
     for (const std::uint32_t n : work.near) {
@@ -213,11 +213,11 @@ class PointDual final : public DualFunction {
   unsigned threads_;
   const base::StopCheck* check_stop_;
   std::vector<double> payment_;  // u
-  std::vector<double> paid_;     // by facility
+  std::vector<double> paid_;     // by facility: what clients pay
   std::vector<double> root_;     // sqrt(w)
   std::vector<double> longest_;  // by node: the greatest payment in it
   std::vector<std::uint32_t> leaves_;
-  // per client: number of paid facilities it pays for
+  // per client: number of paid facilities for which it pays
   std::unique_ptr<std::atomic<std::uint32_t>[]> count_;
 };
 
@@ -225,12 +225,12 @@ void check_start(const FacilitySolution& start, std::size_t count, double outlie
                  const std::string& what) {
   if (start.assignment.size() != count) {
     throw std::invalid_argument("the solution assigns " + std::to_string(start.assignment.size()) +
-                                " of " + std::to_string(count) + " " + what);
+                                " " + what + ", but there are " + std::to_string(count));
   }
   for (const std::uint32_t j : start.facilities) {
     if (j < count) continue;
-    throw std::invalid_argument("the solution has facility " + std::to_string(j) + " of " +
-                                std::to_string(count) + " " + what);
+    throw std::invalid_argument("the solution has facility " + std::to_string(j) +
+                                ", but there are only " + std::to_string(count) + " " + what);
   }
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t c = start.assignment[i];
@@ -241,10 +241,10 @@ void check_start(const FacilitySolution& start, std::size_t count, double outlie
   }
 }
 
-// The start in its own order, its distances, and derived values.
+// The start with its own numbering, its distances, and derived values.
 struct Start {
   std::vector<std::uint32_t> facility;  // per client
-  std::vector<double> distance;         // at most the price
+  std::vector<double> distance;         // per client, at most the price
   double cost = 0.0;
 
   template <class Space>
@@ -263,8 +263,9 @@ struct Start {
     for (std::size_t k = 0; k < order.size(); ++k) cost += frame.weights[k] * distance[k];
   }
 
-  // Payments per weight: the same level in each cluster, where it is above the distance, and so
-  // high that the cluster pays for its facility.
+  // Returns payments per weight. The clients of a cluster pay a common level, or their distance if
+  // that is greater, and at most the price. The level is so high that the cluster pays for its
+  // facility.
   [[nodiscard]] std::vector<double> payments(const SearchFrame& frame) const {
     const std::size_t n = facility.size();
     std::vector<std::uint32_t> clients(n);
@@ -304,7 +305,7 @@ void permute(SearchFrame& frame, const std::vector<std::uint32_t>& order) {
   }
 }
 
-// The duals, given as payments per weight, become the best ones found; returns L there.
+// Replaces the duals, given as payments per weight, by the best ones found. Returns L there.
 template <class Space>
 double ascend_from(const Start& start, const Space& space, const SearchFrame& frame,
                    const BoxTree* tree, const LowerBoundOptions& options,

@@ -8,8 +8,8 @@
 
 namespace terrace::cluster {
 
-/// For every client all facilities by ascending cost, ties by ascending number. Throws:
-/// std::invalid_argument if memory cannot be allocated, naming the bytes needed.
+/// All facilities for every client by ascending cost, with ties by ascending number.
+/// Throws: std::invalid_argument if memory cannot be allocated. The message gives the bytes needed.
 class ClientOrder {
  public:
   explicit ClientOrder(const MatrixRows& costs);

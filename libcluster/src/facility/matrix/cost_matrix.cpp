@@ -19,7 +19,7 @@ void check_memory(std::uint64_t n, std::uint64_t limit, const char* what) {
   throw std::invalid_argument("the costs of " + std::to_string(n) + " " + what + " would need " +
                               std::to_string((n * n >> 17) + 1) +
                               " MiB of memory, but the limit is " + std::to_string(limit >> 20) +
-                              " MiB; take fewer " + what + ", or a method without a matrix");
+                              " MiB; use fewer " + what + ", or a method without a matrix");
 }
 
 template <class Space>

@@ -19,14 +19,14 @@ class CostRows {
   virtual ~CostRows() = default;
   [[nodiscard]] std::size_t facilities() const { return facilities_; }
   [[nodiscard]] std::size_t clients() const { return clients_; }
-  /// Throws what the check throws. For loops over facilities or clients.
+  /// Throws whatever the stop check throws. For loops over facilities or clients.
   void check_stop() const {
     if (*check_stop_) (*check_stop_)();
   }
-  /// The costs of all clients from facility j; valid until `scratch` is used again. This and
-  /// gather() throw what the check throws.
+  /// Returns the costs of all clients from a facility; valid until `scratch` is used again. This
+  /// and gather() throw whatever the stop check throws.
   virtual const double* row(std::size_t facility, std::vector<double>& scratch) const = 0;
-  /// The costs of some clients, the same values as in the row.
+  /// Writes the costs of some clients, with the same values as in the row.
   virtual void gather(std::size_t facility, std::span<const std::uint32_t> clients,
                       double* out) const = 0;
 
@@ -42,7 +42,7 @@ class CostRows {
   const base::StopCheck* check_stop_;
 };
 
-/// A matrix whose costs are at most 2^900; it is copied only if its costs must be scaled for that,
+/// A matrix whose costs are at most 2^900. It is copied only if its costs must be scaled for that,
 /// or if they are all so small that they lack digits.
 class MatrixRows final : public CostRows {
  public:
@@ -55,9 +55,9 @@ class MatrixRows final : public CostRows {
     return connection_[facility * clients() + client];
   }
   [[nodiscard]] std::span<const double> opening() const { return opening_; }
-  /// A scaled cost in the unit of the matrix: infinite if it overflows a double.
+  /// Returns a scaled cost in the unit of the matrix; infinite if it overflows a double.
   [[nodiscard]] double unscaled(double cost) const;
-  /// A cost of the matrix, scaled.
+  /// Returns a cost of the matrix, scaled.
   [[nodiscard]] double scaled(double cost) const;
 
  private:
@@ -66,9 +66,9 @@ class MatrixRows final : public CostRows {
   int exponent_ = 0;
 };
 
-/// Assigns each client to the cheapest of these facilities, on ties the first. Facilities without
-/// clients are closed. Costs are those of the matrix, infinite if they overflow a double. Requires:
-/// `open` ascending, not empty.
+/// Assigns each client to the cheapest of these facilities, on ties to the first, and closes
+/// facilities without clients. Costs are those of the matrix, infinite if they overflow a double.
+/// Requires: `open` is ascending and not empty.
 FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open);
 
 }  // namespace terrace::cluster

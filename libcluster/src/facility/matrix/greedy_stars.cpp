@@ -19,9 +19,9 @@
 namespace terrace::cluster {
 namespace {
 
-// The growth of offers is equivalent to repeatedly taking the star of a facility and some clients
-// with the least cost per client; an open facility costs nothing more. A star gets no cheaper as
-// clients leave, except that its facility opens, so a queue of outdated values suffices.
+// The growth of offers is equivalent to repeatedly taking the star (a facility and some clients)
+// with the least cost per client, where an open facility costs nothing more. A star does not get
+// cheaper as clients leave, except when its facility opens, so a queue of outdated values suffices.
 class Stars {
  public:
   explicit Stars(const MatrixRows& costs)
@@ -92,7 +92,8 @@ class Stars {
     return std::find(open_.begin(), open_.end(), j) != open_.end();
   }
 
-  // Over the waiting clients, nearest first; others are removed from the list.
+  // Finds the cheapest star over the waiting clients, nearest first, and drops the others from the
+  // list.
   Star cheapest(std::uint32_t j) {
     costs_->check_stop();
     std::uint32_t* const order = row_order(j);
@@ -105,7 +106,7 @@ class Stars {
     double sum = opening_[j];
     for (std::uint32_t k = 0; k < kept; ++k) {
       const double cost = costs_->cost(j, order[k]);
-      if (cost > star.price) break;  // the mean only grows from here
+      if (cost > star.price) break;  // the mean can only grow from here on
       sum += cost;
       const double price = sum / (k + 1.0);
       if (price <= star.price) star = {price, k + 1};
@@ -121,7 +122,7 @@ class Stars {
   const MatrixRows* costs_;
   std::vector<double> opening_;
   std::vector<std::uint32_t> order_;  // per facility: waiting clients, nearest first
-  std::vector<std::uint32_t> left_;   // per facility: their number
+  std::vector<std::uint32_t> left_;   // per facility: number of waiting clients
   std::vector<char> connected_;
   std::vector<double> duals_;
   std::vector<std::uint32_t> open_;
@@ -141,7 +142,7 @@ bool is_feasible(const MatrixRows& costs, const std::vector<double>& duals, doub
   return true;
 }
 
-// Bisection between 1 and the harmonic number, for which they are feasible on any costs.
+// Bisects between 1 and the harmonic number, at which the duals are feasible for any costs.
 double least_divisor(const MatrixRows& costs, const std::vector<double>& duals) {
   if (is_feasible(costs, duals, 1.0)) return 1.0;
   double low = 1.0, high = 0.0;

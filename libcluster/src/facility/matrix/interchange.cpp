@@ -32,7 +32,7 @@ struct Found {
   std::vector<std::uint32_t> open;
 };
 
-// Perturbed solutions that end up worse are discarded: the search continues from the best.
+// Perturbed solutions that end up worse are discarded: the search continues from the best one.
 Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_t perturbations,
              std::uint32_t run, Clock::time_point start) {
   std::mt19937_64 random(base::seed_of_run(options.seed, run));
@@ -64,7 +64,7 @@ Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_
 FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOptions& options) {
   const Length length = length_of(options);
   if (length.restarts == 0) {
-    throw std::invalid_argument("a search without restarts: give at least 1");
+    throw std::invalid_argument("restarts is 0: give at least 1");
   }
   if (std::isnan(options.seconds)) {
     throw std::invalid_argument("the time limit is NaN: give seconds, or infinity");

@@ -33,7 +33,8 @@ class Growth {
     }
     for (std::size_t waiting = duals_.size(); waiting > 0;) {
       costs_->check_stop();
-      // At equal times facilities open first: clients that reach them then are connected at once.
+      // At equal times facilities open first, so that clients that reach them then are connected at
+      // once.
       if (!payments_.empty() &&
           (reaches_.empty() || payments_.top().first <= reaches_.top().first)) {
         const auto [time, j] = payments_.top();
@@ -47,9 +48,9 @@ class Growth {
     }
   }
 
-  // In the order of opening, those that share no payer with one that stays.
+  // Returns, in the order of opening, the facilities that share no payer with one that stays open.
   [[nodiscard]] std::vector<std::uint32_t> independent() const {
-    std::vector<char> used(duals_.size(), 0);  // has paid for a facility that stays
+    std::vector<char> used(duals_.size(), 0);  // by client: has paid for a facility that stays
     std::vector<std::uint32_t> stay;
     for (const std::uint32_t j : opening_order_) {
       costs_->check_stop();
@@ -71,12 +72,12 @@ class Growth {
 
  private:
   struct Offers {
-    double fixed = 0.0;         // of connected clients
-    double costs = 0.0;         // connection costs of the clients whose offers grow
-    std::uint32_t growing = 0;  // their number
+    double fixed = 0.0;         // offers of connected clients
+    double costs = 0.0;         // sum of connection costs of the clients whose offers grow
+    std::uint32_t growing = 0;  // number of these clients
   };
 
-  // The time at which the offers, growing at the current rate, reach the opening cost.
+  // Returns the time at which the offers, growing at the current rate, reach the opening cost.
   [[nodiscard]] double payment_time(std::uint32_t j) const {
     const Offers& o = offers_[j];
     if (costs_->opening()[j] == 0.0) return 0.0;
@@ -107,7 +108,7 @@ class Growth {
     opening_order_.push_back(j);
     std::size_t count = 0;
     for (std::uint32_t i = 0; i < duals_.size(); ++i) {
-      // Exactly those whose offer has been counted: rounding of the time must not miss one.
+      // Uses the same test that counted the offer, so that a rounded time misses no client.
       if (connected_[i] || !has_reached(i, j)) continue;
       connect(i, time);
       ++count;

@@ -18,11 +18,11 @@ namespace {
 void check_count(std::size_t k, std::size_t facilities, const KMedianOptions& options) {
   if (k == 0) throw std::invalid_argument("k-median with k = 0: give at least 1");
   if (k > facilities) {
-    throw std::invalid_argument("k-median with k = " + std::to_string(k) + " of " +
+    throw std::invalid_argument("k-median with k = " + std::to_string(k) + ", but there are only " +
                                 std::to_string(facilities) + " places: give at most that many");
   }
   if (options.restarts == 0) {
-    throw std::invalid_argument("a search without restarts: give at least 1");
+    throw std::invalid_argument("restarts is 0: give at least 1");
   }
 }
 
@@ -53,7 +53,7 @@ Connections connect(const CostRows& costs, std::span<const std::uint32_t> facili
   return result;
 }
 
-// The duals begin with what each client would pay for its second facility.
+// Starts the duals from what each client would pay for its second facility.
 double bound(const CostRows& costs, const Connections& connections, std::size_t k,
              const KMedianOptions& options) {
   if (options.bound_steps == 0) return 0.0;

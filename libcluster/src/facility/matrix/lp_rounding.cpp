@@ -82,11 +82,11 @@ class Relaxation {
   }
 
  private:
-  // Columns count from 1.
+  // GLPK's columns count from 1.
   [[nodiscard]] int open(int j) const { return 1 + j; }
   [[nodiscard]] int connected(int j, int i) const { return 1 + m_ + j * n_ + i; }
 
-  // The constraints x_ij <= y_j that are violated. Returns whether there were any.
+  // Adds the constraints x_ij <= y_j that are violated. Returns whether there were any.
   bool add_violated() {
     bool added = false;
     for (int j = 0; j < m_; ++j) {
@@ -146,7 +146,7 @@ FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& repo
   if (problem.facilities > 10000000 / problem.clients) {
     throw std::invalid_argument("a linear program of " + std::to_string(problem.facilities) +
                                 " facilities times " + std::to_string(problem.clients) +
-                                " clients is too large to solve: take interchange");
+                                " clients is too large to solve: use interchange");
   }
   Relaxation relaxation(problem);
   relaxation.solve();
@@ -172,7 +172,7 @@ bool has_lp_rounding() { return false; }
 
 FacilitySolution lp_rounding(const FacilityMatrix&, FacilityReport&) {
   throw std::runtime_error(
-      "this build of libcluster has no linear programming: configure it with "
+      "this build of libcluster has no linear programming: configure with "
       "-Dterrace_glpk=enabled (GLPK, whose licence is GPL-3.0-or-later)");
 }
 

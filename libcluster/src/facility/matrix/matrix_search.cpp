@@ -9,7 +9,7 @@
 
 namespace terrace::cluster {
 
-// Gains below this share of the cost are rounding: without this limit a search might cycle.
+// Gains below this fraction of the cost are rounding. Without this limit a search might cycle.
 constexpr double kLeastGain = 1e-12;
 
 MatrixSearch::MatrixSearch(const CostRows& costs, std::span<const double> opening,
@@ -51,8 +51,8 @@ double MatrixSearch::gain(std::uint32_t candidate) {
     closing[0] += std::min(c, second[i]) - now;
     closing[1] += c - now;
   }
-  // Either one closing, using the second nearest facilities, or any number of them, whose clients
-  // all go to the candidate.
+  // Either one facility closes and its clients use the second nearest, or any number of them close
+  // and all their clients go to the candidate.
   double best_one = 0.0, all = 0.0;
   std::uint32_t one = NearestOpen::kNone;
   for (const std::uint32_t j : state_.facilities()) {

@@ -15,9 +15,9 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kLeastExchangeGain = 1e-12;  // of the cost; smaller gains are rounding
-constexpr std::size_t kTogether = 32;         // exchanges evaluated on the same solution
-// A batch with this many costs is worth a thread.
+constexpr double kLeastExchangeGain = 1e-12;  // fraction of the cost; smaller gains are rounding
+constexpr std::size_t kTogether = 32;         // number of exchanges evaluated on the same solution
+// A batch with at least this many costs is worth a thread.
 constexpr std::size_t kWorthThreads = 200000;
 
 }  // namespace
@@ -66,7 +66,7 @@ void MedianSearch::close_least() {
 void MedianSearch::bring_to(std::size_t k, std::span<const std::uint32_t> candidates) {
   while (state_.facilities().size() > k) close_least();
   if (state_.facilities().size() == k) return;
-  // Gains only decrease as others open, so an old one is an upper bound.
+  // Gains only decrease as other facilities open, so an old gain is an upper bound.
   struct Entry {
     double gain;
     std::uint32_t facility;
@@ -134,7 +134,7 @@ void MedianSearch::descend(std::mt19937_64& random) {
     if (!batch.empty() && exchanges[best].gain > kLeastExchangeGain * cost()) {
       state_.open(batch[best]);
       state_.close(exchanges[best].leaving);
-      refused = 0;  // the batch is repeated, as others in it may still be good
+      refused = 0;  // the batch is repeated, because others in it may still be good
     } else {
       refused += looked;
       at = (at + looked) % order_.size();
@@ -156,8 +156,8 @@ void MedianSearch::replace(std::size_t count, std::mt19937_64& random) {
 namespace {
 
 // Solves facility location with one opening cost for all, repeatedly, each time from the last
-// solution, until k are open or the costs are adjacent. Returns the solution with the closest
-// number.
+// solution, until k are open or the costs are adjacent doubles. Returns the solution whose number
+// of facilities is closest to k.
 std::vector<std::uint32_t> search_for_cost(const CostRows& costs, std::size_t k,
                                            const std::vector<std::uint32_t>& candidates,
                                            std::mt19937_64& random) {
@@ -186,7 +186,7 @@ std::vector<std::uint32_t> search_for_cost(const CostRows& costs, std::size_t k,
 
 std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
                                         const KMedianOptions& options) {
-  constexpr std::size_t kAll = 1000;  // up to this many facilities, all are candidates
+  constexpr std::size_t kAll = 1000;  // with up to this many facilities, all are candidates
   std::mt19937_64 random(base::seed_of_run(options.seed, 0));
   std::vector<std::uint32_t> candidates(costs.facilities());
   std::iota(candidates.begin(), candidates.end(), 0u);

@@ -12,10 +12,10 @@
 
 namespace terrace::cluster {
 
-/// k facilities under exchanges.
+/// A solution of k facilities that is improved by exchanges.
 class MedianSearch {
  public:
-  /// threads: for exchanges evaluated concurrently.
+  /// threads: number of threads that evaluate exchanges concurrently.
   MedianSearch(const CostRows& costs, unsigned threads);
 
   void reset(std::span<const std::uint32_t> open);
@@ -28,7 +28,7 @@ class MedianSearch {
   void replace(std::size_t count, std::mt19937_64& random);
 
   [[nodiscard]] double cost() const { return state_.connection_cost(); }
-  /// Ascending.
+  /// Returns the open facilities in ascending order.
   [[nodiscard]] std::vector<std::uint32_t> open() const;
 
  private:
@@ -50,7 +50,8 @@ class MedianSearch {
   std::vector<std::uint32_t> order_;
 };
 
-/// The best of all restarts, ascending. Requires: 0 < k <= facilities, restarts > 0.
+/// Returns the best facilities of all restarts, ascending. Requires: 0 < k <= facilities, restarts
+/// > 0.
 [[nodiscard]] std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
                                                       const KMedianOptions& options);
 

@@ -16,7 +16,7 @@
 namespace terrace::cluster {
 
 /// Distances from a facility to consecutive clients, and the payments to it: the sum of weight *
-/// max(0, payment - distance). The sum has two halves, those of the even and of the odd positions,
+/// max(0, payment - distance). That sum has two halves, one for even and one for odd positions,
 /// whatever the width of the processor's vectors.
 template <class Space>
 class FastDistances {
@@ -27,11 +27,11 @@ class FastDistances {
   class From {
    public:
     From(const FastDistances& all, std::uint32_t facility) : from_(all.space_->from(facility)) {}
-    /// The distances of the first `count` clients.
+    /// Writes the distances of the first `count` clients.
     void fill(std::uint32_t count, double* out) const {
       for (std::uint32_t i = 0; i < count; ++i) out[i] = from_(i);
     }
-    /// Adds the payments of the `count` clients from `first`.
+    /// Adds the payments of `count` clients, starting at `first`.
     void add(std::uint32_t first, std::uint32_t count, const double* payments,
              const double* weights) {
       for (std::uint32_t k = 0; k < count; ++k) {

@@ -26,19 +26,19 @@ void check_strategy(FacilityStrategy strategy, bool has_boxes, bool has_triangle
       if (has_boxes) return;
       throw std::invalid_argument(asked +
                                   "needs bounds on distances to boxes, which do not exist for " +
-                                  what + ": take automatic or full_scan");
+                                  what + ": use automatic or full_scan");
     case FacilityStrategy::facilities:
       if (has_triangles) return;
       throw std::invalid_argument(
           asked + "needs distances that are symmetric and obey the triangle inequality, and " +
-          what + " does not (or does not declare it): take automatic" +
+          what + " does not (or does not declare it): use automatic" +
           (has_boxes ? ", kd_tree" : "") + " or full_scan");
     case FacilityStrategy::automatic:
     case FacilityStrategy::full_scan:
       return;
     default:
       throw std::invalid_argument(asked + "is not a local search on " + what +
-                                  ": take automatic or full_scan");
+                                  ": use automatic or full_scan");
   }
 }
 
@@ -100,7 +100,7 @@ std::size_t candidate_count(Effort effort, std::size_t points) {
 FacilitySolution run_search(SearchEngine& engine, const FacilityOptions& options,
                             FacilityReport* report) {
   if (options.batch == 0) {
-    throw std::invalid_argument("a batch of 0 candidates: 1 is the plain search");
+    throw std::invalid_argument("batch is 0: give at least 1, which is the plain search");
   }
   std::mt19937_64 random(options.seed);
   if (options.start) {

@@ -11,8 +11,8 @@
 
 namespace terrace::cluster {
 
-/// The local search for a problem that check() has passed. strategy: that of a local search, or
-/// automatic.
+/// Returns the local search for a problem that check() has passed. strategy: one of local search,
+/// or automatic.
 /// Throws: std::invalid_argument if the problem does not admit the strategy.
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(
     const FacilityPoints& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
@@ -21,11 +21,11 @@ namespace terrace::cluster {
     const FacilityEntities& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
     unsigned threads = 1, const base::StopCheck& check_stop = {});
 
-/// The number of candidates of a search over this many points; at least one, unless there are no
-/// points.
+/// Returns the number of candidates of a search over this many points; at least 1 unless there are
+/// no points.
 [[nodiscard]] std::size_t candidate_count(Effort effort, std::size_t points);
 
-/// The complete search requested by the options.
+/// Runs the complete search that the options request.
 [[nodiscard]] FacilitySolution run_search(SearchEngine& engine, const FacilityOptions& options,
                                           FacilityReport* report);
 

@@ -14,12 +14,12 @@ double greatest(const LinearMap& map) {
   return result;
 }
 
-// How many times longer the products that add up to a mapped vector may be than the diagonal of the
-// mapped box.
+// Returns how many times longer the products that add up to a mapped vector may be than the
+// diagonal of the mapped box.
 double stretch_of(LinearMap map, const Box3& box) {
   const double largest = greatest(map);
   for (double& m : map) m /= largest;
-  // Uses halves, as the sides of a box may be infinite.
+  // Halves are used, because the sides of a box may be infinite.
   Point3 half{};
   double longest = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -45,7 +45,7 @@ double stretch_of(LinearMap map, const Box3& box) {
 }  // namespace
 
 double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame) {
-  const double diagonal = frame.facility_cost / problem.facility_cost;  // of weight 1
+  const double diagonal = frame.facility_cost / problem.facility_cost;  // for weight 1
   double weight = 0.0;
   for (const double w : frame.weights) weight += w;
   double unit = 16.0 * std::numeric_limits<double>::epsilon();

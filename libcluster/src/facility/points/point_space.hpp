@@ -16,12 +16,12 @@
 
 namespace terrace::cluster {
 
-/// How far costs of the frame, summed over all clients, may differ from those of the given
-/// coordinates: bringing coordinates into range and mapping them rounds by units in the last place
-/// of the box, even if the distance is short.
+/// Returns how far costs of the frame, summed over all clients, may differ from those of the given
+/// coordinates. Scaling and mapping coordinates rounds by units in the last place of the box, even
+/// if a distance is short.
 [[nodiscard]] double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame);
 
-/// Weighted distances, computed row by row; no client pays more than its outlier price.
+/// Weighted distances, computed row by row and capped at each client's outlier price.
 template <class Space>
 class PointRows final : public CostRows {
  public:

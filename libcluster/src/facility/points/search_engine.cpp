@@ -47,8 +47,8 @@ void SearchEngine::start(const FacilitySolution& solution) {
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t c = solution.assignment[i];
     if (c != kOutlier && c >= solution.facilities.size()) {
-      refuse_start("client " + std::to_string(i) + " is in cluster " + std::to_string(c) + " of " +
-                   std::to_string(solution.facilities.size()));
+      refuse_start("client " + std::to_string(i) + " is in cluster " + std::to_string(c) +
+                   ", but there are only " + std::to_string(solution.facilities.size()));
     }
     if (c == kOutlier && !std::isfinite(price)) {
       refuse_start("client " + std::to_string(i) + " is left out, but outliers have no price");
@@ -56,7 +56,7 @@ void SearchEngine::start(const FacilitySolution& solution) {
     facility[i] = c == kOutlier ? kOutlier : solution.facilities[c];
   }
   for (const std::uint32_t j : solution.facilities) {
-    if (j >= count) refuse_start("facility " + std::to_string(j) + " is not among the points");
+    if (j >= count) refuse_start("facility " + std::to_string(j) + " does not exist");
     facility[j] = j;
   }
   std::vector<double> distances(count, price);
@@ -87,7 +87,7 @@ void SearchEngine::open(std::uint32_t candidate) {
 bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std::size_t batch,
                            const FacilityProgress& progress) {
   assert(batch > 0);
-  // However long the search is, it can be ended soon.
+  // Reports often enough that even a long search can be stopped soon.
   const std::size_t step = std::clamp<std::size_t>(candidates / 256, 1, 1000);
   std::size_t done = 0, next_report = 0;
   while (done < candidates) {

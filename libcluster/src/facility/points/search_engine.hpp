@@ -15,40 +15,44 @@
 
 namespace terrace::cluster {
 
-/// The local search, step by step, for any distances. The part that depends on the distances is in
-/// SpaceSearch. Initially client 0 is the only open facility. Costs and gains are in the unit of
-/// the problem. Law: cost() before open(p) minus cost() after equals gain(p), whatever its sign, up
-/// to rounding.
+/// The local search, step by step, for any distances. SpaceSearch implements the part that depends
+/// on the distances. Initially client 0 is the only open facility. Costs and gains are in the unit
+/// of the problem.
+///
+/// Invariant: cost() before open(p) minus cost() after it equals gain(p), whatever its sign, up to
+/// rounding.
 class SearchEngine {
  public:
-  /// strategy: that of a local search, not automatic. threads: 0: one per core. check_stop: its
-  /// exceptions are thrown by all that takes O(clients) or more.
+  /// strategy: one of local search, not automatic. threads: 0 means one per core. Every member
+  /// function that takes O(clients) or more throws whatever check_stop throws.
   SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
                base::StopCheck check_stop);
   virtual ~SearchEngine() = default;
 
-  /// Meyerson's initial solution (4.2.3): in random order, each client opens a facility with
-  /// probability w d / fc, where d is the distance from the nearest facility so far, and otherwise
-  /// joins that facility (or is left out if that is cheaper). O(clients * facilities).
+  /// Makes Meyerson's initial solution (4.2.3). In random order, each client opens a facility with
+  /// probability w d / fc, where d is the distance to the nearest facility so far. Otherwise it
+  /// joins that facility, or is left out if that is cheaper. Takes O(clients * facilities).
   virtual void start(std::mt19937_64& random) = 0;
-  /// Throws: std::invalid_argument if it is not a solution of the problem.
+  /// Starts from a solution. Throws: std::invalid_argument if it is not a solution of the problem.
   void start(const FacilitySolution& solution);
 
-  /// The saving from opening `candidate`: it takes the clients that are nearer to it than to their
-  /// facility, and all clients of facilities that are then not worth keeping. An open facility can
-  /// be a candidate too; opening it costs nothing.
+  /// Returns the saving from opening `candidate`. It takes the clients that are nearer to it than
+  /// to their facility, and all clients of facilities that are then not worth keeping. An open
+  /// facility can be a candidate too; opening it costs nothing.
   [[nodiscard]] double gain(std::uint32_t candidate);
-  /// Carries out the change evaluated by gain().
+  /// Makes the change that gain() evaluated.
   void open(std::uint32_t candidate);
-  /// Tries random candidates according to FacilityOptions::batch and ::progress. False if stopped.
+  /// Tries random candidates as FacilityOptions::batch and ::progress say. Returns false if
+  /// stopped.
   bool improve(std::size_t candidates, std::mt19937_64& random, std::size_t batch = 1,
                const FacilityProgress& progress = {});
 
-  /// Connects each client to its nearest open facility; on ties to the current one or otherwise the
-  /// lowest number. Leaves out clients if that price is better. The cost does not rise.
+  /// Connects each client to its nearest open facility; on ties to the current one, or otherwise to
+  /// the one with the lowest number. Leaves out clients if their price is lower. The cost does not
+  /// rise.
   virtual void assign_nearest() = 0;
-  /// Number of clients for which another open facility, or the outlier price, would be better.
-  /// O(clients * facilities).
+  /// Returns the number of clients for which another open facility, or the outlier price, would be
+  /// better. Takes O(clients * facilities).
   [[nodiscard]] virtual std::size_t wrongly_assigned() const = 0;
 
   [[nodiscard]] FacilityStrategy strategy() const { return strategy_; }
@@ -56,11 +60,11 @@ class SearchEngine {
   [[nodiscard]] std::size_t facility_count() const { return state_.open().size(); }
   [[nodiscard]] double cost() const { return state_.unscaled(state_.cost()); }
   [[nodiscard]] FacilitySolution solution() const { return state_.solution(); }
-  /// Since construction; wrongly_assigned stays 0.
+  /// Returns statistics since construction. wrongly_assigned stays 0.
   [[nodiscard]] const SearchStatistics& statistics() const { return statistics_; }
 
  protected:
-  /// Fills in verdict. parallel: the engine's threads may be used.
+  /// Fills in `verdict`. parallel: whether the engine's threads may be used.
   virtual void judge(std::uint32_t candidate, bool parallel, Verdict& verdict) = 0;
   virtual void apply(const Verdict& verdict) = 0;
   [[nodiscard]] virtual double distance(std::uint32_t facility, std::uint32_t client) const = 0;

@@ -35,7 +35,7 @@ std::vector<Point3> scaled(std::span<const Point3> points, const Scaling& scalin
   return result;
 }
 
-// The longest diagonal of a box with one corner at the origin.
+// Returns the longest diagonal of a box with one corner at the origin.
 double mapped_diagonal(const LinearMap& map, const Point3& extent) {
   double longest = 0.0;
   for (unsigned corner = 0; corner < 4; ++corner) {
@@ -47,10 +47,10 @@ double mapped_diagonal(const LinearMap& map, const Point3& extent) {
   return longest;
 }
 
-// A channel as an axis: differences in ground units are value * 2^exponent.
+// A channel as an axis. Differences in ground units are value * 2^exponent.
 struct Channel {
   double least = 0.0, weight = 0.0;  // weight in [0.5, 1) or 0
-  int shift = 0;                     // brings half differences below 1
+  int shift = 0;                     // scales half differences to below 1
   int exponent = std::numeric_limits<int>::min();
   double range = 0.0;  // largest value()
 
@@ -77,7 +77,7 @@ struct Channel {
   }
 };
 
-// As the metric measures the box: combines the positions' diagonal and the channels.
+// Combines the positions' diagonal and the channels, as the metric measures the box.
 double whole_diagonal(const Metric& metric, const Point3& extent, double positions,
                       const std::vector<double>& ranges) {
   const std::vector<double> origin(ranges.size(), 0.0);
@@ -95,13 +95,13 @@ double whole_diagonal(const Metric& metric, const Point3& extent, double positio
   return longest;
 }
 
-// Brings weights and costs into range; unit_exponent is that of a distance of weight 1.
+// Brings weights and costs into range. unit_exponent is that of a distance of weight 1.
 void set_costs(SearchFrame& frame, double facility_cost, double outlier_price, int unit_exponent) {
   const double heaviest = *std::max_element(frame.weights.begin(), frame.weights.end());
   const int weight_exponent = exponent_of(heaviest);
   for (double& w : frame.weights) w = std::ldexp(w, -weight_exponent);
   frame.true_facility_cost = std::ldexp(facility_cost, unit_exponent);
-  // Any cost beyond all distances means one facility.
+  // Any cost above all distances leads to one facility.
   frame.facility_cost = std::min(std::ldexp(facility_cost, -weight_exponent), 0x1p1000);
   frame.outlier_price = outlier_price;
   frame.cost_exponent = unit_exponent + weight_exponent;
@@ -160,7 +160,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
   frame.channels.resize(count * frame.channel_count);
   for (std::size_t c = 0; c < frame.channel_count; ++c) {
     const Channel& channel = channels[c];
-    if (channel.weight == 0.0) continue;  // zeros
+    if (channel.weight == 0.0) continue;  // all its values are zeros
     const int shift = channel.exponent - greatest;
     ranges.push_back(std::ldexp(channel.range, shift));
     for (std::size_t i = 0; i < count; ++i) {
@@ -173,7 +173,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
   frame.weights.assign(problem.weights.begin(), problem.weights.end());
   if (frame.weights.empty()) frame.weights.assign(count, 1.0);
   const bool squared = std::holds_alternative<SquaredEuclidean>(problem.metric);
-  // All points equal: there are no outliers then, whatever infinity times zero is.
+  // If all points are equal there are no outliers, so infinity times zero must not matter.
   const double price =
       whole > 0.0 ? problem.outlier_price * whole : std::numeric_limits<double>::infinity();
   set_costs(frame, problem.facility_cost * whole, price, squared ? 2 * greatest : greatest);

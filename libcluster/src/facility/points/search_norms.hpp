@@ -7,7 +7,7 @@
 
 #include <terrace/base/portable_math.hpp>
 
-/// Lengths of vectors of three coordinates and any number of channels, which are further axes: a
+/// Lengths of vectors of three coordinates and any number of channels, which are further axes. a
 /// and b are rows of channels, of which only the difference counts. Every norm grows with the
 /// absolute value of each component, including rounding, except for the powers of PowerNorm.
 

@@ -16,19 +16,21 @@
 #include "facility/points/search_norms.hpp"
 #include "terrace/cluster/metric.hpp"
 
-/// Distances as used by the search engine, a class for each kind of metric, so that they are
-/// inlined. Each has
-///     From from(f)            measures distances from facility f: double operator()(client)
-///                             order(client) orders like them, and from_order() converts it to them
-///     box_distance(f, box)    no client in the box is nearer to f, as computed (if kHasBoxes)
+/// Distances as the search engine uses them. There is one class per kind of metric, so that they
+/// are inlined. Each class has
+///     From from(f)            measures distances from facility f: double operator()(client).
+///                             order(client) sorts like the distance; from_order() converts it
+///                             back.
+///     box_distance(f, box)    lower bound of the computed distance from f to clients in the box
+///                             (if kHasBoxes)
 ///     kHasBoxes, has_triangles()   whether cells in space and clusters as cells may be used
 
 namespace terrace::cluster {
 
-/// Allows for rounding: a bound that says "not nearer" is reduced by this factor.
+/// Allows for rounding: a bound that rules out a nearer client is first reduced by this factor.
 inline constexpr double kBelieved = 1.0 - 1e-9;
 
-/// Components of the shortest vector from a point to a box.
+/// Returns the components of the shortest vector from a point to a box.
 inline Point3 to_box(const Point3& p, const Box3& box) {
   Point3 v{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -97,7 +99,7 @@ class NormSpace {
   bool triangles_;
 };
 
-/// An elliptical metric in each region, by the region of the facility.
+/// An elliptical metric in each region, chosen by the region of the facility.
 class FieldSpace {
  public:
   static constexpr bool kHasBoxes = true;
@@ -116,7 +118,7 @@ class FieldSpace {
     }
   }
 
-  FieldSpace(FieldSpace&&) = default;  // not copied, as places_ points into field_
+  FieldSpace(FieldSpace&&) = default;  // not copyable, because places_ points into field_
 
   struct From {
     const FieldSpace& space;
@@ -151,7 +153,7 @@ class FieldSpace {
   struct Place {
     const LinearMap* map;
     double least_scale;
-    double slack;  // rounding of mapped vectors, whose components may cancel
+    double slack;  // rounding error of mapped vectors, whose components may cancel
   };
   [[nodiscard]] const double* channels_of(std::uint32_t i) const {
     return channels_.data() + i * channel_count_;

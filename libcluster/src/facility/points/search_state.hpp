@@ -11,16 +11,16 @@
 
 namespace terrace::cluster {
 
-/// The clients of an open facility, ascending, and the values that bounds need.
+/// The clients of an open facility, in ascending order, and the values that bounds need.
 struct Cluster {
   std::vector<std::uint32_t> clients;
-  double weight = 0.0;   ///< sum
+  double weight = 0.0;   ///< sum of the clients' weights
   double cost = 0.0;     ///< sum of weighted distances
   double longest = 0.0;  ///< the longest connection, unweighted
 };
 
-/// The effect of opening a candidate. Sorted by facility, then client: so sums have the same order
-/// whatever strategy found the terms.
+/// The effect of opening a candidate. Terms are sorted by facility, then client, so sums have the
+/// same order whatever strategy found the terms.
 struct Verdict {
   struct Taken {
     std::uint64_t key;  ///< current facility * 2^32 + client; kOutlier sorts last
@@ -47,8 +47,9 @@ struct Verdict {
   }
 };
 
-/// A solution under improvement, for any distances. A client that is left out has no facility and a
-/// distance equal to the price. No client pays more than that, and each facility is its own client.
+/// A solution that is being improved, for any distances. A client that is left out has no facility
+/// and a distance equal to the price. No client pays more than the price, and each facility is its
+/// own client.
 class SearchState {
  public:
   explicit SearchState(SearchFrame& frame);
@@ -58,7 +59,7 @@ class SearchState {
   [[nodiscard]] const Cluster& cluster(std::uint32_t facility) const {
     return clusters_[slot_[facility]];
   }
-  /// Number of an open facility, below slot_count(), valid while it is open.
+  /// Returns the number of an open facility, below slot_count(), valid while the facility is open.
   [[nodiscard]] std::uint32_t slot(std::uint32_t facility) const { return slot_[facility]; }
   [[nodiscard]] std::size_t slot_count() const { return clusters_.size(); }
   [[nodiscard]] const std::vector<std::uint32_t>& open() const { return open_; }
@@ -78,8 +79,8 @@ class SearchState {
   /// Sets a new solution: the facility of each client, or kOutlier, and its distance.
   void assign(std::vector<std::uint32_t> facility, std::vector<double> distance);
 
-  /// Applies a verdict. moved_distance(client) is the distance from the candidate. Afterwards
-  /// `changed` holds the clients whose connection changed.
+  /// Applies a verdict. moved_distance(client) is the distance from the candidate. Sets `changed`
+  /// to the clients whose connection changed.
   template <class Distance>
   void apply(const Verdict& verdict, const Distance& moved_distance,
              std::vector<std::uint32_t>& changed);
@@ -99,7 +100,7 @@ class SearchState {
   std::vector<std::uint32_t> facility_;
   double facility_cost_, outlier_price_, true_facility_cost_;
   int cost_exponent_;
-  std::vector<std::uint32_t> open_, outliers_;  // ascending
+  std::vector<std::uint32_t> open_, outliers_;  // in ascending order
   std::vector<std::uint32_t> slot_;             // by facility: index in clusters_
   std::vector<Cluster> clusters_;
   std::vector<std::uint32_t> free_slots_;
@@ -122,7 +123,7 @@ void SearchState::apply(const Verdict& verdict, const Distance& moved_distance,
   bool left_out = false;
   for (const Verdict::Closed& closed : verdict.closed) {
     for (const std::uint32_t client : clusters_[slot_[closed.facility]].clients) {
-      if (facility_[client] != closed.facility) continue;  // already taken
+      if (facility_[client] != closed.facility) continue;  // the candidate has already taken it
       const double d = moved_distance(client);
       if (d <= outlier_price_) {
         connect(client, candidate, d);
@@ -135,7 +136,7 @@ void SearchState::apply(const Verdict& verdict, const Distance& moved_distance,
     }
     close_facility(closed.facility);
   }
-  // The lists of facilities that lost clients, each once: taken is sorted by facility.
+  // Updates the lists of facilities that lost clients, each once: `taken` is sorted by facility.
   std::uint32_t last = candidate;
   bool outliers_taken = former == kOutlier;
   for (const Verdict::Taken& taken : verdict.taken) {

@@ -20,7 +20,7 @@
 
 namespace terrace::cluster {
 
-/// The local search over a space of search_space.hpp.
+/// The local search over one of the spaces of search_space.hpp.
 template <class Space>
 class SpaceSearch final : public SearchEngine {
  public:
@@ -111,7 +111,7 @@ class SpaceSearch final : public SearchEngine {
   [[nodiscard]] auto points() const { return space_.points(); }
 
   // Finds open facilities that are nearer than `distances`. A facility remains its own client, at
-  // 0.
+  // distance 0.
   void find_nearest(std::vector<std::uint32_t>& facility, std::vector<double>& distances) const {
     base::StopTicks ticks(check_stop_);
     for (const std::uint32_t j : state_.open()) {
@@ -142,7 +142,7 @@ class SpaceSearch final : public SearchEngine {
 
   void judge(std::uint32_t candidate, bool parallel, Verdict& verdict) override;
 
-  // Parts of a gain. Each appends to a verdict.
+  // Computes parts of a gain. Each function appends to a verdict.
   void scan_all(std::uint32_t candidate, const From& from, Verdict& verdict);
   void scan_tree(std::uint32_t candidate, const From& from, Verdict& verdict) const;
   void scan_outliers(const From& from, Verdict& verdict) const;
@@ -154,18 +154,18 @@ class SpaceSearch final : public SearchEngine {
     verdict.taken.push_back(
         {facility << 32 | client, state_.weight(client) * (state_.distance(client) - d)});
   }
-  // The loss of a client that is not taken when its facility closes.
+  // Returns the loss of a client that the candidate does not take when its facility closes.
   [[nodiscard]] double loss(std::uint32_t client, double d) const {
     return state_.weight(client) * (std::min(d, state_.outlier_price()) - state_.distance(client));
   }
 
   Space space_;
   std::optional<BoxTree> tree_;
-  std::vector<std::uint32_t> changed_;  // by the last verdict applied
-  std::vector<Verdict> parts_;          // of a gain, by piece of work
+  std::vector<std::uint32_t> changed_;  // clients changed by the last verdict
+  std::vector<Verdict> parts_;          // parts of a gain, by piece of work
 };
 
-// The gain by each strategy.
+// The gain under each strategy.
 
 template <class Space>
 void SpaceSearch<Space>::judge(std::uint32_t candidate, bool parallel, Verdict& verdict) {
@@ -186,7 +186,8 @@ void SpaceSearch<Space>::judge(std::uint32_t candidate, bool parallel, Verdict& 
       scan_facilities(candidate, from, 0, open, verdict);
     }
   } else {
-    // A few pieces per thread, as clusters differ in size; then the client tree or the outliers.
+    // There are a few pieces per thread, because clusters differ in size. The last piece is the
+    // client tree or the outliers.
     const std::size_t pieces = std::min<std::size_t>(open, 4 * team_.threads());
     parts_.resize(pieces + 1);
     team_.run(pieces + 1, [&](std::size_t piece) {
@@ -215,7 +216,7 @@ void SpaceSearch<Space>::judge(std::uint32_t candidate, bool parallel, Verdict& 
   state_.sum(verdict);
 }
 
-// Every client, as in the literature: the reference for the other strategies.
+// Examines every client, as in the literature. The reference for the other strategies.
 template <class Space>
 void SpaceSearch<Space>::scan_all(std::uint32_t candidate, const From& from, Verdict& verdict) {
   std::vector<double>& losses = verdict.losses;
@@ -235,13 +236,13 @@ void SpaceSearch<Space>::scan_all(std::uint32_t candidate, const From& from, Ver
   verdict.inspected += state_.size();
 }
 
-// Clients that may be nearer to the candidate than to their facility.
+// Examines clients that may be nearer to the candidate than to their facility.
 template <class Space>
 void SpaceSearch<Space>::scan_tree(std::uint32_t candidate, const From& from,
                                    Verdict& verdict) const {
   if constexpr (Space::kHasBoxes) {
     const std::vector<BoxTree::Node>& nodes = tree_->nodes();
-    std::vector<std::uint32_t>& stack = verdict.stack;  // nodes still to be visited
+    std::vector<std::uint32_t>& stack = verdict.stack;  // nodes to visit
     stack.assign(1, 0);
     while (!stack.empty()) {
       const BoxTree::Node& node = nodes[stack.back()];
@@ -268,7 +269,8 @@ void SpaceSearch<Space>::scan_outliers(const From& from, Verdict& verdict) const
   verdict.inspected += state_.outliers().size();
 }
 
-// Facilities from the begin-th open one on: their clients, if these are cells, and their closure.
+// Examines facilities from the begin-th open one on: their clients, if they are cells, and their
+// closure.
 template <class Space>
 void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const From& from,
                                          std::size_t begin, std::size_t end,
@@ -283,9 +285,8 @@ void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const From& fr
       const Cluster& cluster = state_.cluster(j);
       const double d = kBelieved * from(j);
       ++verdict.inspected;
-      // By the triangle inequality, a client that is nearer to the candidate than to j, at a
-      // distance of at most the longest connection, implies that the candidate is within twice that
-      // of j.
+      // By the triangle inequality, if a client of j is nearer to the candidate than to j, the
+      // candidate is within twice the longest connection of j.
       takes = takes && d < 2.0 * cluster.longest;
       // And every client i loses at least d - 2 d(i, j), or price - d(i, j).
       closes = cluster.weight * std::min(d, kBelieved * state_.outlier_price()) <
@@ -299,7 +300,8 @@ void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const From& fr
   }
 }
 
-// The clients of one facility: all of them if they may be taken, otherwise until they pay for it.
+// Examines the clients of one facility: all if the candidate may take some, otherwise until they
+// pay for the facility.
 template <class Space>
 void SpaceSearch<Space>::inspect(std::uint32_t facility, const From& from, bool takes,
                                  Verdict& verdict) const {

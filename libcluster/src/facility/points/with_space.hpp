@@ -15,14 +15,14 @@
 
 namespace terrace::cluster {
 
-/// The distances of a problem of entities.
+/// Returns the distances of a problem of entities.
 inline IndexSpace space_of(const FacilityEntities& problem) {
   return {problem.distance, problem.symmetric && problem.triangle_inequality};
 }
 
-/// Calls visit(space) with the distances of the problem among the points of its frame, which are
-/// moved out of it. `original` are the points in the order of the frame's. The space belongs to
-/// visit: it refers to nothing outside.
+/// Calls visit(space) with the distances of the problem between the points of its frame, which are
+/// moved out of it. `original` holds the points in the order of the frame. `visit` owns the space,
+/// which refers to nothing outside it.
 template <class Visit>
 auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<const Point3> original,
                 const Visit& visit) {
@@ -44,7 +44,7 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
         } else if constexpr (std::is_same_v<M, EllipticalField>) {
           return visit(FieldSpace(frame, original, metric));
         } else if constexpr (std::is_same_v<M, CustomMetric>) {
-          // The caller's function on original positions; channels are added under the root.
+          // The caller's function needs original positions. Channels are added under the root.
           auto distance = [points = std::vector<Point3>(original.begin(), original.end()),
                            channels = frame.channels, count = frame.channel_count,
                            function = metric.distance](std::uint32_t j, std::uint32_t i) {
