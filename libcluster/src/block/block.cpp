@@ -28,7 +28,7 @@ EngineFunction engine_of(SimdPath path) {
   return run_engine_portable;
 }
 
-/// A facility at the same place as one of lower number has no clients.
+/// Drops facilities at the same place as one of lower number, because they have no clients.
 void drop_empty_facilities(BlockState& state) {
   std::uint32_t* const number = state.near;
   std::fill_n(number, state.facility_count, 0u);
@@ -46,7 +46,7 @@ void drop_empty_facilities(BlockState& state) {
 
 double mean_of(std::span<const double> weights) {
   if (weights.empty()) return 1.0;
-  // Divided before they are added: the sum itself may exceed the range of double.
+  // Divides before adding, because the sum itself may exceed the range of double.
   const double share = 1.0 / static_cast<double>(weights.size());
   double mean = 0.0;
   for (const double w : weights) mean += w * share;
@@ -94,8 +94,8 @@ BlockClusterer::BlockClusterer(SimdPath path) : impl_(std::make_unique<Impl>()) 
   if (path == SimdPath::automatic) path = best_simd_path();
   if (!base::supports(path)) {
     throw std::invalid_argument(
-        "this processor lacks the instructions of the SIMD path asked for; "
-        "SimdPath::automatic takes the best there is");
+        "this processor lacks the instructions of the requested SIMD path; "
+        "SimdPath::automatic takes the best available");
   }
   impl_->engine = engine_of(path);
 }
@@ -118,8 +118,8 @@ void BlockClusterer::run(std::span<const Point3> points, std::span<const double>
     return;
   }
 
-  // With weights of mean 1 no sum of theirs leaves the range of float. A facility cost beyond the
-  // sum of all distances means one facility, however far beyond it is.
+  // With weights of mean 1 no sum of weights leaves the range of float. Any facility cost above the
+  // sum of all distances leads to one facility.
   const double mean_weight = mean_of(weights);
   const double facility_cost = options.facility_cost * scaling.diagonal;
   BlockState& state = impl_->state;

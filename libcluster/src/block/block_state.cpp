@@ -60,7 +60,7 @@ std::uint32_t BlockState::add_facility(std::uint32_t point) {
   fz[j] = z[point];
   reach[j] = furthest[j] = load[j] = spent[j] = 0;
   size[j] = 0;
-  // The surplus lanes of the last vector.
+  // Fills the surplus lanes of the last vector.
   for (std::uint32_t k = facility_count; k < round_to_lanes(facility_count); ++k) {
     fx[k] = kFarAway;
     fy[k] = fz[k] = reach[k] = 0;
@@ -85,7 +85,7 @@ void BlockState::reserve_pool(std::uint32_t more) {
   if (pool_used + more <= px.capacity()) return;
   std::uint32_t live = 0;
   for (std::uint32_t j = 0; j < facility_count; ++j) live += round_to_lanes(size[j]);
-  // Half of the pool is slack, so that compaction is rare.
+  // Leaves half of the pool free, so that compaction is rare.
   const std::size_t room = std::max<std::size_t>(px.capacity(), 2 * (std::size_t{live} + more));
   Column<float>* columns[6] = {&px, &py, &pz, &pw, &pd, &pp};
   for (Column<float>& column : spare_) column.reserve(room);
@@ -107,7 +107,7 @@ void BlockState::place_segments() {
   std::uint32_t end = 0;
   for (std::uint32_t j = 0; j < facility_count; ++j) {
     closes[j] = end;
-    // Its clients are those of a duplicate.
+    // Its clients belong to a duplicate.
     if (size[j] == 0) continue;
     facility[kept] = facility[j];
     fx[kept] = fx[j];

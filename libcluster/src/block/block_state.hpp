@@ -14,7 +14,7 @@
 namespace terrace::cluster {
 
 /// A grow-only array, aligned for vectors, whose capacity is a multiple of sixteen. It manages only
-/// its storage: the owner tracks how many elements count. Defined for float and std::uint32_t.
+/// its storage; the owner tracks the number of elements. Defined for float and std::uint32_t.
 template <class T>
 class Column {
  public:
@@ -22,7 +22,7 @@ class Column {
   Column(const Column&) = delete;
   Column& operator=(const Column&) = delete;
   ~Column();
-  /// Makes room for `count` elements; the first `kept` are preserved.
+  /// Makes room for `count` elements and preserves the first `kept`.
   void reserve(std::size_t count, std::size_t kept = 0);
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
   void swap(Column& other) noexcept;
@@ -41,23 +41,23 @@ inline constexpr std::uint32_t kLanes = 16;
   return (n + kLanes - 1) & ~(kLanes - 1);
 }
 
-/// A coordinate beyond all points; its square is finite.
+/// A coordinate beyond all points. Its square is finite.
 inline constexpr float kFarAway = 1e18f;
 
 /// A block during clustering, in the unit of its bounding box, in single precision.
 ///
-/// The points lie along a space-filling curve, so that sixteen neighbours in memory (a *group*) are
-/// neighbours in space. Each facility owns a *segment* of the pool with a copy of its clients, so
-/// that gains are computed over contiguous memory. Segments begin and end at multiples of sixteen;
-/// surplus lanes have weight 0 and distance 0 and so never count.
+/// The points are ordered along a space-filling curve, so that sixteen neighbours in memory (a
+/// *group*) are neighbours in space. Each facility owns a *segment* of the pool with a copy of its
+/// clients, so that gains are computed over contiguous memory. Segments begin and end at multiples
+/// of sixteen. Surplus lanes have weight 0 and distance 0, so they never count.
 struct BlockState {
   // Points, in curve order. Surplus lanes repeat the last point with weight 0.
   std::uint32_t count = 0;
   float facility_cost = 0;
   Column<float> x, y, z, w;
   Column<std::uint32_t> original;  ///< number of the point in the block
-  Column<std::uint32_t> nearest;   ///< facility, as of the last assignment
-  Column<float> distance;          ///< distance to it, squared at first
+  Column<std::uint32_t> nearest;   ///< facility of the last assignment
+  Column<float> distance;          ///< distance to that facility, squared at first
 
   // Groups: a ball around sixteen points of the curve.
   std::uint32_t group_count = 0;
@@ -67,7 +67,7 @@ struct BlockState {
   std::uint32_t facility_count = 0;
   Column<std::uint32_t> facility;        ///< the point, by its position on the curve
   Column<float> fx, fy, fz;              ///< its position
-  Column<float> reach;                   ///< squared: candidates farther away cannot gain here
+  Column<float> reach;                   ///< squared; candidates farther away cannot gain here
   Column<float> furthest;                ///< longest connection
   Column<float> load, spent;             ///< sums of w and of w d
   Column<float> mean_x, mean_y, mean_z;  ///< centre of mass of the clients
@@ -99,10 +99,11 @@ struct BlockState {
   void reserve_pool(std::uint32_t more);
   /// Appends a facility without clients.
   std::uint32_t add_facility(std::uint32_t point);
-  /// Removes facility j; the last one takes its number.
+  /// Removes facility j. The last facility takes its number.
   void remove_facility(std::uint32_t j);
-  /// Makes room for a segment per facility by its `size`, with sixteen lanes behind each; drops
-  /// facilities without clients. `closes` becomes the beginnings, by the old numbers.
+  /// Makes room for a segment of `size` clients per facility, followed by sixteen lanes. Drops
+  /// facilities without clients. Sets `closes` to the beginnings of the segments, by the old
+  /// numbers.
   void place_segments();
   /// Sorts the facilities in the order of the curve.
   void sort_facilities();
@@ -123,7 +124,7 @@ class CurveSorter {
             const Scaling& scaling, BlockState& state);
 
  private:
-  /// A point in single precision, sixteen bytes that move at once.
+  /// A point in single precision: sixteen bytes that move at once.
   struct alignas(16) Place {
     float x, y, z;
     std::uint32_t original;

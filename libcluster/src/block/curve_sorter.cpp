@@ -14,14 +14,14 @@ constexpr unsigned kKeyBits = 2 * kDigitBits;
 constexpr unsigned kMostAxisBits = 11;
 
 /// Places on the Z-order curve through a grid of equal cells over the block's box. Short sides have
-/// fewer cells and so fewer bits in the key, which leaves more for the long ones.
+/// fewer cells and so fewer bits in the key, which leaves more bits for the long sides.
 struct CurveTable {
   float cells = 0;  ///< per unit of length
   std::array<std::array<std::uint32_t, 1u << kMostAxisBits>, 3> place;
   std::array<std::uint32_t, 3> last;  ///< cell of each axis
 
   explicit CurveTable(const Point3& extent) {
-    // The longest side is in [1/2, 1): bits of a side halve with its length.
+    // The longest side is in [1/2, 1). A side that is half as long gets one bit less.
     std::array<unsigned, 3> fewer{};
     for (unsigned axis = 0; axis < 3; ++axis) {
       double side = extent[axis];

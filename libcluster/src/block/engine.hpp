@@ -9,10 +9,10 @@ namespace terrace::cluster {
 
 /// How long the engine searches.
 struct SearchPlan {
-  std::uint32_t random_candidates = 0;  ///< if not 0, instead of sweeps
-  std::uint32_t sweeps = 1;             ///< along the curve
-  float candidates = 3.0f;              ///< per facility and sweep, at least
-  std::uint32_t most_spacing = 32;      ///< maximum number of points from one candidate to the next
+  std::uint32_t random_candidates = 0;  ///< if not 0, replaces the sweeps
+  std::uint32_t sweeps = 1;             ///< number of sweeps along the curve
+  float candidates = 3.0f;              ///< least number of candidates per facility and sweep
+  std::uint32_t most_spacing = 32;      ///< largest number of points between candidates
   std::uint32_t polish = 1;             ///< rounds of moving facilities and assigning all points
   std::uint64_t seed = 1;               ///< seed of the random candidates
 };

@@ -7,7 +7,7 @@
 
 namespace terrace::cluster {
 
-/// Squared distance, lane by lane.
+/// Returns the squared distance, lane by lane.
 template <class V>
 V squared(V x, V y, V z, V cx, V cy, V cz) {
   const V dx = x - cx;
@@ -16,19 +16,20 @@ V squared(V x, V y, V z, V cx, V cy, V cz) {
   return dx * dx + dy * dy + dz * dz;
 }
 
-/// The square root of one float by the instruction that vectors use.
+/// Returns the square root of one float, computed by the instruction that vectors use.
 template <class V>
 float root(float value) {
   return largest(sqrt(V::broadcast(value)));
 }
 
-/// Groups of the curve, and the assignment of all points to their nearest facilities.
+/// Computes groups of the curve and assigns all points to their nearest facilities.
 template <class V>
 class Assigner {
  public:
   explicit Assigner(BlockState& state) : s_(state) {}
 
-  /// The ball around each group: the centre of its box and the distance of its farthest point.
+  /// Computes the ball around each group: the centre of its box and the distance of its farthest
+  /// point.
   void measure_groups() {
     s_.group_count = round_to_lanes(s_.count) / kLanes;
     for (std::uint32_t g = 0; g < s_.group_count; ++g) {
@@ -44,7 +45,7 @@ class Assigner {
     }
   }
 
-  /// Nearest facility of every point; ties go to the lowest number.
+  /// Finds the nearest facility of every point. Ties go to the lowest number.
   void assign() {
     const std::uint32_t end = round_to_lanes(s_.facility_count);
     const V step = V::broadcast(1.0e-6f);
@@ -59,7 +60,8 @@ class Assigner {
         d.store(s_.scratch + j);
         low = min(low, d);
       }
-      // A point of the group is nearest to a facility within this distance of the centre.
+      // Every point of the group has its nearest facility within this distance of the group's
+      // centre.
       const float bound = root<V>(least(low)) + 2 * s_.group_radius[g];
       const V limit = V::broadcast(bound * bound * 1.00001f) + step * step;
       const std::uint32_t i = g * kLanes;

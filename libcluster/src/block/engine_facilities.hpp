@@ -7,7 +7,7 @@
 
 namespace terrace::cluster {
 
-/// Single facilities: data about their clients, and their positions.
+/// Updates single facilities: the data about their clients, and their positions.
 template <class V>
 class Facilities {
  public:
@@ -44,8 +44,9 @@ class Facilities {
     s_.mean_x[j] = sx * inverse;
     s_.mean_y[j] = sy * inverse;
     s_.mean_z[j] = sz * inverse;
-    // Beyond twice the longest connection no client is nearer to the candidate. Closing loses at
-    // least load * D - 2 * spent (triangle inequality), which must stay below the facility cost.
+    // No client beyond twice the longest connection is nearer to the candidate. Closing loses at
+    // least load
+    // * D - 2 * spent (triangle inequality), which must stay below the facility cost.
     const float closing = (s_.facility_cost + 2 * spent) * inverse;
     const float far = 2 * furthest > closing ? 2 * furthest : closing;
     s_.reach[j] = load > 0 ? far * far * 1.00001f : kFarAway * kFarAway;
@@ -58,7 +59,7 @@ class Facilities {
     float cx = s_.mean_x[j];
     float cy = s_.mean_y[j];
     float cz = s_.mean_z[j];
-    // One step of Weiszfeld's iteration from the mean.
+    // Makes one step of Weiszfeld's iteration from the mean.
     {
       V sw = V::broadcast(0);
       V sx = sw;
@@ -95,7 +96,7 @@ class Facilities {
       here = here + lanes;
     }
     const float closest = least(best);
-    // Surplus lanes lie where the facility is; should one win, nothing changes.
+    // Surplus lanes are at the facility's position. If one wins, nothing changes.
     const Mask others = less(V::broadcast(closest), best);
     const float where = least(select(others, V::broadcast(3.0e38f), place));
     if (!(where < static_cast<float>(s_.size[j]))) return;

@@ -8,13 +8,13 @@
 
 namespace terrace::cluster {
 
-/// The step of the local search: judge a candidate, open it.
+/// One step of the local search: evaluates a candidate and opens it.
 template <class V>
 class Gain {
  public:
   explicit Gain(BlockState& state) : s_(state), facilities_(state) {}
 
-  /// What opening a facility at (x, y, z) spares. Fills near and closes.
+  /// Returns the saving from opening a facility at (x, y, z). Fills `near` and `closes`.
   float gain(float x, float y, float z) {
     const V cx = V::broadcast(x);
     const V cy = V::broadcast(y);
@@ -37,7 +37,7 @@ class Gain {
       const std::uint32_t j = s_.near[k];
       const std::uint32_t first = s_.begin[j];
       const std::uint32_t end = first + round_to_lanes(s_.size[j]);
-      // Closing j loses at least load * |candidate - mean| - spent: distance is convex.
+      // Closing j loses at least load * |candidate - mean| - spent, because distance is convex.
       const float mx = s_.mean_x[j] - x;
       const float my = s_.mean_y[j] - y;
       const float mz = s_.mean_z[j] - z;
@@ -71,7 +71,7 @@ class Gain {
     return gain + sum(spared);
   }
 
-  /// Opens a facility at the point; gain() for it must have been the last call.
+  /// Opens a facility at the point. The last call must have been gain() for the same point.
   void open(std::uint32_t point) {
     std::uint32_t most = kLanes;
     for (std::uint32_t k = 0; k < s_.near_count; ++k) most += round_to_lanes(s_.size[s_.near[k]]);
@@ -97,7 +97,7 @@ class Gain {
         const V old = V::load(s_.pd + i);
         const V w = V::load(s_.pw + i);
         const Mask client = less(zero, w);
-        // A vector's last lanes may be surplus: they have no weight and go nowhere.
+        // The last lanes of a vector may be surplus. They have no weight and are not moved.
         const Mask moves = closes ? client : client & less(d, old);
         const std::uint32_t bits = moves.bits();
         if (bits == 0 && !changed) {
@@ -134,7 +134,7 @@ class Gain {
     facilities_.recentre(j);
   }
 
-  /// Makes the lanes from `end` to the next multiple of sixteen count for nothing.
+  /// Zeroes the lanes from `end` to the next multiple of sixteen, so that they do not count.
   void clear_surplus(std::uint32_t end) {
     for (std::uint32_t i = end; i < round_to_lanes(end); ++i) {
       s_.px[i] = s_.py[i] = s_.pz[i] = s_.pw[i] = s_.pd[i] = 0;

@@ -11,13 +11,13 @@
 #include "block/engine_segments.hpp"
 
 // The engine and its parts are templates over a vector of sixteen floats (simd_*.hpp), compiled
-// once for each instruction set. They use no library function: such a function, compiled for newer
-// processors, might end up in code for all (tests/check_symbols.sh). Where memory has to grow, they
-// call BlockState, which is compiled for every processor.
+// once for each instruction set. They call no library function, because one compiled for newer
+// processors might end up in code for all processors (tests/check_symbols.sh). Where memory has to
+// grow they call BlockState, which is compiled for every processor.
 
 namespace terrace::cluster {
 
-/// One clustering of the block that the state holds.
+/// Makes one clustering of the block that the state holds.
 template <class V>
 class Engine {
  public:
@@ -44,7 +44,7 @@ class Engine {
   }
 
  private:
-  /// Gives every point to its nearest facility and makes the segments anew.
+  /// Assigns every point to its nearest facility and rebuilds the segments.
   void partition() {
     assigner_.assign();
     Segments<V>(s_).build();
@@ -60,14 +60,14 @@ class Engine {
     if (gain_.gain(s_.x[point], s_.y[point], s_.z[point]) > 0) gain_.open(point);
   }
 
-  /// Considers points at equal distances along the curve.
+  /// Tries points at equal distances along the curve.
   void sweep(std::uint32_t round, const SearchPlan& plan) {
     const float wanted = plan.candidates * static_cast<float>(s_.facility_count);
     auto spacing = static_cast<std::uint32_t>(static_cast<float>(s_.count) / wanted);
     spacing = spacing < 1 ? 1 : spacing > plan.most_spacing ? plan.most_spacing : spacing;
     const std::uint32_t visits = (s_.count + spacing - 1) / spacing;
-    // In steps near the golden section of their number, so that what a change has touched is
-    // seldom judged right afterwards.
+    // Visits in steps near the golden section of their number, so that points affected by a change
+    // are seldom judged right after it.
     auto step = static_cast<std::uint32_t>(static_cast<float>(visits) * 0.618034f);
     if (step == 0) step = 1;
     while (common_divisor(step, visits) != 1) ++step;
@@ -80,7 +80,7 @@ class Engine {
     }
   }
 
-  /// Points that pay more than a facility costs had better be one.
+  /// Opens facilities at points that pay more than a facility costs.
   void open_overpriced() {
     std::uint32_t found = 0;
     const V limit = V::broadcast(s_.facility_cost);

@@ -7,8 +7,8 @@
 
 namespace terrace::cluster {
 
-/// The start: facilities at equal distances along the curve; their number is derived from the cost
-/// of runs of the curve.
+/// Makes the start: facilities at equal distances along the curve. Their number is derived from the
+/// cost of runs of the curve.
 template <class V>
 class Seeder {
  public:
@@ -27,9 +27,9 @@ class Seeder {
   }
 
  private:
-  /// The number of facilities at which the cost is least, if each serves a run of the curve.
+  /// Returns the number of facilities of least cost if each serves a run of the curve.
   float fitted_count() {
-    // Runs of 16, 32, 64, ... points, until their cost has been rising for a while.
+    // Evaluates runs of 16, 32, 64, ... points until their cost has been rising for a while.
     constexpr int kMost = 24;
     float total[kMost];
     float connection[kMost];
@@ -47,7 +47,7 @@ class Seeder {
     if (best + 1 >= levels) return count;
     if (best == 0) return count_of_short_runs(count, total[0], connection[0], connection[1]);
 
-    // A parabola through the least cost and its neighbours, over the logarithm of the length.
+    // Fits a parabola through the least cost and its neighbours, over the logarithm of the length.
     const float before = total[best - 1];
     const float after = total[best + 1];
     const float curvature = before - 2 * total[best] + after;
@@ -64,7 +64,8 @@ class Seeder {
     return count * stretch * (correction < 0.7f ? 0.7f : correction > 1.0f ? 1.0f : correction);
   }
 
-  /// Below sixteen points per run: the cost is taken to fall as it did from 32 to 16.
+  /// Extrapolates to fewer than sixteen points per run, assuming that the cost keeps falling as it
+  /// did from 32 to 16.
   float count_of_short_runs(float count, float total, float sixteen, float thirty_two) {
     const float growth = sixteen > 0 ? thirty_two / sixteen : 1.0f;
     float connection = sixteen;
@@ -78,8 +79,8 @@ class Seeder {
     return count;
   }
 
-  /// Sum of w d over runs of `length` points, d being measured from the run's centre of mass.
-  /// length: a multiple of sixteen.
+  /// Returns the sum of w d over runs of `length` points, where d is the distance to the run's
+  /// centre of mass. length: a multiple of sixteen.
   float run_cost(std::uint32_t length) {
     const std::uint32_t end = round_to_lanes(s_.count);
     V total = V::broadcast(0);

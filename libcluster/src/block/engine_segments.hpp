@@ -7,7 +7,7 @@
 
 namespace terrace::cluster {
 
-/// Stores points of the mask densely in the pool, from a place on, and what else up to sixteen
+/// Stores the points of the mask densely in the pool, starting at `place`. May write up to sixteen
 /// lanes.
 template <class V>
 [[gnu::always_inline]] inline void compress_points(BlockState& s, std::uint32_t place,
@@ -21,14 +21,15 @@ template <class V>
   compress(s.pp + place, mask, p);
 }
 
-/// Makes the segments of all facilities anew from the last assignment. Sixteen points of the curve
-/// belong to few facilities: what each of them takes moves by one compression a column.
+/// Rebuilds the segments of all facilities from the last assignment. Sixteen points of the curve
+/// belong to few facilities, and the points of each facility are moved with one compression per
+/// column.
 template <class V>
 class Segments {
  public:
   explicit Segments(BlockState& state) : s_(state) {}
 
-  /// Drops facilities without clients.
+  /// Builds the segments and drops facilities without clients.
   void build() {
     for (std::uint32_t j = 0; j < s_.facility_count; ++j) s_.size[j] = 0;
     for (std::uint32_t i = 0; i < s_.count; i += kLanes) {
@@ -44,7 +45,8 @@ class Segments {
       const V d = V::load(s_.distance + i);
       const V p = V::iota() + V::broadcast(static_cast<float>(i));
       each_facility(i, [&](std::uint32_t j, Mask mask, std::uint32_t clients) {
-        // Lanes beyond the clients are overwritten by those to come or lie behind the segment.
+        // Lanes beyond the clients are overwritten by later ones or are after the end of the
+        // segment.
         const std::uint32_t place = s_.closes[j];
         compress_points(s_, place, mask, x, y, z, w, d, p);
         s_.closes[j] = place + clients;
@@ -56,12 +58,12 @@ class Segments {
  private:
   using Mask = typename V::Mask;
 
-  /// Calls visit(number, clients, their number) for each facility that serves one of sixteen
+  /// Calls visit(number, clients, count of clients) for each facility that serves one of sixteen
   /// points.
   template <class Visit>
   [[gnu::always_inline]] void each_facility(std::uint32_t first, Visit visit) {
     const V numbers = V::load_integers(s_.nearest + first);
-    // Surplus lanes have the facility of the last point; they come last and are not counted.
+    // Surplus lanes have the facility of the last point. They come last and are not counted.
     const std::uint32_t points = s_.count - first;
     std::uint32_t left = points < kLanes ? (1u << points) - 1 : (1u << kLanes) - 1;
     while (left != 0) {
@@ -73,7 +75,7 @@ class Segments {
     }
   }
 
-  /// Surplus lanes lie where the facility is.
+  /// Sets surplus lanes to the facility's position.
   void fill_surplus(std::uint32_t j) {
     const std::uint32_t end = s_.begin[j] + round_to_lanes(s_.size[j]);
     for (std::uint32_t place = s_.begin[j] + s_.size[j]; place < end; ++place) {

@@ -44,7 +44,7 @@ double ExactFinish::run(std::span<const Point3> points, std::span<const double> 
   Costs present = costs(points, weights, scaling, clustering);
   while (present.greatest > facility_cost) {
     if (check_stop) check_stop();
-    // The new cluster comes behind the one that it splits, which keeps neighbours together.
+    // The new cluster follows the one that it splits, which keeps neighbours together.
     const std::uint32_t number = clustering.assignment[present.where] + 1;
     const Point3 place = scaling.scaled(points[present.where]);
     facilities_.insert(facilities_.begin() + number, place);

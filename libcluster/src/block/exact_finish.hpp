@@ -12,13 +12,13 @@
 
 namespace terrace::cluster {
 
-/// The last step of clustering a block, in double precision: adds up the cost, and opens facilities
+/// The last step of clustering a block, in double precision. Adds up the cost, and opens facilities
 /// at points that single precision cannot distinguish from their facility although they pay more
 /// than a facility costs (close pairs of great weight).
 class ExactFinish {
  public:
-  /// facility_cost: scaled. Changes facilities and assignment of `clustering` if necessary. Returns
-  /// the scaled connection cost. Throws what the check throws.
+  /// Changes facilities and assignment of `clustering` if necessary. facility_cost is scaled.
+  /// Returns the scaled connection cost. Throws whatever the stop check throws.
   double run(std::span<const Point3> points, std::span<const double> weights,
              const Scaling& scaling, double facility_cost, const base::StopCheck& check_stop,
              BlockClustering& clustering);
@@ -26,7 +26,7 @@ class ExactFinish {
  private:
   struct Costs {
     double sum = 0.0, greatest = 0.0;
-    std::uint32_t where = 0;  ///< the point with the greatest
+    std::uint32_t where = 0;  ///< the point with the greatest cost
   };
   [[nodiscard]] Costs costs(std::span<const Point3> points, std::span<const double> weights,
                             const Scaling& scaling, const BlockClustering& clustering) const;

@@ -12,7 +12,7 @@ namespace terrace::cluster {
 void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, BlockOptions options,
                 BlockClustering& result) {
   const SearchFrame frame = make_frame(problem);
-  // The clusterer measures the box of the mapped points, the problem the mapped box of the points.
+  // The clusterer measures the box of the mapped points; the problem measures the mapped box.
   const Scaling scaling(frame.points);
   if (scaling.diagonal > 0.0) {
     options.facility_cost = std::clamp(frame.facility_cost / scaling.unscaled(scaling.diagonal),

@@ -9,7 +9,7 @@
 
 namespace terrace::cluster::simd {
 
-/// For each set of eight lanes the permutation that moves them to the front.
+/// For each set of eight lanes, the permutation that moves them to the front.
 struct CompressTable {
   alignas(32) std::uint32_t order[256][8] = {};
   constexpr CompressTable() {

@@ -64,7 +64,7 @@ struct Avx512 {
     return _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps(two, two, 1)));
   }
   friend void compress(float* to, Mask m, Avx512 a) {
-    // Not the form that stores to memory: it is microcoded on Zen 4.
+    // Not the variant that stores to memory, which is microcoded on Zen 4.
     _mm512_storeu_ps(to, _mm512_maskz_compress_ps(m.lanes, a.v));
   }
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 
 /// Sixteen floats in plain C++. The operations and their results are the same, to the bit, in
-/// simd_avx2.hpp and simd_avx512.hpp: IEEE arithmetic without contraction, one fixed tree of
-/// reductions, min and max that return the second operand if neither is less.
+/// simd_avx2.hpp and simd_avx512.hpp: IEEE arithmetic without contraction, one fixed reduction
+/// tree, and min and max that return the second operand if neither is less.
 
 namespace terrace::cluster::simd {
 
@@ -34,14 +34,14 @@ struct Portable {
   static Portable load(const float* from) {
     return each([=](int i) { return from[i]; });
   }
-  /// Integers from 0 to 2^24
+  /// Loads integers from 0 to 2^24.
   static Portable load_integers(const std::uint32_t* from) {
     return each([=](int i) { return static_cast<float>(from[i]); });
   }
   static Portable broadcast(float value) {
     return each([=](int) { return value; });
   }
-  /// 0, 1, ... 15
+  /// Returns 0, 1, ... 15.
   static Portable iota() {
     return each([](int i) { return static_cast<float>(i); });
   }
@@ -49,7 +49,7 @@ struct Portable {
     for (int i = 0; i < 16; ++i) to[i] = v[i];
   }
 
-  /// Integers from 0 to 2^24
+  /// Stores integers from 0 to 2^24.
   void store_as_integers(std::uint32_t* to) const {
     for (int i = 0; i < 16; ++i) to[i] = static_cast<std::uint32_t>(v[i]);
   }
@@ -83,7 +83,7 @@ struct Portable {
   }
   friend Mask operator&(Mask a, Mask b) { return {a.lanes & b.lanes}; }
   friend Mask operator~(Mask m) { return {~m.lanes & 0xffffu}; }
-  /// a where the mask is set, b elsewhere
+  /// Returns a where the mask is set and b elsewhere.
   friend Portable select(Mask m, Portable a, Portable b) {
     return each([&](int i) { return ((m.lanes >> i) & 1u) != 0 ? a.v[i] : b.v[i]; });
   }

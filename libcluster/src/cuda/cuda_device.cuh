@@ -46,7 +46,7 @@ __device__ Best<Entry> nearest_of_warp(Best<Entry> best) {
 
 template <class Entry, class Kernel>
 __global__ void __launch_bounds__(kThreads) run_reduce(Kernel kernel) {
-  // The same for all threads of the block, so that either all or none reach the barrier.
+  // The same for all threads of the block, so that either all or none of them reach the barrier.
   if (kernel.skip(blockIdx.x)) return;
   __shared__ Entry value[kThreads / kWarp];
   __shared__ std::uint32_t index[kThreads / kWarp];
@@ -64,11 +64,11 @@ __global__ void __launch_bounds__(kThreads) run_reduce(Kernel kernel) {
   kernel.finish(blockIdx.x, best);
 }
 
-/// The current GPU as a device for kernels (device_primitives.hpp). Kernels run one after another;
-/// only download() and wait() wait for them.
+/// The current GPU as a device for kernels (device_primitives.hpp). Kernels run one after another.
+/// Only download() and wait() wait for them.
 class CudaDevice {
  public:
-  /// Owns memory of the GPU.
+  /// Owns memory on the GPU.
   template <class T>
   class Memory {
    public:

@@ -12,7 +12,7 @@
 namespace terrace::cluster {
 namespace {
 
-/// Points are checked first: invalid points give the same error on every machine.
+/// Checks points before the device, so that invalid points give the same error on every machine.
 LinkagePoints checked(std::span<const Point3> points) {
   LinkagePoints scaled(points);
   if (const CudaStatus status = cuda_available(); !status.available) {
@@ -30,7 +30,7 @@ CudaStatus cuda_available() {
   if (fault.empty()) return {true, device::cuda_device_name(), {}};
   return {false,
           {},
-          "this machine has no CUDA device that works (" + fault +
+          "this machine has no usable CUDA device (" + fault +
               "): cluster on the CPU, or check the GPU and its driver"};
 }
 
@@ -52,11 +52,11 @@ Dendrogram cuda_single_linkage(std::span<const Point3> points) {
 CudaStatus cuda_available() {
   return {false,
           {},
-          "this build has no CUDA: cluster on the CPU, or build with nvcc in PATH and the "
+          "this build has no CUDA support: cluster on the CPU, or build with nvcc in PATH and the "
           "option -Dterrace_cuda=enabled"};
 }
 
-// Without a device checked() throws.
+// checked() throws, because there is no device.
 Dendrogram cuda_complete_linkage(std::span<const Point3> points, MatrixEntry) {
   (void)checked(points);
   return {};

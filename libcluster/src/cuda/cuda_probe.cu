@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled when the build is configured: tests whether nvcc, its host compiler and the requested
-// GPUs are compatible.
+// Compiled at configuration time, to test whether nvcc, its host compiler and the requested GPUs
+// are compatible.
 #include <span>
 #include <string>
 

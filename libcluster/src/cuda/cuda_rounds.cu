@@ -9,7 +9,7 @@
 namespace terrace::cluster::device {
 namespace {
 
-/// Throws std::invalid_argument if the device has less free memory.
+/// Throws std::invalid_argument if the device has less free memory than `bytes`.
 void check_memory(std::size_t points, std::uint64_t bytes, const char* remedy) {
   std::size_t left = 0;
   std::size_t all = 0;
@@ -17,7 +17,7 @@ void check_memory(std::size_t points, std::uint64_t bytes, const char* remedy) {
   if (bytes <= left) return;
   throw std::invalid_argument(std::to_string(points) + " points would need " +
                               std::to_string(bytes) + " bytes of memory on the device, which has " +
-                              std::to_string(left) + " left; " + remedy);
+                              std::to_string(left) + " free; " + remedy);
 }
 
 }  // namespace
@@ -26,7 +26,7 @@ std::string cuda_fault() {
   int count = 0;
   cudaError_t error = cudaGetDeviceCount(&count);
   if (error == cudaSuccess && count == 0) error = cudaErrorNoDevice;
-  // Whether the kernels here can run on the device.
+  // Tests whether the kernels of this file can run on the device.
   cudaFuncAttributes attributes;
   if (error == cudaSuccess) error = cudaFuncGetAttributes(&attributes, run_each<OwnClusters>);
   if (error == cudaSuccess) return {};
@@ -45,7 +45,7 @@ std::string cuda_device_name() {
 template <class Entry>
 std::vector<RoundLink> cuda_complete_rounds(std::span<const Point3> points) {
   check_memory(points.size(), complete_rounds_bytes<Entry>(points.size()),
-               "take float entries or fewer points");
+               "use float entries or fewer points");
   CudaDevice device;
   return complete_rounds<Entry>(device, points);
 }
@@ -53,7 +53,7 @@ template std::vector<RoundLink> cuda_complete_rounds<float>(std::span<const Poin
 template std::vector<RoundLink> cuda_complete_rounds<double>(std::span<const Point3>);
 
 std::vector<RoundLink> cuda_single_rounds(std::span<const Point3> points) {
-  check_memory(points.size(), single_rounds_bytes(points.size()), "take fewer points");
+  check_memory(points.size(), single_rounds_bytes(points.size()), "use fewer points");
   CudaDevice device;
   return single_rounds(device, points);
 }

@@ -6,9 +6,9 @@
 
 #include "cuda/device_primitives.hpp"
 
-/// Kernels of complete linkage on the band-shaped half matrix (thesis 7.6.2): row i of `slots` rows
+/// Kernels of complete linkage on the band-shaped half matrix (thesis 7.6.2). Row i of `slots` rows
 /// has the distances to the slots i+1 .. i+half, modulo `slots`. The number of slots is odd here,
-/// if necessary by adding a slot without a cluster, so that no pair is stored twice.
+/// if necessary by an additional slot without a cluster, so that no pair is stored twice.
 
 namespace terrace::cluster::device {
 
@@ -19,13 +19,13 @@ struct Slots {
   std::uint32_t half = 0;             ///< slots / 2, the length of a row
   Entry* band = nullptr;              ///< squared distances
   std::uint32_t* alive = nullptr;     ///< 1 if there is a cluster
-  std::uint32_t* stale = nullptr;     ///< 1 if its nearest neighbour must be found again
+  std::uint32_t* stale = nullptr;     ///< 1 if its nearest neighbour must be searched again
   std::uint32_t* nearest = nullptr;   ///< its nearest neighbour, the lowest slot on ties
   Entry* distance = nullptr;          ///< distance of the nearest neighbour
-  std::uint32_t* partner = nullptr;   ///< what it merges with in this round, or itself
-  std::uint32_t* original = nullptr;  ///< a point of it
+  std::uint32_t* partner = nullptr;   ///< the slot with which it merges in this round, or itself
+  std::uint32_t* original = nullptr;  ///< one of its points
 
-  /// The slot to which an entry of a row refers.
+  /// Returns the slot to which an entry of a row refers.
   TERRACE_CLUSTER_HOST_DEVICE std::uint32_t other(std::uint32_t row, std::uint32_t column) const {
     return static_cast<std::uint32_t>(band_partner(slots, {row, column}));
   }
@@ -44,7 +44,7 @@ TERRACE_CLUSTER_HOST_DEVICE Entry greater_of(Entry a, Entry b) {
   return a < b ? b : a;
 }
 
-/// lanes over rows: distances of the points, rounded to Entry once.
+/// lanes over rows: computes distances of the points, each rounded to Entry once.
 template <class Entry>
 struct FillBand {
   Slots<Entry> s;
@@ -86,7 +86,7 @@ TERRACE_CLUSTER_HOST_DEVICE Best<Entry> best_of_row(const Slots<Entry>& s, std::
   return best;
 }
 
-/// reduce over slots: the nearest neighbour among those in the slot's own row.
+/// reduce over slots: finds the nearest neighbour among those in the slot's own row.
 template <class Entry>
 struct NearestOfRow {
   Slots<Entry> s;
@@ -102,8 +102,8 @@ struct NearestOfRow {
   }
 };
 
-/// reduce over slots, if few are stale: in the slot's own row and in the rows of the others.
-/// Accesses to the others are not contiguous.
+/// reduce over slots, if few are stale: finds the nearest neighbour in the slot's own row and in
+/// the rows of the others. Accesses to the rows of the others are not contiguous.
 template <class Entry>
 struct NearestOfStale {
   Slots<Entry> s;
@@ -124,33 +124,34 @@ struct NearestOfStale {
   }
 };
 
-/// each over parts of the rows times slots: the nearest neighbour of a slot among the rows of a
-/// part. Adjacent indices read adjacent columns of one row.
+/// each over parts of the rows times slots: finds the nearest neighbour of a slot among the rows of
+/// a part. Adjacent indices read adjacent columns of one row.
 template <class Entry>
 struct NearestOfRows {
-  /// A thread reads the rows of its part one after another, so parts are short: but not more than
-  /// kMostParts, for memory, and not below kLeastRows rows, for the pass over the results.
+  /// A thread reads the rows of its part one after another, so parts should be short. kMostParts
+  /// limits their memory, and kLeastRows, the least number of rows in a part, limits the pass over
+  /// the results.
   static constexpr std::uint32_t kMostParts = 128;
   static constexpr std::uint32_t kLeastRows = 16;
   static std::uint32_t rows_of(std::uint32_t slots) {
     const std::uint32_t rows = (slots + kMostParts - 1) / kMostParts;
     return rows < kLeastRows ? kLeastRows : rows;
   }
-  /// An upper bound of the parts of `slots` or fewer slots.
+  /// Returns an upper bound of the number of parts for `slots` or fewer slots.
   static std::uint32_t most_parts(std::uint32_t slots) {
     const std::uint32_t parts = (slots + kLeastRows - 1) / kLeastRows;
     return parts < kMostParts ? parts : kMostParts;
   }
 
   Slots<Entry> s;
-  Entry* value;  // by part
+  Entry* value;  // one value per part and slot
   std::uint32_t* index;
-  std::uint32_t rows;  ///< of a part
+  std::uint32_t rows;  ///< rows in a part
 
   TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t number) const {
     const auto part = static_cast<std::uint32_t>(number / s.slots);
     const auto j = static_cast<std::uint32_t>(number % s.slots);
-    if (s.alive[j] == 0) return;  // nobody reads its result
+    if (s.alive[j] == 0) return;  // its result is never read
     const std::uint32_t first = part * rows;
     const std::uint32_t end = first + rows < s.slots ? first + rows : s.slots;
     Best<Entry> best;
@@ -165,7 +166,7 @@ struct NearestOfRows {
   }
 };
 
-/// each over slots: after NearestOfRow and NearestOfRows, the overall nearest.
+/// each over slots, after NearestOfRow and NearestOfRows: finds the nearest neighbour overall.
 template <class Entry>
 struct NearestOfParts {
   Slots<Entry> s;
@@ -189,9 +190,9 @@ struct RoundCounts {
   std::uint32_t pairs, stale;
 };
 
-/// each over slots: pairs that are each other's nearest. Complete linkage is reducible: merging one
-/// such pair brings no cluster nearer to another, so all of them can merge at once. Links are
-/// stored by the point of the cluster that disappears, which happens once.
+/// each over slots: finds pairs that are each other's nearest. Complete linkage is reducible:
+/// merging one such pair brings no cluster nearer to another, so all of them can merge at once.
+/// Links are stored by the point of the cluster that disappears, which happens once.
 template <class Entry>
 struct MatchPairs {
   Slots<Entry> s;
@@ -216,9 +217,10 @@ struct MatchPairs {
   }
 };
 
-/// lanes over slots, after MarkStale: distances of merged clusters, the greater ones. A pair of two
-/// merged clusters is updated by the lower of them, from the four distances of their halves; those
-/// of disappearing clusters are only read, so no index reads what another one writes.
+/// lanes over slots, after MarkStale: updates the distances of merged clusters to the greater ones.
+/// The lower of two merged clusters updates the distance of the pair, from the four distances of
+/// their halves. Distances of disappearing clusters are only read, so no index reads what another
+/// one writes.
 template <class Entry>
 struct UpdateBand {
   Slots<Entry> s;
@@ -242,8 +244,9 @@ struct UpdateBand {
   }
 };
 
-/// each over slots, after MatchPairs: which clusters remain, and whose nearest neighbour may have
-/// changed. Distances only grow, so a nearest neighbour that did not merge stays the nearest.
+/// each over slots, after MatchPairs: determines which clusters remain, and whose nearest neighbour
+/// may have changed. Distances only grow, so a nearest neighbour that did not merge stays the
+/// nearest.
 template <class Entry>
 struct MarkStale {
   Slots<Entry> s;
@@ -265,15 +268,16 @@ struct MarkStale {
 };
 
 // Compaction: kernels that move the remaining clusters of a round to the first slots, in order, so
-// that the band shrinks with their number, and merge their distances on the way.
+// that the band shrinks with their number. They merge the distances in the same pass.
 
-/// The slots are divided into this many parts, whose clusters are counted concurrently, and the
-/// parts into groups: then no thread adds up more than 32 of either.
+/// The slots are divided into this many parts, whose clusters are counted concurrently. The parts
+/// are divided into groups, so that no thread adds up more than 32 of either.
 inline constexpr std::uint32_t kScanParts = 1024;
-inline constexpr std::uint32_t kScanGroup = 32;  // parts
+inline constexpr std::uint32_t kScanGroup = 32;  // parts per group
 inline constexpr std::uint32_t kScanCounts = kScanParts + kScanParts / kScanGroup;
 
-/// each over kScanParts. count: of the parts, then those of the groups, which start with zero.
+/// each over kScanParts: counts clusters. `count` has the parts, then the groups, which start at
+/// zero.
 template <class Entry>
 struct CountAlive {
   Slots<Entry> s;
@@ -290,7 +294,7 @@ struct CountAlive {
   }
 };
 
-/// each over kScanParts: the new slot of each cluster and the former slot of each new one.
+/// each over kScanParts: sets the new slot of each cluster and the former slot of each new one.
 template <class Entry>
 struct NumberAlive {
   Slots<Entry> s;
@@ -313,7 +317,7 @@ struct NumberAlive {
   }
 };
 
-/// lanes over new slots: the greatest distance between the halves of two clusters.
+/// lanes over new slots: computes the greatest distance between the halves of two clusters.
 template <class Entry>
 struct MergeBand {
   Slots<Entry> from, to;
@@ -339,7 +343,7 @@ struct MergeBand {
   }
 };
 
-/// each over new slots.
+/// each over new slots: copies the data of the remaining clusters.
 template <class Entry>
 struct MergeSlots {
   Slots<Entry> from, to;
@@ -353,7 +357,7 @@ struct MergeSlots {
     if (k >= clusters) return;
     const std::uint32_t i = old_of_new[k];
     to.stale[k] = from.stale[i];
-    to.nearest[k] = new_of_old[from.nearest[i]];  // a cluster, as this is not stale
+    to.nearest[k] = new_of_old[from.nearest[i]];  // exists, because this slot is not stale
     to.distance[k] = from.distance[i];
     to.original[k] = from.original[i];
   }

@@ -12,18 +12,18 @@
 #include "terrace/cluster/point.hpp"
 
 /// Complete linkage in rounds on a device (see device_primitives.hpp). Everything except the loop
-/// over the rounds runs there; two counters come back per round, and the links at the end.
+/// over the rounds runs there. Two counters come back per round, and the links at the end.
 
 namespace terrace::cluster::device {
 
-/// Whether a round leaves so few clusters that the band is rebuilt for them, in one sequential pass
-/// over memory, instead of being updated in place, column by column. Its size is then 0.64 of the
-/// previous one.
+/// Returns whether so few clusters are left that the band is rebuilt for them, in one sequential
+/// pass over memory, instead of being updated in place, column by column. The new band then has at
+/// most 0.64 times the previous size.
 [[nodiscard]] constexpr bool worth_compacting(std::uint32_t clusters, std::uint32_t slots) {
   return 5 * std::uint64_t{clusters} <= 4 * std::uint64_t{slots};
 }
 
-/// Maximum memory that complete_rounds() takes on the device.
+/// Returns the maximum memory that complete_rounds() takes on the device, in bytes.
 template <class Entry>
 [[nodiscard]] std::uint64_t complete_rounds_bytes(std::uint64_t points) {
   const std::uint64_t slots = points | 1;
@@ -57,7 +57,7 @@ class CompleteRounds {
     fill(points, slots);
   }
 
-  /// The links in the order of rounds; within a round they are independent of each other.
+  /// Returns the links in the order of rounds. Within a round they are independent of each other.
   std::vector<RoundLink> run() {
     nearest_of_all();
     std::uint32_t round = 0;
@@ -68,7 +68,7 @@ class CompleteRounds {
       device_.each(s_.slots, MarkStale<Entry>{s_, counts_.data()});
       RoundCounts counts{};
       device_.download(&counts, counts_.data(), 1);
-      // The globally nearest pair always exists, so this is a fault of the device.
+      // The globally nearest pair always exists, so this is an error of the device.
       if (counts.pairs == 0 || counts.pairs >= clusters_) {
         throw std::runtime_error("the device found no pair to merge, or too many");
       }
@@ -80,8 +80,8 @@ class CompleteRounds {
       } else {
         device_.lanes(s_.slots, UpdateBand<Entry>{s_});
       }
-      // Finding one neighbour alone reads its columns one by one, eight times as expensive as
-      // together.
+      // Finding one neighbour alone reads its columns one by one, which is eight times as expensive
+      // as finding all together.
       if (4 * std::uint64_t{counts.stale} >= clusters_) {
         nearest_of_all();
       } else {
@@ -133,7 +133,7 @@ class CompleteRounds {
     device_.each(slots, FillSlots<Entry>{s_, points_});
     device_.lanes(slots,
                   FillBand<Entry>{s_, axes[0].data(), axes[1].data(), axes[2].data(), points_});
-    device_.wait();  // before the coordinates are freed
+    device_.wait();  // the coordinates are freed next
   }
 
   void nearest_of_all() {
@@ -168,7 +168,7 @@ class CompleteRounds {
     std::vector<std::uint32_t> other(points_);
     std::vector<std::uint32_t> round(points_);
     std::vector<Entry> square(points_);
-    // Point 0 is always in the lowest slot: its cluster never disappears.
+    // Point 0 is always in the lowest slot, so its cluster never disappears.
     device_.download(other.data(), link_other_.data(), points_);
     device_.download(round.data(), link_round_.data(), points_);
     device_.download(square.data(), link_square_.data(), points_);
@@ -192,8 +192,9 @@ class CompleteRounds {
   Slots<Entry> s_;
 };
 
-/// points: at least two, fewer than 2^31, as scaled by LinkagePoints. Throws what the device
-/// throws.
+/// Returns the links of all merges.
+/// points: at least two, fewer than 2^31, as scaled by LinkagePoints.
+/// Throws: whatever the device throws.
 template <class Entry, class Device>
 std::vector<RoundLink> complete_rounds(Device& device, std::span<const Point3> points) {
   return CompleteRounds<Entry, Device>(device, points).run();

@@ -7,11 +7,11 @@
 #include "terrace/cluster/band_matrix.hpp"
 
 /// The vocabulary of kernels. A kernel is a function object whose body is plain code marked
-/// TERRACE_CLUSTER_HOST_DEVICE, and a *device* runs it once for each index, in any order and
-/// concurrently. On a GPU that is CudaDevice (cuda_device.cuh); tests have one that loops over
-/// shuffled indices. A device has
+/// TERRACE_CLUSTER_HOST_DEVICE. A *device* runs it once for each index, in any order and
+/// concurrently. On a GPU the device is a CudaDevice (cuda_device.cuh). Tests have one that loops
+/// over shuffled indices. A device has
 ///     allocate<T>(count)           memory that lives as long as the returned object
-///     upload, download, clear      between the host and the device; to zero
+///     upload, download, clear      copy to the device, copy to the host, set to zero
 ///     each(count, kernel)          kernel(index)
 ///     lanes(groups, kernel)        kernel(group, lane, lanes) for every lane of every group
 ///                                  unless kernel.skip(group); lanes of a group are adjacent
@@ -22,7 +22,7 @@ namespace terrace::cluster::device {
 
 inline constexpr std::uint32_t kNone = UINT32_MAX;
 
-/// Memory for data that does not grow with the points.
+/// Memory, in bytes, for data that does not grow with the points.
 inline constexpr std::size_t kSmallMemory = 65536;
 
 /// Adds to a counter atomically.
@@ -43,14 +43,15 @@ TERRACE_CLUSTER_HOST_DEVICE inline void lower(std::uint64_t* least, std::uint64_
 #endif
 }
 
-/// A neighbour at distance `value`. kNone: no neighbour; then the value does not count.
+/// A neighbour at distance `value`. If the index is kNone there is no neighbour and the value is
+/// meaningless.
 template <class Entry>
 struct Best {
   Entry value = 0;
   std::uint32_t index = kNone;
 };
 
-/// The nearer of two, on ties the one of lower index.
+/// Returns the nearer of two, on ties the one of lower index.
 template <class Entry>
 TERRACE_CLUSTER_HOST_DEVICE Best<Entry> nearer(const Best<Entry>& a, const Best<Entry>& b) {
   if (a.index == kNone) return b;
@@ -58,7 +59,7 @@ TERRACE_CLUSTER_HOST_DEVICE Best<Entry> nearer(const Best<Entry>& a, const Best<
   return a.value < b.value || (a.value == b.value && a.index < b.index) ? a : b;
 }
 
-/// The result per merge: the clusters of point i and of point j merged in that round.
+/// One merge: the clusters of point i and of point j merged in that round.
 struct RoundLink {
   std::uint32_t i, j;
   double square;

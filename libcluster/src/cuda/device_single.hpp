@@ -11,28 +11,31 @@
 #include "cuda/device_primitives.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// Single linkage in rounds on a device (see device_primitives.hpp), by Borůvka: in each round
-/// every cluster joins the one with the point nearest to one of its own. Merging only reciprocal
-/// pairs would take a round for every point that a large cluster absorbs; this takes at most log2
-/// n. No matrix is kept: distances are recomputed in each round, which is faster than reading them.
+/// Single linkage in rounds on a device (see device_primitives.hpp), by Borůvka's method: in each
+/// round every cluster joins the one with the point nearest to one of its own. That takes at most
+/// log2 n rounds. (Merging only reciprocal pairs would take a round for every point that a large
+/// cluster absorbs.) No matrix is kept: distances are recomputed in each round, which is faster
+/// than reading them.
 
 namespace terrace::cluster::device {
 
-/// Points and, for each, the name of its cluster, which is the index of one of its points.
+/// Points and, for each, the name of its cluster, which is the index of one of the cluster's
+/// points.
 struct Labelled {
   const double *x, *y, *z;
   std::uint32_t points;
   std::uint32_t* cluster;
 };
 
-/// each over parts times points: the nearest point of another cluster in a part of the points.
+/// each over parts times points: finds the nearest point of another cluster in a part of the
+/// points.
 struct NearestOther {
   Labelled p;
   std::uint32_t parts;
-  double* value;  // by part
+  double* value;  // one value per part and point
   std::uint32_t* index;
 
-  /// Enough for all threads, and few enough for memory.
+  /// Returns the number of parts: enough for all threads, and few enough for memory.
   static std::uint32_t parts_of(std::uint32_t points) {
     return points / 1024 < 64 ? points / 1024 + 1 : 64;
   }
@@ -53,14 +56,14 @@ struct NearestOther {
   }
 };
 
-/// The edges of a round. Edges are compared by length, then by their points, so no two are equal
+/// The edges of a round. Edges are compared by length, then by their points. So no two are equal,
 /// and the chosen ones form no cycle.
 struct RoundEdges {
   std::uint64_t* least;   ///< by cluster: the bits of the squared length, ordered like the numbers
   std::uint64_t* ends;    ///< by cluster: the lower point, then the higher
-  double* value;          ///< by point: to the nearest point of another cluster
+  double* value;          ///< by point: squared distance of the nearest point of another cluster
   std::uint32_t* index;   ///< by point: that point
-  std::uint32_t* parent;  ///< by cluster: the one it joins, or itself
+  std::uint32_t* parent;  ///< by cluster: the cluster that it joins, or itself
 };
 
 TERRACE_CLUSTER_HOST_DEVICE inline std::uint64_t bits_of(double value) {
@@ -73,7 +76,7 @@ TERRACE_CLUSTER_HOST_DEVICE inline std::uint64_t bits_of(double value) {
 #endif
 }
 
-/// each over points: no edges yet.
+/// each over points: clears the edges.
 struct ClearEdges {
   RoundEdges e;
   TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t i) const {
@@ -82,7 +85,8 @@ struct ClearEdges {
   }
 };
 
-/// each over points: the nearest over all parts, and the shortest length for its cluster.
+/// each over points: finds the nearest point over all parts, and the shortest length for its
+/// cluster.
 struct ShortestLength {
   Labelled p;
   RoundEdges e;
@@ -101,7 +105,7 @@ struct ShortestLength {
   }
 };
 
-/// each over points: among the edges of that length the one with the lowest points.
+/// each over points: among the edges of that length, finds the one with the lowest points.
 struct LowestEnds {
   Labelled p;
   RoundEdges e;
@@ -115,8 +119,8 @@ struct LowestEnds {
   }
 };
 
-/// each over points: every cluster joins the one at the other end of its edge; of two with the same
-/// edge the lower stays. Links are stored by the cluster that disappears.
+/// each over points: every cluster joins the one at the other end of its edge. Of two clusters with
+/// the same edge, the lower one stays. Links are stored by the cluster that disappears.
 struct JoinClusters {
   Labelled p;
   RoundEdges e;
@@ -142,7 +146,7 @@ struct JoinClusters {
   }
 };
 
-/// each over points: the cluster at the end of the chain.
+/// each over points: finds the cluster at the end of the chain.
 struct FollowParents {
   Labelled p;
   RoundEdges e;
@@ -154,7 +158,7 @@ struct FollowParents {
   }
 };
 
-/// each over points: a cluster each.
+/// each over points: makes each point its own cluster.
 struct OwnClusters {
   std::uint32_t* cluster;
   TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t i) const {
@@ -162,14 +166,15 @@ struct OwnClusters {
   }
 };
 
-/// Memory that single_rounds() takes on the device.
+/// Returns the memory that single_rounds() takes on the device, in bytes.
 [[nodiscard]] inline std::uint64_t single_rounds_bytes(std::uint64_t points) {
   return points * (12 * NearestOther::parts_of(static_cast<std::uint32_t>(points)) + 80) +
          kSmallMemory;
 }
 
-/// points: at least two, fewer than 2^31, as scaled by LinkagePoints. Returns the links in no
-/// particular order, one for each point but one. Throws what the device throws.
+/// Returns the links in no particular order, one fewer than points.
+/// points: at least two, fewer than 2^31, as scaled by LinkagePoints.
+/// Throws: whatever the device throws.
 template <class Device>
 std::vector<RoundLink> single_rounds(Device& device, std::span<const Point3> points) {
   using u32 = std::uint32_t;

@@ -21,9 +21,10 @@
 namespace terrace::cluster {
 namespace {
 
-// Points closer to their centre, in the unit of the box, count as at it: a mean of many is rounded.
+// Points nearer to their centre than this (in the unit of the box, squared) count as being at it,
+// because a mean of many points is rounded.
 constexpr double kAtCentre2 = 0x1p-72;
-// Limit of the caller's centres, in the same unit: beyond it squares would overflow.
+// Limit for the caller's centres in the same unit. Beyond it squares would overflow.
 constexpr double kFarthest = 0x1p+400;
 constexpr double kLeastWeight = 0x1p-500;
 
@@ -44,9 +45,9 @@ void check(std::span<const Point3> points, std::span<const double> weights, std:
   assert(weights.empty() || weights.size() == points.size());
   assert(points.size() < UINT32_MAX);
   if (clusters == 0 || clusters > points.size()) {
-    throw std::invalid_argument(std::to_string(clusters) + " clusters of " +
+    throw std::invalid_argument("cannot make " + std::to_string(clusters) + " clusters of " +
                                 std::to_string(points.size()) +
-                                " points: ask for at least one and at most as many as points");
+                                " points: give at least one and at most as many as points");
   }
   if (!(options.tolerance >= 0)) {
     throw std::invalid_argument(
@@ -63,7 +64,7 @@ void check(std::span<const Point3> points, std::span<const double> weights, std:
   }
 }
 
-/// Weights divided by a power of two, so that the greatest lies in [1/2, 1).
+/// Weights divided by a power of two, so that the greatest is in [1/2, 1).
 struct ScaledWeights {
   std::vector<double> values;
   int exponent = 0;
@@ -88,7 +89,7 @@ struct Run {
 
   void iterate(const KMeansOptions& options, double diagonal) {
     const double still2 = options.tolerance * diagonal * options.tolerance * diagonal;
-    bool assigned = false;  // to the current centres
+    bool assigned = false;  // whether the points are assigned to the current centres
     while (iterations < options.max_iterations && !converged) {
       const bool changed = filter.assign(centres);
       ++iterations;
@@ -113,8 +114,8 @@ struct Run {
     for (std::size_t place = 0; place < tree.count; ++place) sse += cost(place);
   }
 
-  /// Gives each empty cluster a point, as described in k_means.hpp. Returns whether there was one
-  /// to give.
+  /// Gives each empty cluster a point, as described in k_means.hpp. Returns whether there was a
+  /// point to give.
   bool fill_empty() {
     const std::span<KMeansFilter::Sum> sums = filter.sums();
     const auto is_empty = [](const KMeansFilter::Sum& sum) { return sum.weight == 0; };
@@ -148,7 +149,8 @@ struct Run {
     }
     if (moves.empty()) return false;
     for (const auto& [place, c] : moves) filter.move_point(place, c);
-    // Recomputed: subtracting a heavy point would leave rounding errors of its size.
+    // Sums are recomputed, because subtracting a heavy point would leave rounding errors of its
+    // size.
     std::fill(sums.begin(), sums.end(), KMeansFilter::Sum{});
     for (std::size_t place = 0; place < tree.count; ++place) {
       KMeansFilter::Sum& sum = sums[filter.cluster(place)];
@@ -203,7 +205,7 @@ KMeansResult k_means(std::span<const Point3> points, std::span<const double> wei
                      const KMeansOptions& options) {
   check(points, weights, options.clusters, options);
   if (options.restarts == 0) {
-    throw std::invalid_argument("k-means with 0 restarts does nothing; 1 is a single run");
+    throw std::invalid_argument("restarts is 0: give at least 1, which is a single run");
   }
   const Scaling scaling(points);
   const ScaledWeights scaled_weights(weights);
@@ -261,7 +263,7 @@ std::vector<std::uint32_t> nearest_to_means(std::span<const Point3> points,
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const std::uint32_t c = labels[i];
     const double d = distance(Euclidean{}, mean[c], points[i]);
-    // Where sums overflow, no distance is finite: the first point then stands for the cluster.
+    // If the sums overflow, no distance is finite, and the first point represents the cluster.
     if (d < least[c] || labels[nearest[c]] != c) {
       least[c] = d;
       nearest[c] = i;

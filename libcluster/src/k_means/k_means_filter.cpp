@@ -10,7 +10,8 @@
 namespace terrace::cluster {
 namespace {
 
-/// Chunks are long compared to k, so that their sums take less memory than the points.
+/// Returns the level of the chunks, which are long compared with k, so that their sums take less
+/// memory than the points.
 std::size_t chunk_level(const KMeansTree& tree, std::size_t clusters) {
   const std::size_t least = std::max<std::size_t>(8192, 4 * clusters);
   std::size_t level = 0;
@@ -114,9 +115,9 @@ void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates&
     least = std::min(least, d);
   }
 
-  // Compared to the best: |p - c|^2 - |p - best|^2 is linear in p and least at the corner farthest
-  // in the direction from the best to c. The margin covers the relative rounding errors of both
-  // squares anywhere in the box.
+  // Compares each centre c with the best: |p - c|^2 - |p - best|^2 is linear in p and least at the
+  // corner farthest in the direction from the best to c. The margin covers the relative rounding
+  // errors of both squares anywhere in the box.
   const double bx = from.x[best];
   const double by = from.y[best];
   const double bz = from.z[best];
@@ -178,7 +179,7 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
   const double* const w = &tree_.w[block * KMeansTree::kBlock];
   std::array<double, KMeansTree::kBlock> least;
   std::array<double, KMeansTree::kBlock>
-      nearest{};  // a double, as the vectors of doubles select it
+      nearest{};  // doubles, because vectors of doubles select them
   for (std::size_t i = 0; i < KMeansTree::kBlock; ++i) {
     least[i] = distance2<D>(x[i], y[i], z[i], candidates.x[0], candidates.y[0], candidates.z[0]);
   }
@@ -212,7 +213,8 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
 void KMeansFilter::move_point(std::size_t place, std::uint32_t cluster) {
   cluster_[place] = cluster;
   owner_[place / KMeansTree::kBlock] = kMixed;
-  // The copies that fill the last block move with the last point: they must not count as a change.
+  // The copies that fill the last block move with the last point, so that they do not count as a
+  // change.
   if (place + 1 == tree_.count) {
     std::fill(cluster_.begin() + static_cast<std::ptrdiff_t>(place), cluster_.end(), cluster);
   }

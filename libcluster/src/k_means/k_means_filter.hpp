@@ -13,29 +13,30 @@
 
 namespace terrace::cluster {
 
-/// Assigns the points of a tree to the nearest of k centres. From the root down each node keeps the
-/// centres that may be nearest to some point of its box; if one is left the whole node is assigned
-/// to it. Excluded centres are farther than another one from all of the box by more than rounding,
-/// so the assignment equals that from comparing all computed distances, the lowest number on ties.
+/// Assigns the points of a tree to the nearest of k centres. From the root down, each node keeps
+/// the centres that may be nearest to some point of its box. If only one is left, the whole node is
+/// assigned to it. An excluded centre is farther from all of the box than another one, by more than
+/// rounding. So the assignment equals that from comparing all computed distances, with the lowest
+/// number on ties.
 class KMeansFilter {
  public:
   struct Sum {
-    Point3 sum{};  ///< of weight times position
+    Point3 sum{};  ///< sum of weight times position
     double weight = 0;
   };
 
-  /// tree, team and check_stop outlive this object.
+  /// tree, team and check_stop must outlive this object.
   KMeansFilter(const KMeansTree& tree, std::size_t clusters, base::ThreadTeam& team,
                const base::StopCheck& check_stop);
 
-  /// One assignment. Returns whether a point has changed its cluster since the last one.
+  /// Makes one assignment. Returns whether any point has changed its cluster since the last one.
   bool assign(std::span<const Point3> centres);
 
-  /// Sums of the clusters, always added up in the same order.
+  /// Returns the sums of the clusters, always added up in the same order.
   [[nodiscard]] std::span<Sum> sums() { return sums_; }
-  /// The cluster of the point at a position.
+  /// Returns the cluster of the point at a position.
   [[nodiscard]] std::uint32_t cluster(std::size_t place) const { return cluster_[place]; }
-  /// Overrides the last assignment.
+  /// Overrides the last assignment of one point.
   void move_point(std::size_t place, std::uint32_t cluster);
 
  private:
@@ -52,7 +53,7 @@ class KMeansFilter {
     base::StopTicks ticks;
     std::vector<double> x, y, z;  // room for k candidates on each level
     std::vector<std::uint32_t> number;
-    std::vector<Sum> sums;  // of the current chunk
+    std::vector<Sum> sums;  // sums of the current chunk
     bool changed = false;
   };
 
@@ -71,7 +72,7 @@ class KMeansFilter {
   const KMeansTree& tree_;
   const std::size_t clusters_;
   base::ThreadTeam& team_;
-  std::size_t chunk_level_ = 0;         // the nodes of this level are divided among threads
+  std::size_t chunk_level_ = 0;         // threads divide the nodes of this level among them
   std::vector<std::uint32_t> cluster_;  // by position, padded
   std::vector<std::uint32_t> owner_;    // by block: the cluster of all its points, or kMixed
   std::vector<Sum> sums_;

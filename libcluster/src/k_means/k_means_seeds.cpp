@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kFan = KMeansTree::kFan;
 
-/// Squared distance from a point to a box, minus a bound of its rounding error.
+/// Returns the squared distance from a point to a box, minus a bound of its rounding error.
 double below_box(const Point3& p, const KMeansTree::Node& box) {
   double sum = 0;
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -31,17 +31,17 @@ class CentreSeeder {
         cost_(tree.x.size(), std::numeric_limits<double>::infinity()) {
     for (const auto& level : tree.levels) {
       std::vector<State>& states = states_.emplace_back(level.size());
-      // The first seed: by weight alone.
+      // The first seed is drawn by weight alone.
       for (std::size_t k = 0; k < level.size(); ++k) {
         states[k] = {std::numeric_limits<double>::infinity(), level[k].weight};
       }
     }
   }
 
-  /// The sum that remains with the seeds so far.
+  /// Returns the sum of costs that remains with the seeds so far.
   [[nodiscard]] double total() const { return states_.back().front().sum; }
 
-  /// A position drawn with probability proportional to its cost; requires total() > 0.
+  /// Returns a position drawn with probability proportional to its cost. Requires: total() > 0.
   [[nodiscard]] std::size_t draw(bool first, std::mt19937_64& random) const {
     double at = base::draw_unit(random) * total();
     std::size_t node = 0;
@@ -53,7 +53,7 @@ class CentreSeeder {
                   at, [&](std::size_t place) { return first ? tree_.w[place] : cost(place); });
   }
 
-  /// By how much a seed there would lower total().
+  /// Returns by how much a seed there would lower total().
   [[nodiscard]] double gain(const Point3& seed) { return gain(seed, states_.size() - 1, 0); }
 
   void add(const Point3& seed) { add(seed, states_.size() - 1, 0); }
@@ -61,12 +61,12 @@ class CentreSeeder {
  private:
   struct State {
     double most;  // the largest squared distance of a point below
-    double sum;   // of weight times squared distance
+    double sum;   // sum of weight times squared distance
   };
 
   [[nodiscard]] double cost(std::size_t place) const { return tree_.w[place] * cost_[place]; }
 
-  /// The part of [first, end) in which `at` falls, never an empty one.
+  /// Returns the part of [first, end) in which `at` falls, never an empty part.
   template <class Size>
   static std::size_t chosen(std::size_t first, std::size_t end, double& at, const Size& size) {
     std::size_t last = first;
@@ -132,10 +132,10 @@ std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
   CentreSeeder seeder(tree, check_stop);
   std::vector<Point3> seeds{tree.point(seeder.draw(true, random))};
   seeder.add(seeds.front());
-  // 0.7 is approximately the natural logarithm of two.
+  // 0.7 is approximately the natural logarithm of 2.
   const std::size_t draws = 2 + static_cast<std::size_t>(std::bit_width(clusters)) * 7 / 10;
   while (seeds.size() < clusters) {
-    // Every point coincides with a seed: further clusters stay empty.
+    // If every point coincides with a seed, further clusters stay empty.
     if (seeder.total() <= 0) {
       seeds.resize(clusters, seeds.front());
       break;

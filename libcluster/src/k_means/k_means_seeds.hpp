@@ -11,9 +11,10 @@
 
 namespace terrace::cluster {
 
-/// Positions of k seeds by greedy k-means++: each is drawn with probability proportional to weight
-/// times squared distance to the nearest seed so far, several times, and the draw that leaves the
-/// least sum of these is taken. Boxes that a new seed cannot improve are skipped.
+/// Returns positions of k seeds by greedy k-means++. Each seed is drawn several times, with
+/// probability proportional to weight times squared distance to the nearest seed so far, and the
+/// draw that leaves the least sum of these costs is taken. Boxes that a new seed cannot improve are
+/// skipped.
 [[nodiscard]] std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
                                                 std::mt19937_64& random,
                                                 const base::StopCheck& check_stop);

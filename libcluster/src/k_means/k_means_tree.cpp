@@ -12,7 +12,8 @@ namespace {
 
 constexpr unsigned kAxisBits = 20;
 
-/// Spreads the lowest twenty bits with one gap each, or with two.
+/// Spreads the lowest twenty bits with a gap of one bit after each. spread_by_two() makes gaps of
+/// two.
 std::uint64_t spread_by_one(std::uint64_t v) {
   v = (v | v << 16) & 0x0000FFFF0000FFFF;
   v = (v | v << 8) & 0x00FF00FF00FF00FF;
@@ -33,7 +34,7 @@ struct Keyed {
   std::uint32_t index;
 };
 
-/// Stable, by the lowest `bits` of the keys.
+/// Sorts stably by the lowest `bits` bits of the keys.
 void radix_sort(std::vector<Keyed>& items, unsigned bits, const base::StopCheck& check_stop) {
   constexpr unsigned kKeyDigitBits = 10;
   constexpr std::size_t kKeyDigits = std::size_t{1} << kKeyDigitBits;

@@ -13,7 +13,7 @@
 
 namespace terrace::cluster {
 
-/// The squared distance.
+/// Returns the squared distance.
 inline double squared(const Point3& a, const Point3& b) {
   const double x = a[0] - b[0];
   const double y = a[1] - b[1];
@@ -21,8 +21,8 @@ inline double squared(const Point3& a, const Point3& b) {
   return x * x + y * y + z * z;
 }
 
-/// Points in Z-order, in blocks of kBlock, and a tree over the blocks: each node has up to kFan
-/// consecutive children, a box and sums.
+/// Points in Z-order, in blocks of kBlock points, and a tree over the blocks. Each node has up to
+/// kFan consecutive children, a box, and sums.
 struct KMeansTree {
   static constexpr std::size_t kBlock = 32;
   static constexpr std::size_t kFan = 4;
@@ -30,7 +30,7 @@ struct KMeansTree {
   struct Node {
     Point3 low, high;
     double diagonal2 = 0;  ///< squared diagonal of the box
-    Point3 sum{};          ///< of weight times position
+    Point3 sum{};          ///< sum of weight times position
     double weight = 0;
   };
 
@@ -39,7 +39,7 @@ struct KMeansTree {
              const Scaling& scaling, const base::StopCheck& check_stop);
 
   [[nodiscard]] std::size_t block_count() const { return levels.front().size(); }
-  /// Blocks [first, last) below a node.
+  /// Returns the first block below a node.
   [[nodiscard]] std::size_t first_block(std::size_t level, std::size_t node) const;
   [[nodiscard]] Point3 point(std::size_t place) const { return {x[place], y[place], z[place]}; }
 
@@ -47,7 +47,7 @@ struct KMeansTree {
   // Scaled columns, padded to whole blocks with copies of the last point at weight 0.
   std::vector<double> x, y, z, w;
   std::vector<std::uint32_t> original;    ///< index in the input; not padded
-  std::vector<std::vector<Node>> levels;  ///< levels[0]: the blocks; the last has one node
+  std::vector<std::vector<Node>> levels;  ///< levels[0] is the blocks; the last level is one node
 };
 
 }  // namespace terrace::cluster

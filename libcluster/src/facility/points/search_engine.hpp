@@ -23,8 +23,8 @@ namespace terrace::cluster {
 /// rounding.
 class SearchEngine {
  public:
-  /// strategy: one of local search, not automatic. threads: 0 means one per core. Every member
-  /// function that takes O(clients) or more throws whatever check_stop throws.
+  /// strategy: one of local search, not automatic. threads: 0 means one per core. check_stop:
+  /// every operation of O(clients) or more throws whatever it throws.
   SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
                base::StopCheck check_stop);
   virtual ~SearchEngine() = default;
