@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which of three depots to open for six shops, and how far from the optimum the answer may be.
+// Finds which of three depots to open for six shops, and how far the answer may be from the
+// optimum.
 #include <cstdio>
 
 #include <terrace/cluster/facility_location.hpp>

@@ -16,7 +16,7 @@ using namespace terrace::cluster;
 
 namespace {
 
-/// Keeps clusters in memory; a real sink would pack them in prepare() and write them in commit().
+/// Keeps clusters in memory. A real sink would pack them in prepare() and write them in commit().
 class MemorySink : public HierarchySink {
  public:
   struct Cluster {
@@ -70,7 +70,7 @@ int main() {
   HierarchyOptions options;
   options.block_size = 400;
   options.threads = 2;
-  // Positions are in degrees, heights in metres; clusters should be compact in metres.
+  // Positions are in degrees and heights in metres, but clusters should be compact in metres.
   options.ground = [](const Box3& block) {
     constexpr double kDegree = 3.14159265358979323846 / 180;
     constexpr double kMetresPerDegree = 111195.0;
@@ -81,7 +81,7 @@ int main() {
 
   HierarchyBuilder builder(options, sink);
   constexpr int kTiles = 10;
-  constexpr int kTile = 20;  // 20 x 20 points: one block
+  constexpr int kTile = 20;  // 20 x 20 points form one block
   std::vector<Point3> tile;
   for (int t = 0; t < kTiles * kTiles; ++t) {
     tile.clear();
@@ -101,7 +101,7 @@ int main() {
                 static_cast<unsigned long long>(result.level_clusters[level]));
   }
 
-  // From the top down, always into the first point's cluster.
+  // Goes down from the top, always into the first point's cluster.
   const MemorySink::Cluster* cluster = &sink.top;
   for (unsigned level = result.top; level > 0; --level) {
     cluster = &sink.levels.at(level - 1).at(cluster->children.front());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Four clumps of points in the plane, found by k-means.
+// Finds four clumps of points in the plane by k-means.
 #include <cstdio>
 #include <random>
 
@@ -20,6 +20,6 @@ int main() {
   const KMeansResult result = k_means(points, /* weights */ {}, options);
   for (const Point3& c : result.centres) std::printf("%.2f %.2f\n", c[0], c[1]);
   std::printf("SSE %.1f after %zu iterations\n", result.sse, result.iterations);
-  // Uniform in a unit square: 1/6 per point is expected.
+  // The points are uniform in unit squares, so the expectation is 1/6 per point.
   return result.converged && result.sse < 4000 * 0.2 ? 0 : 1;
 }

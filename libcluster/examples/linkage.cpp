@@ -2,9 +2,9 @@
 // Reads points, one per line with two or three coordinates, from standard input and prints their
 // dendrogram, one row per merge as in SciPy's linkage matrix: cluster, cluster, height, size.
 //     linkage METHOD [THREADS] < points
-// METHOD is single, complete, average, weighted, ward, centroid or median, or complete-float: with
-// a matrix of half the size. Without arguments it clusters two small rings, and prints the number
-// of clusters below a height for some methods.
+// METHOD is single, complete, average, weighted, ward, centroid or median, or complete-float, which
+// uses a matrix of half the size. Without arguments it clusters two small rings and prints the
+// number of clusters below a height for some methods.
 #include "terrace/cluster/linkage.hpp"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ std::vector<Point3> read_points(std::istream& in) {
     std::istringstream fields(line);
     Point3 p{0.0, 0.0, 0.0};
     if (!(fields >> p[0])) continue;  // an empty line
-    if (!(fields >> p[1])) throw std::runtime_error("a line has one coordinate: " + line);
+    if (!(fields >> p[1])) throw std::runtime_error("a line has only one coordinate: " + line);
     fields >> p[2];
     points.push_back(p);
   }
@@ -41,7 +41,7 @@ Dendrogram tree_of(const std::string& method, const std::vector<Point3>& points,
   if (const auto known = linkage_method_named(method)) {
     return linkage(points, *known, {.threads = threads});
   }
-  throw std::runtime_error("there is no method " + method);
+  throw std::runtime_error("unknown method " + method);
 }
 
 int demonstrate() {
@@ -51,7 +51,7 @@ int demonstrate() {
     const double radius = i % 2 == 0 ? 1.0 : 2.0;
     points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0.0});
   }
-  // Single linkage follows the rings, the others make compact pieces.
+  // Single linkage follows the rings. The other methods make compact pieces.
   for (const char* method : {"single", "complete", "average"}) {
     const std::vector<std::uint32_t> labels = cut_height(tree_of(method, points, 1), 0.5);
     std::printf("%s linkage: %u clusters below 0.5\n", method,

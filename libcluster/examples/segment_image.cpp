@@ -28,7 +28,7 @@ struct Image {
   std::vector<unsigned char> rgb;
 };
 
-/// A number of the header; comments run from # to the end of the line.
+/// Reads a number of the header. Comments run from # to the end of the line.
 std::size_t header_number(std::istream& in, const std::string& path) {
   while (in >> std::ws && in.peek() == '#') {
     in.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
@@ -67,7 +67,8 @@ void write_ppm(const Image& image, const std::string& path) {
   if (!out.flush()) throw std::runtime_error(path + ": cannot be written");
 }
 
-/// Shapes of uniform colour: a square and a disc on a background: 0, 1, 2.
+/// Returns the shape at a pixel: a background (0) with a square (1) and a disc (2) of uniform
+/// colour.
 int shape_at(std::size_t x, std::size_t y) {
   const double dx = static_cast<double>(x) - 70.0, dy = static_cast<double>(y) - 65.0;
   if (dx * dx + dy * dy < 20.0 * 20.0) return 2;
@@ -90,7 +91,7 @@ Image made_picture() {
   return image;
 }
 
-/// colour_weight: the pixels of distance that a step of one in a colour channel is worth.
+/// colour_weight: the distance, in pixels, that a step of one in a colour channel is worth.
 FacilitySolution segment(const Image& image, double facility_cost, double colour_weight) {
   std::vector<Point3> positions;
   for (std::size_t y = 0; y < image.height; ++y) {
@@ -113,7 +114,7 @@ void paint(Image& image, const FacilitySolution& solution) {
   }
 }
 
-/// Number of pixels whose segment's representative is in another shape.
+/// Returns the number of pixels whose segment's representative is in another shape.
 std::size_t misplaced(const Image& image, const FacilitySolution& solution) {
   const auto shape = [&](std::size_t i) { return shape_at(i % image.width, i / image.width); };
   std::size_t count = 0;
@@ -137,7 +138,7 @@ int main(int argc, char** argv) {
     if (own) {
       const std::size_t wrong = misplaced(image, solution);
       std::printf("%zu pixels in a segment of another shape\n", wrong);
-      // The background may be several segments; the shapes must be separate.
+      // The background may be several segments, but the shapes must be separate.
       return wrong == 0 && solution.facilities.size() >= 3 && solution.facilities.size() <= 30 ? 0
                                                                                                : 1;
     }

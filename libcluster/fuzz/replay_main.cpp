@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a fuzz target over the files of a corpus folder, so that the target compiles everywhere and
-// every input that once failed stays tested.
+// Runs a fuzz target on the files of a corpus folder. So the target compiles with every compiler,
+// and every input that once failed remains a test.
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
