@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker's exception must not end the process. A separate program, as it replaces operator new:
-// each allocation fails in turn, on whichever thread it is.
+// A worker's exception must not end the process. This is a separate program, because it replaces
+// operator new: each allocation fails in turn, on whatever thread it is.
 #include <atomic>
 #include <cstdlib>
 #include <limits>
@@ -30,8 +30,8 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 namespace terrace::cluster {
 namespace {
 
-/// Calls work() repeatedly, with the first allocation failing, then the second, ... and all after
-/// it, about `times` times in all. Returns how often it threw std::bad_alloc.
+/// Calls work() repeatedly, about `times` times. Each time a later allocation and all allocations
+/// after it fail. Returns how often it threw std::bad_alloc.
 template <class Work>
 int fail_in_turn(int times, const Work& work) {
   constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
@@ -61,7 +61,7 @@ struct Nowhere final : HierarchySink {
   void root(const FinishedBlock&) override {}
 };
 
-TEST(AllocationFailure, OfTheHierarchyComesOut) {
+TEST(AllocationFailure, InTheHierarchyIsRethrown) {
   std::vector<Point3> points(3000);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = static_cast<double>(i);

@@ -11,7 +11,7 @@
 namespace terrace::cluster {
 namespace {
 
-TEST(BandIndex, EveryPairIsThereOnceOrTwice) {
+TEST(BandIndex, HoldsEveryPairOnceOrTwice) {
   for (std::uint64_t n = 2; n <= 65; ++n) {
     SCOPED_TRACE(testing::Message() << "n = " << n);
     std::set<std::uint64_t> used;
@@ -30,7 +30,7 @@ TEST(BandIndex, EveryPairIsThereOnceOrTwice) {
       }
     }
     ASSERT_EQ(used.size(), n * (n / 2));
-    // The thesis's mapping from the place to the pair (7.9) inverts it.
+    // The thesis's mapping from a place to a pair (7.9) must invert it.
     for (std::uint64_t row = 0; row < n; ++row) {
       for (std::uint64_t column = 0; column < n / 2; ++column) {
         const std::uint64_t j = (column + row + 1) % n;
@@ -50,7 +50,7 @@ TEST(BandIndex, IsConstantExpression) {
   static_assert(band_entry(std::uint64_t{1} << 31, 0, 1) == 0);
 }
 
-TEST(BandMatrix, BothCopiesAreSet) {
+TEST(BandMatrix, SetsBothCopies) {
   for (std::size_t n = 1; n <= 20; ++n) {
     BandMatrix<double> matrix(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -68,7 +68,7 @@ TEST(BandMatrix, BothCopiesAreSet) {
   }
 }
 
-TEST(BandMatrix, SaysHowMuchMemoryItNeeds) {
+TEST(BandMatrix, ReportsTheMemoryItNeeds) {
   EXPECT_EQ(checked_band_bytes(10000, 4, 0), 200000000u);
   EXPECT_EQ(checked_band_bytes(10000, 8, 400000000), 400000000u);
   EXPECT_EQ(checked_band_bytes(0, 8, 0), 0u);
@@ -82,7 +82,7 @@ TEST(BandMatrix, SaysHowMuchMemoryItNeeds) {
     return "no exception";
   };
   EXPECT_NE(error(10000, 8, 399999999).find("400000000 bytes"), std::string::npos);
-  // Half of 10^14 entries; without a limit the system must refuse them.
+  // Half of 10^14 entries. Without a limit the system must refuse them.
   EXPECT_NE(error(10000000, 8, std::uint64_t{1} << 40).find("400000000000000 bytes"),
             std::string::npos);
   EXPECT_EQ(checked_band_bytes(10000000, 8, 0), 400000000000000u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quality of the clusterings compared with the optimum and with the reference search.
+// Compares the cost of clusterings with the optimum and with the reference search.
 #include <gtest/gtest.h>
 
 #include "clustering_laws.hpp"
@@ -36,13 +36,13 @@ TEST(BlockCost, IsNearTheOptimumOnTinyBlocks) {
       continue;
     }
     ASSERT_GE(clustering.cost(), best * (1 - 1e-9));
-    ASSERT_LE(clustering.cost(), best * 3);  // the proven factor of a local optimum
+    ASSERT_LE(clustering.cost(), best * 3);  // the proven bound for a local optimum
     sum += clustering.cost() / best;
   }
   EXPECT_LE(sum / kBlocks, 1.03);
 }
 
-/// Mean cost over blocks relative to the reference search.
+/// Mean cost over blocks, relative to the reference search.
 struct Costs {
   double tenth = 0.0, full = 0.0;
   double fast = 0.0, standard = 0.0, fine = 0.0, engine_full = 0.0;
@@ -96,8 +96,8 @@ TEST(BlockCost, BeatsTheShortSearchAndIsCloseToTheFullOne) {
   }
 }
 
-TEST(BlockCost, HoldsOnLinesClustersAndMixedDensity) {
-  // Cases in which a wrong number of seeds would show.
+TEST(BlockCost, IsLowOnLinesClustersAndMixedDensity) {
+  // A wrong number of seeds would show on these inputs.
   std::mt19937_64 random(12);
   std::vector<Point3> line, groups, mixed, rows;
   for (int i = 0; i < 3000; ++i) {
@@ -121,8 +121,8 @@ TEST(BlockCost, HoldsOnLinesClustersAndMixedDensity) {
   }
 }
 
-TEST(BlockCost, WeightsCountLikeThatManyPoints) {
-  // A point of weight w equals w coincident points.
+TEST(BlockCost, WeightsCountLikeCoincidentPoints) {
+  // A point of weight w must count like w coincident points.
   std::mt19937_64 random(8);
   std::vector<Point3> points = inputs::cube(2600, random);
   std::vector<Point3> repeated;

@@ -39,7 +39,7 @@ std::vector<Block> ordinary_blocks(std::uint64_t seed) {
   return blocks;
 }
 
-/// Blocks that break careless code, each at several sizes.
+/// Returns blocks that break careless code, each at several sizes.
 std::vector<Block> degenerate_blocks(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Block> blocks;
@@ -100,7 +100,7 @@ std::vector<Block> degenerate_blocks(std::uint64_t seed) {
   return blocks;
 }
 
-/// In addition to the portable path.
+/// Returns the available paths other than the portable one.
 std::vector<SimdPath> available_paths() {
   std::vector<SimdPath> paths;
   for (const SimdPath path : {SimdPath::avx2, SimdPath::avx512}) {
@@ -143,7 +143,7 @@ TEST(BlockClusterer, ResultsAreValidAndTheSameOnAllPaths) {
       BlockClustering expected;
       portable.run(block.points, block.weights, options, expected);
       laws::expect_valid(block.points, block.weights, options, expected, laws::kFloatSlack);
-      // Each clusterer has seen other blocks before, so this also tests that nothing carries over.
+      // Each clusterer has seen other blocks before, so this also shows that nothing carries over.
       for (BlockClusterer& clusterer : clusterers) {
         BlockClustering clustering;
         clusterer.run(block.points, block.weights, options, clustering);
@@ -154,7 +154,7 @@ TEST(BlockClusterer, ResultsAreValidAndTheSameOnAllPaths) {
   }
 }
 
-TEST(BlockClusterer, RemembersNothing) {
+TEST(BlockClusterer, KeepsNoStateBetweenBlocks) {
   std::mt19937_64 random(3);
   const std::vector<Point3> block = inputs::cube(3000, random);
   const std::vector<Point3> larger = inputs::dem_tiles(100, 100, 30.0, 2.65, random);
@@ -196,8 +196,8 @@ TEST(BlockClusterer, NoPointsGiveAnEmptyResult) {
   EXPECT_EQ(clustering.cost(), 0.0);
 }
 
-TEST(BlockClusterer, PlacesFarApartAreFacilitiesOfTheirOwn) {
-  // Two places with 500 points each: joining them would cost far more than a facility.
+TEST(BlockClusterer, DistantPlacesGetSeparateFacilities) {
+  // Two places with 500 points each. Joining them would cost far more than a facility.
   std::vector<Point3> points;
   for (int i = 0; i < 1000; ++i) points.push_back({i % 2 == 0 ? 0.0 : 1.0, 0, 0});
   BlockClusterer clusterer;
@@ -207,9 +207,9 @@ TEST(BlockClusterer, PlacesFarApartAreFacilitiesOfTheirOwn) {
   EXPECT_EQ(clustering.connection_cost, 0.0);
 }
 
-TEST(BlockClusterer, HeavyPointsThatFloatsCannotTellApartAreFacilities) {
-  // 1e-9 of the box apart: coincident in single precision, but the difference is worth 1e3
-  // facilities.
+TEST(BlockClusterer, SeparatesHeavyPointsThatCoincideInFloat) {
+  // The two points are 1e-9 of the box apart. They coincide in single precision, but the difference
+  // is worth 1e3 facilities.
   std::mt19937_64 random(9);
   std::vector<Point3> points = inputs::cube(3000, random);
   std::vector<double> weights(points.size(), 1.0);
@@ -236,7 +236,7 @@ TEST(BlockClusterer, TinyFacilityCostMakesEveryPointAFacility) {
   EXPECT_GE(clustering.facilities.size(), 2990u);
 }
 
-TEST(BlockClusterer, HugeFacilityCostMakesOneCluster) {
+TEST(BlockClusterer, HugeFacilityCostGivesOneCluster) {
   std::mt19937_64 random(4);
   BlockClusterer clusterer;
   BlockClustering clustering;
@@ -253,7 +253,7 @@ TEST(BlockClusterer, ScaleOffsetAndEqualWeightsChangeNothing) {
   std::mt19937_64 random(6);
   std::vector<Point3> points = inputs::cube(3000, random);
   for (Point3& p : points) {
-    for (double& v : p) v = std::floor(v * 1000);  // so that moving is exact
+    for (double& v : p) v = std::floor(v * 1000);  // makes moving exact
   }
   BlockClusterer clusterer;
   BlockClustering expected;
@@ -290,11 +290,11 @@ TEST(BlockClusterer, CostsBeyondTheRangeOfDoubleAreInfinite) {
   EXPECT_EQ(clustering.facility_cost, std::numeric_limits<double>::infinity());
 }
 
-TEST(BlockClusterer, PathsThatTheMachineLacksAreRefused) {
+TEST(BlockClusterer, RejectsUnavailablePaths) {
   EXPECT_NO_THROW(BlockClusterer{SimdPath::portable});
   EXPECT_NO_THROW(BlockClusterer{SimdPath::automatic});
   EXPECT_NO_THROW(BlockClusterer{best_simd_path()});
-  // Paths are numbered from the slowest; no machine has the last one.
+  // Paths are numbered from the slowest. No machine has the last one.
   constexpr auto kOfNoMachine = static_cast<SimdPath>(255);
   for (const SimdPath path : {SimdPath::avx2, SimdPath::avx512, kOfNoMachine}) {
     if (path <= best_simd_path()) {

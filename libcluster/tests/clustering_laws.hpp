@@ -13,18 +13,18 @@
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
-/// The guarantees of every clustering of a block, checked independently of how it was found.
+/// Checks of the guarantees of every clustering of a block, independent of how it was found.
 
 namespace terrace::cluster::laws {
 
-/// Nearest facilities are found in single precision relative to the block's box: a facility may be
-/// this much farther than another, in diagonals, and yet be taken for the nearer one.
+/// Nearest facilities are found in single precision relative to the block's box. A facility may be
+/// this much farther than another, in diagonals, and still count as the nearer one.
 inline constexpr double kFloatSlack = 1e-6;
 
-/// Denormal lengths have few digits.
+/// Allowed because denormal lengths have few digits.
 inline constexpr double kDenormalSlack = 1e-319;
 
-/// Distance without overflow or underflow.
+/// Returns the distance without overflow or underflow.
 inline double distance(const Point3& a, const Point3& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
@@ -45,8 +45,8 @@ inline double weight(std::span<const double> weights, std::size_t i) {
   return weights.empty() ? 1.0 : weights[i];
 }
 
-/// Checks the structure, recomputed costs, and that every point is at its nearest facility; `slack`
-/// is the tolerance of the latter in diagonals.
+/// Checks the structure, recomputed costs, and that every point is at its nearest facility. `slack`
+/// is the tolerance of the last check, in diagonals.
 inline void expect_valid(std::span<const Point3> points, std::span<const double> weights,
                          const BlockOptions& options, const BlockClustering& clustering,
                          double slack) {
@@ -61,7 +61,7 @@ inline void expect_valid(std::span<const Point3> points, std::span<const double>
   ASSERT_EQ(distinct.size(), clustering.facilities.size()) << "a facility is listed twice";
   ASSERT_LT(*distinct.rbegin(), points.size());
   for (std::size_t c = 0; c < clustering.facilities.size(); ++c) {
-    ASSERT_EQ(clustering.assignment[clustering.facilities[c]], c) << "facility not in its cluster";
+    ASSERT_EQ(clustering.assignment[clustering.facilities[c]], c) << "facility outside its cluster";
   }
   const double diameter = diagonal(points);
   double connections = 0.0;
@@ -81,7 +81,7 @@ inline void expect_valid(std::span<const Point3> points, std::span<const double>
   EXPECT_TRUE(std::isfinite(clustering.cost()));
 }
 
-/// The least cost over all sets of facilities. Requires at most 12 points.
+/// Returns the least cost over all sets of facilities. Requires: at most 12 points.
 inline double optimum(std::span<const Point3> points, std::span<const double> weights,
                       double facility_cost) {
   double best = std::numeric_limits<double>::infinity();
@@ -101,8 +101,8 @@ inline double optimum(std::span<const Point3> points, std::span<const double> we
   return best;
 }
 
-/// The textbook search, to whose costs others are compared: every candidate is evaluated by a scan
-/// of all points.
+/// Runs the textbook search, with whose costs others are compared. It evaluates every candidate by
+/// a scan of all points.
 inline FacilitySolution textbook_search(std::span<const Point3> points, double facility_cost,
                                         Effort effort, std::uint64_t seed) {
   return solve(FacilityPoints{.points = points, .facility_cost = facility_cost},

@@ -28,7 +28,7 @@ std::vector<std::size_t> sizes_of(const std::vector<std::uint32_t>& labels) {
   return sizes;
 }
 
-TEST(ClustersOfSize, ClustersAreAboutAsLargeAsAsked) {
+TEST(ClustersOfSize, ClustersHaveAboutTheRequestedSize) {
   const auto points = uniform_points(60000);
   for (const double size : {100.0, 10000.0}) {
     const std::vector<std::size_t> sizes = sizes_of(clusters_of_size(points, size, 1, 2));
@@ -49,11 +49,11 @@ TEST(ClustersOfSize, ClustersAreCompact) {
     const Box3 box = base::box_of(of_cluster);
     for (std::size_t d = 0; d < 3; ++d) widest = std::max(widest, box.max[d] - box.min[d]);
   }
-  // A block of 10,000 points is half as wide as all.
+  // A block of 10,000 points is half as wide as the whole set.
   EXPECT_LT(widest, 0.4);
 }
 
-TEST(ClustersOfSize, ThreadsDoNotMatter) {
+TEST(ClustersOfSize, DoesNotDependOnThreads) {
   const auto points = uniform_points(45000);
   EXPECT_EQ(clusters_of_size(points, 1000, 1, 1), clusters_of_size(points, 1000, 1, 3));
 }
@@ -64,7 +64,7 @@ TEST(ClustersOfSize, FewPointsAreOneCluster) {
   }
 }
 
-TEST(ClustersOfSize, SizesThatMakeNoSenseAreRefused) {
+TEST(ClustersOfSize, RejectsSizesThatAreNotPositive) {
   for (const double size : {0.0, -80.0, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THROW((void)clusters_of_size(uniform_points(20), size, 1, 1), std::invalid_argument);
   }

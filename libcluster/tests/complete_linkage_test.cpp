@@ -11,7 +11,8 @@ namespace {
 
 using laws::message_of;
 
-/// A symmetric matrix; with `levels` different values if not 0, so that most are equal.
+/// Returns a random symmetric matrix. If `levels` is not 0, it has that many different values, so
+/// that most are equal.
 laws::Distances random_distances(std::size_t count, unsigned levels, std::mt19937_64& random) {
   laws::Distances d(count, std::vector<double>(count, 0.0));
   for (std::size_t i = 0; i < count; ++i) {
@@ -38,7 +39,7 @@ BandMatrix<double> band_of(const laws::Distances& d) {
   return matrix;
 }
 
-TEST(CompleteLinkage, IsThatOfTheTextbook) {
+TEST(CompleteLinkage, EqualsTheTextbook) {
   for (const std::size_t count : {2u, 3u, 4u, 5u, 8u, 17u, 40u, 150u}) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       for (const auto& [name, points] : laws::linkage_inputs(count, seed)) {
@@ -54,8 +55,8 @@ TEST(CompleteLinkage, IsThatOfTheTextbook) {
   }
 }
 
-/// The law for runs on other devices: the order among equal distances may change the heights that
-/// follow.
+/// The checker must accept valid runs of other devices: the order of merges at equal distances may
+/// change the heights that follow.
 TEST(CompleteLinkage, EqualDistancesAllowRunsOfDifferentHeights) {
   const laws::Distances d = laws::distances_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
   const Dendrogram pairs{4, {{0, 1, 1, 2}, {2, 3, 1, 2}, {4, 5, 3, 4}}};
@@ -68,7 +69,7 @@ TEST(CompleteLinkage, EqualDistancesAllowRunsOfDifferentHeights) {
   EXPECT_EQ(laws::complete_fault(early, d, 0.0), "row 1: others are nearer");
 }
 
-TEST(CompleteLinkage, HeightsAreThoseOfTheTextbook) {
+TEST(CompleteLinkage, HeightsEqualTheTextbook) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
@@ -81,7 +82,7 @@ TEST(CompleteLinkage, HeightsAreThoseOfTheTextbook) {
   }
 }
 
-TEST(CompleteLinkage, TakesAnyDistances) {
+TEST(CompleteLinkage, AcceptsAnyDistances) {
   for (const std::size_t count : {2u, 3u, 6u, 7u, 31u, 64u, 130u}) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       for (const unsigned levels : {0u, 1u, 3u, 50u}) {
@@ -105,9 +106,9 @@ TEST(CompleteLinkage, TakesAnyDistances) {
   }
 }
 
-TEST(CompleteLinkage, ThreadsAndInstructionsDoNotMatter) {
+TEST(CompleteLinkage, DoesNotDependOnThreadsOrInstructionSet) {
   for (const auto& [name, points] : laws::linkage_inputs(801, 3)) {
-    if (name == "geometric spacing") continue;  // beyond the range of double
+    if (name == "geometric spacing") continue;  // distances exceed the range of double
     SCOPED_TRACE(testing::Message() << name << ", seed 3");
     for (const MatrixEntry entry : {MatrixEntry::float32, MatrixEntry::float64}) {
       const Dendrogram one = complete_linkage(points, {.entry = entry, .path = SimdPath::portable});
@@ -123,8 +124,9 @@ TEST(CompleteLinkage, ThreadsAndInstructionsDoNotMatter) {
   }
 }
 
-/// Each point is farther from the previous one than all others are: rounds merge one pair.
-TEST(CompleteLinkage, GeometricSpacingTakesTheChain) {
+/// Each point is farther from the previous one than all others are, so a round merges only one
+/// pair.
+TEST(CompleteLinkage, GeometricSpacingUsesTheChain) {
   for (const std::size_t count : {600u, 1000u}) {
     std::vector<Point3> points;
     double x = 1;
@@ -141,7 +143,7 @@ TEST(CompleteLinkage, GeometricSpacingTakesTheChain) {
 }
 
 TEST(CompleteLinkage, GridsTakeFewRounds) {
-  // A round that merged one pair after the other would take seconds here.
+  // Merging one pair per round would take seconds here.
   std::vector<Point3> points;
   for (unsigned i = 0; i < 4096; ++i) {
     points.push_back({static_cast<double>(i % 16), static_cast<double>(i / 16 % 16),
@@ -164,11 +166,11 @@ TEST(CompleteLinkage, GridsTakeFewRounds) {
         farthest = std::max(farthest, std::sqrt(sum));
       }
     }
-    ASSERT_EQ(dendrogram.merges[r].height, farthest);  // the diameter of the cluster
+    ASSERT_EQ(dendrogram.merges[r].height, farthest);  // the cluster's diameter
   }
 }
 
-TEST(CompleteLinkage, NoPointOnePointBadPoints) {
+TEST(CompleteLinkage, HandlesFewPointsAndNamesBadOnes) {
   EXPECT_TRUE(complete_linkage(std::vector<Point3>{}).merges.empty());
   EXPECT_TRUE(complete_linkage(std::vector<Point3>{{1, 2, 3}}).merges.empty());
   const auto nothing = [](std::uint32_t, std::uint32_t) { return 0.0; };
@@ -183,7 +185,7 @@ TEST(CompleteLinkage, NoPointOnePointBadPoints) {
   }
 }
 
-TEST(CompleteLinkage, BadDistancesAreNamed) {
+TEST(CompleteLinkage, NamesBadDistances) {
   for (const std::size_t count : {7u, 8u}) {
     for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -1.0}) {
       std::mt19937_64 random(1);
@@ -208,7 +210,7 @@ TEST(CompleteLinkage, BadDistancesAreNamed) {
                "1 and 3");
 }
 
-TEST(CompleteLinkage, ExceptionsOfTheDistanceComeOut) {
+TEST(CompleteLinkage, RethrowsExceptionsOfTheDistance) {
   const auto throwing = [](std::uint32_t i, std::uint32_t j) -> double {
     if (i == 3 && j == 40) throw std::runtime_error("no distance");
     return 1.0;
@@ -218,7 +220,7 @@ TEST(CompleteLinkage, ExceptionsOfTheDistanceComeOut) {
   }
 }
 
-TEST(CompleteLinkage, MatricesBeyondTheLimitAreRefused) {
+TEST(CompleteLinkage, RejectsMatricesAboveTheLimit) {
   const std::vector<Point3> points(101, Point3{1, 2, 3});
   EXPECT_PRED2(laws::contains,
                message_of([&] { (void)complete_linkage(points, {.memory_limit = 40399}); }),
@@ -232,7 +234,7 @@ TEST(CompleteLinkage, MatricesBeyondTheLimitAreRefused) {
             "no exception");
 }
 
-// The tests of all paths skip instruction sets that the machine lacks; this one reports it.
+// The other tests silently skip instruction sets that the machine lacks. These two report it.
 TEST(InstructionSets, Avx2IsTested) {
   if (best_simd_path() < SimdPath::avx2) GTEST_SKIP() << "the processor lacks AVX2";
 }

@@ -50,8 +50,8 @@ TEST(CostMatrix, HoldsTheWeightedDistancesOfAllPairs) {
   EXPECT_NEAR(matrix.view().cost(3, 7), std::hypot(flat, 0.5 * (values[3] - values[7])), 1e-12);
 }
 
-// A solution found through the matrix has the cost that the search on points computes, which is not
-// below its bound.
+// The cost of a solution found through the matrix must equal the cost that the search on points
+// computes, and must not be below its bound.
 TEST(CostMatrix, AgreesWithTheSearchOnPoints) {
   std::mt19937_64 random(4);
   laws::OwnedProblem p;
@@ -92,7 +92,7 @@ TEST(CostMatrix, AgreesWithTheSearchOnPoints) {
   }
 }
 
-TEST(CostMatrix, StrategiesOfOtherProblemsAreRefused) {
+TEST(CostMatrix, RejectsStrategiesOfOtherProblems) {
   const std::vector<double> one{1.0};
   const FacilityMatrix matrix{1, 1, one, one};
   for (const FacilityStrategy strategy :
@@ -103,7 +103,7 @@ TEST(CostMatrix, StrategiesOfOtherProblemsAreRefused) {
   EXPECT_THROW((void)solve(matrix, {.start = &start}), std::invalid_argument);
 }
 
-TEST(CostMatrix, SaysHowMuchMemoryItWouldNeed) {
+TEST(CostMatrix, ReportsTheMemoryItNeeds) {
   std::mt19937_64 random(5);
   const std::vector<Point3> points = inputs::cube(1000, random);
   try {

@@ -12,7 +12,7 @@ namespace {
 
 using laws::heights_of;
 
-TEST(CudaLinkage, SaysWhyItCannotRun) {
+TEST(CudaLinkage, ReportsWhyItCannotRun) {
   const CudaStatus status = cuda_available();
   if (status.available) {
     EXPECT_FALSE(status.device.empty());
@@ -46,7 +46,7 @@ TEST(CudaLinkage, RefusesPointsThatAreNotFinite) {
   }
 }
 
-TEST(CudaLinkage, GivesTheDendrogramsOfTheCpu) {
+TEST(CudaLinkage, EqualsTheCpu) {
   if (const CudaStatus status = cuda_available(); !status.available) {
     GTEST_SKIP() << status.reason;
   }
@@ -55,7 +55,7 @@ TEST(CudaLinkage, GivesTheDendrogramsOfTheCpu) {
     std::mt19937_64 random(count);
     const std::vector<Point3> points = inputs::cube(count, random);
     EXPECT_EQ(cuda_complete_linkage(points), complete_linkage(points));
-    // Roundings to float are sometimes equal: several runs are valid.
+    // Distances rounded to float are sometimes equal, so several runs are valid.
     EXPECT_EQ(laws::complete_fault(cuda_complete_linkage(points, MatrixEntry::float32),
                                    laws::distances_of(points), laws::kFloatTolerance),
               "");
@@ -70,7 +70,7 @@ TEST(CudaLinkage, GivesTheDendrogramsOfTheCpu) {
   }
 }
 
-TEST(CudaLinkage, SaysHowMuchMemoryIsMissing) {
+TEST(CudaLinkage, ReportsTheMemoryItNeeds) {
   if (const CudaStatus status = cuda_available(); !status.available) {
     GTEST_SKIP() << status.reason;
   }

@@ -15,7 +15,7 @@ using inputs::kNaN;
 using laws::message_of;
 using Labels = std::vector<std::uint32_t>;
 
-/// A random tree over the points; coarse heights, so that many are equal.
+/// Makes a random tree over the points. Heights are coarse, so that many are equal.
 std::vector<Link> random_links(std::size_t count, std::mt19937_64& random) {
   std::vector<Link> links;
   for (std::uint32_t i = 1; i < count; ++i) {
@@ -26,7 +26,7 @@ std::vector<Link> random_links(std::size_t count, std::mt19937_64& random) {
   return links;
 }
 
-/// Labels of components of the links up to a height, by brute force.
+/// Returns labels of the components of the links up to a height, by brute force.
 Labels components(std::size_t count, const std::vector<Link>& links, double height) {
   Labels label(count);
   for (std::uint32_t i = 0; i < count; ++i) label[i] = i;
@@ -73,7 +73,8 @@ TEST(Dendrogram, CutsAreComponents) {
       const Labels labels = cut_count(dendrogram, k);
       const std::size_t clusters = *std::max_element(labels.begin(), labels.end()) + 1u;
       ASSERT_LE(clusters, k);
-      // The lowest cut that leaves no more: just below the height of the last merge there are more.
+      // Finds the lowest cut that leaves no more. Just below the last merge's height there are
+      // more.
       double height = -1.0;
       for (const double h : {-1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0}) {
         const Labels cut = components(count, links, h);
@@ -88,7 +89,7 @@ TEST(Dendrogram, CutsAreComponents) {
   }
 }
 
-TEST(Dendrogram, OneAndNoPoint) {
+TEST(Dendrogram, HandlesFewerThanTwoPoints) {
   for (const std::size_t count : {0u, 1u}) {
     const Dendrogram dendrogram = make_dendrogram(count, {});
     EXPECT_EQ(dendrogram_fault(dendrogram), "");
@@ -98,7 +99,7 @@ TEST(Dendrogram, OneAndNoPoint) {
   EXPECT_EQ(cut_count(make_dendrogram(1, {}), 1), Labels{0});
 }
 
-TEST(Dendrogram, RefusesWhatIsNoTree) {
+TEST(Dendrogram, RejectsLinksThatAreNotATree) {
   const auto error = [](std::size_t count, const std::vector<Link>& links) {
     return message_of([&] { (void)make_dendrogram(count, links); });
   };
@@ -112,16 +113,16 @@ TEST(Dendrogram, RefusesWhatIsNoTree) {
   EXPECT_PRED2(laws::contains, error(kMostDendrogramPoints + 1, {}), "2^31");
 }
 
-TEST(Dendrogram, RefusesCutsThatMeanNothing) {
+TEST(Dendrogram, RejectsInvalidCuts) {
   const Dendrogram dendrogram = make_dendrogram(3, std::vector<Link>{{0, 1, 1}, {1, 2, 2}});
   EXPECT_THROW((void)cut_height(dendrogram, kNaN), std::invalid_argument);
   EXPECT_THROW((void)cut_count(dendrogram, 0), std::invalid_argument);
   EXPECT_THROW((void)cut_count(dendrogram, 4), std::invalid_argument);
 }
 
-/// An equilateral triangle by centroids: the third point is nearer to the middle of the others
-/// than they are to each other.
-TEST(Dendrogram, CutsMindInversions) {
+/// An equilateral triangle by centroids: the third point is nearer to the middle of the others than
+/// they are to each other.
+TEST(Dendrogram, CutsHandleInversions) {
   const std::vector<Link> links{{0, 1, 1.0}, {1, 2, 0.866}, {3, 4, 0.9}, {0, 4, 3.0}};
   const Dendrogram dendrogram = make_dendrogram_in_order(5, links);
   const std::vector<Merge> expected{
@@ -133,7 +134,7 @@ TEST(Dendrogram, CutsMindInversions) {
   EXPECT_EQ(cut_height(dendrogram, 1.0), (Labels{0, 0, 0, 1, 1}));
   EXPECT_EQ(cut_count(dendrogram, 1), (Labels{0, 0, 0, 0, 0}));
   EXPECT_EQ(cut_count(dendrogram, 2), (Labels{0, 0, 0, 1, 1}));
-  // Three are not possible: both merges of the triangle have the crest 1.
+  // Three clusters are not possible, because both merges of the triangle have the crest 1.
   EXPECT_EQ(cut_count(dendrogram, 3), (Labels{0, 0, 0, 1, 1}));
   EXPECT_EQ(cut_count(dendrogram, 4), (Labels{0, 1, 2, 3, 3}));
   EXPECT_EQ(cut_count(dendrogram, 5), (Labels{0, 1, 2, 3, 4}));
@@ -141,7 +142,7 @@ TEST(Dendrogram, CutsMindInversions) {
                std::invalid_argument);
 }
 
-TEST(Dendrogram, FaultsAreFound) {
+TEST(Dendrogram, FindsFaults) {
   const Dendrogram good = make_dendrogram(4, std::vector<Link>{{0, 1, 1}, {2, 3, 2}, {1, 2, 3}});
   ASSERT_EQ(dendrogram_fault(good), "");
   const auto broken = [&](const std::function<void(std::vector<Merge>&)>& change) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernels of linkage on a GPU, run by loops over shuffled indices.
+// Runs the kernels of GPU linkage as loops over shuffled indices.
 #include <gtest/gtest.h>
 
 #include "cuda/device_complete.hpp"
@@ -27,7 +27,7 @@ Dendrogram single_on(LoopDevice& loop, std::span<const Point3> points) {
   });
 }
 
-TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {
+TEST(DeviceLinkage, EqualsTheCpu) {
   for (const std::size_t count : {2u, 3u, 4u, 5u, 6u, 7u, 8u, 31u, 64u, 100u, 333u, 700u}) {
     for (const std::uint32_t lanes : {1u, 7u, 32u}) {
       SCOPED_TRACE(testing::Message() << count << " points, " << lanes << " lanes");
@@ -39,7 +39,7 @@ TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {
       LoopDevice loop(lanes, true, count);
       EXPECT_EQ(complete_on<double>(loop, points), complete_linkage(points));
       EXPECT_EQ(single_on(loop, points), single_linkage(points));
-      // Roundings to float are sometimes equal: several runs are valid.
+      // Distances rounded to float are sometimes equal, so several runs are valid.
       EXPECT_EQ(laws::complete_fault(complete_on<float>(loop, points), laws::distances_of(points),
                                      laws::kFloatTolerance),
                 "");
@@ -47,7 +47,7 @@ TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {
   }
 }
 
-TEST(DeviceLinkage, SingleLinkageOfMorePointsThanOnePart) {
+TEST(DeviceLinkage, SingleLinkageUsesSeveralParts) {
   std::mt19937_64 random(12);
   const std::vector<Point3> points = inputs::cube(2500, random);
   ASSERT_GT(device::NearestOther::parts_of(2500), 2u);
@@ -55,7 +55,7 @@ TEST(DeviceLinkage, SingleLinkageOfMorePointsThanOnePart) {
   EXPECT_EQ(single_on(loop, points), single_linkage(points));
 }
 
-TEST(DeviceLinkage, TiesAndDegenerateInputs) {
+TEST(DeviceLinkage, HandlesTiesAndDegenerateInput) {
   for (const std::size_t count : {2u, 3u, 10u, 61u, 150u}) {
     for (const auto& [name, points] : laws::linkage_inputs(count, 3)) {
       SCOPED_TRACE(testing::Message() << name << ", " << count << " points");
@@ -70,7 +70,7 @@ TEST(DeviceLinkage, TiesAndDegenerateInputs) {
 }
 
 TEST(DeviceLinkage, DoesNotDependOnTheOrderOfThreads) {
-  // Ties everywhere: any dependence on the order would show.
+  // The inputs are full of ties, so any dependence on the order would show.
   for (const auto& [name, points] : laws::linkage_inputs(200, 4)) {
     SCOPED_TRACE(name);
     LoopDevice straight(1, false, 0);
@@ -86,7 +86,7 @@ TEST(DeviceLinkage, DoesNotDependOnTheOrderOfThreads) {
   }
 }
 
-TEST(DeviceLinkage, RoundsAreFewAndMemoryIsAsSaid) {
+TEST(DeviceLinkage, TakesFewRoundsAndTheDocumentedMemory) {
   std::mt19937_64 random(5);
   for (const std::size_t count : {100u, 1000u}) {
     const std::vector<Point3> points = inputs::cube(count, random);
@@ -102,7 +102,7 @@ TEST(DeviceLinkage, RoundsAreFewAndMemoryIsAsSaid) {
     for (const device::RoundLink& link : links) EXPECT_LT(link.round, 10u);
     EXPECT_LE(loop.bytes, device::single_rounds_bytes(count));
   }
-  // One pair per round: the nearest neighbours of all others stay.
+  // Only one pair merges per round, because the nearest neighbours of all others stay the same.
   std::vector<Point3> geometric;
   double x = 1;
   for (int i = 0; i < 60; ++i, x *= 2.5) geometric.push_back({x, 0, 0});

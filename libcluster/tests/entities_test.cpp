@@ -19,7 +19,7 @@ namespace {
 using inputs::kInfinity;
 
 Point3 random_point(std::mt19937_64& random, double scale) {
-  // Sometimes a grid, so that ties and equal corners occur.
+  // Sometimes uses a grid, so that ties and equal corners occur.
   const bool coarse = random() % 2 == 0;
   Point3 p{};
   for (double& x : p) {
@@ -62,7 +62,7 @@ void expect_metric(const Distance& distance) {
   }
 }
 
-TEST(Entities, TheReadyDistancesAreMetrics) {
+TEST(Entities, ProvidedDistancesAreMetrics) {
   expect_metric<2>(segment_distance);
   expect_metric<3>(triangle_distance);
   EXPECT_DOUBLE_EQ(segment_distance({{{0, 0, 0}, {1, 0, 0}}}, {{{1, 2, 0}, {0, 2, 0}}}), 2.0);
@@ -73,8 +73,8 @@ TEST(Entities, TheReadyDistancesAreMetrics) {
       3.0);
 }
 
-// Compared with both orders of b, in extended precision.
-TEST(Entities, PolylinesKeepTheOrderOfTheirVertices) {
+// Compares with both orders of b, in extended precision.
+TEST(Entities, PolylinesKeepTheOrderOfVertices) {
   std::mt19937_64 random(17);
   for (int trial = 0; trial < 3000; ++trial) {
     SCOPED_TRACE(testing::Message() << "trial " << trial);
@@ -106,14 +106,14 @@ TEST(Entities, PolylinesKeepTheOrderOfTheirVertices) {
     ASSERT_EQ(polyline_distance(backward, a), 0.0);
     ASSERT_NEAR(polyline_distance(backward, b), ab, 1e-14 * ab);
   }
-  // A triangle's corners may be renumbered, a polyline's vertices not.
+  // A triangle's corners may be renumbered, but a polyline's vertices may not.
   const Triangle corners{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
   const Triangle turned{{{1, 0, 0}, {0, 1, 0}, {0, 0, 0}}};
   EXPECT_EQ(triangle_distance(corners, turned), 0.0);
   EXPECT_GT(polyline_distance(corners, turned), 0.5);
 }
 
-TEST(Entities, PointsByIndexAreThePointsThemselves) {
+TEST(Entities, PointsByIndexClusterLikePoints) {
   std::mt19937_64 random(9);
   const std::vector<Point3> points = inputs::cube(250, random);
   const FacilityPoints by_points{.points = points, .facility_cost = 0.5, .outlier_price = 0.2};
@@ -147,7 +147,7 @@ TEST(Entities, PointsByIndexAreThePointsThemselves) {
 
 TEST(Entities, TrianglesClusterByPlaceAndShape) {
   std::mt19937_64 random(2);
-  // Small ones in two places, and large ones around both.
+  // Small triangles in two places, and large ones around both.
   std::vector<Triangle> triangles;
   for (std::size_t i = 0; i < 300; ++i) {
     Triangle t{};
@@ -176,7 +176,7 @@ TEST(Entities, TrianglesClusterByPlaceAndShape) {
   }
 }
 
-// The Levenshtein distance, a metric.
+// Returns the Levenshtein distance, which is a metric.
 double edits(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -211,7 +211,7 @@ TEST(Entities, WordsClusterByEdits) {
   EXPECT_LT(fewer.cost(), solution.cost());
 }
 
-TEST(Entities, BadInputIsNamed) {
+TEST(Entities, NamesBadInput) {
   const auto zero = [](std::uint32_t, std::uint32_t) { return 0.0; };
   const auto message = [](const FacilityEntities& problem, unsigned threads = 1) -> std::string {
     try {

@@ -30,7 +30,7 @@ struct Instance {
   std::vector<double> opening, connection;
 
   [[nodiscard]] FacilityMatrix matrix() const { return {facilities, clients, opening, connection}; }
-  /// The folder: orlib, kratica_M, pmedian, or UflLib's own folder.
+  /// Returns the folder: orlib, kratica_M, pmedian, or UflLib's own folder.
   [[nodiscard]] std::string group() const {
     return std::filesystem::path(file).parent_path().filename().string();
   }
@@ -40,7 +40,7 @@ struct Instance {
   }
 };
 
-/// Words of a text, and the numbers among them; every error names the source.
+/// Words of a text, and the numbers among them. Every error names the source.
 class Words {
  public:
   Words(std::string source, std::string text)
@@ -51,7 +51,7 @@ class Words {
   }
   std::string_view word() {
     const auto from = text_.find_first_not_of(" \t\r\n", at_);
-    if (from == std::string::npos) fail("ends too early");
+    if (from == std::string::npos) fail("is truncated");
     at_ = std::min(text_.find_first_of(" \t\r\n", from), text_.size());
     return std::string_view(text_).substr(from, at_ - from);
   }
@@ -60,7 +60,7 @@ class Words {
     double value = 0.0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size() || !(value >= 0.0)) {
-      fail(std::string(text) + " is not a number from 0");
+      fail(std::string(text) + " is not a number of at least 0");
     }
     return value;
   }
@@ -74,7 +74,7 @@ class Words {
     return static_cast<std::size_t>(value);
   }
   void end() const {
-    if (text_.find_first_not_of(" \t\r\n", at_) != std::string::npos) fail("goes on after its end");
+    if (text_.find_first_not_of(" \t\r\n", at_) != std::string::npos) fail("has trailing data");
   }
 
  private:
@@ -84,8 +84,8 @@ class Words {
 
 inline constexpr std::size_t kMostPlaces = 10000;
 
-/// "m n", m times "capacity opening-cost", then per client its demand and m costs, each for the
-/// whole demand. A capacity may be the word `capacity`; capacities are not used.
+/// Reads "m n", m times "capacity opening-cost", then per client its demand and m costs, each for
+/// the whole demand. A capacity may be the word `capacity`; capacities are not used.
 inline void read_orlib(Words& words, Instance& instance) {
   instance.facilities = words.count(1, kMostPlaces);
   instance.clients = words.count(1, kMostPlaces);
@@ -103,7 +103,7 @@ inline void read_orlib(Words& words, Instance& instance) {
   words.end();
 }
 
-/// "FILE: name", "m n 0", then per facility "number opening-cost" and n costs.
+/// Reads "FILE: name", "m n 0", then per facility "number opening-cost" and n costs.
 inline void read_simple(Words& words, Instance& instance) {
   if (words.word() != "FILE:") words.fail("does not begin with FILE:");
   words.word();
@@ -120,8 +120,8 @@ inline void read_simple(Words& words, Instance& instance) {
   words.end();
 }
 
-/// "n edges k", then "from to length" per edge; of repeated edges the last counts. Costs are the
-/// lengths of shortest paths.
+/// Reads "n edges k", then "from to length" per edge. Of repeated edges the last one counts. Costs
+/// are the lengths of shortest paths.
 inline void read_pmed(Words& words, Instance& instance) {
   const std::size_t n = words.count(1, kMostPlaces);
   const std::size_t edges = words.count(0, n * n);
@@ -170,7 +170,8 @@ inline std::string read_text(const std::filesystem::path& path) {
   return std::move(text).str();
 }
 
-/// The folder of instances: that of TERRACE_DATA, if it is set and has one.
+/// Returns the folder of instances in the folder named by TERRACE_DATA, or nullopt if there is
+/// none.
 inline std::optional<std::filesystem::path> folder() {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) return std::nullopt;
@@ -179,7 +180,7 @@ inline std::optional<std::filesystem::path> folder() {
   return path;
 }
 
-/// What optima.tsv lists, without the costs: load() reads those.
+/// Returns the instances that optima.tsv lists, without their costs, which load() reads.
 inline std::vector<Instance> listed(const std::filesystem::path& folder) {
   std::istringstream lines(read_text(folder / "optima.tsv"));
   std::vector<Instance> all;
@@ -203,8 +204,8 @@ inline std::vector<Instance> listed(const std::filesystem::path& folder) {
   return all;
 }
 
-/// Reads the costs of a listed instance. Throws: std::invalid_argument if the file does not match
-/// the list.
+/// Reads the costs of a listed instance.
+/// Throws: std::invalid_argument if the file does not match the list.
 inline void load(const std::filesystem::path& folder, Instance& instance) {
   const std::size_t facilities = instance.facilities, clients = instance.clients;
   parse(Words(instance.file, read_text(folder / instance.file)), instance);

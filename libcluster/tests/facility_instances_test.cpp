@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The instances of OR-Library, UflLib and Kratica, with their known optima.
+// Solves the instances of OR-Library, UflLib and Kratica, whose optima are known.
 #include "facility_instances.hpp"
 
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ TEST(FacilityInstances, CostsAreNearTheKnownOptima) {
     if (instance.is_metric()) {
       EXPECT_LE(above, 0.02);
     }
-    // In these groups good solutions are isolated by design: no local search finds them.
+    // In these groups good solutions are isolated by design, so no local search finds them.
     const std::string group = instance.group();
     if (group == "GapA" || group == "GapB" || group == "Chess" || group == "Fpp11") continue;
     sum += above;
@@ -95,7 +95,7 @@ TEST(FacilityInstances, MediansAreNearTheKnownOptima) {
   EXPECT_EQ(seen, 14u);
 }
 
-TEST(FacilityInstances, ReaderRefusesWhatIsNotAnInstance) {
+TEST(FacilityInstances, ReaderRejectsInvalidInstances) {
   const auto read = [](const std::string& format, const std::string& text) {
     instances::Instance instance;
     instance.format = format;

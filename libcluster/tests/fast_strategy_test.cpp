@@ -42,7 +42,7 @@ TEST(FastStrategy, IsAsGoodAsTheSearchUnderLinearMetrics) {
       ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, fast, 1e-8));
       const FacilitySolution search = solve(p.view());
       EXPECT_LT(fast.cost(), search.cost());
-      // In single precision ties are broken differently from double.
+      // Single precision breaks ties differently from double.
       EXPECT_LE(report.search.wrongly_assigned, 3u);
       const FacilitySolution full =
           solve(p.view(), {.strategy = FacilityStrategy::fast, .effort = Effort::full});
@@ -51,7 +51,7 @@ TEST(FastStrategy, IsAsGoodAsTheSearchUnderLinearMetrics) {
   }
 }
 
-TEST(FastStrategy, EuclideanIsTheBlockClusterer) {
+TEST(FastStrategy, EqualsTheBlockClustererUnderTheEuclideanMetric) {
   std::mt19937_64 random(15);
   OwnedProblem p;
   p.points = inputs::scan(2, 60, random);
@@ -65,7 +65,7 @@ TEST(FastStrategy, EuclideanIsTheBlockClusterer) {
               static_cast<double>(clustering.facilities.size()), 3.0);
 }
 
-TEST(FastStrategy, DegenerateInputs) {
+TEST(FastStrategy, HandlesDegenerateInput) {
   for (const Metric& metric : linear_metrics()) {
     for (OwnedProblem& p : laws::problems(90, 3)) {
       p.metric = metric;
@@ -76,7 +76,7 @@ TEST(FastStrategy, DegenerateInputs) {
   }
 }
 
-TEST(FastStrategy, WhatItLacksIsRefused) {
+TEST(FastStrategy, RejectsUnsupportedProblems) {
   std::mt19937_64 random(16);
   OwnedProblem p;
   p.points = inputs::cube(30, random);

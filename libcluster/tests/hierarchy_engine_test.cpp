@@ -27,7 +27,7 @@ namespace {
 using inputs::kInfinity;
 using inputs::kNaN;
 
-/// Runs of ten consecutive points; the first of each is the facility.
+/// Makes clusters of ten consecutive points. The first of each is the facility.
 void runs_of_ten(std::span<const Point3> points, std::span<const double>, const BlockOptions&,
                  BlockClustering& result) {
   result.facilities.clear();
@@ -74,7 +74,7 @@ std::vector<std::size_t> block_sizes(const RecordingSink& sink, unsigned level) 
 
 using Sizes = std::vector<std::size_t>;
 
-TEST(HierarchyEngine, BatchThatFitsABlockIsNotTorn) {
+TEST(HierarchyEngine, BatchThatFitsABlockIsNotSplit) {
   RecordingSink sink;
   HierarchyEngine engine(small_blocks(), sink, [] { return runs_of_ten; });
   const std::vector<Point3> points = line(260);
@@ -88,7 +88,7 @@ TEST(HierarchyEngine, BatchThatFitsABlockIsNotTorn) {
   laws::check_hierarchy(sink, result, points, 100);
 }
 
-TEST(HierarchyEngine, LargeBatchFillsThePresentBlock) {
+TEST(HierarchyEngine, LargeBatchFillsTheCurrentBlock) {
   RecordingSink sink;
   HierarchyEngine engine(small_blocks(), sink, [] { return runs_of_ten; });
   const std::vector<Point3> points = line(471);
@@ -100,7 +100,7 @@ TEST(HierarchyEngine, LargeBatchFillsThePresentBlock) {
   laws::check_hierarchy(sink, result, points, 100);
 }
 
-TEST(HierarchyEngine, FullBlockWithNothingBehindIsTheRoot) {
+TEST(HierarchyEngine, FullBlockAtTheEndIsTheRoot) {
   RecordingSink sink;
   HierarchyEngine engine(small_blocks(), sink, [] { return runs_of_ten; });
   push_all(engine, line(100), 50);
@@ -126,7 +126,7 @@ TEST(HierarchyEngine, ClusteringThatKeepsAllPointsStillEnds) {
       push_all(engine, line(n), 2);
       const HierarchyResult result = engine.finish();
       laws::check_hierarchy(sink, result, line(n), block_size);
-      // Retried with ever higher costs, beyond any sum of distances in a block.
+      // The block is retried with ever higher costs, beyond any sum of distances in it.
       EXPECT_EQ(costs[0], 1.0);
       EXPECT_EQ(costs[1], 4.0);
       EXPECT_GT(*std::max_element(costs.begin(), costs.end()), 0x1p24);
@@ -147,7 +147,7 @@ TEST(HierarchyEngine, WeightsAreCountsWithMeanOne) {
   };
   RecordingSink sink;
   HierarchyEngine engine(small_blocks(), sink, [&] { return cluster; });
-  push_all(engine, line(20003), 77);  // ends of blocks make clusters of less than ten
+  push_all(engine, line(20003), 77);  // at the ends of blocks, clusters have fewer than ten points
   const HierarchyResult result = engine.finish();
   ASSERT_EQ(result.top, 3u);
 
@@ -161,7 +161,7 @@ TEST(HierarchyEngine, WeightsAreCountsWithMeanOne) {
     EXPECT_NEAR(sum / static_cast<double>(call.points), 1.0, 1e-12);
   }
   EXPECT_EQ(weighted, sink.levels[1].size() + sink.levels[2].size());
-  // With one thread the first block of level 1 is the first one with weights.
+  // With one thread, the first call with weights is for the first block of level 1.
   const auto call =
       std::find_if(calls.begin(), calls.end(), [](const Call& c) { return !c.weights.empty(); });
   const RecordedBlock& block = sink.levels[1][0];
@@ -182,7 +182,7 @@ TEST(HierarchyEngine, WeightsAreCountsWithMeanOne) {
   }
 }
 
-TEST(HierarchyEngine, EachBlockHasItsSeed) {
+TEST(HierarchyEngine, EachBlockHasItsOwnSeed) {
   std::vector<std::uint64_t> seeds;
   const auto cluster = [&](std::span<const Point3> points, std::span<const double> weights,
                            const BlockOptions& options, BlockClustering& result) {
@@ -222,7 +222,8 @@ TEST(HierarchyEngine, ClusteringSeesGroundPositions) {
   EXPECT_EQ(asked[0], (Box3{{0, 0.5, -1}, {99, 0.5, -1}}));
   EXPECT_EQ(asked[1], (Box3{{100, 0.5, -1}, {149, 0.5, -1}}));
   EXPECT_EQ(seen[0][7], (Point3{14, 0, 0}));
-  EXPECT_EQ(seen[1][7], (Point3{14, 0, 0})) << "relative to the minimum of the block";
+  EXPECT_EQ(seen[1][7], (Point3{14, 0, 0}))
+      << "positions must be relative to the minimum of the block";
 }
 
 // If maps differ between blocks, the error is the smaller of two bounds, each of which is valid for
@@ -248,7 +249,7 @@ TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
 
   struct Descendant {
     Point3 position;
-    long double path;  // from the head along the representatives
+    long double path;  // length of the path from the head along the representatives
   };
   std::vector<std::vector<Descendant>> below;
   for (const auto& level : sink.levels) {
@@ -291,7 +292,7 @@ TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
   }
 }
 
-TEST(HierarchyEngine, BadInputLeavesTheBuilderAsItWas) {
+TEST(HierarchyEngine, BadInputLeavesTheBuilderUnchanged) {
   const std::vector<Point3> points = line(330);
   for (const double bad : {kInfinity, -kInfinity, kNaN}) {
     for (const std::size_t where : {0u, 1u, 5u, 128u, 229u}) {
@@ -316,7 +317,7 @@ TEST(HierarchyEngine, BadInputLeavesTheBuilderAsItWas) {
   }
 }
 
-TEST(HierarchyEngine, OptionsOutOfRangeAreRefused) {
+TEST(HierarchyEngine, RejectsOptionsOutOfRange) {
   RecordingSink sink;
   const auto make = [] { return runs_of_ten; };
   HierarchyOptions options;
@@ -340,7 +341,7 @@ struct Failure : std::runtime_error {
 
 enum class Where { prepare, commit, root, ground, cluster };
 
-/// Throws at the n-th visit of one place.
+/// Throws at the n-th visit to one place.
 struct Trap {
   Where where;
   int visits_left;
@@ -372,7 +373,7 @@ class TrappedSink : public RecordingSink {
   Trap& trap_;
 };
 
-TEST(HierarchyEngine, ExceptionsComeOutOnce) {
+TEST(HierarchyEngine, ExceptionsAreRethrownOnce) {
   for (const Where where :
        {Where::prepare, Where::commit, Where::root, Where::ground, Where::cluster}) {
     for (const int visit : {0, 1, 20, 55}) {
@@ -409,8 +410,8 @@ TEST(HierarchyEngine, ExceptionsComeOutOnce) {
   }
 }
 
-/// Its first block fails while another is being prepared by a thread that is not the caller's. That
-/// one lingers until all other threads wait for it, or the failure has been thrown.
+/// Its first block fails while another thread than the caller's prepares a second one. That thread
+/// lingers until all other threads wait for it, or the failure has been thrown.
 class LingeringSink : public RecordingSink {
  public:
   std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
@@ -431,7 +432,7 @@ class LingeringSink : public RecordingSink {
   std::atomic<bool> lingers = false, failed = false, come_out = false;
 };
 
-TEST(HierarchyEngine, NoCallToTheSinkIsRunningWhenAnExceptionComesOut) {
+TEST(HierarchyEngine, RethrowsOnlyWhenNoCallToTheSinkIsRunning) {
   LingeringSink sink;
   HierarchyEngine engine(small_blocks(3), sink, [] { return runs_of_ten; });
   const auto build = [&] {
@@ -443,7 +444,7 @@ TEST(HierarchyEngine, NoCallToTheSinkIsRunningWhenAnExceptionComesOut) {
   sink.come_out = true;
 }
 
-TEST(HierarchyEngine, FinishOnlyOnce) {
+TEST(HierarchyEngine, FinishMayBeCalledOnce) {
   RecordingSink sink;
   HierarchyEngine engine(small_blocks(), sink, [] { return runs_of_ten; });
   engine.finish();
@@ -451,7 +452,7 @@ TEST(HierarchyEngine, FinishOnlyOnce) {
   EXPECT_THROW(engine.push(line(1), numbered_payload(0, 1)), std::logic_error);
 }
 
-TEST(HierarchyEngine, UselessGroundMapsAreRefused) {
+TEST(HierarchyEngine, RejectsInvalidGroundMaps) {
   const std::vector<GroundMap> maps = {{1, 0, 0, 0, kNaN, 0, 0, 0, 1},
                                        {1, 0, 0, 0, 1, 0, 0, kInfinity, 1},
                                        {0, 0, 0, 0, 0, 0, 0, 0, 0},
@@ -485,7 +486,7 @@ TEST(HierarchyEngine, DestructorStopsQuietly) {
       EXPECT_FALSE(sink.has_root);
     }
   }
-  // With an additional failure.
+  // The same with an additional failure.
   Trap trap{Where::commit, 3, {}};
   TrappedSink sink(trap);
   HierarchyEngine engine(small_blocks(2), sink, [] { return runs_of_ten; });
@@ -515,7 +516,7 @@ class SlowStartSink : public RecordingSink {
   std::atomic<int> waiting_ = 0;
 };
 
-TEST(HierarchyEngine, FewBlocksPerThreadAreUnderWay) {
+TEST(HierarchyEngine, FewBlocksPerThreadAreInProgress) {
   for (const unsigned threads : {1u, 2u, 4u}) {
     SlowStartSink sink;
     HierarchyEngine engine(small_blocks(threads), sink, [] { return runs_of_ten; });

@@ -18,12 +18,12 @@
 #include "terrace/cluster/hierarchy.hpp"
 
 /// Entities of several corners in the stream (thesis chapter 9). The payload is the entity's
-/// number, by which its corners are looked up.
+/// number, by which its corners are found.
 
 namespace terrace::cluster {
 namespace {
 
-// Entities of k corners, contiguous.
+// Entities of k contiguous corners.
 struct Entities {
   std::size_t k = 3;
   bool ordered = false;
@@ -48,7 +48,7 @@ struct Entities {
               std::copy(all.begin(), all.end(), corners_of_one.begin());
             }};
   }
-  // The public distances, on the ground.
+  // Returns the library's public distance, on the ground.
   [[nodiscard]] double distance(std::size_t i, std::size_t j, const GroundMap& map) const {
     const auto ground = [&](std::size_t e) {
       std::vector<Point3> points((*this)[e].begin(), (*this)[e].end());
@@ -67,7 +67,7 @@ struct Entities {
   }
 };
 
-// Small entities on a lattice and off it, a few of them equal or degenerate.
+// Makes small entities on and off a lattice, a few of them equal or degenerate.
 Entities soup(std::size_t n, std::size_t k, bool ordered, std::mt19937_64& random) {
   Entities entities{k, ordered, {}};
   for (std::size_t i = 0; i < n; ++i) {
@@ -99,8 +99,8 @@ struct BuiltEntities {
   }
 };
 
-// The hierarchy's laws; every entity is with the nearest representative by the public distance; any
-// number of threads gives the same.
+// The hierarchy's guarantees must hold, every entity must be with the nearest representative by the
+// public distance, and any number of threads must give the same hierarchy.
 TEST(HierarchyEntities, AreWithTheNearestRepresentative) {
   const GroundMap oblong{2, 0, 0, 0, 0.5, 0, 0, 0, 3};
   int run = 0;
@@ -138,7 +138,7 @@ TEST(HierarchyEntities, AreWithTheNearestRepresentative) {
   }
 }
 
-// Triangles around one place that differ in size and direction, whichever corner is the first.
+// Triangles around one place differ in size and direction, whichever corner comes first.
 TEST(HierarchyEntities, ClusterByAllCorners) {
   std::mt19937_64 random(3);
   Entities entities;
@@ -162,7 +162,7 @@ TEST(HierarchyEntities, ClusterByAllCorners) {
   }
 }
 
-TEST(HierarchyEntities, EqualOnesAndHugeOnes) {
+TEST(HierarchyEntities, HandlesEqualAndHugeEntities) {
   for (const double scale : {0.0, 1e-140, 1e140}) {
     SCOPED_TRACE(scale);
     std::mt19937_64 random(8);
@@ -177,7 +177,7 @@ TEST(HierarchyEntities, EqualOnesAndHugeOnes) {
   }
 }
 
-TEST(HierarchyEntities, WhatCannotBeClusteredIsRefused) {
+TEST(HierarchyEntities, RejectsUnsupportedOptionsAndBadCorners) {
   RecordingSink sink;
   std::mt19937_64 random(1);
   const Entities triangles = soup(50, 3, false, random);
@@ -203,7 +203,7 @@ TEST(HierarchyEntities, WhatCannotBeClusteredIsRefused) {
     o.mark_outlier = [](std::span<std::byte>) {};
   });
 
-  // In the stream: a corner that is not finite, and a search that needs points.
+  // Failures in the stream: a corner that is not finite, and a search that needs points.
   Entities broken = triangles;
   broken.corners[3 * 30 + 2][1] = std::numeric_limits<double>::quiet_NaN();
   HierarchyOptions options = good;

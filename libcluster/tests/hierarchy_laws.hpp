@@ -13,12 +13,12 @@
 #include "recording_sink.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
-/// The guarantees of every hierarchy, checked by brute force over all descendants. Payloads must be
-/// those of numbered_payload().
+/// Checks of the guarantees of every hierarchy by brute force over all descendants. Requires:
+/// payloads from numbered_payload().
 
 namespace terrace::cluster::laws {
 
-/// |map * (a - b)| in extended precision.
+/// Returns |map * (a - b)| in extended precision.
 inline long double ground_distance(const GroundMap& m, const Point3& a, const Point3& b) {
   long double sum = 0.0L;
   for (std::size_t row = 0; row < 3; ++row) {
@@ -32,7 +32,7 @@ inline long double ground_distance(const GroundMap& m, const Point3& a, const Po
   return std::sqrt(sum);
 }
 
-/// Checks one block: its clusters are a partition, grouped, in ascending order.
+/// Checks that the clusters of a block are a partition, grouped, and in ascending order.
 inline void check_partition(const RecordedBlock& block, std::size_t block_size) {
   const std::size_t n = block.positions.size();
   const std::size_t clusters = block.representatives.size();
@@ -61,7 +61,7 @@ inline void check_partition(const RecordedBlock& block, std::size_t block_size) 
   }
 }
 
-/// A cluster with all its descendants, as input indices, and its block.
+/// A cluster with its block and all its descendants, as input indices.
 struct Expanded {
   const RecordedBlock* block = nullptr;
   std::size_t c = 0;
@@ -70,7 +70,7 @@ struct Expanded {
   [[nodiscard]] std::uint32_t representative() const { return block->representatives[c]; }
 };
 
-/// Compares a summary with its descendants. The map is the same for all blocks.
+/// Compares a summary with its descendants. The map must be the same for all blocks.
 inline void check_summary(const Expanded& cluster, std::span<const Point3> input,
                           const GroundMap& map) {
   const Summary& summary = cluster.block->summaries[cluster.c];
@@ -100,7 +100,7 @@ inline void check_summary(const Expanded& cluster, std::span<const Point3> input
   EXPECT_LE(static_cast<long double>(summary.error), edges * (1.0L + 1e-12L));
 }
 
-/// Checks everything. `map` is that of all blocks.
+/// Checks everything. `map` is the map of all blocks.
 inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& result,
                             std::span<const Point3> input, std::size_t block_size,
                             const GroundMap& map = {1, 0, 0, 0, 1, 0, 0, 0, 1}) {
@@ -114,10 +114,10 @@ inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& re
 
   // The expected content of each level: the input, or the clusters of the level below, in order.
   std::vector<Expanded> below;
-  std::vector<std::vector<std::uint64_t>> heads;  // input number, by level and ordinal
+  std::vector<std::vector<std::uint64_t>> heads;  // input index, by level and ordinal
   std::vector<bool> placed(input.size(), false);
   const auto place = [&](std::uint64_t id) {
-    ASSERT_FALSE(placed[id]) << "point " << id << " has two places";
+    ASSERT_FALSE(placed[id]) << "point " << id << " is in two places";
     placed[id] = true;
   };
   const auto check_point = [&](const RecordedBlock& block, std::size_t i, std::uint64_t number) {

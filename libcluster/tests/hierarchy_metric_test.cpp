@@ -17,7 +17,7 @@
 #include "search_laws.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
-/// The streaming builder under metrics and with channels.
+/// The streaming builder under various metrics and with channels.
 
 namespace terrace::cluster {
 namespace {
@@ -35,7 +35,7 @@ HierarchyResult build(const std::vector<Point3>& points, HierarchyOptions option
   return builder.finish();
 }
 
-// Sum over the clusters of a level of the distances from their representatives.
+// Returns the sum over the clusters of a level of the distances from their representatives.
 double connections(const RecordingSink& sink, const Metric& metric) {
   double sum = 0.0;
   for (const RecordedBlock& block : sink.levels[0]) {
@@ -48,7 +48,7 @@ double connections(const RecordingSink& sink, const Metric& metric) {
   return sum;
 }
 
-TEST(HierarchyMetric, LawsHoldUnderEveryMetric) {
+TEST(HierarchyMetric, GuaranteesHoldUnderEveryMetric) {
   const GroundMap map{2, 0, 0, 0, 0.5, 0, 0, 0, 1};
   for (const Metric& metric : laws::metrics()) {
     for (const laws::OwnedProblem& input : laws::problems(400, 6)) {
@@ -88,7 +88,7 @@ TEST(HierarchyMetric, ClustersFollowTheMetric) {
     options.metric = metrics[k];
     results.push_back(build(points, options, sinks[k]));
   }
-  // Each beats the Euclidean one in its own metric, for about as many clusters.
+  // Each metric beats the Euclidean one in its own distances, with about as many clusters.
   for (std::size_t k = 1; k < metrics.size(); ++k) {
     SCOPED_TRACE(name_of(metrics[k]));
     const auto clusters = static_cast<double>(results[k].level_clusters[0]);
@@ -101,7 +101,7 @@ TEST(HierarchyMetric, ClustersFollowTheMetric) {
   }
 }
 
-// The regions of a field are on the ground: in degrees they would be elsewhere.
+// The regions of a field are on the ground. In degrees they would be elsewhere.
 TEST(HierarchyMetric, FieldsAreOnTheGround) {
   std::mt19937_64 random(32);
   std::vector<Point3> metres = inputs::cube(900, random);
@@ -121,7 +121,7 @@ TEST(HierarchyMetric, FieldsAreOnTheGround) {
     EXPECT_EQ(by_metres.levels[0][b].order, by_degrees.levels[0][b].order);
     EXPECT_EQ(by_metres.levels[0][b].representatives, by_degrees.levels[0][b].representatives);
   }
-  // The same if each block has its own frame, here twice as large for every other one.
+  // The result is the same if blocks have different frames: here every other one is twice as large.
   const auto growth = [](const Box3& box) { return box.min[1] > 0x1p4 + 0x1p-9 ? 2.0 : 1.0; };
   options.ground = [&](const Box3& box) {
     return GroundMap{growth(box) * 0x1p16, 0, 0, 0, growth(box) * 0x1p17, 0, 0, 0, growth(box)};
@@ -143,7 +143,7 @@ TEST(HierarchyMetric, FieldsAreOnTheGround) {
   EXPECT_NE(plain.levels[0][0].order, by_degrees.levels[0][0].order);
 }
 
-TEST(HierarchyMetric, ChannelsOfThePayloadSeparateClusters) {
+TEST(HierarchyMetric, PayloadChannelsSeparateClusters) {
   std::mt19937_64 random(33);
   const std::vector<Point3> points = inputs::cube(1200, random);
   HierarchyOptions options;
@@ -171,7 +171,7 @@ TEST(HierarchyMetric, ChannelsOfThePayloadSeparateClusters) {
   }
 }
 
-TEST(HierarchyMetric, AStopEndsTheSearchOfABlock) {
+TEST(HierarchyMetric, StopRequestEndsTheSearchOfABlock) {
   std::mt19937_64 random(3);
   const std::vector<Point3> points = inputs::cube(2000, random);
   const auto distances = [&](bool stopped) {
@@ -195,7 +195,7 @@ TEST(HierarchyMetric, AStopEndsTheSearchOfABlock) {
   EXPECT_LT(4 * distances(true), distances(false));
 }
 
-TEST(HierarchyMetric, BadInputIsNamed) {
+TEST(HierarchyMetric, NamesBadInput) {
   std::mt19937_64 random(34);
   const std::vector<Point3> points = inputs::cube(300, random);
   const auto message = [&](const HierarchyOptions& options) -> std::string {

@@ -45,7 +45,7 @@ struct Built {
     EXPECT_EQ(result.outliers, outliers.size());
   }
 
-  // Numbers of the representatives of a level.
+  // Returns the input indices of the representatives of a level.
   [[nodiscard]] std::set<std::uint64_t> representatives(std::size_t level) const {
     std::set<std::uint64_t> ids;
     for (const RecordedBlock& block : sink.levels[level]) {
@@ -60,9 +60,9 @@ std::vector<FacilityStrategy> searches() {
           FacilityStrategy::octree,    FacilityStrategy::kd_tree,   FacilityStrategy::facilities};
 }
 
-// A surface of one block with distant points: their presence changes neither representatives nor
-// clusters of the surface.
-TEST(HierarchyOutliers, SteerNoCluster) {
+// A surface of one block with distant points. Their presence must change neither representatives
+// nor clusters of the surface.
+TEST(HierarchyOutliers, DoNotInfluenceClusters) {
   std::mt19937_64 random(71);
   const std::vector<Point3> surface = inputs::scan(2, 50, random);
   const Box3 box = base::box_of(surface);
@@ -75,8 +75,8 @@ TEST(HierarchyOutliers, SteerNoCluster) {
   for (const auto& [at, place] : birds) {
     all.insert(all.begin() + static_cast<std::ptrdiff_t>(at), place);
   }
-  const std::set<std::uint64_t> numbers{0, 701, 3002};  // positions shifted by later insertions
-  // A point of the next block, so that there is a level above.
+  const std::set<std::uint64_t> numbers{0, 701, 3002};  // positions after the later insertions
+  // A point of the next block makes a level above.
   std::vector<Point3> without = surface;
   for (std::vector<Point3>* points : {&all, &without}) points->push_back(surface[0]);
 
@@ -103,14 +103,14 @@ TEST(HierarchyOutliers, SteerNoCluster) {
     for (const std::uint32_t i : b.members(c)) others.push_back(b.positions[i]);
     EXPECT_EQ(members, others) << "cluster " << c;
   }
-  // Without the price they do: the box is a thousand times as large.
+  // Without the price they do change them, because the box is a thousand times as large.
   options.outlier_price = std::numeric_limits<double>::infinity();
   const Built steered(all, options);
   EXPECT_TRUE(steered.outliers.empty());
   EXPECT_NE(steered.representatives(0), with.representatives(0));
 }
 
-TEST(HierarchyOutliers, OfASingleBlockAreMarkedToo) {
+TEST(HierarchyOutliers, AreMarkedInASingleBlock) {
   std::mt19937_64 random(76);
   std::vector<Point3> points = inputs::cube(500, random);
   points[123] = {50, 50, 50};
@@ -122,7 +122,7 @@ TEST(HierarchyOutliers, OfASingleBlockAreMarkedToo) {
   laws::check_hierarchy(built.sink, built.result, points, options.block_size, kIdentityMap);
 }
 
-TEST(HierarchyOutliers, LawsHoldForEveryInputPriceAndStrategy) {
+TEST(HierarchyOutliers, GuaranteesHoldForEveryInputPriceAndStrategy) {
   for (const laws::OwnedProblem& input : laws::problems(300, 8)) {
     for (const FacilityStrategy strategy : searches()) {
       for (const double price : {0.01, 0.3, 2.0}) {
@@ -138,7 +138,7 @@ TEST(HierarchyOutliers, LawsHoldForEveryInputPriceAndStrategy) {
         const Built three(input.points, options);
         EXPECT_EQ(three.sink.levels, one.sink.levels);
         EXPECT_EQ(three.outliers, one.outliers);
-        // Only members of clusters can be outliers.
+        // Only members of clusters can be outliers, not representatives.
         if (one.sink.levels.empty()) continue;
         for (const std::uint64_t id : one.representatives(0)) {
           EXPECT_FALSE(one.outliers.contains(id));
@@ -148,7 +148,7 @@ TEST(HierarchyOutliers, LawsHoldForEveryInputPriceAndStrategy) {
   }
 }
 
-// Clients left out by leave_out() lower the cost, and those kept are no farther than the price.
+// leave_out() must lower the cost, and the points that it keeps must be no farther than the price.
 TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
   std::mt19937_64 random(72);
   std::size_t left_out = 0;
@@ -199,8 +199,8 @@ TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
   EXPECT_GT(left_out, 100u);
 }
 
-// About as good as the local search that takes the price into account throughout.
-TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
+// The cost must be about as good as that of the local search that uses the price throughout.
+TEST(HierarchyOutliers, CostIsCloseToTheSearchWithThePrice) {
   std::mt19937_64 random(73);
   for (const double price : {0.02, 0.05, 0.1}) {
     SCOPED_TRACE("price " + std::to_string(price));
@@ -214,7 +214,7 @@ TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
     options.block.effort = Effort::fine;
     const auto cost = [&](const Built& built) {
       const RecordedBlock& block = built.sink.levels[0][0];
-      // Both in the same unit.
+      // Both costs are in the same unit.
       const double unit = 10.0;
       double sum =
           unit * options.block.facility_cost * static_cast<double>(block.representatives.size());
@@ -236,7 +236,7 @@ TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
   }
 }
 
-// The searches find the same solution, whichever strategy computes the gains (7.3.2).
+// The searches must find the same solution, whatever strategy computes the gains (7.3.2).
 TEST(HierarchyStrategy, SearchesOfTheThesisGiveOneHierarchy) {
   std::mt19937_64 random(74);
   const std::vector<Point3> points = inputs::cube(1500, random);
@@ -257,7 +257,7 @@ TEST(HierarchyStrategy, SearchesOfTheThesisGiveOneHierarchy) {
   }
 }
 
-TEST(HierarchyStrategy, WhatABlockDoesNotAdmitIsRefused) {
+TEST(HierarchyStrategy, RejectsStrategiesThatABlockDoesNotAdmit) {
   std::mt19937_64 random(75);
   const std::vector<Point3> points = inputs::cube(200, random);
   const auto message = [&](HierarchyOptions options) -> std::string {

@@ -14,7 +14,7 @@
 #include "inputs.hpp"
 #include "recording_sink.hpp"
 
-/// The laws of the hierarchy, with the real clustering, over ordinary and degenerate inputs.
+/// The guarantees of the hierarchy, with the real clustering, on ordinary and degenerate inputs.
 
 namespace terrace::cluster {
 namespace {
@@ -66,7 +66,7 @@ std::vector<Input> all_inputs() {
   return inputs;
 }
 
-TEST(Hierarchy, LawsHoldOnAllInputs) {
+TEST(Hierarchy, GuaranteesHoldOnAllInputs) {
   for (const Input& input : all_inputs()) {
     for (const std::size_t block_size : {2u, 3u, 17u, 100u, 699u, 700u, 701u}) {
       SCOPED_TRACE(input.name + ", blocks of " + std::to_string(block_size));
@@ -79,7 +79,7 @@ TEST(Hierarchy, LawsHoldOnAllInputs) {
   }
 }
 
-TEST(Hierarchy, SizesAroundMultiplesOfTheBlock) {
+TEST(Hierarchy, HandlesSizesAroundMultiplesOfTheBlock) {
   std::mt19937_64 random(3);
   const std::vector<Point3> all = inputs::cube(100, random);
   for (std::size_t n = 0; n <= 41; ++n) {
@@ -103,7 +103,7 @@ TEST(Hierarchy, NoPointsGiveAnEmptyRoot) {
   EXPECT_GT(sink.top.summaries[0].box.min[0], sink.top.summaries[0].box.max[0]);
 }
 
-TEST(Hierarchy, SameForAnyNumberOfThreads) {
+TEST(Hierarchy, DoesNotDependOnThreads) {
   std::mt19937_64 random(7);
   const std::vector<Point3> points = inputs::scan(11, 10, random);
   HierarchyOptions options;
@@ -126,7 +126,7 @@ TEST(Hierarchy, SameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Hierarchy, SeedDecides) {
+TEST(Hierarchy, DependsOnTheSeed) {
   std::mt19937_64 random(8);
   const std::vector<Point3> points = inputs::cube(3000, random);
   HierarchyOptions options;
@@ -152,8 +152,8 @@ TEST(Hierarchy, FacilityCostTooLowStillEnds) {
   }
 }
 
-// Powers of two, so that the twin's coordinates, products of both, are exact.
-TEST(Hierarchy, DegreesClusterLikeTheirTwinInMetres) {
+// Scales are powers of two, so that the twin's coordinates, which are products, are exact.
+TEST(Hierarchy, DegreesClusterLikeMetres) {
   std::mt19937_64 random(10);
   const double kEast = 0x1p16;
   const double kNorth = 0x1p17;
@@ -185,11 +185,12 @@ TEST(Hierarchy, DegreesClusterLikeTheirTwinInMetres) {
       }
     }
   }
-  // Degrees combined with heights in metres make height bands: entirely different clusters.
+  // Degrees combined with heights in metres make height bands, which are entirely different
+  // clusters.
   EXPECT_NE(by_metres.levels[0][0].order, without_map.levels[0][0].order);
 }
 
-TEST(Hierarchy, AnyLinearMapAndLargeOffsets) {
+TEST(Hierarchy, AcceptsAnyLinearMapAndLargeOffsets) {
   std::mt19937_64 random(11);
   std::vector<Point3> points = inputs::cube(1000, random);
   for (Point3& p : points) p = {p[0] + 4e5, p[1] + 5.2e6, 100.0 * p[2]};

@@ -18,28 +18,28 @@ namespace terrace::cluster::inputs {
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Uniform in [0, 1).
+/// Returns a number that is uniform in [0, 1).
 inline double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-/// Approximately normal with mean 0 and variance 1: a sum of twelve uniform numbers.
+/// Returns an approximately normal number with mean 0 and variance 1, a sum of twelve uniform ones.
 inline double bell(std::mt19937_64& random) {
   double sum = -6.0;
   for (int k = 0; k < 12; ++k) sum += uniform(random);
   return sum;
 }
 
-/// Uniform in the unit cube.
+/// Returns points that are uniform in the unit cube.
 inline std::vector<Point3> cube(std::size_t count, std::mt19937_64& random) {
   std::vector<Point3> points(count);
   for (Point3& p : points) p = {uniform(random), uniform(random), uniform(random)};
   return points;
 }
 
-/// A bumpy closed surface scanned in parallel swaths from pole to pole, one after another, each
-/// `width` points wide and long enough for about the same density along and across. width * width *
-/// swaths * swaths / 2 points. Requires: width even.
+/// Returns a bumpy closed surface scanned in parallel swaths from pole to pole, one after another.
+/// Each is `width` points wide and long enough for about the same density along and across. There
+/// are width * width * swaths * swaths / 2 points. Requires: width is even.
 inline std::vector<Point3> scan(std::size_t swaths, std::size_t width, std::mt19937_64& random) {
   constexpr double kPi = 3.14159265358979323846;
   const std::size_t around = swaths * width;
@@ -63,8 +63,8 @@ inline std::vector<Point3> scan(std::size_t swaths, std::size_t width, std::mt19
   return points;
 }
 
-/// A fractal height field of side x side cells (midpoint displacement on a square), with heights
-/// scaled so that neighbours in a row differ by `step` (root mean square).
+/// Returns a fractal height field of side x side cells (midpoint displacement on a square), with
+/// heights scaled so that neighbours in a row differ by `step` (root mean square).
 inline std::vector<double> fractal_heights(std::size_t side, double step, std::mt19937_64& random) {
   std::size_t size = 1;
   while (size < side) size *= 2;
@@ -112,7 +112,8 @@ inline std::vector<double> fractal_heights(std::size_t side, double step, std::m
   return heights;
 }
 
-/// A fractal elevation model cut into square tiles, tile after tile; heights are integer metres.
+/// Returns a fractal elevation model cut into square tiles, tile after tile. Heights are integer
+/// metres.
 /// Requires: tile divides side.
 inline std::vector<Point3> dem_tiles(std::size_t side, std::size_t tile, double cell, double step,
                                      std::mt19937_64& random) {

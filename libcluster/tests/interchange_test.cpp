@@ -27,7 +27,7 @@ TEST(Interchange, FindsTheOptimumOfSmallProblems) {
   }
 }
 
-TEST(Interchange, GainIsWhatOpeningSpares) {
+TEST(Interchange, GainEqualsTheSaving) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 40, 60);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
@@ -43,14 +43,14 @@ TEST(Interchange, GainIsWhatOpeningSpares) {
       if (search.state().is_open(candidate)) continue;
       const double before = search.cost();
       const double gain = search.gain(candidate);
-      // Losses are carried out too: the law does not depend on the sign. Clients of closed
-      // facilities may find a nearer one than assumed.
+      // Also opens candidates that raise the cost, because the gain must be right whatever its
+      // sign. Clients of closed facilities may find a nearer one than assumed.
       search.open(candidate);
       ASSERT_LE(search.cost(), before - gain + 1e-9 * before);
       if (search.closings().size() <= 1) {
         ASSERT_NEAR(before - search.cost(), gain, 1e-9 * before);
       }
-      // The nearest and second nearest, compared with a scan.
+      // The nearest and second nearest must match a scan.
       for (std::uint32_t i = 0; i < problem.clients; ++i) {
         std::vector<double> all;
         for (const std::uint32_t j : search.state().facilities()) all.push_back(costs.cost(j, i));
@@ -85,7 +85,7 @@ TEST(Interchange, EndsWhereNoSingleMoveHelps) {
       open[a] = !open[a];
       EXPECT_GE(cost(open), least) << "opening or closing " << a;
       for (std::size_t b = 0; b < a; ++b) {
-        // a has changed: one of the two opens and the other closes
+        // `a` has changed: one of the two opens and the other closes.
         if (open[a] != open[b]) continue;
         open[b] = !open[b];
         EXPECT_GE(cost(open), least) << "exchanging " << a << " and " << b;
@@ -106,7 +106,7 @@ TEST(Interchange, ThreadsDoNotChangeTheResult) {
   }
 }
 
-TEST(Interchange, HugeAndTinyCosts) {
+TEST(Interchange, HandlesHugeAndTinyCosts) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     laws::MatrixProblem problem = laws::random_problem(seed, 10, 20);
@@ -122,7 +122,7 @@ TEST(Interchange, HugeAndTinyCosts) {
   }
 }
 
-TEST(Interchange, EqualAndFreeOnes) {
+TEST(Interchange, HandlesEqualCostsAndFreeFacilities) {
   const std::vector<double> zeros(12, 0.0), opening(3, 0.0), ones(12, 1.0), paid(3, 2.0);
   const FacilitySolution free = solve(FacilityMatrix{3, 4, opening, zeros});
   EXPECT_EQ(free.cost(), 0.0);
@@ -134,7 +134,7 @@ TEST(Interchange, EqualAndFreeOnes) {
   EXPECT_EQ(single.cost(), 5.0);
 }
 
-TEST(Interchange, RefusesWhatIsNoProblem) {
+TEST(Interchange, RejectsInvalidProblems) {
   const std::vector<double> opening{1.0, 2.0};
   std::vector<double> costs{1.0, 2.0, 3.0, -1.0};
   try {
@@ -156,7 +156,7 @@ TEST(Interchange, RefusesWhatIsNoProblem) {
                std::invalid_argument);
 }
 
-TEST(Interchange, ATimeLimitEndsIt) {
+TEST(Interchange, TimeLimitEndsTheSearch) {
   const laws::MatrixProblem problem = laws::random_problem(6 * 5, 30, 60);
   const FacilitySolution solution =
       solve(problem.matrix(), {.restarts = 2, .steps = 4000000000u, .seconds = 0.02});

@@ -38,7 +38,7 @@ std::size_t count_of(const std::vector<std::uint32_t>& assignment, std::uint32_t
   return static_cast<std::size_t>(std::count(assignment.begin(), assignment.end(), cluster));
 }
 
-/// Textbook Lloyd's iteration, with the rule of k_means.hpp for empty clusters.
+/// Runs textbook Lloyd iterations, with the rule of k_means.hpp for empty clusters.
 KMeansResult plain_lloyd(std::vector<Point3> centres, std::vector<Point3> points,
                          std::vector<double> weights, std::size_t max_iterations) {
   // Relative to the least coordinates, so that means are rounded as in the library.
@@ -97,7 +97,8 @@ KMeansResult plain_lloyd(std::vector<Point3> centres, std::vector<Point3> points
   return result;
 }
 
-/// Kinds of input: uniform, a plane, a grid with ties and duplicates, a line, tight clusters.
+/// Makes inputs of several kinds: uniform, a plane, a grid with ties and duplicates, a line, tight
+/// clusters.
 std::vector<Point3> make_points(std::uint64_t kind, std::size_t count, std::mt19937_64& random) {
   std::vector<Point3> points = inputs::cube(count, random);
   for (Point3& p : points) {
@@ -144,7 +145,7 @@ TEST(KMeans, EqualsPlainLloyd) {
     const std::vector<Point3> points = make_points(kind, count, random);
     std::vector<double> weights;
     if (seed % 3 == 0) {
-      // Integers: ties of the grid remain ties.
+      // Integer weights keep the ties of the grid.
       for (std::size_t i = 0; i < count; ++i) {
         weights.push_back(static_cast<double>(1 + random() % 9));
       }
@@ -152,7 +153,7 @@ TEST(KMeans, EqualsPlainLloyd) {
     const std::size_t k = 1 + random() % std::min<std::size_t>(count, 40);
     std::vector<Point3> centres;
     for (std::size_t c = 0; c < k; ++c) centres.push_back(points[random() % count]);
-    // Some outside, where they get no points.
+    // Some centres are outside, where they get no points.
     if (seed % 4 == 0) centres.back() = {-3, 7, seed % 8 == 0 ? 2.0 : 0.0};
     KMeansOptions options;
     options.max_iterations = seed % 7 == 0 ? seed % 4 : 1000;
@@ -229,12 +230,12 @@ TEST(KMeans, SeedsFindClustersFarApart) {
     const KMeansResult result = k_means(points, {}, options);
     EXPECT_TRUE(result.converged);
     EXPECT_EQ(result.iterations, 2u);
-    EXPECT_LT(result.sse, 0.3 * 2700);  // three times 1/12 per point is expected
+    EXPECT_LT(result.sse, 0.3 * 2700);  // the expectation is three times 1/12 per point
   }
 }
 
 TEST(KMeans, SeedsFollowTheWeights) {
-  // With one cluster the only seed is drawn by weight: 1 : 3.
+  // With one cluster the only seed is drawn by weight, 1 : 3.
   const std::vector<Point3> points{{0, 0, 0}, {1, 0, 0}};
   const std::vector<double> weights{1, 3};
   KMeansOptions options;
@@ -247,7 +248,7 @@ TEST(KMeans, SeedsFollowTheWeights) {
   EXPECT_NEAR(heavy, 750, 60);
 }
 
-TEST(KMeans, RestartsKeepTheBest) {
+TEST(KMeans, RestartsKeepTheBestRun) {
   std::mt19937_64 random(8);
   const std::vector<Point3> points = inputs::cube(500, random);
   KMeansOptions options;
@@ -263,7 +264,7 @@ TEST(KMeans, RestartsKeepTheBest) {
   EXPECT_GT(better, 1u);
 }
 
-TEST(KMeans, AToleranceEndsEarlier) {
+TEST(KMeans, ToleranceEndsTheRunEarlier) {
   std::mt19937_64 random(9);
   const std::vector<Point3> points = inputs::cube(5000, random);
   KMeansOptions options;
@@ -279,7 +280,7 @@ TEST(KMeans, AToleranceEndsEarlier) {
   EXPECT_EQ(rough.assignment, nearest(rough.centres, points));
 }
 
-TEST(KMeans, FewerDistinctPointsThanClusters) {
+TEST(KMeans, HandlesFewerDistinctPointsThanClusters) {
   KMeansOptions options;
   options.clusters = 7;
   for (const bool weighted : {false, true}) {
@@ -309,7 +310,7 @@ TEST(KMeans, FewerDistinctPointsThanClusters) {
   EXPECT_EQ(one.centres, std::vector<Point3>(7, equal[0]));
 }
 
-TEST(KMeans, EveryPointItsOwnCluster) {
+TEST(KMeans, HandlesAsManyClustersAsPoints) {
   std::mt19937_64 random(10);
   const std::vector<Point3> points = inputs::cube(80, random);
   KMeansOptions options;
@@ -321,7 +322,7 @@ TEST(KMeans, EveryPointItsOwnCluster) {
   EXPECT_EQ(std::unique(clusters.begin(), clusters.end()), clusters.end());
 }
 
-TEST(KMeans, AnyScaleAndOffset) {
+TEST(KMeans, AcceptsAnyScaleAndOffset) {
   std::mt19937_64 random(11);
   std::vector<Point3> points = inputs::cube(400, random);
   points[0] = {0, 0, 0};
@@ -353,7 +354,7 @@ TEST(KMeans, AnyScaleAndOffset) {
   for (const Point3& c : result.centres) {
     for (const double v : c) EXPECT_TRUE(std::isfinite(v));
   }
-  // Weights of any scale.
+  // Weights may have any scale.
   const std::vector<double> huge(points.size(), 0x1p+1000);
   EXPECT_EQ(k_means(points, huge, options).assignment, unit.assignment);
   std::vector<double> mixed(points.size(), 1e-300);
@@ -407,20 +408,20 @@ TEST(KMeans, RefusesBadInput) {
   }
 }
 
-TEST(KMeans, APointOfItsOwnStandsForAClusterBeyondAllNumbers) {
+TEST(KMeans, RepresentativeIsInItsClusterEvenIfSumsOverflow) {
   const std::vector<Point3> points{{0, 0, 0}, {1.7e308, 0, 0}, {1.6e308, 0, 0}};
   EXPECT_EQ(nearest_to_means(points, std::vector<std::uint32_t>{0, 1, 1}, 2),
             (std::vector<std::uint32_t>{0, 1}));
 }
 
-TEST(KMeans, APointStandsForEachCluster) {
+TEST(KMeans, RepresentativeIsNearestToTheMean) {
   std::mt19937_64 random(9);
   for (int round = 0; round < 20; ++round) {
     const std::size_t count = 1 + random() % 60, clusters = 1 + random() % 8;
     std::vector<Point3> points(count);
     std::vector<std::uint32_t> labels(count);
     for (std::size_t i = 0; i < count; ++i) {
-      // Few places, so that some are equally near.
+      // There are few places, so that some are equally near.
       for (double& v : points[i]) v = static_cast<double>(random() % 5);
       labels[i] = static_cast<std::uint32_t>(random() % clusters);
     }
@@ -438,7 +439,7 @@ TEST(KMeans, APointStandsForEachCluster) {
         EXPECT_EQ(found[c], 0u);
         continue;
       }
-      // Squares of n times the distance: whole numbers.
+      // Squares of n times the distance are whole numbers.
       const auto far2 = [&](std::uint32_t i) {
         double d2 = 0;
         for (std::size_t k = 0; k < 3; ++k) {

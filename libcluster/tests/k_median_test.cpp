@@ -66,7 +66,7 @@ TEST(KMedian, EndsWhereNoExchangeHelps) {
   }
 }
 
-// Structure and costs of a solution for points, from the definitions.
+// Checks the structure and costs of a solution for points, from the definitions.
 void expect_medians(const FacilityPoints& problem, std::size_t k, const FacilitySolution& s) {
   ASSERT_EQ(s.facilities.size(), k);
   ASSERT_EQ(std::set<std::uint32_t>(s.facilities.begin(), s.facilities.end()).size(), k);
@@ -98,7 +98,7 @@ void expect_medians(const FacilityPoints& problem, std::size_t k, const Facility
   EXPECT_EQ(s.opening_cost, 0.0);
 }
 
-TEST(KMedian, PointsAreTheirMatrix) {
+TEST(KMedian, PointsEqualTheirMatrix) {
   const std::vector<Metric> metrics{
       Euclidean{}, SquaredEuclidean{}, Minkowski{1.0}, Elliptical(2.0, 0.5, 20.0),
       CustomMetric{[](const Point3& a, const Point3& b) { return std::abs(a[0] - b[0]); }}};
@@ -152,7 +152,7 @@ TEST(KMedian, FarPointsAreLeftOutAtThePrice) {
 }
 
 TEST(KMedian, FindsSeparateClusters) {
-  // More points than the binary search considers, in 12 clumps.
+  // There are more points than the binary search considers, in 12 clumps.
   std::mt19937_64 random(12);
   std::vector<Point3> points;
   for (std::size_t i = 0; i < 3000; ++i) {
@@ -184,7 +184,7 @@ TEST(KMedian, ThreadsDoNotChangeTheResult) {
   }
 }
 
-TEST(KMedian, HugeTinyAndEqual) {
+TEST(KMedian, HandlesHugeTinyAndEqualCosts) {
   std::mt19937_64 random(2);
   const std::vector<Point3> unit = inputs::cube(40, random);
   FacilityPoints problem;
@@ -209,7 +209,7 @@ TEST(KMedian, HugeTinyAndEqual) {
   EXPECT_EQ(k_median(problem, 1).cost(), 0.0);
 }
 
-TEST(KMedian, RefusesWhatCannotBe) {
+TEST(KMedian, RejectsInvalidInput) {
   const std::vector<double> opening{1.0, 2.0}, costs{1.0, 2.0, 3.0, 4.0};
   const FacilityMatrix matrix{2, 2, opening, costs};
   EXPECT_THROW(static_cast<void>(k_median(matrix, 0)), std::invalid_argument);

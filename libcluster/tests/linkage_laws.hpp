@@ -13,7 +13,7 @@
 #include "terrace/cluster/linkage.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// The laws of linkage by brute force, and inputs that break careless code.
+/// Checks of linkage by brute force, and inputs that break careless code.
 
 namespace terrace::cluster::laws {
 
@@ -26,7 +26,7 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// The message of the std::invalid_argument that `action` throws.
+/// Returns the message of the std::invalid_argument that `action` throws.
 inline std::string message_of(const std::function<void()>& action) {
   try {
     action();
@@ -48,7 +48,7 @@ inline Distances distances_of(const std::vector<Point3>& points) {
   Distances d(points.size(), std::vector<double>(points.size(), 0.0));
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = 0; j < points.size(); ++j) {
-      // In long double, whose range holds the squares of all doubles.
+      // Uses long double, whose range holds the squares of all doubles.
       long double sum = 0;
       for (unsigned a = 0; a < 3; ++a) {
         const long double v = static_cast<long double>(points[i][a]) - points[j][a];
@@ -60,8 +60,8 @@ inline Distances distances_of(const std::vector<Point3>& points) {
   return d;
 }
 
-/// Textbook agglomeration, O(n^3): the nearest two clusters merge repeatedly; `combine` gives the
-/// distance to the new cluster. Returns the heights.
+/// Runs textbook agglomeration in O(n^3): the nearest two clusters merge repeatedly, and `combine`
+/// gives the distance to the new cluster. Returns the heights.
 inline std::vector<double> brute_heights(Distances d, bool complete) {
   std::vector<double> heights;
   std::vector<std::size_t> active(d.size());
@@ -89,7 +89,7 @@ inline std::vector<double> brute_heights(Distances d, bool complete) {
   return heights;
 }
 
-/// The points of each cluster, including those made by rows.
+/// Returns the points of each cluster, including the clusters made by rows.
 inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dendrogram) {
   std::vector<std::vector<std::uint32_t>> members(dendrogram.points);
   for (std::uint32_t i = 0; i < dendrogram.points; ++i) members[i] = {i};
@@ -104,8 +104,8 @@ inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dend
 /// Relative tolerance of heights computed from a float matrix, whose entries are rounded once.
 inline constexpr double kFloatTolerance = 1e-7;
 
-/// The distance of a cluster to one that was made of two, from those of its parts: the definitions
-/// of the methods as G. Lance and W. Williams wrote them.
+/// Returns the distance of a cluster to one made of two parts, from the distances to the parts: the
+/// definitions of the methods by G. Lance and W. Williams.
 inline double combined_distance(LinkageMethod method, double a, double b, double between, double na,
                                 double nb, double n) {
   const auto root = [](double square) { return std::sqrt(std::max(square, 0.0)); };
@@ -129,15 +129,15 @@ inline double combined_distance(LinkageMethod method, double a, double b, double
   return 0.0;
 }
 
-/// Checks a dendrogram as a run of linkage: each row must merge two clusters than which none are
-/// nearer, at their distance, up to `tolerance` (relative) and `floor` (about a share of the
-/// largest distance). Returns the fault, or an empty string. This is the complete law: if distances
-/// are equal several runs are valid, and even their heights may differ. O(n^2) unless many
-/// distances are equal.
+/// Checks a dendrogram as a run of linkage. Each row must merge two clusters such that no others
+/// are nearer, at their distance, up to `tolerance` (relative) and `floor` (about a fraction of the
+/// largest distance). Returns the fault, or an empty string. Nothing more can be required: if
+/// distances are equal several runs are valid, and even their heights may differ. Takes O(n^2)
+/// unless many distances are equal.
 inline std::string linkage_fault(const Dendrogram& dendrogram, Distances d, LinkageMethod method,
                                  double tolerance, double floor = 0.0) {
   if (std::string fault = dendrogram_fault(dendrogram); !fault.empty()) return fault;
-  // The largest near 1, exactly: squares of distances may overflow.
+  // Scales the largest to near 1, exactly, because squares of distances may overflow.
   double largest = 0.0;
   for (const auto& row : d) {
     for (const double v : row) largest = std::max(largest, v);
@@ -151,7 +151,7 @@ inline std::string linkage_fault(const Dendrogram& dendrogram, Distances d, Link
   for (std::size_t i = 0; i < place.size(); ++i) place[i] = i;
   std::vector<std::size_t> active = place;
   std::vector<double> size(place.size(), 1.0);
-  // for each active row the other one nearest to it
+  // For each active row, the other row nearest to it.
   std::vector<std::size_t> nearest(place.size());
   const auto find_nearest = [&](std::size_t i) {
     std::size_t best = i;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The seven methods of linkage(), of points and of distances.
+// Tests the seven methods of linkage(), of points and of distances.
 #include <limits>
 #include <utility>
 
@@ -30,7 +30,7 @@ PairDistance distances_in(const laws::Distances& d) {
   return [&d](std::uint32_t i, std::uint32_t j) { return d[i][j]; };
 }
 
-TEST(LinkageMethods, FollowTheirLaws) {
+TEST(LinkageMethods, MergeTheNearestClusters) {
   for (const std::size_t count : {2u, 3u, 5u, 17u, 60u, 150u}) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       for (const auto& [name, points] : laws::linkage_inputs(count, seed)) {
@@ -42,7 +42,7 @@ TEST(LinkageMethods, FollowTheirLaws) {
           ASSERT_EQ(laws::linkage_fault(made, d, method, 1e-12, 1e-13), "");
           const Dendrogram of_distances = linkage(count, distances_in(d), method);
           ASSERT_EQ(laws::linkage_fault(of_distances, d, method, 1e-12, 1e-13), "");
-          // Distances of some sets are beyond the range of float.
+          // The distances of some sets exceed the range of float.
           const LinkageOptions floats{.entry = MatrixEntry::float32};
           if (uses_matrix(method)) {
             ASSERT_EQ(laws::linkage_fault(linkage(points, method, floats), d, method, 1e-5, 1e-5),
@@ -62,7 +62,7 @@ TEST(LinkageMethods, FollowTheirLaws) {
   }
 }
 
-/// Without ties there is one dendrogram, whichever way it is found.
+/// Without ties there is one dendrogram, however it is found.
 TEST(LinkageMethods, PointsAndTheirDistancesGiveTheSameRows) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     std::mt19937_64 random(seed);
@@ -82,8 +82,8 @@ TEST(LinkageMethods, PointsAndTheirDistancesGiveTheSameRows) {
   }
 }
 
-/// Any distances do for what compares and averages them, ties included.
-TEST(LinkageMethods, TakeAnyDistances) {
+/// Methods that only compare and average distances must accept any distances, ties included.
+TEST(LinkageMethods, AcceptAnyDistances) {
   for (const std::size_t count : {2u, 7u, 64u, 131u}) {
     for (const unsigned levels : {0u, 1u, 3u}) {
       std::mt19937_64 random(count + levels);
@@ -105,7 +105,7 @@ TEST(LinkageMethods, TakeAnyDistances) {
   }
 }
 
-/// The third corner is nearer to the middle of two than they are to each other.
+/// The third corner is nearer to the middle of the others than they are to each other.
 TEST(LinkageMethods, CentroidsHaveInversions) {
   const std::vector<Point3> points{{0, 0, 0}, {2, 0, 0}, {1, 1.75, 0}, {50, 0, 0}};
   for (const LinkageMethod method : {LinkageMethod::centroid, LinkageMethod::median}) {
@@ -132,8 +132,8 @@ TEST(LinkageMethods, TiesGoToTheFirst) {
   EXPECT_EQ(linkage(row, LinkageMethod::median).merges, pairs);
 }
 
-/// As quadratic as others: equal points, grids, and points each of which is nearest to the one
-/// before.
+/// These inputs must take quadratic time like others: equal points, grids, and points each of which
+/// is nearest to the previous one.
 TEST(LinkageMethods, DegenerateInputsAreNotCubic) {
   std::vector<std::vector<Point3>> sets(3);
   double x = 1;
@@ -151,7 +151,7 @@ TEST(LinkageMethods, DegenerateInputsAreNotCubic) {
   }
 }
 
-TEST(LinkageMethods, ThreadsAndInstructionsDoNotMatter) {
+TEST(LinkageMethods, DoNotDependOnThreadsOrInstructionSet) {
   for (const auto& [name, points] : laws::linkage_inputs(200, 3)) {
     SCOPED_TRACE(name);
     for (const LinkageMethod method : kMethods) {
@@ -171,7 +171,7 @@ TEST(LinkageMethods, ThreadsAndInstructionsDoNotMatter) {
   }
 }
 
-TEST(LinkageMethods, TheMatrixKeepsItsLimit) {
+TEST(LinkageMethods, RespectTheMemoryLimit) {
   std::mt19937_64 random(1);
   const std::vector<Point3> points = inputs::cube(1000, random);
   const laws::Distances d = laws::distances_of(points);
@@ -192,7 +192,7 @@ TEST(LinkageMethods, TheMatrixKeepsItsLimit) {
   }
 }
 
-TEST(LinkageMethods, NoPointOnePointBadPoints) {
+TEST(LinkageMethods, HandleFewPointsAndNameBadOnes) {
   for (const LinkageMethod method : kMethods) {
     SCOPED_TRACE(testing::Message() << "method " << static_cast<int>(method));
     const auto bad = [](std::uint32_t i, std::uint32_t j) {

@@ -4,15 +4,15 @@
 
     linkage_scipy_vectors.py PROGRAM [DATA]
 
-PROGRAM is examples/linkage. DATA, or else the environment variable TERRACE_DATA, names a folder with
+PROGRAM is examples/linkage. DATA, or the environment variable TERRACE_DATA, names a folder with
 clustering/linkage/SET_NAME.METHOD.Z.gz (linkage matrices of SciPy) and clustering/SET/NAME.data.gz
-(the points). Standard library only.
+(the points). Needs only the standard library.
 
-If no heights are equal, the rows must be the same; with average and weighted linkage always. If
-some are equal, SciPy's dendrogram is one of several: single linkage still has the same heights,
-others need not, so each row is compared with the points instead: the height is the distance of the
-two clusters, and no two clusters at that moment were nearer. Exits with 77 (skipped) if there are no
-vectors.
+If no heights are equal, the rows must be the same; with average and weighted linkage, always. If
+some heights are equal, SciPy's dendrogram is one of several. Single linkage still has the same
+heights. For the other methods each row is checked against the points: the height must be the
+distance of the two clusters, and no two clusters may be nearer at that moment. Exits with 77
+(skipped) if there are no vectors.
 """
 import gzip
 import math
@@ -41,7 +41,7 @@ def close(x, y, tolerance):
 
 
 def combined(method, a, b, between, na, nb, n):
-    """The distance to a cluster of two parts from those to the parts (G. Lance, W. Williams)."""
+    """Returns the distance to a cluster of two parts (G. Lance, W. Williams)."""
     if method == "complete":
         return max(a, b)
     if method == "ward":
@@ -54,7 +54,7 @@ def combined(method, a, b, between, na, nb, n):
 
 
 def run_fault(points, rows, method, tolerance):
-    """The fault of rows as a run of linkage, or None."""
+    """Returns the first fault of the rows as a run of linkage, or None."""
     count = len(points)
     size = {i: 1 for i in range(count)}
     distance = {i: {} for i in range(count)}

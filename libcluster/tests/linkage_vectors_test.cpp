@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small set of points and the results of scipy.cluster.hierarchy 1.10.1: linkage() and
-// fcluster(), its labels renumbered by first appearance.
+// A small set of points with the results of scipy.cluster.hierarchy 1.10.1: linkage() and
+// fcluster(), whose labels are renumbered by first appearance.
 #include <gtest/gtest.h>
 
 #include "terrace/cluster/linkage.hpp"
@@ -66,7 +66,7 @@ TEST(LinkageVectors, Methods) {
   struct Case {
     LinkageMethod method;
     std::vector<Merge> rows;
-    Labels three, below_four;  ///< labels of cuts
+    Labels three, below_four;  ///< labels of cuts into three clusters and below height 4
   };
   const std::vector<Case> cases{
       {LinkageMethod::average,

@@ -14,8 +14,8 @@
 namespace terrace::cluster {
 
 /// A device for kernels (see src/cuda/device_primitives.hpp) that loops over their indices, in an
-/// order drawn for each kernel: any dependence on the order of threads gives different results.
-/// Memory starts with garbage.
+/// order drawn for each kernel, so that any dependence on the order of threads gives different
+/// results. Memory starts with garbage.
 class LoopDevice {
  public:
   /// lanes: threads per group. Without shuffling the order is ascending.
@@ -63,7 +63,7 @@ class LoopDevice {
   template <class Kernel>
   void lanes(std::uint32_t groups, const Kernel& kernel) {
     ++launches;
-    // Lanes of all groups mixed.
+    // Mixes the lanes of all groups.
     for (const std::size_t index : order(std::size_t{groups} * lanes_)) {
       const auto group = static_cast<std::uint32_t>(index / lanes_);
       if (!kernel.skip(group)) {
@@ -86,8 +86,8 @@ class LoopDevice {
     }
   }
 
-  std::size_t bytes = 0;     ///< allocated, whether released or not
-  std::size_t launches = 0;  ///< kernels
+  std::size_t bytes = 0;     ///< bytes allocated, whether released or not
+  std::size_t launches = 0;  ///< number of kernels started
 
  private:
   std::vector<std::size_t> order(std::size_t count) {

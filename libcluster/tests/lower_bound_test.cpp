@@ -21,7 +21,7 @@ TEST(LowerBound, IsBelowTheOptimum) {
     const double best = laws::optimum(problem.matrix());
     const LowerBound ascent = lower_bound(problem.matrix(), {}, {.steps = 0});
     const LowerBound bound = lower_bound(problem.matrix(), {}, {.steps = 200});
-    // Not a hair above: the bound is rounded down, the optimum is not.
+    // Without any tolerance: the bound is rounded down, the optimum is not.
     EXPECT_LE(ascent.lower_bound, best);
     EXPECT_LE(bound.lower_bound, best);
     EXPECT_GE(bound.lower_bound, ascent.lower_bound);
@@ -70,7 +70,7 @@ TEST(LowerBound, HoldsForAnyDuals) {
 }
 
 TEST(LowerBound, ProvesOptimaWithoutAGap) {
-  // Clients and facilities on a line, one facility per client: the relaxation has no gap there.
+  // Clients and facilities are on a line, one facility per client. The relaxation has no gap there.
   std::vector<double> opening(12), connection(144);
   std::mt19937_64 random(3);
   std::vector<double> at(12);
@@ -97,7 +97,7 @@ TEST(LowerBound, ThreadsDoNotChangeTheResult) {
   }
 }
 
-TEST(LowerBound, HugeAndTinyCosts) {
+TEST(LowerBound, HandlesHugeAndTinyCosts) {
   for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const laws::MatrixProblem problem = laws::random_problem(seed, 8, 12);
@@ -115,7 +115,7 @@ TEST(LowerBound, HugeAndTinyCosts) {
   }
 }
 
-TEST(LowerBound, RefusesWhatDoesNotFit) {
+TEST(LowerBound, RejectsInvalidInput) {
   const std::vector<double> opening{1.0, 2.0}, costs{1.0, 2.0, 3.0, 4.0};
   const FacilityMatrix problem{2, 2, opening, costs};
   EXPECT_THROW(static_cast<void>(dual_value(problem, std::vector{1.0})), std::invalid_argument);

@@ -16,7 +16,7 @@ double bound_by(const FacilityMatrix& matrix, FacilityStrategy strategy) {
   return solve(matrix, {.strategy = strategy}).lower_bound;
 }
 
-TEST(LpRounding, SaysSoWhereItIsNotBuilt) {
+TEST(LpRounding, ReportsThatItIsNotBuilt) {
   const std::vector<double> one{1.0};
   if (has_lp_rounding()) {
     EXPECT_NO_THROW(static_cast<void>(solve(FacilityMatrix{1, 1, one, one}, kRounding)));
@@ -30,7 +30,7 @@ TEST(LpRounding, SaysSoWhereItIsNotBuilt) {
   }
 }
 
-TEST(LpRounding, KeepsItsPromises) {
+TEST(LpRounding, CostIsWithinTheProvenFactor) {
   if (!has_lp_rounding()) GTEST_SKIP() << "GLPK is not built in (-Dterrace_glpk=enabled)";
   for (std::uint64_t seed = 1; seed <= 120; ++seed) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 10, 20);
@@ -75,7 +75,7 @@ TEST(LpRounding, NoBoundIsAboveTheRelaxation) {
   EXPECT_GT(share / count, 0.999);  // measured: 0.99999
 }
 
-TEST(LpRounding, FiftyByFifty) {
+TEST(LpRounding, SolvesFiftyByFifty) {
   if (!has_lp_rounding()) GTEST_SKIP() << "GLPK is not built in (-Dterrace_glpk=enabled)";
   std::mt19937_64 random(50);
   const std::vector<Point3> points = inputs::cube(50, random);
@@ -93,7 +93,7 @@ TEST(LpRounding, FiftyByFifty) {
   EXPECT_NEAR(lower_bound(matrix).lower_bound, result.relaxation, 0.01 * result.relaxation);
 }
 
-TEST(LpRounding, RefusesWhatIsNoProblem) {
+TEST(LpRounding, RejectsInvalidProblems) {
   EXPECT_THROW(static_cast<void>(solve(FacilityMatrix{0, 1, {}, {}}, kRounding)),
                std::invalid_argument);
 }

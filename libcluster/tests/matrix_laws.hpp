@@ -12,8 +12,8 @@
 #include "inputs.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
-/// Small random problems with a cost matrix, their optimum by brute force, and the guarantees of
-/// every solution, checked independently of how it was found.
+/// Small random problems with a cost matrix, their optimum by brute force, and checks of the
+/// guarantees of every solution, independent of how it was found.
 
 namespace terrace::cluster::laws {
 
@@ -30,9 +30,9 @@ struct MatrixProblem {
   }
 };
 
-/// Seeds in turn: uniform costs, integers with many ties, points in a square, points on a small
-/// grid with duplicates, sparse ones where most connections are prohibitively expensive, and free
-/// facilities.
+/// Makes a random problem. Seeds select in turn: uniform costs, integers with many ties, points in
+/// a square, points on a small grid with duplicates, sparse problems where most connections are
+/// prohibitively expensive, and free facilities.
 inline MatrixProblem random_problem(std::uint64_t seed, std::size_t most_facilities,
                                     std::size_t most_clients) {
   std::mt19937_64 random(seed);
@@ -83,8 +83,9 @@ inline MatrixProblem random_problem(std::uint64_t seed, std::size_t most_facilit
   return p;
 }
 
-/// The least cost over all sets of facilities, of exactly `count` if that is not 0. Requires: at
-/// most 16 facilities.
+/// Returns the least cost over all sets of facilities, or over sets of exactly `count` if that is
+/// not 0.
+/// Requires: at most 16 facilities.
 inline double optimum(const FacilityMatrix& problem, std::size_t count = 0) {
   double best = std::numeric_limits<double>::infinity();
   for (unsigned set = 1; set < (1u << problem.facilities); ++set) {
@@ -109,8 +110,8 @@ inline double optimum(const FacilityMatrix& problem, std::size_t count = 0) {
 }
 
 /// Checks the structure, recomputed costs, and that every client is at a cheapest open facility.
-/// `pays`: whether opening costs count (in a k-median problem they do not, and facilities may have
-/// no clients).
+/// `pays` is whether opening costs count. In a k-median problem they do not, and facilities may
+/// have no clients.
 inline void expect_solution(const FacilityMatrix& problem, const FacilitySolution& solution,
                             bool pays = true) {
   ASSERT_FALSE(solution.facilities.empty());
@@ -132,7 +133,7 @@ inline void expect_solution(const FacilityMatrix& problem, const FacilitySolutio
     connection += own;
   }
   if (pays) {
-    EXPECT_EQ(std::count(used.begin(), used.end(), false), 0) << "a facility without clients";
+    EXPECT_EQ(std::count(used.begin(), used.end(), false), 0) << "a facility has no clients";
   }
   EXPECT_NEAR(solution.opening_cost, opening, 1e-12 * opening);
   EXPECT_NEAR(solution.connection_cost, connection, 1e-12 * connection);

@@ -51,7 +51,7 @@ TEST(Metric, EveryRadiusOfTheEllipseHasLengthOne) {
     for (int step = 0; step < 360; step += 7) {
       const double t = step * std::numbers::pi / 180.0;
       const double along = a * std::cos(t), across = b * std::sin(t);
-      // Counter-clockwise from +x.
+      // The angle is counter-clockwise from +x.
       const Point3 radius{along * std::cos(turn) - across * std::sin(turn),
                           along * std::sin(turn) + across * std::cos(turn), 0.0};
       EXPECT_NEAR(distance(metric, {0, 0, 0}, radius), 1.0, 1e-14);
@@ -60,7 +60,7 @@ TEST(Metric, EveryRadiusOfTheEllipseHasLengthOne) {
   }
 }
 
-TEST(Metric, TheSignOfM12IsThatOfAnAngleCounterClockwise) {
+TEST(Metric, SignOfM12IsThatOfACounterClockwiseAngle) {
   const Elliptical metric(2.0, 0.5, 30.0);
   const double sin = 0.5, cos = std::sqrt(0.75);
   EXPECT_NEAR(metric.map()[1], (1.0 / 2.0 - 1.0 / 0.5) * sin * cos, 1e-15);
@@ -83,7 +83,7 @@ TEST(Metric, MinkowskiTakesAbsoluteValuesAndSums) {
   EXPECT_NEAR(distance(Minkowski{2.0}, origin, {3e300, 4e300, 0}), 5e300, 1e286);
 }
 
-/// The C library's pow gives different last bits for some of these.
+/// The C library's pow() gives different last bits for some of these.
 TEST(Metric, PowersHaveTheSameBitsOnEveryMachine) {
   const auto of = [](double p) { return distance(Minkowski{p}, {0, 0, 0}, {1, 2.25, -0.3}); };
   EXPECT_EQ(of(1.5), 0x1.5eea974e767f3p+1);
@@ -104,26 +104,27 @@ TEST(Metric, PowersAgreeWithTheLibrary) {
     const double expected = largest * std::pow(sum, 1 / p);
     ASSERT_NEAR(distance(Minkowski{p}, {}, v), expected, 1e-14 * expected) << p;
   }
-  // Ratios below the smallest normal number, and a root that overflows.
+  // Covers ratios below the smallest normal number, and a root that overflows.
   EXPECT_DOUBLE_EQ(distance(Minkowski{0.01}, {}, {1, 1e-310, 0}),
                    std::pow(1 + std::pow(1e-310, 0.01), 100));
   EXPECT_EQ(distance(Minkowski{0.001}, {}, {1, 1, 1}), std::pow(3.0, 1000));
 }
 
-TEST(Metric, ADistanceInAFieldBelongsToTheRegionOfTheFacility) {
+TEST(Metric, FieldUsesTheRegionOfTheFacility) {
   const EllipticalField field({{{{0, 0, -1}, {10, 10, 1}}, Elliptical(10.0, 10.0, 0.0, 10.0)}});
   const Point3 inside{5, 5, 0}, outside{-5, 5, 0};
   EXPECT_EQ(distance(field, inside, outside), 1.0);
   EXPECT_EQ(distance(field, outside, inside), 10.0);
   EXPECT_FALSE(is_symmetric(field));
-  EXPECT_EQ(diagonal(field, {{0, 0, 0}, {3, 4, 0}}), 5.0);  // the Euclidean one
+  EXPECT_EQ(diagonal(field, {{0, 0, 0}, {3, 4, 0}}), 5.0);  // the Euclidean diagonal
   EXPECT_EQ(field.uniform_in({{1, 1, 0}, {2, 2, 0}})->at(0), 0.1);
   EXPECT_EQ(field.uniform_in({{-2, 1, 0}, {-1, 2, 0}}), kIdentityMap);
   EXPECT_FALSE(field.uniform_in({{-2, 1, 0}, {1, 2, 0}}));
 }
 
-TEST(Metric, TheBoxesOfAFieldMayBeInAnotherFrame) {
-  // A quarter turn, twice as long, and translated: (x, y) is at (3 - 2y, 2x, z) in the frame.
+TEST(Metric, BoxesOfAFieldMayBeInAnotherFrame) {
+  // The frame turns a quarter, doubles lengths and translates: (x, y, z) is at (3 - 2y, 2x, z) in
+  // it.
   const EllipticalField field({{{{1, 0, -1}, {3, 10, 1}}, Elliptical(10.0, 10.0, 0.0, 10.0)}},
                               EllipticalField::Frame{{0, -2, 0, 2, 0, 0, 0, 0, 1}, {3, 0, 0}});
   for (double x = -2; x <= 7; x += 0.25) {
@@ -137,8 +138,8 @@ TEST(Metric, TheBoxesOfAFieldMayBeInAnotherFrame) {
   EXPECT_FALSE(field.uniform_in({{4, 0, 0}, {7, 1, 0}}));
 }
 
-// The properties that a metric declares hold for random points.
-TEST(Metric, LinearPointsAreAsFarApartAsTheMetricSays) {
+// A linear map must reproduce the distances of the metric.
+TEST(Metric, LinearPointsKeepTheDistances) {
   std::mt19937_64 random(5);
   std::vector<Point3> points(50);
   for (Point3& p : points) p = random_point(random);
@@ -154,11 +155,11 @@ TEST(Metric, LinearPointsAreAsFarApartAsTheMetricSays) {
       EXPECT_NEAR(distance(Euclidean{}, (*mapped)[i], (*mapped)[i + 1]), d, 1e-13 * d);
     }
   }
-  EXPECT_EQ(linear, 3);  // Euclidean and two ellipses
+  EXPECT_EQ(linear, 3);  // Euclidean and the two ellipses
   EXPECT_EQ(linear_points(Euclidean{}, points), points);
 }
 
-TEST(Metric, DeclarationsHold) {
+TEST(Metric, DeclaredPropertiesHold) {
   std::mt19937_64 random(7);
   for (const Metric& metric : all_metrics()) {
     SCOPED_TRACE(name_of(metric));
@@ -172,13 +173,13 @@ TEST(Metric, DeclarationsHold) {
       triangle =
           triangle && distance(metric, a, c) <= (ab + distance(metric, b, c)) * (1.0 + 1e-12);
     }
-    // True, and no usable property is undeclared.
+    // The properties must be true, and no usable property may be undeclared.
     EXPECT_EQ(is_symmetric(metric), symmetric);
     EXPECT_EQ(obeys_triangle_inequality(metric), triangle);
   }
 }
 
-TEST(Metric, NoVectorIsShorterThanTheLeastScaleSays) {
+TEST(Metric, LeastScaleBoundsAllLengths) {
   std::mt19937_64 random(8);
   for (int trial = 0; trial < 200; ++trial) {
     const Elliptical metric(0.1 + 9 * unit(random), 0.1 + 9 * unit(random), 360 * unit(random),
@@ -210,7 +211,7 @@ TEST(Metric, TheDiagonalIsTheDiameterOfTheBox) {
   }
 }
 
-TEST(Metric, DegenerateEllipsesAreRefused) {
+TEST(Metric, RejectsDegenerateEllipses) {
   EXPECT_THROW(Elliptical(0.0, 1.0, 0.0), std::invalid_argument);
   EXPECT_THROW(Elliptical(1.0, -1.0, 0.0), std::invalid_argument);
   EXPECT_THROW(Elliptical(1.0, kInfinity, 0.0), std::invalid_argument);
@@ -224,7 +225,7 @@ TEST(Metric, DegenerateEllipsesAreRefused) {
   EXPECT_THROW(check(Metric(CustomMetric{})), std::invalid_argument);
 }
 
-TEST(FacilityProblem, BadInputIsRefusedByName) {
+TEST(FacilityProblem, NamesBadInput) {
   const auto message = [](const auto& problem) -> std::string {
     try {
       check(problem);

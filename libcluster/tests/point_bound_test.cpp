@@ -42,7 +42,8 @@ std::vector<Metric> metrics() {
       }}};
 }
 
-// Some have weights, some a price of being left out, some duplicates; Euclidean ones have channels.
+// Makes a problem. Some have weights, some a price of leaving points out, some duplicates.
+// Euclidean ones have channels.
 void make(Case& c, std::uint64_t seed, std::size_t most_points) {
   std::mt19937_64 random(seed);
   c.points = inputs::cube(2 + random() % (most_points - 1), random);
@@ -69,7 +70,7 @@ void make(Case& c, std::uint64_t seed, std::size_t most_points) {
   c.refer();
 }
 
-// The same as a matrix, whose last facility means being left out at the price, if there is one.
+// The problem as a matrix. If there is a price, the last facility stands for being left out at it.
 struct AsMatrix {
   std::vector<double> opening, connection;
   FacilityMatrix matrix;
@@ -107,7 +108,7 @@ struct AsMatrix {
   }
 };
 
-// A solution to start from: each point its own facility, or all points at the first.
+// Returns a solution to start from: each point as its own facility, or all points at the first.
 FacilitySolution start_of(const FacilityPoints& p, bool one) {
   FacilitySolution start;
   for (std::uint32_t i = 0; i < p.points.size(); ++i) {
@@ -129,9 +130,9 @@ TEST(PointBound, IsBelowTheOptimum) {
     const LowerBound bound = lower_bound(c.problem, start_of(c.problem, seed % 2 == 0));
     EXPECT_LE(bound.lower_bound, best);
     ASSERT_EQ(bound.duals.size(), c.points.size());
-    // The value of the duals by definition.
+    // Evaluates the duals by the definition.
     const double value = dual_value(same.matrix, bound.duals);
-    // Exponents below 1 amplify small roundings.
+    // Exponents below 1 amplify small rounding errors.
     const auto* power = std::get_if<Minkowski>(&c.problem.metric);
     const double slack = power && power->p < 1.0 ? 1e-5 : 1e-11;
     EXPECT_NEAR(bound.lower_bound, value, slack * static_cast<double>(c.points.size()) * best);
@@ -142,8 +143,8 @@ TEST(PointBound, IsBelowTheOptimum) {
   EXPECT_GT(share / count, 0.998);  // measured: 0.9998
 }
 
-TEST(PointBound, IsThatOfTheMatrix) {
-  // Larger, so that the tree has leaves to prune: the two methods reach the same limit.
+TEST(PointBound, EqualsTheBoundOfTheMatrix) {
+  // The sets are larger, so that the tree has leaves to prune. Both methods reach the same limit.
   for (std::uint64_t seed = 1; seed <= 27; ++seed) {
     Case c;
     make(c, seed, 10);
@@ -190,7 +191,7 @@ TEST(PointBound, ThreadsDoNotChangeTheResult) {
   }
 }
 
-TEST(PointBound, HugeTinyAndFarCoordinates) {
+TEST(PointBound, HandlesHugeTinyAndFarCoordinates) {
   std::mt19937_64 random(8);
   const std::vector<Point3> unit = inputs::cube(9, random);
   for (const double scale : {1e300, 1e-300, 1.0}) {
@@ -203,7 +204,7 @@ TEST(PointBound, HugeTinyAndFarCoordinates) {
       FacilityPoints problem;
       problem.points = points;
       problem.facility_cost = 0.3;
-      // The optimum of the same points moved close to the origin: differences are exact.
+      // The optimum of the same points moved close to the origin, where differences are exact.
       std::vector<Point3> near = points;
       for (Point3& p : near) {
         for (std::size_t a = 0; a < 3; ++a) p[a] = (p[a] - points[0][a]) / scale;
@@ -219,7 +220,7 @@ TEST(PointBound, HugeTinyAndFarCoordinates) {
   }
 }
 
-TEST(PointBound, EqualAndSinglePoints) {
+TEST(PointBound, HandlesEqualAndSinglePoints) {
   for (const std::size_t count : {1u, 40u}) {
     const std::vector<Point3> points(count, Point3{3, 4, 5});
     FacilityPoints problem;
@@ -256,7 +257,7 @@ TEST(PointBound, EntitiesHaveTheBoundOfTheirMatrix) {
   EXPECT_THROW(static_cast<void>(lower_bound(problem, FacilitySolution{})), std::invalid_argument);
 }
 
-TEST(PointBound, RefusesWhatDoesNotFit) {
+TEST(PointBound, RejectsInvalidInput) {
   std::mt19937_64 random(1);
   const std::vector<Point3> points = inputs::cube(5, random);
   FacilityPoints problem;

@@ -32,7 +32,7 @@ bool admits(const OwnedProblem& p, FacilityStrategy strategy) {
   return !std::holds_alternative<CustomMetric>(p.metric);
 }
 
-// Every metric with every input, weights, channels and outliers in turn.
+// Returns every metric with every input, and with weights, channels and outliers in turn.
 std::vector<OwnedProblem> all_problems(std::size_t count) {
   std::vector<OwnedProblem> all;
   std::mt19937_64 random(77);
@@ -59,7 +59,7 @@ void expect_same(const FacilitySolution& a, const FacilitySolution& b) {
   EXPECT_EQ(a.cost(), b.cost());
 }
 
-TEST(PointSearch, GainIsWhatOpeningSparesInEveryStrategy) {
+TEST(PointSearch, GainEqualsTheSavingInEveryStrategy) {
   for (const OwnedProblem& p : all_problems(60)) {
     SCOPED_TRACE(p.name);
     std::vector<std::unique_ptr<SearchEngine>> searches;
@@ -78,9 +78,10 @@ TEST(PointSearch, GainIsWhatOpeningSparesInEveryStrategy) {
         const FacilitySolution before = searches[0]->solution();
         const double gain = searches[0]->gain(candidate);
         for (const auto& search : searches) {
-          ASSERT_EQ(search->gain(candidate), gain);  // to the last bit
+          ASSERT_EQ(search->gain(candidate), gain);  // equal to the last bit
         }
-        // Losses are carried out too: the law does not depend on the sign.
+        // Also opens candidates that raise the cost, because the gain must be right whatever its
+        // sign.
         if (gain <= 0 && step % 3 != 0) continue;
         for (const auto& search : searches) search->open(candidate);
         const FacilitySolution after = searches[0]->solution();
@@ -217,8 +218,8 @@ TEST(PointSearch, NeverBeatsTheOptimumAndComesNear) {
   EXPECT_LE(ratios / metric_problems, 1.05);
 }
 
-// Figure 7.3: four clusters, of which the block has three, and one point of the fourth.
-TEST(PointSearch, TheSingleOutlierIsLeftOut) {
+// Figure 7.3: there are four clusters. The block contains three, and one point of the fourth.
+TEST(PointSearch, LeavesOutTheSingleOutlier) {
   std::mt19937_64 random(4);
   OwnedProblem p;
   const Point3 centres[] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -256,7 +257,7 @@ TEST(PointSearch, TheSingleOutlierIsLeftOut) {
   }
 }
 
-TEST(PointSearch, AllLeftOutButAFacility) {
+TEST(PointSearch, LeavesOutAllButAFacility) {
   std::mt19937_64 random(4);
   OwnedProblem p;
   p.points = inputs::cube(50, random);
@@ -268,7 +269,7 @@ TEST(PointSearch, AllLeftOutButAFacility) {
   laws::expect_solution(p, solution);
 }
 
-TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
+TEST(PointSearch, DoesNotDependOnScaleAndOffset) {
   std::mt19937_64 random(8);
   OwnedProblem p;
   p.points = inputs::cube(150, random);
@@ -303,7 +304,7 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
     heavy.facility_cost = plain.facility_cost * 1e300;
     EXPECT_EQ(solve(heavy.view()).facilities, expected.facilities);
   }
-  // Squares of 1e300 overflow a double: the search is correct, its costs are infinite.
+  // Squares of 1e300 overflow a double. The search is still correct, but its costs are infinite.
   OwnedProblem squares = p;
   squares.metric = SquaredEuclidean{};
   squares.channel_weights.clear();
@@ -317,7 +318,7 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
   EXPECT_EQ(solution.cost(), kInfinity);
 }
 
-TEST(PointSearch, ChannelsSeparateWhatLiesTogether) {
+TEST(PointSearch, ChannelsSeparateCoincidentPoints) {
   std::mt19937_64 random(6);
   OwnedProblem p;
   p.points.assign(200, Point3{1, 2, 3});
@@ -362,7 +363,7 @@ TEST(PointSearch, StartsFromAGivenSolution) {
   EXPECT_THROW((void)solve(p.view(), options), std::invalid_argument);
 }
 
-TEST(PointSearch, AssignNearestLeavesNobodyWronglyAssigned) {
+TEST(PointSearch, AssignNearestLeavesNoClientWronglyAssigned) {
   for (const OwnedProblem& p : all_problems(100)) {
     SCOPED_TRACE(p.name);
     std::mt19937_64 random(2);
@@ -381,7 +382,7 @@ TEST(PointSearch, AssignNearestLeavesNobodyWronglyAssigned) {
   }
 }
 
-TEST(PointSearch, ProgressIsToldAndStops) {
+TEST(PointSearch, ReportsProgressAndStops) {
   std::mt19937_64 random(12);
   OwnedProblem p;
   p.points = inputs::cube(500, random);
@@ -406,7 +407,7 @@ TEST(PointSearch, ProgressIsToldAndStops) {
   laws::expect_solution(p, part);
 }
 
-TEST(PointSearch, WhatAStrategyLacksIsSaid) {
+TEST(PointSearch, ReportsWhyAStrategyIsNotAdmitted) {
   OwnedProblem p;
   p.points = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
   const auto message = [&](FacilityStrategy strategy) -> std::string {

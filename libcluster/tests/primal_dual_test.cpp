@@ -52,7 +52,7 @@ double most_paid_share(const FacilityMatrix& matrix, const std::vector<double>& 
   return most;
 }
 
-TEST(PrimalDual, KeepsItsPromises) {
+TEST(PrimalDual, CostsAndBoundsAreWithinTheProvenFactors) {
   double growth_cost = 0.0, stars_cost = 0.0;
   unsigned count = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
@@ -72,7 +72,7 @@ TEST(PrimalDual, KeepsItsPromises) {
     EXPECT_EQ(growth.divisor, 1.0);
     EXPECT_LE(most_paid_share(matrix, growth.duals, 1.0), 1.0 + 1e-9);
     EXPECT_LE(most_paid_share(matrix, stars.duals, stars.divisor), 1.0 + 1e-8);
-    // Duals pay for the stars, and clients then change only to cheaper facilities.
+    // Duals pay for the stars, and clients then only change to cheaper facilities.
     EXPECT_LE(stars.solution.cost(), sum_of(stars.duals) * (1.0 + 1e-12));
     if (!problem.metric) continue;
     EXPECT_LE(growth.solution.cost(), 3.0 * growth.solution.lower_bound * (1.0 + 1e-9));
@@ -82,16 +82,17 @@ TEST(PrimalDual, KeepsItsPromises) {
     stars_cost += stars.solution.cost() / best;
     ++count;
   }
-  // On metric costs; measured: 1.012 for both.
+  // On metric costs; 1.012 was measured for both.
   EXPECT_LT(growth_cost / count, 1.05);
   EXPECT_LT(stars_cost / count, 1.05);
 }
 
 TEST(PrimalDual, FollowsTheClock) {
-  // Two facilities of cost 3 and 4; clients at 1 and 2 from the first, 5 and 0 from the second.
+  // Two facilities cost 3 and 4. The clients are at 1 and 2 from the first, and at 5 and 0 from the
+  // second.
   const std::vector<double> opening{3.0, 4.0}, costs{1.0, 2.0, 5.0, 0.0};
   const FacilityMatrix problem{2, 2, opening, costs};
-  // At time 3 the first has been offered 2 + 1; the second 0 + 3, one too few.
+  // At time 3 the first facility has been offered 2 + 1. The second has 0 + 3, one too few.
   const PrimalDual growth = jain_vazirani(problem);
   EXPECT_EQ(growth.duals, (std::vector{3.0, 3.0}));
   EXPECT_EQ(growth.solution.facilities, (std::vector<std::uint32_t>{0}));
@@ -103,15 +104,15 @@ TEST(PrimalDual, FollowsTheClock) {
   EXPECT_EQ(stars.divisor, 1.0);
 }
 
-TEST(PrimalDual, ClosesWhatSharesAPayer) {
-  // The client in between pays for both facilities: only the first to open stays.
+TEST(PrimalDual, ClosesFacilitiesThatShareAPayer) {
+  // The client in between pays for both facilities, so only the first to open stays.
   const std::vector<double> opening{2.0, 3.0}, costs{1.0, 0.5, 9.0, 9.0, 0.5, 1.0};
   const FacilityMatrix problem{2, 3, opening, costs};
   const PrimalDual growth = jain_vazirani(problem);
   EXPECT_EQ(growth.solution.facilities, (std::vector<std::uint32_t>{0}));
 }
 
-TEST(PrimalDual, EqualAndFreeOnes) {
+TEST(PrimalDual, HandlesEqualCostsAndFreeFacilities) {
   const std::vector<double> zeros(12, 0.0), free(3, 0.0), ones(12, 1.0), paid(3, 2.0);
   for (const auto& algorithm : {jain_vazirani, greedy_stars}) {
     EXPECT_EQ(algorithm({3, 4, free, zeros}).solution.cost(), 0.0);
@@ -123,7 +124,7 @@ TEST(PrimalDual, EqualAndFreeOnes) {
   }
 }
 
-TEST(PrimalDual, HugeAndTinyCosts) {
+TEST(PrimalDual, HandlesHugeAndTinyCosts) {
   for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const laws::MatrixProblem problem = laws::random_problem(seed, 8, 12);

@@ -41,7 +41,7 @@ struct RecordedBlock {
 
   friend bool operator==(const RecordedBlock&, const RecordedBlock&) = default;
 
-  /// The input index of point i, if payloads are those of numbered_payload().
+  /// Returns the input index of point i, if payloads are those of numbered_payload().
   [[nodiscard]] std::uint64_t id(std::size_t i) const {
     std::uint64_t id = 0;
     std::memcpy(&id, payload.data() + sizeof id * i, sizeof id);
@@ -52,7 +52,7 @@ struct RecordedBlock {
   }
 };
 
-/// Eight bytes per point: its input index.
+/// Returns eight bytes per point that hold its input index.
 inline std::vector<std::byte> numbered_payload(std::size_t begin, std::size_t end) {
   std::vector<std::byte> payload((end - begin) * sizeof(std::uint64_t));
   for (std::uint64_t i = begin; i < end; ++i) {
@@ -72,18 +72,18 @@ class RecordingSink : public HierarchySink {
 
   void commit(unsigned level, std::unique_ptr<Prepared> prepared) override {
     ++calls;
-    EXPECT_FALSE(committing_.exchange(true)) << "two commits at once";
+    EXPECT_FALSE(committing_.exchange(true)) << "two commits ran at once";
     RecordedBlock& block = dynamic_cast<Copy&>(*prepared).block;
     EXPECT_EQ(block.level, level);
     if (levels.size() <= level) levels.resize(level + 1);
-    EXPECT_EQ(block.block, levels[level].size()) << "out of order on level " << level;
+    EXPECT_EQ(block.block, levels[level].size()) << "blocks are out of order on level " << level;
     levels[level].push_back(std::move(block));
     committing_ = false;
   }
 
   void root(const FinishedBlock& block) override {
     ++calls;
-    EXPECT_FALSE(has_root) << "a second root";
+    EXPECT_FALSE(has_root) << "root() was called twice";
     has_root = true;
     top = RecordedBlock(block);
   }

@@ -14,7 +14,7 @@
 #include "inputs.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
-/// Facility location of points checked independently: costs from the definitions, in the points'
+/// Independent checks of facility location of points: costs from the definitions, in the points'
 /// own coordinates, and the least cost over all solutions.
 
 namespace terrace::cluster::laws {
@@ -33,7 +33,7 @@ struct OwnedProblem {
   }
 };
 
-/// The distance including channels, as defined in metric.hpp.
+/// Returns the distance including channels, as defined in metric.hpp.
 inline double full_distance(const OwnedProblem& p, std::uint32_t facility, std::uint32_t client) {
   const double d = distance(p.metric, p.points[facility], p.points[client]);
   const std::size_t count = p.channel_weights.size();
@@ -50,13 +50,13 @@ inline double full_distance(const OwnedProblem& p, std::uint32_t facility, std::
   return squared || std::isinf(power) ? sum : std::pow(sum, 1.0 / power);
 }
 
-/// The factor of facility_cost and outlier_price.
+/// Returns the factor of facility_cost and outlier_price.
 inline double full_diagonal(const OwnedProblem& p) {
   OwnedProblem box;
   box.metric = p.metric;
   box.channel_weights = p.channel_weights;
   box.points = {{}, {}};
-  // The channels' ranges, and a first coordinate as long as the diagonal in the metric.
+  // Combines the ranges of the channels with a coordinate as long as the diagonal in the metric.
   const double d = diagonal(p.metric, base::box_of(p.points));
   const std::size_t count = p.channel_weights.size();
   if (count == 0) return d;
@@ -75,12 +75,12 @@ inline double full_diagonal(const OwnedProblem& p) {
   return full_distance(box, 0, 1);
 }
 
-/// The price of leaving out a client of weight 1; infinite if outliers are not allowed.
+/// Returns the price of leaving out a client of weight 1, infinite if outliers are not allowed.
 inline double outlier_price(const OwnedProblem& p) {
   return std::isinf(p.outlier_price) ? p.outlier_price : p.outlier_price * full_diagonal(p);
 }
 
-/// Checks the structure, and the three costs from their definitions.
+/// Checks the structure, and the three costs against their definitions.
 inline void expect_solution(const OwnedProblem& p, const FacilitySolution& s, double slack = 1e-9) {
   ASSERT_EQ(s.assignment.size(), p.points.size());
   ASSERT_FALSE(s.facilities.empty());
@@ -90,7 +90,7 @@ inline void expect_solution(const OwnedProblem& p, const FacilitySolution& s, do
   double connections = 0.0, prices = 0.0;
   for (std::uint32_t c = 0; c < s.facilities.size(); ++c) {
     ASSERT_LT(s.facilities[c], p.points.size());
-    ASSERT_EQ(s.assignment[s.facilities[c]], c) << "facility not in its cluster";
+    ASSERT_EQ(s.assignment[s.facilities[c]], c) << "a facility is not in its cluster";
   }
   for (std::uint32_t i = 0; i < s.assignment.size(); ++i) {
     const double w = p.weights.empty() ? 1.0 : p.weights[i];
@@ -100,7 +100,7 @@ inline void expect_solution(const OwnedProblem& p, const FacilitySolution& s, do
     }
     ASSERT_LT(s.assignment[i], s.facilities.size());
     const double d = full_distance(p, s.facilities[s.assignment[i]], i);
-    EXPECT_LE(d, price * (1 + 1e-9)) << "connected above the price: " << i;
+    EXPECT_LE(d, price * (1 + 1e-9)) << "this client is connected above the price: " << i;
     connections += w * d;
   }
   const double opening = static_cast<double>(s.facilities.size()) * p.facility_cost * unit;
@@ -110,7 +110,7 @@ inline void expect_solution(const OwnedProblem& p, const FacilitySolution& s, do
   EXPECT_NEAR(s.outlier_cost, prices, tolerance);
 }
 
-/// The least cost of all solutions with a facility. Requires at most 12 points.
+/// Returns the least cost of all solutions with a facility. Requires: at most 12 points.
 inline double optimum(const OwnedProblem& p) {
   const double unit = full_diagonal(p);
   const auto n = static_cast<std::uint32_t>(p.points.size());
@@ -157,7 +157,7 @@ inline std::vector<Metric> metrics() {
       CustomMetric{uphill, false, true}};
 }
 
-/// Point sets in about the unit cube, including degenerate ones.
+/// Returns point sets in about the unit cube, including degenerate ones.
 inline std::vector<OwnedProblem> problems(std::size_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<OwnedProblem> sets;

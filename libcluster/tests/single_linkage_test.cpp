@@ -12,7 +12,8 @@ namespace {
 
 using laws::heights_of;
 
-/// Lengths of the minimum spanning tree, ascending, by Prim's algorithm. O(n^2).
+/// Returns the lengths of the minimum spanning tree's edges, ascending, by Prim's algorithm in
+/// O(n^2).
 std::vector<double> prim(const std::vector<Point3>& points) {
   const laws::Distances d = laws::distances_of(points);
   std::vector<double> near(points.size(), std::numeric_limits<double>::infinity());
@@ -42,7 +43,7 @@ void expect_near(const std::vector<double>& got, const std::vector<double>& expe
   }
 }
 
-TEST(SingleLinkage, IsThatOfTheTextbook) {
+TEST(SingleLinkage, EqualsTheTextbook) {
   for (const std::size_t count : {2u, 3u, 8u, 9u, 10u, 17u, 60u}) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
       for (const auto& [name, points] : laws::linkage_inputs(count, seed)) {
@@ -50,7 +51,7 @@ TEST(SingleLinkage, IsThatOfTheTextbook) {
         const Dendrogram dendrogram = single_linkage(points);
         ASSERT_EQ(dendrogram_fault(dendrogram), "");
         expect_near(heights_of(dendrogram), laws::brute_heights(laws::distances_of(points), false));
-        // The clusters themselves: single linkage cut at a height gives the components.
+        // Checks the clusters themselves: a cut of single linkage at a height gives the components.
         const laws::Distances d = laws::distances_of(points);
         const auto members = laws::members_of(dendrogram);
         for (const Merge& merge : dendrogram.merges) {
@@ -69,7 +70,7 @@ TEST(SingleLinkage, IsTheMinimumSpanningTree) {
   for (const std::size_t count : {300u, 1500u}) {
     for (const auto& [name, points] : laws::linkage_inputs(count, 7)) {
       SCOPED_TRACE(testing::Message() << name << ", " << count << " points, seed 7");
-      if (name == "geometric spacing") continue;  // beyond the range of double
+      if (name == "geometric spacing") continue;  // distances exceed the range of double
       const Dendrogram dendrogram = single_linkage(points);
       ASSERT_EQ(dendrogram_fault(dendrogram), "");
       expect_near(heights_of(dendrogram), prim(points));
@@ -77,7 +78,7 @@ TEST(SingleLinkage, IsTheMinimumSpanningTree) {
   }
 }
 
-TEST(SingleLinkage, ThreadsDoNotMatter) {
+TEST(SingleLinkage, DoesNotDependOnThreads) {
   for (const auto& [name, points] : laws::linkage_inputs(8000, 3)) {
     if (name == "geometric spacing") continue;
     SCOPED_TRACE(testing::Message() << name << ", seed 3");
@@ -88,7 +89,7 @@ TEST(SingleLinkage, ThreadsDoNotMatter) {
   }
 }
 
-TEST(SingleLinkage, FewThousandPlacesOfManyPoints) {
+TEST(SingleLinkage, HandlesManyPointsInFewPlaces) {
   std::mt19937_64 random(5);
   const std::vector<Point3> places = inputs::cube(1000, random);
   std::vector<Point3> points;
@@ -115,7 +116,7 @@ TEST(SingleLinkage, CandidatesThatContainTheTreeGiveTheSame) {
   }
 }
 
-TEST(SingleLinkage, CandidatesAreChecked) {
+TEST(SingleLinkage, RejectsInvalidCandidates) {
   const std::vector<Point3> points{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
   const auto error = [&](const std::vector<PointPair>& pairs) -> std::string {
     try {
@@ -131,7 +132,7 @@ TEST(SingleLinkage, CandidatesAreChecked) {
   EXPECT_EQ(error({{0, 1}, {1, 1}, {3, 1}, {2, 3}, {1, 0}}), "no exception");
 }
 
-TEST(SingleLinkage, NoPointOnePointBadPoints) {
+TEST(SingleLinkage, HandlesFewPointsAndNamesBadOnes) {
   EXPECT_TRUE(single_linkage(std::vector<Point3>{}).merges.empty());
   EXPECT_TRUE(single_linkage(std::vector<Point3>{{1, 2, 3}}).merges.empty());
   EXPECT_TRUE(

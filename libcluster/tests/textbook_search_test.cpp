@@ -9,7 +9,7 @@ namespace terrace::cluster {
 namespace {
 
 TEST(CandidateCount, FollowsTheThesis) {
-  // 1640 points: 6560 iterations (thesis 7.3.4), so its logarithm is decimal.
+  // The thesis (7.3.4) uses 6560 iterations for 1640 points, so its logarithm is decimal.
   EXPECT_EQ(candidate_count(Effort::fine, 1640), 6560u);
   EXPECT_EQ(candidate_count(Effort::fine, 10000), 40000u);
   EXPECT_EQ(candidate_count(Effort::full, 10000), 140000u);
@@ -32,7 +32,7 @@ TEST(TextbookSearch, IsNearTheOptimumOnTinyBlocks) {
     const double cost = laws::textbook_search(points, facility_cost, Effort::full, seed).cost();
     const double best = laws::optimum(points, {}, facility_cost);
     ASSERT_GE(cost, best * (1 - 1e-12));
-    ASSERT_LE(cost, best * 3);  // the proven factor of a local optimum
+    ASSERT_LE(cost, best * 3);  // the proven bound for a local optimum
     sum += cost / best;
   }
   EXPECT_LE(sum / kBlocks, 1.05);

@@ -13,8 +13,8 @@
 
 namespace terrace::cluster {
 
-/// Returns when every other thread of the process is waiting, or when `enough` returns true:
-/// subsequent work finds them asleep, whatever the machine's load.
+/// Returns when every other thread of the process is waiting, or when `enough` returns true.
+/// Subsequent work then finds the threads asleep, however loaded the machine is.
 inline void wait_until_others_wait(const std::function<bool()>& enough = [] { return false; }) {
   namespace fs = std::filesystem;
   const std::string own = std::to_string(::gettid());
@@ -22,7 +22,7 @@ inline void wait_until_others_wait(const std::function<bool()>& enough = [] { re
     std::ifstream file(task / "stat");
     const std::string text{std::istreambuf_iterator<char>(file), {}};
     const std::size_t name_end = text.rfind(')');
-    // A thread that has ended meanwhile has no text.
+    // A thread that has ended in the meantime has no text.
     return name_end == std::string::npos || text[name_end + 2] == 'S' || task.filename() == own;
   };
   for (bool all = false; !all && !enough(); std::this_thread::yield()) {

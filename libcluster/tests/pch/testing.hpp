@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once for all tests; each test still includes what it uses.
+// Precompiled for all tests. Each test still includes what it uses.
 #include <algorithm>
 #include <array>
 #include <cmath>
