@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Block clustering: points per second for each effort and instruction set, and the cost Q relative
-// to the reference search. Blocks of 10 000 points (TERRACE_BENCH_SMALL: 576), of
+// Block clustering: measures points per second for each effort and instruction set, and the cost Q
+// relative to the reference search. Blocks have 10 000 points (TERRACE_BENCH_SMALL: 576) of
 //   dem   square tiles of a fractal elevation model, cells of 30 m, neighbours differ by 2.65 m
 //   scan  patches 500 points wide of a bumpy closed surface
 //   shuf  the scan shuffled: each block is a coarse copy of the whole surface
 //   cube  uniform in a cube
 // Counters: Q_tenth, Q_log10 and Q_log2 are the percentages above (below, if negative) the cost of
 // the thesis's search from Meyerson's start with 0.1 m, m ceil(log10 m) (the thesis's "full
-// number") and m ceil(log2 m) candidates, mean over blocks; clusters per block, and the median of
-// their sizes.
+// number") and m ceil(log2 m) candidates, mean over blocks. Also clusters per block and the median
+// of their sizes.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -69,7 +69,7 @@ Input make_input(std::size_t which) {
   return input;
 }
 
-/// Made on first use: a filtered run makes only what it needs.
+/// Makes the input on first use, so that a filtered run makes only what it needs.
 const Input& input_of(std::size_t which) {
   static std::array<std::optional<Input>, kInputs.size()> inputs;
   if (!inputs[which]) inputs[which] = make_input(which);
@@ -122,7 +122,7 @@ void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, S
   report_quality(state, input, *clusterer, effort);
 }
 
-/// The textbook search by full scans with 0.1 m candidates, for comparison.
+/// Runs the textbook search by full scans with 0.1 m candidates, for comparison.
 void reference(benchmark::State& state, std::size_t which) {
   const FacilityPoints problem{.points = input_of(which).blocks[0]};
   for ([[maybe_unused]] const auto iteration : state) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linkage on a GPU, wall time from points to dendrogram including copies and memory, once the
-// device is awake: 5 000 to 40 000 points uniform in a cube (TERRACE_BENCH_SMALL: 500). Counters:
-// seconds on one core of this machine for the same task, and the speed-up of the GPU. Checks that
-// the heights are equal, except for floats, where ties occur and heights may differ: there it
-// checks that the smallest set is clustered by a valid run of complete linkage. Without a device it
-// reports so and does nothing.
+// Linkage on a GPU: wall time from points to dendrogram, including copies and memory, after the
+// device is awake, for 5 000 to 40 000 points uniform in a cube (TERRACE_BENCH_SMALL: 500). The
+// counters are the seconds that one core of this machine takes for the same task, and the speed-up
+// of the GPU. Checks that the heights are equal. With floats, ties occur and heights may differ, so
+// there it checks that the smallest set is clustered by a valid run of complete linkage. Without a
+// device it reports so and does nothing.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

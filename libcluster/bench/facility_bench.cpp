@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// The general facility location problem and k-median compared with known optima: a table of every
-// instance in TERRACE_DATA/facility (OR-Library, UflLib, Kratica), then mean and worst by group.
-// Without the data, and with TERRACE_BENCH_SMALL, synthetic instances, with the best bound instead
-// of the optimum. Columns, all in percent of the optimum except costs and seconds:
+// Compares the general facility location problem and k-median with known optima. Prints a table of
+// every instance in TERRACE_DATA/facility (OR-Library, UflLib, Kratica), then mean and worst by
+// group. Without the data, and with TERRACE_BENCH_SMALL, it solves synthetic instances and uses the
+// best bound instead of the optimum. Columns, all in percent of the optimum except costs and
+// seconds:
 //   search   interchange with default options, one thread; k_median for p-median
-//            instances, their bound included in the seconds
+//            instances, with their bound included in the seconds
 //   JV, JMS  jain_vazirani and greedy_stars
 //   bound    lower_bound from the search's solution
 //   JV bnd, JMS bnd   the bounds of the two primal-dual algorithms
-// Finally, lower bounds of points (BlockClusterer's solution for a fractal elevation model and its
-// gap) and k-median of points.
+// At the end it prints lower bounds of points (BlockClusterer's solution for a fractal elevation
+// model and its gap) and k-median of points.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -111,7 +112,7 @@ void print_table(std::vector<instances::Instance> all,
   }
 }
 
-// Facilities and clients in a square.
+// Makes an instance of facilities and clients in a square.
 instances::Instance made(std::size_t facilities, std::size_t clients, std::size_t medians,
                          std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -139,7 +140,7 @@ void print_points() {
        kSmall ? std::vector<std::size_t>{40} : std::vector<std::size_t>{100, 300, 1000}) {
     std::mt19937_64 random(20);
     const std::vector<Point3> points = inputs::dem_tiles(side, side, 30.0, 2.65, random);
-    // A facility costs as much on the larger models as on the one of 10 000 points.
+    // A facility costs as much on the larger models as on the model of 10 000 points.
     const double facility_cost = 100.0 / static_cast<double>(side);
     BlockClusterer clusterer;
     BlockClustering clustering;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hierarchy over complete streams, with a sink that discards everything: from positions in
-// memory to the root, all levels. Inputs: square tiles of a fractal elevation model, and a shuffled
-// scan of a closed surface. The overhead is measured with a clustering that costs almost nothing.
+// Builds the hierarchy of complete streams, from positions in memory to the root, all levels, with
+// a sink that discards everything. The inputs are square tiles of a fractal elevation model and a
+// shuffled scan of a closed surface. The overhead is measured with a clustering that costs almost
+// nothing.
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
@@ -78,8 +79,8 @@ void stream(benchmark::State& state, const std::vector<Point3>& points) {
 void hierarchy_terrain_tiles(benchmark::State& state) { stream(state, terrain_tiles()); }
 void hierarchy_shuffled_scan(benchmark::State& state) { stream(state, shuffled_scan()); }
 
-// Other metrics, on 400,000 points of the shuffled scan: elliptical is linear, the others are local
-// searches.
+// Other metrics, on 400,000 points of the shuffled scan. The elliptical metric is linear; the
+// others need local searches.
 const Metric& metric_of(std::int64_t which) {
   static const std::vector<Metric> metrics{
       Elliptical(2.0, 0.5, 30.0), Minkowski{1.0}, SquaredEuclidean{},
@@ -105,8 +106,8 @@ void hierarchy_metric(benchmark::State& state) {
   report(state, result);
 }
 
-// Everything except the clustering. Clusters of about 100 points, a typical size; neighbours in the
-// block are in different ones, as in a shuffled scan.
+// Measures everything except the clustering. Clusters have about 100 points, a typical size.
+// Neighbours in the block are in different clusters, as in a shuffled scan.
 void hierarchy_overhead(benchmark::State& state) {
   const std::vector<Point3>& points = shuffled_scan();
   const auto cluster = [](std::span<const Point3> block, std::span<const double>,

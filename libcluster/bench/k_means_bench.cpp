@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// k-means: seconds for seeds and iterations separately, on synthetic inputs:
-//   grid   n points about the k knots of a square grid in the plane, as in the set birch1
+// k-means: measures seconds for seeds and iterations separately, on synthetic inputs:
+//   grid   n points around the k knots of a square grid in the plane, as in the set birch1
 //   cube   uniform in a cube
-// from n = 100 000 and k = 100 upward (TERRACE_BENCH_SMALL: n = 2 000, k = 20). Counters:
-// iterations until no assignment changes (at most 300), the time per iteration, and the ratio of
-// the SSE to that of the k-means++ seeds.
+// They start at n = 100 000 and k = 100 (TERRACE_BENCH_SMALL: n = 2 000, k = 20). The counters are
+// the iterations until no assignment changes (at most 300), the time per iteration, and the ratio
+// of the SSE to that of the k-means++ seeds.
 //
 // With `--peer POINTS CENTRES` it runs once per repetition on files of raw doubles, three per
-// point, and prints the seconds of each run, then SSE and iterations: see k_means_peers.py.
+// point, and prints the seconds of each run, then SSE and iterations. See k_means_peers.py.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

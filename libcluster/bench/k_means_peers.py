@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares k-means with scikit-learn, both on one thread, from the same centres, until no assignment
-changes. Needs numpy and scikit-learn.
+"""Compares k-means with scikit-learn from the same centres until no assignment changes.
+
+Both run on one thread. Needs numpy and scikit-learn. The exit status is 0 if this library is at
+least as fast with every seed.
 
 k_means_peers.py BENCH DATA [K]
 BENCH  the program cluster_k_means_bench
-DATA   text, one point per line (two or three numbers), gzipped or not; the bar applies to the set birch1
-K      number of centres, 100 if not given; they are points drawn with the seeds 1, 2, 3
+DATA   text, one point per line (two or three numbers), gzipped or not, for example the set birch1
+K      number of centres, 100 by default; they are points drawn with the seeds 1, 2 and 3
 """
 
 import os

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linkage of points uniform in a cube, wall time: single linkage of 10 000, 100 000 and 1 000 000
-// points (TERRACE_BENCH_SMALL: 500), on one thread and two. Also on inputs with ties and
-// duplicates. linkage_peers.py compares it with fastcluster.
+// Measures the wall time of linkage of points uniform in a cube: single linkage of 10 000, 100 000
+// and 1 000 000 points (TERRACE_BENCH_SMALL: 500), on one thread and two. Also runs on inputs with
+// ties and duplicates. linkage_peers.py compares it with fastcluster.
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -33,7 +33,7 @@ std::vector<Point3> make_points(Input input, std::size_t count) {
   return points;
 }
 
-/// A value in kilobytes from /proc/self/status, in mebibytes; 0 if there is none.
+/// Returns a value of /proc/self/status, which is in kilobytes, in mebibytes; 0 if it is missing.
 double status_mebibytes(const std::string& key) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -51,7 +51,7 @@ void complete(benchmark::State& state, Input input, MatrixEntry entry) {
     const Dendrogram dendrogram = complete_linkage(points, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());
   }
-  // The peak of the process so far: this benchmark's own only if it is the first.
+  // The peak of the whole process so far, so it belongs to this benchmark only if it runs first.
   state.counters["peak_MiB"] = status_mebibytes("VmHWM") - before;
 }
 

@@ -4,11 +4,11 @@
 
     linkage_peers.py PROGRAM [single] [complete] [methods] [memory] [--full]
 
-PROGRAM is cluster_linkage_bench; without further arguments all parts run; `methods` are the other five. Points are uniform in a
-cube. fastcluster's single linkage without a matrix is quadratic: it is timed at 20 000 points and
-scaled to 100 000, or timed there with --full. Its complete linkage is timed including the distances
-it needs (SciPy's pdist); peak memory is that of the process minus its previous memory. Times are
-the least of several.
+PROGRAM is cluster_linkage_bench. Without further arguments all parts run; `methods` are the other
+five. Points are uniform in a cube. fastcluster's single linkage without a matrix is quadratic: it
+is timed at 20 000 points and scaled to 100 000, or timed there with --full. Its complete linkage is
+timed including the distances it needs (SciPy's pdist). Peak memory is that of the process minus its
+previous memory. Times are the least of several.
 """
 import json
 import resource
@@ -25,7 +25,7 @@ def counters(program, pattern, *options):
 
 
 def ours(program, pattern):
-    """Milliseconds by name of the benchmark, the least of the repetitions."""
+    """Returns milliseconds by name of the benchmark, the least of the repetitions."""
     times = {}
     for run in counters(program, pattern, "--benchmark_repetitions=3", "--benchmark_min_time=0.2"):
         if run.get("run_type") == "iteration":
@@ -107,7 +107,7 @@ def compare_methods(program, modules):
 
 
 def compare_memory(program, modules):
-    for entry in "float", "double":  # each in a process of its own
+    for entry in "float", "double":  # each in its own process
         peak = counters(program, f"complete/{entry}/cube/10000/1/")[0]["peak_MiB"]
         print(f"complete/{entry}, 10 000 points: {peak:.1f} MiB")
     if modules is None:
@@ -125,7 +125,7 @@ def main():
     program = sys.argv[1]
     words = [word for word in sys.argv[2:] if word != "--full"]
     modules = peer()
-    if "memory" in words or not words:  # first: the peak of this process only rises
+    if "memory" in words or not words:  # first, because the peak of this process only rises
         compare_memory(program, modules)
     if "complete" in words or not words:
         compare_complete(program, modules)

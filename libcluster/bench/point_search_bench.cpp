@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The strategies of the local search, on blocks of 10 000 points, facility cost 1 diagonal,
-// Meyerson's start:
+// Runs the strategies of the local search on blocks of 10 000 points, with a facility cost of 1
+// diagonal and Meyerson's start:
 //   <input>/<strategy>/<metric>          0.1 m candidates, one thread
 //   <input>/<strategy>/threads:T         one gain by T threads
 //   <input>/<strategy>/batch:B/threads:T several gains at once
-// Inputs: scan (a patch of a bumpy surface), shuf (all of the surface, at random), cube.
-// Times are for a complete search, including the start. Columns: ns per gain (everything except the
-// start: the mean over the search, including openings), share of positive gains, share of vertices
-// (clients and facilities) inspected, Q relative to batch 1 in %, clients not at their nearest
-// facility in %.
+// Inputs: scan (a patch of a bumpy surface), shuf (all of the surface, at random), cube. Times are
+// for a complete search, including the start. Columns: ns per gain (the mean over the search
+// without the start, including openings), fraction of positive gains, fraction of vertices (clients
+// and facilities) inspected, Q relative to batch 1 in %, clients not at their nearest facility in
+// %.
 #include <chrono>
 #include <cstdlib>
 #include <functional>
@@ -84,7 +84,7 @@ void search(benchmark::State& state, std::size_t which, const Setting& setting) 
       100.0 * static_cast<double>(report.search.wrongly_assigned) / static_cast<double>(kPoints);
 }
 
-/// The production engine on the same block.
+/// Runs the production engine on the same block.
 void fast(benchmark::State& state, std::size_t which) {
   const FacilityPoints problem{.points = input(which)};
   double cost = 0.0;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thesis, rerun: J. Skála, Algorithms for manipulating large geometric data, tables 7.1, 7.4 to
-// 7.8 and figures 7.5, 7.6, 7.12 to 7.14, on synthetic inputs, next to the thesis's own figures (in
-// square brackets). Those are for comparison only: data and machines differ, and the thesis's
-// counts differ between its tables. Its logarithm is decimal, its speed-ups are shares of time
-// saved.
-// TERRACE_BENCH_SMALL: everything once on tiny inputs.
+// 7.8 and figures 7.5, 7.6, 7.12 to 7.14, on synthetic inputs. The thesis's own figures are next to
+// ours in square brackets. They are for comparison only: data and machines differ, and the thesis's
+// counts differ between its tables. Its logarithm is decimal, and its speed-ups are fractions of
+// time saved.
+// With TERRACE_BENCH_SMALL set, runs everything once on tiny inputs.
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -34,13 +34,13 @@ constexpr std::array kParts{Part{"table7.1", table_7_1},     Part{"table7.4", ta
 
 constexpr const char* kUsage =
     "usage: cluster_thesis_bench [--full] [--out DIR] [--tables LIST] [--threads N]\n"
-    "  --full        sets as large as the thesis's, not 1 M points at most (hours)\n"
-    "  --out DIR     write tables as CSV and plots as SVG there\n"
-    "  --tables LIST of table7.1,table7.4,...,table7.8,figure7.5,figure7.6,figure7.12,\n"
+    "  --full        sets as large as the thesis's (default: 1 M points at most); takes hours\n"
+    "  --out DIR     write tables as CSV and plots as SVG to DIR\n"
+    "  --tables LIST some of table7.1,table7.4,...,table7.8,figure7.5,figure7.6,figure7.12,\n"
     "                figure7.13,figure7.14; all by default\n"
-    "  --threads N   for what the thesis ran on four (all processors)\n";
+    "  --threads N   for what the thesis ran on four threads; all processors by default\n";
 
-/// Takes the first name off a comma-separated list.
+/// Removes the first name from a comma-separated list and returns it.
 std::string_view take(std::string_view& list) {
   const std::size_t comma = list.find(',');
   const std::string_view name = list.substr(0, comma);
@@ -82,7 +82,8 @@ Options parse(int argc, char** argv) {
         const std::string_view name = take(value);
         std::size_t part = 0;
         while (part < kParts.size() && kParts[part].name != name) ++part;
-        if (part == kParts.size()) throw std::invalid_argument("no part " + std::string(name));
+        if (part == kParts.size())
+          throw std::invalid_argument("--tables: unknown name " + std::string(name));
         options.wanted[part] = true;
       }
     }

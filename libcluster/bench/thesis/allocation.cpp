@@ -29,7 +29,7 @@ void release(void* memory) noexcept {
 
 }  // namespace
 
-// The other forms in the standard library call these.
+// The standard library's other forms of new and delete call these.
 void* operator new(std::size_t size) { return counted(std::malloc(size == 0 ? 1 : size)); }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   const auto align = static_cast<std::size_t>(alignment);

@@ -3,13 +3,13 @@
 
 #include <cstddef>
 
-/// The memory allocated by the program: allocation.cpp replaces operator new and delete of the
-/// whole program.
+/// Measures the memory allocated by the program. allocation.cpp replaces operator new and delete of
+/// the whole program.
 
 namespace terrace::cluster::thesis {
 
-/// The peak of live bytes since construction, beyond those alive at construction. One object at a
-/// time; memory of all threads counts.
+/// The peak of live bytes since construction, minus those live at construction. Only one object may
+/// exist at a time. Memory of all threads counts.
 class PeakMemory {
  public:
   PeakMemory();

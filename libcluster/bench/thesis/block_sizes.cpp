@@ -59,7 +59,7 @@ BlockSizeRun run_once(std::uint64_t points, std::size_t block, Effort effort,
   return result;
 }
 
-/// By how much the cost of the blocks is higher after the short search.
+/// By how much the short search raises the cost of the blocks.
 struct Errors {
   double low = std::numeric_limits<double>::infinity(), mean = 0.0, high = -low;
 };
@@ -102,7 +102,7 @@ void table_7_1(Setting& setting) {
   Table table{"table-7.1",
               "Table 7.1: block size. " + grouped(points) + " points (" + lucy().name() +
                   "), facility cost 1 x diagonal, m ceil(log10 m) candidates, partition by "
-                  "facilities, one thread.\n[..] the thesis: 10 M points.",
+                  "facilities, one thread.\n[..]: the thesis, 10 M points.",
               {"block", "time s", "[h:m]", "memory MB", "[MB]", "level 1", "[level 1]", "level 2",
                "[level 2]", "level 3", "[level 3]"}};
   const auto& runs = block_size_runs(setting);
@@ -130,7 +130,7 @@ void table_7_5(Setting& setting) {
                   " points (" + lucy().name() +
                   "), partition by facilities, which gives the full scan's solution; last row: the "
                   "full scan on the first " +
-                  grouped(subset) + " points.\n[..] the thesis: 10 M points, full scan.",
+                  grouped(subset) + " points.\n[..]: the thesis, 10 M points, full scan.",
               {"block", "m log m s", "0.1 m s", "time used", "min. error", "avg.", "max.",
                "[m log m]", "[0.1 m]", "[time used]", "[min.]", "[avg.]", "[max.]"}};
   const auto& runs = block_size_runs(setting);

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kPoints = 1640;
 constexpr std::uint64_t kSeeds = 20;
 
-/// Half of them uniform in a rectangle, half in twelve clumps there.
+/// Makes points of which half are uniform in a rectangle and half are in twelve clumps there.
 std::vector<Point3> make_points() {
   std::mt19937_64 random(12);
   std::vector<Point3> heaps(12);
@@ -69,7 +69,7 @@ void figure_7_12(Setting& setting) {
                   " points in one block, facility cost 1 x diagonal; means of " +
                   std::to_string(kSeeds) +
                   " seeds. Wrongly assigned: some open facility is "
-                  "nearer.\n[..] the thesis, one run on other points.",
+                  "nearer.\n[..]: the thesis, one run on other points.",
               {"candidates", "facilities", "cost", "[cost]", "more", "[more]", "wrongly assigned",
                "share"}};
   double full_cost = 0.0;

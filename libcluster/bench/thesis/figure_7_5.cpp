@@ -12,7 +12,7 @@
 namespace terrace::cluster::thesis {
 namespace {
 
-/// A set cut into pieces of random lengths, which are put in random order.
+/// A set cut into pieces of random lengths, which are read in random order.
 class Shuffled final : public PointSet {
  public:
   Shuffled(std::unique_ptr<PointSet> set, std::uint64_t shortest, std::uint64_t longest)
@@ -29,7 +29,7 @@ class Shuffled final : public PointSet {
     }
   }
 
-  /// Continues reading: first is where the last call ended.
+  /// Continues reading; `first` must be where the last call ended.
   void read(std::uint64_t, std::span<Point3> points) override {
     while (!points.empty()) {
       Piece& piece = pieces_[next_];
@@ -55,7 +55,7 @@ constexpr std::size_t kBins = 100;
 
 struct Histogram {
   std::array<std::uint64_t, kBins> counts{};
-  std::uint64_t far = 0;  // beyond a quarter of the facility cost
+  std::uint64_t far = 0;  // points beyond a quarter of the facility cost
   std::uint64_t clusters = 0;
 
   void add(const StreamBlock& block) {
@@ -89,7 +89,7 @@ void figure_7_5(Setting& setting) {
   Table table{"figure-7.5",
               "Figure 7.5: order of the stream. " + grouped(points) + " points (" + named.name() +
                   "), blocks of " + grouped(block) +
-                  ", facility cost 1 x diagonal, m ceil(log10 m) candidates.\n[..] the thesis.",
+                  ", facility cost 1 x diagonal, m ceil(log10 m) candidates.\n[..]: the thesis.",
               {"order", "seconds", "clusters", "beyond 0.25 fc", "share", "[beyond 0.25 fc]"}};
   Table data{"figure-7.5-histogram", "", {"from", "to", names[0], names[1], names[2]}};
   std::array<Histogram, 3> histograms;

@@ -34,7 +34,7 @@ Measured measure(std::uint64_t points, std::size_t block) {
   return measured;
 }
 
-/// Points per cluster (m / k) for any block size, between the measured ones.
+/// Returns points per cluster (m / k) for any block size, interpolated between the measured ones.
 double ratio_at(const Series& ratios, double m) {
   std::size_t i = 1;
   while (i + 1 < ratios.x.size() && ratios.x[i] < m) ++i;
@@ -42,7 +42,7 @@ double ratio_at(const Series& ratios, double m) {
   return ratios.y[i - 1] + share * (ratios.y[i] - ratios.y[i - 1]);
 }
 
-/// The factor that fits `model` to `measured` by least squares.
+/// Returns the factor that fits `model` to `measured` by least squares.
 double fit(const std::vector<double>& model, const std::vector<double>& measured) {
   double both = 0.0;
   double square = 0.0;
@@ -89,7 +89,7 @@ void figure_7_6(Setting& setting) {
   }
   setting.report.table(table);
 
-  // The equations give values that memory is proportional to.
+  // The equations give values to which memory is proportional.
   Series smooth{.name = "m log(N / m), fitted", .colour = "#222"};
   Series steps{.name = "m l, whole levels, fitted", .colour = "#0072b2"};
   const double smooth_unit = fit(equation, heap.y);

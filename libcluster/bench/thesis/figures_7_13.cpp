@@ -23,7 +23,7 @@ struct Course {
 
 struct Blocks {
   std::vector<std::vector<Point3>> blocks;
-  std::size_t per_bin;  // candidates
+  std::size_t per_bin;  // candidates per bin
 
   explicit Blocks(const Setting& setting)
       : blocks(setting.is_small() ? 2 : 20), per_bin(setting.is_small() ? 2 : 20) {
@@ -61,7 +61,7 @@ Course follow(const Blocks& blocks, double facility_cost, FacilityStrategy strat
 
 using Share = double (SearchStatistics::*)() const;
 
-/// One curve per facility cost: a table of five stages and, for the plot, all bins.
+/// Reports one curve per facility cost: a table of five stages and, for the plot, all bins.
 void report_courses(Setting& setting, const std::string& name, const std::string& title,
                     const std::string& label, const std::array<Course, kCosts.size()>& courses,
                     std::size_t per_bin, Share share) {

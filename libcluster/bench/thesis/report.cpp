@@ -62,7 +62,7 @@ void Report::table(const Table& table) {
   std::vector<std::size_t> widths(table.columns.size(), 0);
   const auto measure = [&](const std::vector<std::string>& cells) {
     if (cells.size() != widths.size())
-      throw std::logic_error("table " + table.name + ": a row of another length");
+      throw std::logic_error("table " + table.name + ": a row has the wrong length");
     for (std::size_t i = 0; i < cells.size(); ++i) widths[i] = std::max(widths[i], cells[i].size());
   };
   measure(table.columns);

@@ -10,12 +10,12 @@
 
 #include "svg_plot.hpp"
 
-/// Output of results: tables to stdout and as CSV into a folder, plots as SVG into the folder.
+/// Writes results: tables to stdout and as CSV into a folder, plots as SVG into the folder.
 
 namespace terrace::cluster::thesis {
 
 struct Table {
-  std::string name;  ///< of the file
+  std::string name;  ///< name of the file
   std::string title;
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows = {};  ///< as many cells as columns
@@ -23,27 +23,27 @@ struct Table {
   void add(std::vector<std::string> row) { rows.push_back(std::move(row)); }
 };
 
-/// Numbers as text: 1234.5678 with 2 digits is "1234.57", "12 345 678", a share of 0.0123 is
-/// "1.2 %".
+/// Format numbers as text: 1234.5678 with 2 digits is "1234.57", 12345678 is "12 345 678", and a
+/// fraction of 0.0123 is "1.2 %".
 std::string fixed(double value, int digits);
 std::string grouped(std::uint64_t value);
 std::string percent(double share, int digits = 1);
-/// The share of the time `before` that is saved by `after`, as the thesis states speed-ups: twice
-/// as fast is "50 %".
+/// Returns the fraction of the time `before` that `after` saves, as the thesis states speed-ups:
+/// twice as fast is "50 %".
 std::string time_saved(double before, double after);
-/// "[0:20:18]": a figure of the thesis in one of our columns.
+/// Returns "[0:20:18]" for a figure of the thesis in one of our columns.
 std::string quoted(std::string_view figure);
 
 class Report {
  public:
-  /// Creates the folder. Without a folder no files are written. Throws:
-  /// std::filesystem::filesystem_error.
+  /// Creates the folder. Without a folder no files are written.
+  /// Throws: std::filesystem::filesystem_error.
   explicit Report(std::optional<std::filesystem::path> folder);
 
-  /// Throws: std::logic_error for a row of the wrong length, std::runtime_error if a file cannot be
-  /// written.
+  /// Writes a table. Throws: std::logic_error for a row of the wrong length, std::runtime_error if
+  /// a file cannot be written.
   void table(const Table& table);
-  /// As CSV only.
+  /// Writes a table as CSV only.
   void data(const Table& table);
   void plot(const std::string& name, const Plot& plot);
   void note(std::string_view text);

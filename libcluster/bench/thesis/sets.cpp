@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the seed of the k-th number is k steps away, so any number
+/// SplitMix64 (Steele, Lea, Flood 2014). The seed of the k-th number is k steps away, so any number
 /// can be computed without the previous ones.
 class Hash {
  public:
@@ -26,7 +26,7 @@ class Hash {
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     return z ^ (z >> 31);
   }
-  /// Uniform in [0, 1).
+  /// Returns a number that is uniform in [0, 1).
   double uniform() { return static_cast<double>(next() >> 11) * 0x1p-53; }
   std::uint64_t below(std::uint64_t bound) { return next() % bound; }
 
@@ -151,8 +151,8 @@ class Plant final : public PointSet {
 
 using Kind = NamedSet::Kind;
 
-// Sizes as in section 7.3.4; where it gives only "million", two more digits are zeros. Cells and
-// steps are in metres.
+// Sizes are those of section 7.3.4. Where it gives only "million", two more digits are zeros. Cells
+// and steps are in metres.
 constexpr std::array<NamedSet, 8> kLarge{{{"Grand Canyon", 8'400'000, Kind::terrain, 60, 13},
                                           {"Puget Sound", 268'500'000, Kind::terrain, 10, 2.65},
                                           {"Earth", 309'400'000, Kind::terrain, 1000, 40},

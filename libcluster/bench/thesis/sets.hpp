@@ -9,8 +9,8 @@
 
 #include "terrace/cluster/point.hpp"
 
-/// Point sets of any size in constant memory that stand for those of the thesis: points are
-/// generated when they are read, anywhere in the stream, and the same ones each time.
+/// Point sets of any size in constant memory that stand in for those of the thesis. Points are
+/// generated when they are read, anywhere in the stream, and are the same each time.
 
 namespace terrace::cluster::thesis {
 
@@ -22,44 +22,44 @@ class PointSet {
   PointSet& operator=(const PointSet&) = delete;
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// The points first, first + 1, ... Requires: first + points.size() <= size().
+  /// Reads the points first, first + 1, ... Requires: first + points.size() <= size().
   virtual void read(std::uint64_t first, std::span<Point3> points) = 0;
 
  private:
   std::uint64_t size_;
 };
 
-/// A fractal elevation model on a square lattice, in tiles of 100 x 100 points, tile after tile, in
-/// patches of 4 x 4 tiles, patch after patch. Neighbours in a row are `cell` apart and differ by
-/// `step` in height (root mean square); heights are integers. Patches are independent fractals on a
-/// common undulating base.
+/// Makes a fractal elevation model on a square lattice, in tiles of 100 x 100 points, tile after
+/// tile, in patches of 4 x 4 tiles, patch after patch. Neighbours in a row are `cell` apart and
+/// differ by `step` in height (root mean square). Heights are integers. Patches are independent
+/// fractals on a common undulating base.
 std::unique_ptr<PointSet> make_terrain(std::uint64_t size, double cell, double step,
                                        std::uint64_t seed);
 
-/// A bumpy closed surface as seen by a laser scanner: swaths from pole to pole, one after another,
-/// at most 500 points wide, with about the same density along and across.
+/// Makes a bumpy closed surface as seen by a laser scanner: swaths from pole to pole, one after
+/// another, at most 500 points wide, with about the same density along and across.
 std::unique_ptr<PointSet> make_scan(std::uint64_t size, std::uint64_t seed);
 
-/// Not a surface but a plant full of pipes: rings of 12 points, 40 per pipe, 64 pipes per cell of a
-/// cubic lattice, cell after cell.
+/// Makes a plant full of pipes instead of a surface: rings of 12 points, 40 per pipe, 64 pipes per
+/// cell of a cubic lattice, cell after cell.
 std::unique_ptr<PointSet> make_plant(std::uint64_t size, std::uint64_t seed);
 
-/// A set of the thesis and how it is generated here.
+/// A point set of the thesis and how it is generated here.
 struct NamedSet {
   enum class Kind : std::uint8_t { terrain, scan, plant };
   std::string_view thesis_name;
   std::uint64_t thesis_points;
   Kind kind;
-  double cell = 0.0, step = 0.0;  ///< of a terrain
+  double cell = 0.0, step = 0.0;  ///< for terrains only
 
-  /// For example "terrain, as Grand Canyon".
+  /// Returns for example "terrain, as Grand Canyon".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::unique_ptr<PointSet> make(std::uint64_t size) const;
 };
 
-/// The eight of tables 7.2, 7.3, 7.6 and 7.7, in that order.
+/// Returns the eight sets of tables 7.2, 7.3, 7.6 and 7.7, in that order.
 std::span<const NamedSet> large_sets();
-/// The four of table 7.4.
+/// Returns the four sets of table 7.4.
 std::span<const NamedSet> single_sets();
 
 }  // namespace terrace::cluster::thesis

@@ -75,8 +75,8 @@ StreamClustering::StreamClustering(StreamClustering&&) noexcept = default;
 
 void StreamClustering::push(std::span<const Point3> points) {
   const Timed timed(seconds_);
-  // Full blocks, as in the thesis: a batch that does not fit into the current one would begin
-  // another.
+  // Fills blocks, as in the thesis. A batch that does not fit into the current block would begin
+  // another one.
   while (!points.empty()) {
     const std::size_t count = std::min(points.size(), block_ - held_);
     builder_->push(points.first(count));
@@ -93,7 +93,7 @@ void StreamClustering::finish() {
 double StreamClustering::cost() const { return sink_->cost; }
 
 void run(PointSet& set, std::span<StreamClustering> streams) {
-  std::array<Point3, 500> buffer;  // not on the heap, so that it does not count as memory
+  std::array<Point3, 500> buffer;  // not on the heap, so that it is not counted as memory
   for (std::uint64_t first = 0; first < set.size(); first += buffer.size()) {
     const std::span points(
         buffer.data(), static_cast<std::size_t>(std::min<std::uint64_t>(500, set.size() - first)));

@@ -29,8 +29,8 @@ struct StreamOptions {
 /// A clustered block of level 0.
 struct StreamBlock {
   const FinishedBlock& block;
-  double facility_cost = 0.0;  ///< of one facility
-  double cost = 0.0;           ///< of all facilities and the connections
+  double facility_cost = 0.0;  ///< cost of one facility
+  double cost = 0.0;           ///< cost of all facilities and connections
 };
 
 class StreamClustering {
@@ -43,11 +43,11 @@ class StreamClustering {
   void push(std::span<const Point3> points);
   void finish();
 
-  /// Time spent in the library.
+  /// Returns the time spent in the library.
   [[nodiscard]] double seconds() const { return seconds_; }
-  /// The sum over all blocks of level 0, in their order.
+  /// Returns the sum over all blocks of level 0, in their order.
   [[nodiscard]] double cost() const;
-  /// Points that reached each level; [0] is the input.
+  /// Returns the number of points that reached each level; [0] is the input.
   [[nodiscard]] std::vector<std::uint64_t> level_points() const { return result_.level_points; }
 
  private:
@@ -60,8 +60,8 @@ class StreamClustering {
   double seconds_ = 0.0;
 };
 
-/// Reads a set to its end, a few points at a time, and gives all of it to each of the streams, so
-/// that disturbances of the machine affect all of them.
+/// Reads a set to its end, a few points at a time, and gives all points to each of the streams, so
+/// that disturbances of the machine affect all streams.
 void run(PointSet& set, std::span<StreamClustering> streams);
 
 }  // namespace terrace::cluster::thesis

@@ -13,7 +13,7 @@ namespace {
 constexpr double kWidth = 760, kHeight = 480;
 constexpr double kLeft = 78, kRight = 24, kTop = 46, kBottom = 58;
 
-// Okabe and Ito's colours, which are distinct for colour-blind readers too.
+// Okabe and Ito's colours, which colour-blind readers can also distinguish.
 constexpr std::array kPalette{"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
 
 std::string format(const char* pattern, double value) {
@@ -48,7 +48,7 @@ std::string line_at(double x0, double y0, double x1, double y1, const std::strin
          pixels(y1) + "' " + attributes + "/>\n";
 }
 
-/// From data to pixels along one axis.
+/// Maps data to pixels along one axis.
 struct Scale {
   bool log = false;
   double low = 0, high = 1;   ///< logarithms on a logarithmic axis
@@ -97,7 +97,7 @@ std::vector<Tick> ticks_of(const Scale& scale) {
         if (at < scale.low - slack || at > scale.high + slack) continue;
         std::string label = digit == 1 ? format("%g", std::pow(10.0, power)) : "";
         if (digit == 1 && power > 5) label = "1e" + format("%g", power);
-        // Less than two decades: label more ticks.
+        // Labels more ticks if there are fewer than two decades.
         if (scale.high - scale.low < 2.0 && (digit == 2 || digit == 5))
           label = format("%g", digit * std::pow(10.0, power));
         ticks.push_back({std::pow(10.0, at), label});
@@ -112,7 +112,7 @@ std::vector<Tick> ticks_of(const Scale& scale) {
                                : rough < 7.5 * power ? 5
                                                      : 10);
   for (double k = std::ceil((scale.low - slack) / step); k * step <= scale.high + slack; k += 1.0) {
-    ticks.push_back({k * step, format("%g", k * step + 0.0)});  // no "-0"
+    ticks.push_back({k * step, format("%g", k * step + 0.0)});  // avoids "-0"
   }
   return ticks;
 }
@@ -170,7 +170,7 @@ std::string drawn(const Series& series, const std::string& colour, const Scale& 
   return out + "'/>\n";
 }
 
-/// In an upper corner, on a background that partly hides the curves.
+/// Draws the legend in an upper corner, on a background that partly hides the curves.
 std::string legend(const Plot& plot, const std::vector<std::string>& colours, const Scale& x,
                    const Scale& y) {
   const std::vector<Series>& all = plot.series;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-/// Line and scatter plots as SVG text.
+/// Makes line and scatter plots as SVG text.
 
 namespace terrace::cluster::thesis {
 
@@ -15,13 +15,13 @@ struct Series {
   std::vector<double> x = {}, y = {};
   Mark mark = Mark::line;
   double size = 1.6;        ///< stroke width of lines, radius of dots, in pixels
-  std::string colour = {};  ///< empty: the next of the palette
+  std::string colour = {};  ///< empty: the next colour of the palette
 };
 
 struct Axis {
   std::string label;
   bool log = false;
-  std::optional<double> low = {}, high = {};  ///< otherwise from the data
+  std::optional<double> low = {}, high = {};  ///< if not set, determined from the data
 };
 
 struct Plot {
@@ -29,11 +29,11 @@ struct Plot {
   Axis x, y;
   std::vector<Series> series = {};
   bool legend_left = false;   ///< in the upper left corner instead of the right one
-  bool equal_scales = false;  ///< a unit of x is as long as one of y
+  bool equal_scales = false;  ///< a unit of x is as long as a unit of y
 };
 
-/// On a logarithmic axis values that are not positive break lines. A plot without data has only its
-/// frame.
+/// On a logarithmic axis, values that are not positive break lines. A plot without data shows only
+/// its frame.
 [[nodiscard]] std::string svg(const Plot& plot);
 
 }  // namespace terrace::cluster::thesis

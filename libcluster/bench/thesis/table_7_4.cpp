@@ -57,7 +57,7 @@ constexpr std::array<ThesisRow, 4> kThesis{{{"23.1", "0.7", "21.5", "0.1"},
 void table_7_4(Setting& setting) {
   Table table{"table-7.4",
               "Table 7.4: parts of the plain search. One block, full scan, 0.1 N candidates, "
-              "facility cost 1 x diagonal; seconds.\n[..] the thesis.",
+              "facility cost 1 x diagonal; seconds.\n[..]: the thesis.",
               {"set", "points", "total", "[total]", "initial", "[initial]", "gains", "[gains]",
                "reassignments", "[reass.]", "share of gains"}};
   for (std::size_t i = 0; i < kThesis.size(); ++i) {

@@ -34,8 +34,8 @@ void table_7_6(Setting& setting) {
   Table table{"table-7.6",
               "Table 7.6: partitions of space. Blocks of " + grouped(block) +
                   ", facility cost 2 x diagonal, 0.1 m candidates, one thread; seconds in the "
-                  "clustering and time saved.\nAll but the last give the same solution, to the "
-                  "last bit; the last is BlockClusterer. [..] the thesis.",
+                  "clustering and time saved.\nAll except the last give the same solution to the "
+                  "last bit; the last is BlockClusterer. [..]: the thesis.",
               {"set", "points", "full scan", "[full scan]", "quadtree", "saved", "[saved]",
                "octree", "saved", "[saved]", "kd-tree", "saved", "[saved]", "facilities", "saved",
                "[saved]", "fast", "saved", "cost"}};

@@ -36,8 +36,8 @@ void table_7_7(Setting& setting) {
                   ", facility cost 2 x diagonal, 0.1 m candidates, partition by facilities; "
                   "seconds in the clustering and time saved.\nSeveral gains: " +
                   std::to_string(batch) +
-                  " candidates at once, which is another search: its cost against the plain one's "
-                  "is in the last column. [..] the thesis, four threads.",
+                  " candidates at once, a different search; the last column has its cost relative "
+                  "to the plain one. [..]: the thesis, four threads.",
               {"set", "points", "one thread", "[one]", "one gain", "[one gain]", "saved", "[saved]",
                "several gains", "[several]", "saved", "[saved]", "cost"}};
   for (std::size_t i = 0; i < kThesis.size(); ++i) {

@@ -28,7 +28,8 @@ constexpr std::array<ThesisRow, 4> kThesis{{{"Objects", 1420, "2.855", "2.434", 
                                             {"Cow", 2905, "25.578", "19.420", "24 %"},
                                             {"Head CT", 4098, "70.369", "54.951", "22 %"}}};
 
-/// Throws: std::runtime_error if it is not a valid result of complete linkage by floats.
+/// Throws: std::runtime_error if `dendrogram` is not a valid result of complete linkage with
+/// floats.
 void check(const Dendrogram& dendrogram, const laws::Distances& distances, const char* where) {
   const std::string fault = laws::complete_fault(dendrogram, distances, laws::kFloatTolerance);
   if (!fault.empty()) {
@@ -36,7 +37,8 @@ void check(const Dendrogram& dendrogram, const laws::Distances& distances, const
   }
 }
 
-/// The shortest of several runs; the first also loads code and wakes the device.
+/// Returns the time of the shortest of several runs. The first also loads code and wakes the
+/// device.
 template <class Run>
 double shortest(const Run& linkage, Dendrogram& result) {
   double best = std::numeric_limits<double>::infinity();
@@ -59,7 +61,7 @@ void table_7_8(Setting& setting) {
               "of " +
                   std::to_string(kRepeats) +
                   " runs. GPU: " + (cuda.available ? cuda.device : "none (" + cuda.reason + ")") +
-                  ".\n[..] the thesis, seconds.",
+                  ".\n[..]: the thesis, seconds.",
               {"set", "points", "one thread", "[CPU]", threads + " threads", "GPU", "[GPU]",
                "saved", "[saved]"}};
   for (const ThesisRow& thesis : kThesis) {
@@ -88,7 +90,7 @@ void table_7_8(Setting& setting) {
     if (cuda.available) {
       const double gpu_time =
           shortest([&] { return cuda_complete_linkage(points, options.entry); }, device);
-      // Not necessarily the processor's dendrogram: floats can be equal.
+      // Not necessarily the processor's dendrogram, because floats can be equal.
       check(device, distances, "on the GPU");
       row[5] = fixed(1e3 * gpu_time, 2);
       row[7] = time_saved(one_time, gpu_time);

@@ -3,13 +3,13 @@
 
 #include "setting.hpp"
 
-/// The tables and figures, each in the file of its name. All of them report their results and
-/// return nothing; they throw std::runtime_error if a result violates a law.
+/// The tables and figures, each in the file of its name. They report their results, and throw
+/// std::runtime_error if a result is invalid.
 
 namespace terrace::cluster::thesis {
 
 void table_7_1(Setting& setting);    ///< block size: time, memory, clusters
-void table_7_4(Setting& setting);    ///< where the time of the plain search goes
+void table_7_4(Setting& setting);    ///< where the plain search spends its time
 void table_7_5(Setting& setting);    ///< the short search compared with the long one
 void table_7_6(Setting& setting);    ///< space partitioning
 void table_7_7(Setting& setting);    ///< threads
