@@ -47,7 +47,7 @@ void check(std::span<const Point3> points, std::span<const double> weights, std:
   if (clusters == 0 || clusters > points.size()) {
     throw std::invalid_argument("cannot make " + std::to_string(clusters) + " clusters of " +
                                 std::to_string(points.size()) +
-                                " points: give at least one and at most as many as points");
+                                " points: give from 1 to the number of points");
   }
   if (!(options.tolerance >= 0)) {
     throw std::invalid_argument(
