@@ -263,9 +263,9 @@ void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
   }
 }
 
-/// Lists the new clusters whose entry belongs to the row of k and for which an entry of their parts
-/// is neither in the row of the first part of k nor, in a column of that row, in the row of the
-/// second.
+/// Lists the new clusters whose entry belongs to the row of k but needs an entry from elsewhere:
+/// one that is neither in the row of the first part of k nor, in a column of that row, in the row
+/// of the second part.
 template <class T>
 void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const {
   others.clear();

@@ -252,13 +252,14 @@ struct FacilityReport {
 /// wrongly_assigned takes O(n * facilities).
 ///
 /// The result depends on the problem and the options, but not on threads.
-/// Throws: std::invalid_argument as check(problem) does; for a strategy that the problem does not
-/// admit, with the reason; for a batch of 0, no restarts, or `seconds` that is NaN; for a start
-/// that is not a solution of the problem or that the strategy does not accept; for a caller's
-/// distance that is negative or NaN (the message names facility and client); and if the matrix of
-/// points or entities exceeds the limit or memory cannot be allocated (the message gives the bytes
-/// needed). std::runtime_error if LP rounding is not built in (the message names the option) or
-/// GLPK fails.
+/// Throws: std::invalid_argument as check(problem) does, and
+/// - for a strategy that the problem does not admit, with the reason;
+/// - for a batch of 0, no restarts, or `seconds` that is NaN;
+/// - for a start that is not a solution of the problem or that the strategy does not accept;
+/// - for a caller's distance that is negative or NaN, with facility and client;
+/// - if the matrix of points or entities exceeds the limit or memory cannot be allocated, with the
+///   bytes needed.
+/// std::runtime_error if LP rounding is not built in (the message names the option) or GLPK fails.
 /// Cost: a local search takes at most O(n) per candidate, O(n * facilities) for the start, and
 /// about 150 bytes per point.
 [[nodiscard]] FacilitySolution solve(const FacilityPoints& problem,

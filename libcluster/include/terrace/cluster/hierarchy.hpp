@@ -19,9 +19,11 @@
 /// The streaming cluster hierarchy: one pass over any number of points in constant memory, by
 /// divide and conquer over blocks, with every level kept.
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 4.3, 7.1.2, 7.2. Differences
-/// from the thesis: blocks are clustered in parallel; distances are ground distances, under any
-/// metric; a level that fits one block becomes the top without being clustered; a facility cost
-/// that is too low to reduce a block is raised.
+/// from the thesis:
+/// - blocks are clustered in parallel;
+/// - distances are ground distances, under any metric;
+/// - a level that fits one block becomes the top without being clustered;
+/// - a facility cost that is too low to reduce a block is raised.
 ///
 /// Points arrive at level 0. Each block of a level is clustered separately. The representative of
 /// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
@@ -177,10 +179,12 @@ struct HierarchyResult {
 class HierarchyBuilder {
  public:
   /// The sink must outlive the builder.
-  /// Throws: std::invalid_argument if block_size, facility_cost, outlier_price, the metric, a
-  /// channel's weight or the number of corners is out of range, if channels, corners or outliers
-  /// have no function, if corners are combined with another metric, channels or outliers, or if the
-  /// SIMD path is not available.
+  /// Throws: std::invalid_argument
+  /// - if block_size, facility_cost, outlier_price, the metric, a channel's weight or the number of
+  ///   corners is out of range;
+  /// - if channels, corners or outliers have no function;
+  /// - if corners are combined with another metric, channels or outliers;
+  /// - if the SIMD path is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
   /// Stops without finishing. Waits for the blocks that are being clustered, after which the sink
   /// gets no more calls.
@@ -194,11 +198,13 @@ class HierarchyBuilder {
   /// full. An empty batch only reports failures.
   /// Throws: std::invalid_argument for a coordinate that is not finite (the message gives its index
   /// in the batch), and for a payload whose size is not payload_size bytes per point. The builder
-  /// is then unchanged. In the following cases the builder has ended, and further calls throw
-  /// std::logic_error: whatever the sink or `ground` throws, and std::invalid_argument for a ground
-  /// map that is not finite, is zero, or makes distances beyond 1e150, a channel or corner that is
-  /// not finite, a custom distance that is negative or not finite, and a strategy that a block does
-  /// not admit.
+  /// is then unchanged. After the following exceptions the builder has ended, and further calls
+  /// throw std::logic_error:
+  /// - whatever the sink or `ground` throws;
+  /// - std::invalid_argument for a ground map that is not finite, is zero, or makes distances
+  /// beyond
+  ///   1e150; for a channel or corner that is not finite; for a custom distance that is negative or
+  ///   not finite; and for a strategy that a block does not admit.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 
   /// Clusters the remaining points, from level 0 upward. The top is the first level that fits one

@@ -133,8 +133,9 @@ enum class LinkageMethod : std::uint8_t {
 /// - ward: a nearest-neighbour chain over means, without a matrix; 120 bytes per point.
 /// - average, weighted: a chain over a matrix of n (n - 1) / 2 entries, and about 50 bytes per
 ///   point. With float entries each merge rounds its distances to float. Equals SciPy's result in
-///   every bit, ties included: a chain begins at the first cluster and prefers the previous cluster
-///   of the chain, then the first one; a new cluster takes the place of its later part.
+///   every bit, ties included. For that, a chain begins at the first cluster and prefers the
+///   previous cluster of the chain, then the first one, and a new cluster takes the place of its
+///   later part.
 /// - centroid, median: repeatedly merges the nearest two clusters, on ties the first pair, without
 ///   a matrix; 120 bytes per point. A merge may be lower than the merges of its parts. Rows are in
 ///   the order of the merges.

@@ -36,7 +36,7 @@ struct MatchingTree {
   std::vector<MatchingTreeRow> rows;
   /// The weighted mean of all points below each row's node.
   std::vector<Point> positions;
-  /// The last row's node; 0 for a single point; kNobody if there are no points or the work was
+  /// The last row's node, or 0 for a single point. kNobody if there are no points or the work was
   /// stopped.
   std::uint32_t root = kNobody;
 };
