@@ -199,7 +199,7 @@ TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
   EXPECT_GT(left_out, 100u);
 }
 
-// The cost must be about as good as that of the local search that uses the price throughout.
+// The cost must be close to that of the local search that uses the price throughout.
 TEST(HierarchyOutliers, CostIsCloseToTheSearchWithThePrice) {
   std::mt19937_64 random(73);
   for (const double price : {0.02, 0.05, 0.1}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Long work calls its check at intervals, and what the check throws ends it.
+// Long work calls the stop check at intervals, and an exception from it ends the work.
 
 #include <atomic>
 #include <cmath>
@@ -26,7 +26,7 @@ namespace {
 struct Stop {};
 using Work = std::function<void(const base::StopCheck&)>;
 
-/// work: with one thread, so that the calls are the same each time.
+/// work: must use one thread, so that the calls are the same each time.
 void expect_stops(const Work& work, std::size_t least_calls) {
   std::size_t calls = 0;
   work([&] { ++calls; });
@@ -72,7 +72,7 @@ TEST(StopCheck, EndsEveryLinkage) {
 }
 
 TEST(StopCheck, EndsTheChainOfCompleteLinkage) {
-  // Points in geometric progression: a round finds one pair.
+  // With points in geometric progression, each round finds only one pair.
   std::vector<Point3> points;
   for (int i = 0; i < 600; ++i) points.push_back({std::ldexp(1.0, i), 0, 0});
   expect_stops(

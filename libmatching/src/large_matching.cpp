@@ -202,7 +202,8 @@ class Windows {
     if (keep_duals_) discs.start(parts.count());
     parts_ = parts.count();
     planned_ = windows_done_.load() + parts_;
-    // The caller is asked after each part that its own thread matches; after a stop no more begin.
+    // Progress is reported after each part that the calling thread matches. After a stop no more
+    // parts begin.
     std::atomic<bool> stopped = false;
     base::parallel_for(parts.count(), threads_, [&](std::size_t k, unsigned thread) {
       if (stopped) return;

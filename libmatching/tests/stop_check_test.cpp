@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Long work calls its check at intervals, and what the check throws ends it.
+// Long work calls the stop check at intervals, and an exception from it ends the work.
 
 #include <array>
 #include <cmath>
@@ -27,7 +27,7 @@ namespace {
 struct Stop {};
 using Work = std::function<void(const base::StopCheck&)>;
 
-/// work: with one thread, so that the calls are the same each time.
+/// work: must use one thread, so that the calls are the same each time.
 void expect_stops(const Work& work, std::size_t least_calls) {
   std::size_t calls = 0;
   work([&] { ++calls; });

@@ -84,10 +84,10 @@ struct BlockState {
   Column<float> scratch;
   Column<float> scratch_pool;
 
-  /// Of the options; never null.
+  /// The stop check of the options; never null.
   const base::StopCheck* check_stop = nullptr;
   std::uint32_t vectors_since_check = 0;
-  /// To be called once per so many vectors; throws what the check throws.
+  /// Counts vectors of work and calls the stop check from time to time. Throws whatever it throws.
   [[gnu::always_inline]] void tick(std::uint32_t vectors) {
     vectors_since_check += vectors;
     if (vectors_since_check >= kVectorsBetweenChecks) look();

@@ -12,10 +12,10 @@
 #include "terrace/cluster/point.hpp"
 
 /// Single linkage in rounds on a device (see device_primitives.hpp), by Borůvka's method: in each
-/// round every cluster joins the one with the point nearest to one of its own. That takes at most
-/// log2 n rounds. (Merging only reciprocal pairs would take a round for every point that a large
-/// cluster absorbs.) No matrix is kept: distances are recomputed in each round, which is faster
-/// than reading them.
+/// round every cluster joins the one with the point nearest to any of its own points. That takes at
+/// most log2 n rounds. (Merging only reciprocal pairs would take a round for every point that a
+/// large cluster absorbs.) No matrix is kept: distances are recomputed in each round, which is
+/// faster than reading them.
 
 namespace terrace::cluster::device {
 

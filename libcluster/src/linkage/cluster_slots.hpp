@@ -36,7 +36,7 @@ struct NearCluster {
 
 class ClusterSlots {
  public:
-  /// check_stop: outlives this object.
+  /// check_stop: must outlive this object.
   ClusterSlots(std::size_t count, const base::StopCheck& check_stop)
       : points_(count, 1.0), name_(count), ticks_(check_stop) {
     std::iota(name_.begin(), name_.end(), 0u);
@@ -49,7 +49,7 @@ class ClusterSlots {
   /// Returns a point of the cluster.
   [[nodiscard]] std::uint32_t name(std::uint32_t slot) const { return name_[slot]; }
 
-  /// To be called once per so many distances; throws what the check throws.
+  /// Counts distances and calls the stop check from time to time. Throws whatever it throws.
   void tick(std::size_t distances) { ticks_(distances); }
 
   void count_as_one(std::uint32_t low, std::uint32_t high) {

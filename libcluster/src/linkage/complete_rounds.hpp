@@ -79,7 +79,7 @@ class CompleteRounds {
   }
   [[nodiscard]] Pieces pieces(std::uint32_t c) const;
   [[nodiscard]] unsigned threads() const;
-  /// Throws what the check throws.
+  /// Throws whatever the stop check throws.
   void check_stop() const {
     if (check_stop_) check_stop_();
   }

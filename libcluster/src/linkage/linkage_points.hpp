@@ -14,7 +14,7 @@
 
 namespace terrace::cluster {
 
-/// What a distance that the caller computes costs, see base::StopTicks.
+/// Units of work of one distance that the caller computes, see base::StopTicks.
 inline constexpr std::size_t kTicksOfDistance = 64;
 
 /// Copies of points, scaled by a power of two so that squares of distances do not overflow, nor

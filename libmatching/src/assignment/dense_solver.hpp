@@ -25,7 +25,7 @@ class DenseSolver {
  public:
   using Number = LabelOf<Cost>;
 
-  /// check_stop: outlives this object.
+  /// check_stop: must outlive this object.
   DenseSolver(std::size_t rows, std::size_t columns, Rows& source,
               const base::StopCheck& check_stop)
       : rows_(rows),

@@ -77,7 +77,7 @@ class NearCandidates {
     for (std::size_t i = 0; i < rows.size(); ++i)
       threshold_[i] = tree_.nearest(rows[i], labels, kFirstCandidates, all, lists_[i]);
     step_ = threshold_;
-    // Keeps steps finite if a row has all columns from the start, and above 0 if all its first
+    // Keeps steps finite if a row has all columns from the start, and positive if all its first
     // columns are at distance 0.
     for (double& step : step_) step = step > 0 ? std::min(step, 1.0) : 0.01;
   }

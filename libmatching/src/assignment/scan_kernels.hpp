@@ -49,7 +49,7 @@ struct ScanKernels {
 template <class Cost>
 const ScanKernels<Cost>& scan_kernels();
 
-/// The kernels for a supported instruction set; tests compare them with each other.
+/// Returns the kernels for a supported instruction set. Tests compare them with each other.
 template <class Cost>
 const ScanKernels<Cost>& scan_kernels(base::SimdPath path);
 

@@ -38,7 +38,7 @@ struct Candidate {
 template <class Source>
 class SparseSolver {
  public:
-  /// check_stop: outlives this object.
+  /// check_stop: must outlive this object.
   SparseSolver(std::size_t rows, std::size_t columns, Source& source,
                const base::StopCheck& check_stop)
       : rows_(rows),

@@ -29,7 +29,8 @@ struct BlockOptions {
   double facility_cost = 1.0;  ///< positive; multiplied by the diagonal of the bounding box
   Effort effort = Effort::standard;
   std::uint64_t seed = 1;  ///< only Effort::full tries random candidates
-  /// For large blocks. After it has thrown, the next block is clustered as if nothing had happened.
+  /// Called only during large blocks. After it has thrown, the clusterer can be used for the next
+  /// block.
   base::StopCheck check_stop = {};
 };
 

@@ -211,7 +211,7 @@ struct FacilityOptions {
   std::uint64_t memory_limit = 0;
   /// Reports the progress of a local search in candidates.
   FacilityProgress progress = {};
-  /// Heard by every strategy except LP rounding.
+  /// Called by every strategy except LP rounding.
   base::StopCheck check_stop = {};
 };
 
@@ -237,8 +237,8 @@ struct SearchStatistics {
 struct FacilityReport {
   FacilityStrategy strategy = FacilityStrategy::automatic;  ///< the one that was used
   SearchStatistics search;
-  /// Duals per client. Growth: when the client was connected. LP rounding: what it pays in the
-  /// relaxation.
+  /// Duals per client. For growth, the time at which the client was connected. For LP rounding, its
+  /// payment in the relaxation.
   std::vector<double> duals;
   /// The lower bound is that of the duals divided by this number, the least divisor (to 1e-9) for
   /// which no facility is paid more than it costs. 1 except for greedy_stars.

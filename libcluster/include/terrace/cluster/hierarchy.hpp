@@ -26,7 +26,7 @@
 /// - a facility cost that is too low to reduce a block is raised.
 ///
 /// Points arrive at level 0. Each block of a level is clustered separately. The representative of
-/// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
+/// each cluster, an input point, moves up to the level above, where it heads that cluster. So every
 /// input point ends in exactly one place: as a member, not a representative, of a cluster on the
 /// highest level that it reached, or as a point of the root.
 
@@ -75,7 +75,7 @@ struct FinishedBlock {
 /// ends the build. push() or finish() throws it once, when no call to the sink is running any more.
 class HierarchySink {
  public:
-  /// What the sink makes of a block before it can be committed.
+  /// The result of prepare(), kept until the block is committed.
   struct Prepared {
     virtual ~Prepared() = default;
   };
@@ -225,7 +225,7 @@ class HierarchyBuilder {
 /// `size` (as a ratio). Blocks are compact sets of points, whatever the order of the input. The
 /// facility cost gives clusters of about 100 points, so smaller sizes give these too, and up to
 /// 10,000 points form one cluster. Takes O(n log n). progress, if given, is called with the number
-/// of points done; what it throws ends the work.
+/// of points done; an exception from it ends the work.
 /// Throws: std::invalid_argument unless size is positive; as HierarchyBuilder::push().
 [[nodiscard]] std::vector<std::uint32_t> clusters_of_size(
     std::span<const Point3> points, double size, std::uint64_t seed, unsigned threads = 1,

@@ -15,8 +15,8 @@ class DualAscent {
   /// Starts from the least cost of each client. Takes O(facilities * clients).
   DualAscent(const ClientOrder& order, const MatrixRows& costs);
 
-  /// Raises the duals of these clients in turn until none can be raised. Throws, as adjust() does,
-  /// what the check of the costs throws.
+  /// Raises the duals of these clients in turn until none can be raised. Like adjust(), throws
+  /// whatever the stop check of the costs throws.
   void raise(std::span<const std::uint32_t> clients);
   /// Makes one round of dual adjustment. Returns whether the sum of the duals has grown.
   bool adjust();

@@ -31,7 +31,7 @@ class CostRows {
                       double* out) const = 0;
 
  protected:
-  /// check_stop: outlives this object.
+  /// check_stop: must outlive this object.
   CostRows(std::size_t facilities, std::size_t clients, const base::StopCheck& check_stop)
       : facilities_(facilities), clients_(clients), check_stop_(&check_stop) {}
   CostRows(const CostRows&) = default;
