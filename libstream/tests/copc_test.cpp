@@ -26,7 +26,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Where pages begin in the files made here, and the first chunk.
+/// Offsets of the pages and of the first chunk in the files made here.
 constexpr std::uint64_t kFirstChunk = 100, kFirstPage = 1000;
 
 struct HierarchyEntry {
@@ -57,7 +57,7 @@ std::string info_of(std::uint64_t page_bytes, double half_size = 8, double spaci
   return info;
 }
 
-/// The octree of a file that has these pages, one behind the other.
+/// The octree of a file with these consecutive pages.
 Octree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
                  const std::string& info = {}) {
   std::string file(kFirstPage, '\0');
@@ -74,7 +74,7 @@ std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, st
   return error_of([&] { static_cast<void>(octree_of(pages, points, info)); });
 }
 
-/// A node's subtree of random shape, its points one behind the other from `offset` on.
+/// A random subtree of a node, with consecutive points beginning at `offset`.
 void grow(std::mt19937_64& random, Octree& octree, const OctreeNode& node, std::uint64_t& offset) {
   OctreeNode& here = octree.nodes.emplace_back(node);
   here.points = node.depth == 0 || random() % 8 == 0 ? 0 : 1 + random() % 9;
@@ -93,7 +93,7 @@ void grow(std::mt19937_64& random, Octree& octree, const OctreeNode& node, std::
   }
 }
 
-TEST(CopcHierarchy, PagesHoldAllNodesAndNoneIsLarge) {
+TEST(CopcHierarchy, PagesContainAllNodesAndAreBounded) {
   constexpr std::uint64_t kSeed = 3;
   std::cout << "seed " << kSeed << '\n';
   std::mt19937_64 random(kSeed);
@@ -122,7 +122,7 @@ TEST(CopcHierarchy, PagesHoldAllNodesAndNoneIsLarge) {
       ASSERT_EQ(read.nodes[i].bytes, with_points[i].bytes);
       ASSERT_EQ(read.nodes[i].points, with_points[i].points);
     }
-    // The pages behind the root's are whole, and follow one another.
+    // The pages after the root page are complete and consecutive.
     std::uint64_t next = offset + written.root_bytes;
     std::size_t pages = 0;
     for (std::size_t at = 0; at < written.root_bytes; at += 32) {
@@ -145,7 +145,7 @@ TEST(CopcHierarchy, PagesHoldAllNodesAndNoneIsLarge) {
 }
 
 TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
-  // The second page begins behind the four entries of the first.
+  // The second page begins after the four entries of the first.
   const Octree octree = octree_of({{{1, 1, 0, 0, 120, 10, 3},
                                     {0, 0, 0, 0, 110, 10, 2},
                                     {1, 0, 0, 1, 0, 0, 0},
@@ -160,7 +160,7 @@ TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
   EXPECT_EQ(box.max, (Point3{8, 0, -4}));
 }
 
-TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
+TEST(CopcOctree, KeepsNodesInTheRegionDownToTheResolution) {
   const auto kept = [](const std::optional<Box3>& region, double resolution) {
     Octree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
                                 {1, 0, 0, 0, 120, 10, 2},
@@ -183,44 +183,44 @@ TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
   EXPECT_EQ(kept(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0.5), 5u);
   // A cube's points may be rounded across its sides.
   EXPECT_EQ(kept(Box3{{-1, -1, -1}, {-0.005, -0.005, -0.005}}, 0), 7u);
-  // The root is read for any region, as its points check its cube.
+  // The root is read for any region, because its points check its cube.
   EXPECT_EQ(kept(Box3{{9, 9, 9}, {10, 10, 10}}, 0), 1u);
 }
 
-TEST(CopcOctree, RefusesWhatCannotBe) {
+TEST(CopcOctree, RejectsInvalidHierarchies) {
   const HierarchyEntry root{0, 0, 0, 0, 110, 10, 1};
   const auto has = [](const std::string& text, std::string_view part) {
     return text.find(part) != text.npos;
   };
   EXPECT_EQ(refusal_of({{root}}, 1), "");
   EXPECT_PRED2(has, refusal_of({{root}}, 2), "have 1 points, but the header promises 2");
-  EXPECT_PRED2(has, refusal_of({{root, {0, 0, 0, 0, 120, 10, 1}}}, 2), "is there twice");
+  EXPECT_PRED2(has, refusal_of({{root, {0, 0, 0, 0, 120, 10, 1}}}, 2), "is listed twice");
   EXPECT_PRED2(has, refusal_of({{root, {1, 0, 0, 0, 119, 10, 1}}}, 2), "share points");
   EXPECT_PRED2(has, refusal_of({{{-1, 0, 0, 0, 110, 10, 1}}}, 1), "has depth -1");
   EXPECT_PRED2(has, refusal_of({{{31, 0, 0, 0, 110, 10, 1}}}, 1), "has depth 31");
-  EXPECT_PRED2(has, refusal_of({{{1, 2, 0, 0, 110, 10, 1}}}, 1), "outside of its root");
-  EXPECT_PRED2(has, refusal_of({{{1, 0, -1, 0, 110, 10, 1}}}, 1), "outside of its root");
+  EXPECT_PRED2(has, refusal_of({{{1, 2, 0, 0, 110, 10, 1}}}, 1), "outside its root");
+  EXPECT_PRED2(has, refusal_of({{{1, 0, -1, 0, 110, 10, 1}}}, 1), "outside its root");
   EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, -10, 1}}}, 1), "negative size");
   EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, 10, -2}}}, 1), "negative size");
-  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 99, 10, 1}}}, 1), "do not lie in the file");
-  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 1030, 10, 1}}}, 1), "do not lie in the file");
-  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, ~0ULL, 10, 1}}}, 1), "do not lie in the file");
-  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, 0, 1}}}, 1), "do not lie in the file");
-  // Pages: outside, in a circle, overlapping until they are more than the file, of parts of
-  // entries.
-  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 2000, 32, -1}}}, 1), "does not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 99, 10, 1}}}, 1), "are outside the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 1030, 10, 1}}}, 1), "are outside the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, ~0ULL, 10, 1}}}, 1), "are outside the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, 0, 1}}}, 1), "are outside the file");
+  // Pages that are outside the file, circular, overlapping and larger than the file in total, or
+  // that end within an entry.
+  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 2000, 32, -1}}}, 1), "is outside the file");
   EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, kFirstPage, 32, -1}}}, 1), "referred to twice");
   EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 0, 992, -1}, {1, 0, 0, 1, 8, 992, -1}}}, 1),
                "referred to twice");
-  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 0, 31, -1}}}, 1), "does not lie in the file");
-  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(64)), "does not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 0, 31, -1}}}, 1), "is outside the file");
+  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(64)), "is outside the file");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 0)), "not a positive number");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 1, -1)), "not a positive number");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "cut off");
 }
 
-/// A cube in another place would leave all points of a region out.
-TEST(CopcOctree, RegionsOfAWrongCubeAreRefused) {
+/// With a misplaced cube, a region would lose all its points.
+TEST(CopcOctree, RejectsRegionsIfTheCubeIsWrong) {
   const TempFolder folder;
   const std::string path = (folder.path() / "cube.copc.laz").string();
   PointBlock points;
@@ -241,15 +241,14 @@ TEST(CopcOctree, RegionsOfAWrongCubeAreRefused) {
   for (const unsigned threads : {1u, 3u}) {
     options.threads = threads;
     const std::string error = error_of([&] { read_file(path, options); });
-    EXPECT_NE(error.find("node 0-0-0-0: has a point outside of its cube"), std::string::npos)
-        << error;
+    EXPECT_NE(error.find("node 0-0-0-0: has a point outside its cube"), std::string::npos) << error;
   }
 }
 
 class CopcFiles : public ::testing::TestWithParam<const char*> {};
 
-/// The oracle is the same file with another name in place of the VLR's: a LAZ file like others.
-TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
+/// The oracle is the same file with another user name in its VLR, which is a normal LAZ file.
+TEST_P(CopcFiles, RegionsHaveTheSamePointsAsTheWholeFile) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
   const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();
@@ -269,21 +268,21 @@ TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
   EXPECT_TRUE(records(by_nodes, kEverywhere) == records(all, kEverywhere));
 
   expect_parts_of_regions({file.string(), plain}, all);
-  // As it has no octree.
+  // Because it has no octree.
   SourceOptions coarse;
   coarse.selection.resolution = 1;
   EXPECT_NE(error_of([&] { read_file(plain, coarse); }).find("name a COPC file"),
             std::string::npos);
 }
 
-TEST_P(CopcFiles, CoarserResolutionsAreParts) {
+TEST_P(CopcFiles, CoarserResolutionsAreSubsets) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
   expect_coarser_parts((std::filesystem::path(data) / "lidar" / GetParam()).string());
 }
 
-/// What copies a COPC file's VLRs beside other points leaves a hierarchy that tells nothing.
-TEST_P(CopcFiles, WithoutItsHierarchyItIsLaz) {
+/// Programs that copy the VLRs of COPC to other points leave a hierarchy that is wrong.
+TEST_P(CopcFiles, ReadAsLazIfTheHierarchyIsDamaged) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
   const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();

@@ -29,7 +29,7 @@ using Place = std::array<std::int32_t, 3>;
 
 constexpr std::int32_t kCubeSide = 1 << 16;
 
-/// A node and its points, as they were written.
+/// A node and its points as written.
 struct BuiltNode {
   OctreeNode node{};
   std::vector<std::pair<Place, std::uint32_t>> points{};  ///< with the number of each
@@ -39,7 +39,7 @@ struct BuiltNode {
   }
 };
 
-/// The octree of places in a cube of kCubeSide steps from 0.
+/// Builds the octree of places in a cube with a side of kCubeSide steps and its corner at 0.
 std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_once,
                              unsigned threads = 1) {
   constexpr std::size_t kRecord = 16;
@@ -65,7 +65,7 @@ std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_on
 }
 
 Place cell_of(const Place& place, unsigned depth, unsigned bits) {
-  // Cells of that depth: kCubeSide / (2^depth * 2^bits) steps along a side.
+  // Cells at that depth: kCubeSide / (2^depth * 2^bits) steps along a side.
   const double cells = std::ldexp(1.0, static_cast<int>(depth + bits)) / kCubeSide;
   Place cell{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -74,7 +74,7 @@ Place cell_of(const Place& place, unsigned depth, unsigned bits) {
   return cell;
 }
 
-/// Holds the builder to what it promises, and returns the nodes.
+/// Checks what the builder promises, and returns the nodes.
 std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
   const std::vector<BuiltNode> nodes = built(places, std::size_t{1} << 19);
   EXPECT_TRUE(nodes == built(places, 1)) << "memory makes a difference";
@@ -100,13 +100,13 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
   }
   EXPECT_EQ(std::count(seen.begin(), seen.end(), true), std::ssize(seen));
 
-  // Leaves are the nodes with few points in their cube, but for what their parents took.
+  // Leaves are the nodes with few points in their cube, not counting those promoted to parents.
   unsigned depths = 0;
   for (const BuiltNode& node : nodes) depths = std::max(depths, node.node.depth + 1);
   for (unsigned depth = 0; depth < depths; ++depth) {
     std::map<Place, std::size_t> in_cubes;
     for (const Place& place : places) ++in_cubes[cell_of(place, depth, 0)];
-    std::map<Place, std::size_t> taken;  // by nodes down to this depth, of each cell
+    std::map<Place, std::size_t> taken;  // points of each cell in nodes down to this depth
     std::set<Place> all, leaves;
     for (const BuiltNode& node : nodes) {
       const Place at{static_cast<std::int32_t>(node.node.place[0]),
@@ -126,7 +126,7 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
         if (node.node.depth <= depth) ++taken[cell];
       }
     }
-    // Each cell of other nodes has exactly one point.
+    // Each cell of the other nodes has exactly one point.
     EXPECT_EQ(taken.size(), all.size()) << "depth " << depth;
     for (const auto& [cell, count] : taken) EXPECT_EQ(count, 1u);
   }
@@ -151,7 +151,7 @@ TEST(OctreeBuilder, SurfacesAreEvenAtEachDepth) {
   EXPECT_EQ(name_of(nodes.back().node), "0-0-0-0");
 }
 
-TEST(OctreeBuilder, FewPointsAreOneNode) {
+TEST(OctreeBuilder, KeepsFewPointsInOneNode) {
   EXPECT_TRUE(built({}, 1).empty());
   const std::vector<BuiltNode> nodes = expect_octree({{0, 0, 0}, {0, 0, 0}, {kCubeSide - 1, 5, 7}});
   ASSERT_EQ(nodes.size(), 1u);
@@ -173,7 +173,7 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
   EXPECT_GT(most, 39'000u);
 }
 
-TEST(OctreeBuilder, MorePointsInOnePlaceThanAreAllowedAreRefused) {
+TEST(OctreeBuilder, RejectsTooManyPointsInOnePlace) {
   constexpr std::uint64_t kMost = 50'000;
   const auto build = [](std::uint64_t points) {
     OctreeBuilder builder("made", {}, 12, 1, kMost);
@@ -186,11 +186,11 @@ TEST(OctreeBuilder, MorePointsInOnePlaceThanAreAllowedAreRefused) {
     return written;
   };
   EXPECT_EQ(build(kMost), kMost);
-  EXPECT_NE(error_of([&] { build(kMost + 1); }).find("50001 points lie in one place"),
+  EXPECT_NE(error_of([&] { build(kMost + 1); }).find("50001 points are in one place"),
             std::string::npos);
 }
 
-TEST(OctreeBuilder, NodesOfCloudsThatFillSpaceAreBounded) {
+TEST(OctreeBuilder, BoundsNodesOfCloudsThatFillSpace) {
   std::mt19937_64 random(5);
   std::vector<Place> places;
   for (int i = 0; i < 400'000; ++i) {
@@ -253,7 +253,7 @@ AllPoints made_scan(std::size_t points, std::vector<Channel> attributes) {
 }
 
 std::vector<Channel> attributes_of_format(const fs::path& folder, unsigned format) {
-  // As the reader names them: those of a file with one point.
+  // Attributes as the reader names them, from a file with one point.
   AllPoints one = made_scan(1, {});
   if (format >= 7) {
     for (const char* name : {"red", "green", "blue"}) {
@@ -266,11 +266,11 @@ std::vector<Channel> attributes_of_format(const fs::path& folder, unsigned forma
   return read_file(write_copc((folder / "one.copc.laz").string(), one)).info.attributes;
 }
 
-TEST(CopcWriter, RecordsComeBackFromTheOctree) {
+TEST(CopcWriter, OctreesHaveTheRecordsThatWereWritten) {
   const TempFolder folder;
   for (const unsigned format : {6u, 7u, 8u}) {
     std::vector<Channel> attributes = attributes_of_format(folder.path(), format);
-    // Values of fields that are parts of bytes are tested with LAS.
+    // Bit fields are tested with LAS.
     std::erase_if(attributes, [](const Channel& c) {
       return c.type == ScalarType::u8 && c.name != "return_number" && c.name != "classification";
     });
@@ -290,13 +290,13 @@ TEST(CopcWriter, RecordsComeBackFromTheOctree) {
     const AllPoints whole = read_file(file);
     expect_parts_of_regions({file}, whole);
     expect_coarser_parts(file);
-    // Same points, same bytes, whatever the blocks and threads.
+    // The same points give the same bytes, whatever the blocks and threads.
     write_copc((folder.path() / "b.copc.laz").string(), all, 777, format);
     EXPECT_TRUE(read_text(file) == read_text(folder.path() / "b.copc.laz"));
   }
 }
 
-TEST(CopcWriter, FilesOfNoPointAndOne) {
+TEST(CopcWriter, WritesFilesWithZeroAndOnePoints) {
   const TempFolder folder;
   for (const std::size_t points : {0u, 1u}) {
     const AllPoints all = made_scan(points, {});
@@ -308,7 +308,7 @@ TEST(CopcWriter, FilesOfNoPointAndOne) {
   }
 }
 
-TEST(CopcWriter, RanksBecomeAngles) {
+TEST(CopcWriter, ConvertsRanksToAngles) {
   const TempFolder folder;
   AllPoints all = made_scan(255, {{.name = "scan_angle_rank", .type = ScalarType::i8}});
   for (std::size_t i = 0; i < 255; ++i) all.points.payload[i] = static_cast<std::byte>(i - 127);
@@ -324,7 +324,7 @@ TEST(CopcWriter, RanksBecomeAngles) {
   }
 }
 
-TEST(CopcWriter, NothingIsLeftOfAFileThatIsNotFinished) {
+TEST(CopcWriter, LeavesNothingOfAnUnfinishedFile) {
   const TempFolder folder;
   {
     const auto writer = open_point_writer((folder.path() / "a.copc.laz").string(), {});

@@ -12,7 +12,7 @@
 namespace terrace::stream {
 namespace {
 
-TEST(Ept, RefusesWhatCannotBe) {
+TEST(Ept, RejectsInvalidDataSets) {
   const auto refusal = [](auto change) {
     EptParts parts = small_parts();
     change(parts);
@@ -50,8 +50,8 @@ TEST(Ept, RefusesWhatCannotBe) {
   EXPECT_PRED2(has, with("schema", {1}), "is not an object");
   EXPECT_PRED2(has, with("srs", 1), "srs");
   EXPECT_PRED2(has, with("srs", {{"authority", "EPSG"}, {"horizontal", "x"}}), "srs");
-  EXPECT_PRED2(has, with_dimension(1, {{"name", "Y"}}), "once more");
-  EXPECT_PRED2(has, with_dimension(4, {{"name", "Intensity"}}), "once more");
+  EXPECT_PRED2(has, with_dimension(1, {{"name", "Y"}}), "repeats Y");
+  EXPECT_PRED2(has, with_dimension(4, {{"name", "Intensity"}}), "repeats Intensity");
   EXPECT_PRED2(has, with_dimension(4, {{"name", ""}}), "has no name");
   EXPECT_PRED2(has, with_dimension(4, {{"type", "text"}}), "is not a type");
   EXPECT_PRED2(has, with_dimension(4, {{"size", 3}}), "is not a type");
@@ -62,7 +62,7 @@ TEST(Ept, RefusesWhatCannotBe) {
   Json deep = 1;
   for (int i = 0; i < 100; ++i) deep = Json::array({deep});
   EXPECT_PRED2(has, with("more", deep), "nested too deeply");
-  // In time linear in their number.
+  // Time is linear in their number.
   EXPECT_EQ(with("more", Json(400'000, Json::object())), "");
   EXPECT_PRED2(has, with("more", Json(600'000, Json::object())), "has too many values");
   Json many = Json::array();
@@ -86,15 +86,15 @@ TEST(Ept, RefusesWhatCannotBe) {
   const auto with_root = [&](const std::string& text) {
     return refusal([&](EptParts& parts) { parts.hierarchy["0-0-0-0"] = text; });
   };
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 2, "0-0-0-0": 3, "2-3-0-0": -1})"), "is there twice");
+  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 2, "0-0-0-0": 3, "2-3-0-0": -1})"), "is listed twice");
   EXPECT_PRED2(has, with_root(R"({"0-0-0-0": -1})"), "referred to twice");
   EXPECT_PRED2(has, with_root(R"({"2-3-0-0": -1, "02-3-0-0": -1})"), "referred to twice");
   EXPECT_PRED2(has, with_root(R"({"0-0-0-0": -2})"), "has -2 points");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 1.5})"), "numbers of points");
+  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 1.5})"), "point counts");
   EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 18446744073709551615})"), "more points");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": {}})"), "numbers of points");
-  EXPECT_PRED2(has, with_root("[1]"), "numbers of points");
-  EXPECT_PRED2(has, with_root("1"), "numbers of points");
+  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": {}})"), "point counts");
+  EXPECT_PRED2(has, with_root("[1]"), "point counts");
+  EXPECT_PRED2(has, with_root("1"), "point counts");
   EXPECT_PRED2(has, with_root("{"), "not JSON");
   EXPECT_PRED2(has, with_root(""), "not JSON");
   for (const char* name : {"0", "0-0-0", "0-0-0-0-0", "1-2-0-0", "31-0-0-0", "1-0-0--1", "a-0-0-0",
@@ -135,11 +135,11 @@ TEST(Ept, RefusesWhatCannotBe) {
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string& bytes) {
                  node = compressed(bytes.substr(1));
                }),
-               "ends before");
+               "ends earlier");
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node.pop_back(); }),
                "is cut off");
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node.clear(); }),
-               "ends before");
+               "ends earlier");
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node[0] ^= 1; }),
                "zstandard: ");
   EXPECT_PRED2(has, with("dataType", "laszip"), "0-0-0-0.laz");

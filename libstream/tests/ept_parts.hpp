@@ -25,7 +25,7 @@ inline std::string compressed(std::string_view bytes) {
   return out;
 }
 
-/// A dataset of 8 x 8 x 8 units with its corner at 0, with records written by the test itself.
+/// A data set of 8 x 8 x 8 units with its corner at 0 and records written by the test itself.
 struct EptParts {
   Json metadata = {
       {"version", "1.0.0"},

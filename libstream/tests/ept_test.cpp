@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(Ept, ReadsWhatItsSchemaSays) {
+TEST(Ept, ReadsTheTypesOfItsSchema) {
   const TempFolder folder;
   const std::string file = small_parts().write(folder.path());
   const AllPoints all = read_file(file);
@@ -50,7 +50,7 @@ TEST(Ept, ReadsWhatItsSchemaSays) {
 }
 
 // The intensity comes first, and equals the number of points of the node.
-TEST(Ept, RecordsThatBeginLikeGzipAreRecords) {
+TEST(Ept, DoesNotTakeRecordsForGzip) {
   const TempFolder folder;
   EptParts parts;
   const std::size_t count = 0x8b1f;
@@ -65,7 +65,7 @@ TEST(Ept, AFolderWithEptJsonIsOneInput) {
   for (const fs::path& name : {folder.path() / "all" / "scan", folder.path() / "all"}) {
     EXPECT_EQ(read_file(name).info.files, std::vector<std::string>{inside});
   }
-  // Next to another dataset, on a lattice that begins elsewhere.
+  // Together with another data set, whose lattice begins elsewhere.
   EptParts other = small_parts();
   other.metadata["schema"][1]["offset"] = 104;
   other.write(folder.path() / "all" / "scan2");
@@ -74,7 +74,7 @@ TEST(Ept, AFolderWithEptJsonIsOneInput) {
   EXPECT_EQ(both.points.positions[6], (Point3{192, -8, 0}));
 }
 
-TEST(Ept, CoordinatesMayBeOfAnyType) {
+TEST(Ept, ReadsCoordinatesOfAnyType) {
   for (const char* type : {"float", "signed"}) {
     for (const int size : {4, 8}) {
       EptParts parts;
@@ -111,8 +111,8 @@ TEST(Ept, CoordinatesMayBeOfAnyType) {
   }
 }
 
-/// Nodes written as LAZ must agree: one that lacks a point or is on another lattice is refused.
-TEST(Ept, NodesOfLazAgree) {
+/// LAZ nodes must agree: one that lacks a point or is on another lattice is refused.
+TEST(Ept, RejectsLazNodesThatDisagree) {
   const auto read = [](std::size_t points, double step) {
     const TempFolder folder;
     EptParts parts = small_parts();
@@ -149,11 +149,11 @@ TEST(Ept, NodesOfLazAgree) {
     return error;
   };
   EXPECT_EQ(read(3, 1), "");
-  EXPECT_NE(read(2, 1).find("counts 3 points, the file has 2"), std::string::npos);
+  EXPECT_NE(read(2, 1).find("counts 3 points, but the file has 2"), std::string::npos);
   EXPECT_NE(read(3, 0.5).find("scale or offset"), std::string::npos);
 }
 
-/// A copy of the dataset whose nodes hold records of its schema.
+/// A copy of the data set with nodes of plain records.
 std::string write_by_schema(const fs::path& from, const fs::path& folder, bool zstandard) {
   Json metadata = Json::parse(read_text(from / "ept.json"));
   metadata["dataType"] = zstandard ? "zstandard" : "binary";
@@ -192,8 +192,8 @@ std::string write_by_schema(const fs::path& from, const fs::path& folder, bool z
   return write_text(folder / "ept.json", metadata.dump());
 }
 
-/// Bounds in another place would leave all points of a region out.
-TEST(Ept, RegionsOfWrongBoundsAreRefused) {
+/// With misplaced bounds, a region would lose all its points.
+TEST(Ept, RejectsRegionsIfTheBoundsAreWrong) {
   EptParts parts = small_parts();
   SourceOptions options;
   options.selection.region = Box3{{0, 0, 0}, {1, 1, 8}};
@@ -202,11 +202,11 @@ TEST(Ept, RegionsOfWrongBoundsAreRefused) {
   parts.metadata["bounds"] = {100, 0, 0, 108, 8, 8};
   const std::string file = parts.write(folder.path());
   EXPECT_EQ(read_file(file).points.size(), 6u);
-  EXPECT_NE(error_of([&] { read_file(file, options); }).find("outside of its cube"),
+  EXPECT_NE(error_of([&] { read_file(file, options); }).find("outside its cube"),
             std::string::npos);
 }
 
-TEST(Ept, LoneStarInAllThreeForms) {
+TEST(Ept, ReadsLoneStarInAllThreeEncodings) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
   const fs::path folder = fs::path(data) / "lidar" / "ept-lone-star";
@@ -216,7 +216,7 @@ TEST(Ept, LoneStarInAllThreeForms) {
   EXPECT_EQ(all.info.octree->depths, 4u);
   EXPECT_EQ(all.info.octree->spacing, 44.0 / 128);
   EXPECT_NE(all.info.crs.wkt.find("NAD83 / UTM zone 12N"), std::string::npos);
-  // The nodes are LAZ files: read as such they are the same.
+  // The nodes are LAZ files: read as LAZ they give the same points.
   std::vector<std::string> nodes;
   for (const auto& entry : fs::directory_iterator(folder / "ept-data")) {
     nodes.push_back(entry.path().string());
@@ -241,7 +241,7 @@ TEST(Ept, LoneStarInAllThreeForms) {
     std::vector<double> values;
     for (std::size_t i = 0; i < points.points.size(); ++i) {
       const Point3 at = world_point(points.info, points.points.positions[i]);
-      // Compared in steps, as offsets differ.
+      // Compare in steps, because offsets differ.
       values.clear();
       for (const double value : at) values.push_back(std::round(value / 0.00025));
       for (const auto& [type, offset] : columns) {

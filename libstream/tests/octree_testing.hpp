@@ -17,7 +17,7 @@
 #include "point_files.hpp"
 #include "terrace/stream/schema.hpp"
 
-/// Properties of every file that is read by its octree.
+/// Checks for all files that are read by their octree.
 
 namespace terrace::stream {
 
@@ -28,7 +28,7 @@ inline constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity},
 /// A place in the CRS and a hash of the packed attributes.
 using Record = std::pair<Point3, std::size_t>;
 
-/// Those inside a region, sorted: equal for the same points in any order.
+/// The records inside a region, sorted, so that they are equal for the same points in any order.
 inline std::vector<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
   std::vector<Record> found;
   const std::size_t bytes = all.info.payload_size();
@@ -43,7 +43,7 @@ inline std::vector<Record> records(const AllPoints& all, const Box3& region = kE
   return found;
 }
 
-/// Regions of each of the files, which have the points `all`, contain exactly those inside.
+/// Checks that regions of each file, which have the points `all`, contain exactly those inside.
 inline void expect_parts_of_regions(const std::vector<std::string>& files, const AllPoints& all) {
   Box3 bounds;
   for (const Point3& p : all.points.positions) bounds.include(world_point(all.info, p));
@@ -71,7 +71,7 @@ inline void expect_parts_of_regions(const std::vector<std::string>& files, const
   }
 }
 
-/// Each depth of the file's octree has more points than the previous one, and includes these.
+/// Checks that each depth of the file's octree includes the points of the previous one and more.
 inline void expect_coarser_parts(const std::string& file) {
   const AllPoints all = read_file(file);
   ASSERT_TRUE(all.info.octree);

@@ -14,7 +14,7 @@
 namespace terrace::stream {
 namespace {
 
-/// What the readers of all threads check.
+/// What the readers of all threads share for their checks.
 struct CubeCheck {
   RecordParts parts;
   std::vector<OctreeNode> nodes;
@@ -60,7 +60,7 @@ class CubeCheckingReader final : public PartReader {
   [[noreturn]] void refuse() const {
     throw Error({.file = check_->file,
                  .where = "node " + name_of(check_->nodes[part_]),
-                 .cause = "has a point outside of its cube: the header or the hierarchy is wrong, "
+                 .cause = "has a point outside its cube: the header or the hierarchy is wrong, "
                           "and a region would miss points",
                  .remedy = "convert the whole file to LAS or LAZ and select the region from that"});
   }
@@ -80,7 +80,7 @@ std::string name_of(const OctreeNode& node) {
 }
 
 bool before(const OctreeNode& a, const OctreeNode& b) {
-  // The axis whose places differ in the highest bit decides; of equal ones the first, z.
+  // The axis whose places differ in the highest bit decides; in a tie z, then y.
   std::uint32_t most = 0;
   bool less = false;
   for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
@@ -162,7 +162,7 @@ RecordParts parts_in_cubes(RecordParts parts, const Octree& octree, const Record
   for (std::size_t axis = 0; axis < 3; ++axis) {
     check->types[axis] = stream.info.coordinates[axis].type;
   }
-  // Less than keep() allows, so that no point within it is missed.
+  // A smaller tolerance than that of keep(), so that a region misses no point that passes.
   const Point3 steps = steps_of(stream.info);
   for (const OctreeNode& node : octree.nodes) {
     Box3& box = check->boxes.emplace_back(octree.box(node));

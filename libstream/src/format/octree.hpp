@@ -46,11 +46,11 @@ struct Octree {
   [[nodiscard]] std::uint64_t points() const;
   /// The public description of the nodes.
   [[nodiscard]] OctreeInfo info() const;
-  /// Sorts the nodes. Returns a duplicate node, nullptr if there is none.
+  /// Sorts the nodes. Returns a duplicate node, or nullptr if there is none.
   const OctreeNode* arrange();
-  /// Keeps the nodes down to the first depth whose spacing is at most `resolution` (all, if that is
-  /// 0) whose cubes, enlarged by two `steps`, meet the region. The first node is kept for any
-  /// region: parts_in_cubes() checks the root's cube by its points.
+  /// Keeps the nodes whose cubes, enlarged by two `steps`, meet the region, down to the first depth
+  /// whose spacing is at most `resolution` (to any depth if that is 0). The first node is kept for
+  /// any region: parts_in_cubes() checks the root's cube by its points.
   void keep(const std::optional<Box3>& region, double resolution, const Point3& steps);
 };
 
@@ -58,10 +58,10 @@ struct Octree {
 /// node.
 Point3 steps_of(const Placement& placement);
 
-/// The same parts, one for each of the octree's nodes, with a check that their points are in the
-/// nodes' cubes, by which a region selects nodes: a wrong cube would leave points out in silence.
-/// stream: the records and their placement. The reader throws: Error that names `file` and the
-/// node.
+/// Returns the same parts, one for each of the octree's nodes, with readers that check that a
+/// node's points are in its cube. Regions select nodes by their cubes, so a wrong cube would
+/// silently lose points. stream: the records and their placement. The readers throw: Error that
+/// names `file` and the node.
 RecordParts parts_in_cubes(RecordParts parts, const Octree& octree, const RecordStream& stream,
                            const std::string& file);
 

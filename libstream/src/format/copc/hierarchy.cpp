@@ -20,10 +20,10 @@ namespace {
   throw Error({.file = file.name(),
                .where = "byte " + std::to_string(byte),
                .cause = std::move(cause),
-               .remedy = "the file is damaged: get it anew"});
+               .remedy = "the file is damaged: download it again"});
 }
 
-/// A part of the hierarchy that is read at once.
+/// A part of the hierarchy that is read in one piece.
 struct Page {
   std::uint64_t offset = 0, bytes = 0;
 };
@@ -48,11 +48,11 @@ class HierarchyReader {
   }
 
  private:
-  /// from: where the page is referred to. As no page is read twice, references in a circle end.
+  /// from: offset of the reference to the page. No page is read twice, so circular references end.
   void add_page(const Page& page, std::uint64_t from) {
     if (page.bytes % kCopcEntryBytes != 0 || page.bytes == 0 || page.offset > file_.size() ||
         page.bytes > file_.size() - page.offset) {
-      fail(file_, from, "a page of the COPC hierarchy does not lie in the file");
+      fail(file_, from, "a page of the COPC hierarchy is outside the file");
     }
     // Pages that overlap could be many more bytes than the file has.
     page_bytes_ += page.bytes;
@@ -74,7 +74,7 @@ class HierarchyReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto place = load_little_endian<std::int32_t>(at + 4 + 4 * axis);
       if (place < 0 || (place >> depth) != 0) {
-        fail(file_, byte, "a node of the COPC hierarchy lies outside of its root");
+        fail(file_, byte, "a node of the COPC hierarchy is outside its root");
       }
       node.place[axis] = static_cast<std::uint32_t>(place);
     }
@@ -90,7 +90,7 @@ class HierarchyReader {
     node.points = static_cast<std::uint64_t>(points);
     if (node.offset < first_chunk_ || node.offset > file_.size() ||
         node.bytes > file_.size() - node.offset || node.bytes == 0) {
-      fail(file_, byte, "the points of a node of the COPC hierarchy do not lie in the file");
+      fail(file_, byte, "the points of a node of the COPC hierarchy are outside the file");
     }
     nodes_.push_back(node);
   }
@@ -103,7 +103,7 @@ class HierarchyReader {
   std::vector<OctreeNode> nodes_;
 };
 
-/// No two nodes may share a key or a byte, so that no point comes twice.
+/// Throws: Error if two nodes share a key or a byte, which would deliver points twice.
 void check_disjoint(const ByteSource& file, Octree& octree) {
   std::vector<OctreeNode>& nodes = octree.nodes;
   std::sort(nodes.begin(), nodes.end(),
@@ -114,7 +114,7 @@ void check_disjoint(const ByteSource& file, Octree& octree) {
     }
   }
   if (const OctreeNode* const twice = octree.arrange()) {
-    fail(file, twice->offset, "a node of the COPC hierarchy is there twice");
+    fail(file, twice->offset, "a node of the COPC hierarchy is listed twice");
   }
 }
 
@@ -150,7 +150,7 @@ std::vector<std::size_t> subtree_ends(std::span<const OctreeNode> nodes) {
 CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at, std::size_t page_nodes) {
   const std::span<const OctreeNode> nodes = octree.nodes;
   const std::vector<std::size_t> ends = subtree_ends(nodes);
-  // A page of less is not worth a request.
+  // A smaller page is not worth a request.
   const std::size_t least = nodes.size() <= page_nodes ? nodes.size() + 1 : page_nodes / 16;
   const auto has_page = [&](std::size_t node) {
     const std::size_t count = ends[node] - node;
@@ -178,7 +178,7 @@ CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at, std::
 
 Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::uint64_t first_chunk,
                            std::uint64_t points) {
-  // It follows the header of LAS 1.4 and its own.
+  // The info follows the LAS 1.4 header and its own VLR header.
   constexpr std::uint64_t kInfoAt = 375 + 54;
   if (info.size() < kCopcInfoBytes) fail(file, kInfoAt, "the COPC info is cut off");
   Octree octree;

@@ -17,17 +17,17 @@ namespace terrace::stream {
 /// The VLR that marks COPC, the first of the file, and the EVLR of its nodes.
 inline constexpr std::string_view kCopcUser = "copc";
 inline constexpr std::uint16_t kCopcInfo = 1, kCopcHierarchy = 1000;
-/// Bytes of the info, and of a node's entry in the hierarchy.
+/// Sizes of the info and of a node's entry in the hierarchy.
 inline constexpr std::size_t kCopcInfoBytes = 160, kCopcEntryBytes = 32;
 
-/// Reads the whole hierarchy. info: the payload of the info VLR; first_chunk: where the first chunk
-/// of the file begins; points: how many its header promises. Memory: 56 bytes per node.
-/// Throws: Error unless pages and nodes lie in the file, no page is referred to twice, no two nodes
-/// have the same key or bytes, and the nodes have exactly these points.
+/// Reads the whole hierarchy. info: the payload of the info VLR; first_chunk: offset of the first
+/// chunk in the file; points: how many its header promises. Memory: 56 bytes per node.
+/// Throws: Error unless pages and nodes are inside the file, no page is referred to twice, no two
+/// nodes have the same key or share bytes, and the nodes have exactly that many points.
 Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::uint64_t first_chunk,
                            std::uint64_t points);
 
-/// Nodes of a page: its 16 KiB are one request.
+/// Nodes per page; its 16 KiB take one request.
 inline constexpr std::size_t kCopcPageNodes = 512;
 
 /// The hierarchy as the payload of its EVLR; the first root_bytes are its root page.
@@ -36,10 +36,10 @@ struct CopcHierarchy {
   std::uint64_t root_bytes = 0;
 };
 
-/// One page of all nodes if they are not more than `page_nodes`. Else the largest subtrees that are
-/// not more have a page each, behind that of the root, but for small ones, which are in it. Nodes
-/// without points are there for their children. octree: with all ancestors of its nodes, in the
-/// order of before(). at: where the payload begins in the file.
+/// Writes one page if there are at most `page_nodes` nodes. Otherwise each of the largest subtrees
+/// with at most that many nodes gets a page after the root page, which keeps small subtrees. Nodes
+/// without points are written for the sake of their children. octree: includes all ancestors of its
+/// nodes, in the order of before(). at: offset of the payload in the file.
 CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at,
                                    std::size_t page_nodes = kCopcPageNodes);
 

@@ -14,15 +14,15 @@
 namespace terrace::stream {
 namespace {
 
-/// Cells of the finest lattice along a side, and of a node, as powers of two.
+/// Cells along a side, as powers of two: of the finest lattice, and of a node's grid.
 constexpr unsigned kCellBits = 30, kSpanBits = 7;
 static_assert(OctreeBuilder::kSpan == 1U << kSpanBits);
 constexpr unsigned kDeepestLeaf = kCellBits - kSpanBits;
-/// Depths that are distributed at once, to 64 buckets.
+/// Depths that are distributed in one pass, to 64 buckets.
 constexpr unsigned kDepthsAtOnce = 2;
 constexpr std::size_t kChildren = 8;
 
-/// Which child of a node of that depth a cell lies in.
+/// The number of the child that contains the cell, in a node at `depth`.
 std::size_t child_of(const std::array<std::uint32_t, 3>& cell, unsigned depth) {
   const unsigned shift = kCellBits - 1 - depth;
   return ((cell[0] >> shift) & 1U) | ((cell[1] >> shift) & 1U) << 1U |
@@ -37,7 +37,7 @@ OctreeNode child(const OctreeNode& node, std::size_t number) {
   return child;
 }
 
-/// A number without relation to the coordinates (the finaliser of MurmurHash3 by A. Appleby).
+/// Hash of the coordinates (with the finaliser of MurmurHash3 by A. Appleby).
 std::uint64_t hash_of(const std::array<std::int32_t, 3>& place) {
   std::uint64_t hash = 0;
   for (const std::int32_t coordinate : place) {
@@ -51,11 +51,11 @@ std::uint64_t hash_of(const std::array<std::int32_t, 3>& place) {
 
 }  // namespace
 
-/// A point on its way.
+/// A point on its way to a node.
 struct OctreeBuilder::Item {
   std::array<std::uint32_t, 3> cell{};
-  std::uint32_t index = 0;  ///< of its record among those that it is with
-  std::uint64_t rank = 0;   ///< of a cell's points the least goes up
+  std::uint32_t index = 0;  ///< of its record in NodePoints::records
+  std::uint64_t rank = 0;   ///< the lowest-ranked point of a cell is promoted
   std::uint64_t number = 0;
 
   [[nodiscard]] bool goes_before(const Item& other) const {
@@ -76,7 +76,7 @@ struct OctreeBuilder::NodePoints {
   }
 };
 
-/// What lies below a node that one thread builds.
+/// A subtree that one thread builds.
 struct OctreeBuilder::Subtree {
   OctreeNode node{};
   std::span<const Item> items{};
@@ -91,12 +91,11 @@ std::span<const std::byte> OctreeBuilder::record_of(const NodePoints& points,
 }
 
 std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t at_once) {
-  // The beginnings of 64 buckets for each factor of 64, of which ten billion points take three or
-  // four.
+  // The unwritten tails of 64 buckets for each pass; ten billion points take three or four passes.
   constexpr std::uint64_t kBuckets = 8u << 20;
   const std::uint64_t kept = record_bytes + sizeof(std::uint64_t) + sizeof(Item);
-  // Nodes on the way up hold copies of the records in memory, in vectors that have grown, and wait
-  // to be written. A node, its child and the bytes that are written for it come on top.
+  // Unfinished nodes hold copies of the records in memory, in vectors with spare capacity, and wait
+  // to be written. A node, its child and the bytes being written for it come on top.
   return kBuckets + at_once * (3 * kept + record_bytes) +
          kChildren * kMostPromoted * (2 * kept + record_bytes);
 }
@@ -168,7 +167,7 @@ OctreeBuilder::NodePoints OctreeBuilder::build(const OctreeNode& node, Bucket bu
   return visit(node, buckets);
 }
 
-/// The buckets are those of the node's descendants of some depth, in Morton order.
+/// buckets: one for each of the node's descendants at some depth, in Morton order.
 OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span<Bucket> buckets) {
   if (buckets.size() == 1) return build(node, std::move(buckets.front()));
   const auto records = [this](std::span<const Bucket> some) {
@@ -190,7 +189,7 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
         visit(child(node, i), some), *write_,
         [&](const Item&, std::span<const std::byte> record) { file_.append(promoted, record); });
   }
-  // In Morton order, as the children are.
+  // The promoted points are in Morton order, because the children are.
   return load(node, std::move(promoted));
 }
 
@@ -221,14 +220,14 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
     throw Error({.file = name_,
                  .where = {},
                  .cause = counted(count, "point") +
-                          " lie in one place, more than a node of "
+                          " are in one place, more than a node of "
                           "COPC can have in this memory: " +
                           std::to_string(most_together_),
                  .remedy = "raise `memory_bytes`, leave them out, or write LAZ"});
   }
   NodePoints points = load(node, std::move(bucket));
   sort(points.items, node.depth);
-  // A thread builds what lies below a node of the next depths.
+  // One thread builds each subtree below the next depths.
   const unsigned lowest = std::min(node.depth + kDepthsAtOnce, kDeepestLeaf);
   const auto is_leaf = [](const OctreeNode& at, std::span<const Item> items) {
     return items.size() <= kLeafPoints || at.depth == kDeepestLeaf;
@@ -262,7 +261,7 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
   return combine(node, points.items, is_task, built, *write_);
 }
 
-/// To Morton order. depth: of the node in which all lie.
+/// Sorts items in Morton order. depth: of the node that contains all of them.
 void OctreeBuilder::sort(std::vector<Item>& items, unsigned depth) {
   const unsigned depths = std::min(kDepthsAtOnce, kDeepestLeaf - depth);
   const auto part_of = [&](const Item& item) {
@@ -282,7 +281,7 @@ void OctreeBuilder::sort(std::vector<Item>& items, unsigned depth) {
   team_.run(begins.size() - 1, [&](std::size_t part, std::size_t) {
     const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
     std::sort(at(begins[part]), at(begins[part + 1]), [](const Item& a, const Item& b) {
-      // The axis whose cells differ in the highest bit decides; of equal ones the first, z.
+      // The axis whose cells differ in the highest bit decides; in a tie z, then y.
       std::uint32_t most = 0;
       bool less = a.number < b.number;
       for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
@@ -297,7 +296,7 @@ void OctreeBuilder::sort(std::vector<Item>& items, unsigned depth) {
   });
 }
 
-/// Calls visit(child, items) for the children of a node that have some of its items.
+/// Calls visit(child, items) for each child of a node that contains some of its items.
 template <class Item, class Visit>
 void for_each_child(const OctreeNode& node, std::span<const Item> items, const Visit& visit) {
   for (std::size_t i = 0; i < kChildren; ++i) {
@@ -335,7 +334,7 @@ OctreeBuilder::NodePoints OctreeBuilder::combine(const OctreeNode& node,
   return points;
 }
 
-/// Gives one point of each of the parent's cells to it, and writes what is left of the child.
+/// Promotes one point of each of the parent's cells to the parent, and writes the child's rest.
 template <class Add>
 void OctreeBuilder::promote(NodePoints child, const Write& write, const Add& add) const {
   const unsigned shift = kCellBits - kSpanBits - (child.node.depth - 1);

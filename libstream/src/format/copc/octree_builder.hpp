@@ -20,42 +20,43 @@
 
 namespace terrace::stream {
 
-/// Distributes points of any number among the nodes of an octree, through a temporary file.
+/// Distributes any number of points among the nodes of an octree, through a temporary file.
 ///
-/// A node whose cube has few points keeps them all. Of others each keeps one point of every cell,
-/// kSpan of which make up its side; the rest lies deeper. So the nodes down to a depth are a cloud
-/// that is as even as the points allow. Which of a cell's points it is, a hash of the coordinates
-/// says: the octree depends on the points and their order, not on what fits into memory.
+/// A node with few points in its cube keeps them all. Any other node keeps one point for each cell
+/// of a grid, kSpan cells along a side; the rest go deeper. The nodes down to any depth are thus a
+/// cloud as even as the points allow. A hash of the coordinates chooses the point of a cell: the
+/// octree depends on the points and their order, not on how much fits into memory.
 ///
 /// Time O(points * depth). Memory: bytes_with().
 class OctreeBuilder {
  public:
   static constexpr unsigned kSpan = 128;
-  /// Nodes with at most so many points below and in them are leaves.
+  /// Nodes with at most this many points in and below them are leaves.
   static constexpr std::size_t kLeafPoints = std::size_t{1} << 15;
-  /// Points that a child gives to its parent at most, which so has eight times as many. Surfaces
-  /// have fewer; only clouds that fill space reach it.
+  /// Upper limit of the points that a child promotes to its parent, which gets at most eight times
+  /// as many. Surfaces promote fewer; only clouds that fill space reach the limit.
   static constexpr std::size_t kMostPromoted = std::size_t{1} << 14;
 
-  /// The most that is held with so many records in memory at once.
+  /// Upper bound of the memory held, in bytes, with `at_once` records in memory.
   static std::uint64_t bytes_with(std::size_t record_bytes, std::size_t at_once);
 
-  /// Takes a node and its records, in the order in which they were added; there may be none.
-  /// Children come before their parents.
+  /// Receives a node and its records, if any, in the order in which they were added. Children come
+  /// before their parents.
   using Write = std::function<void(const OctreeNode& node, std::span<const std::byte> records)>;
 
-  /// Records begin with x, y and z as int32. name, folder: of the temporary file.
-  /// at_once: the records in memory, of which results do not depend; kLeafPoints at least.
-  /// most_together: of points that the deepest node cannot part. threads: that work on what is in
-  /// memory; results do not depend on them either.
+  /// Records begin with x, y and z as int32. name: of the output, for messages. folder: for the
+  /// temporary file. at_once: the number of records in memory, at least kLeafPoints.
+  /// most_together: limit of the points in one of the deepest nodes. threads: how many work on the
+  /// records in memory. Results depend neither on at_once nor on threads.
   OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
                 std::size_t record_bytes, std::size_t at_once, std::uint64_t most_together,
                 unsigned threads = 1);
 
-  /// Throws: Error, if the disk is full above all.
+  /// Throws: Error, mostly if the disk is full.
   void add(std::span<const std::byte> records);
-  /// Once, after all points. The cube of `octree` is to enclose them. Throws: Error for more
-  /// points than `most_together` that the deepest node cannot part; what `write` throws.
+  /// Builds the nodes. Called once, after all points. The cube of `octree` must enclose them.
+  /// Throws: Error if one of the deepest nodes has more than `most_together` points; what `write`
+  /// throws.
   void build(const Octree& octree, const Lattice& lattice, const Write& write);
 
  private:
@@ -64,21 +65,21 @@ class OctreeBuilder {
   struct Subtree;
 
   [[nodiscard]] std::array<std::uint32_t, 3> cell_of(const std::byte* record) const;
-  /// With its number.
+  /// The record of an item, followed by its number.
   [[nodiscard]] std::span<const std::byte> record_of(const NodePoints& points,
                                                      const Item& item) const;
-  /// The records of a bucket, taken out of it, and what they are.
+  /// Takes the records out of a bucket and computes their items.
   NodePoints load(const OctreeNode& node, Bucket bucket);
   NodePoints build(const OctreeNode& node, Bucket bucket);
   NodePoints visit(const OctreeNode& node, std::span<Bucket> buckets);
   NodePoints build_in_memory(const OctreeNode& node, Bucket bucket);
   void sort(std::vector<Item>& items, unsigned depth);
-  /// The nodes where stop(node, items) is true.
+  /// Appends to `tasks` the topmost nodes where stop(node, items) is true.
   template <class Stop>
   void plan(const OctreeNode& node, std::span<const Item> items, const Stop& stop,
             std::vector<Subtree>& tasks) const;
-  /// The node's points once its descendants have theirs. Where stop(node, items) is true,
-  /// leaf(node, items) makes them.
+  /// Returns the node's points after its descendants have got theirs. Where stop(node, items) is
+  /// true, leaf(node, items) makes them.
   template <class Stop, class Leaf>
   NodePoints combine(const OctreeNode& node, std::span<const Item> items, const Stop& stop,
                      const Leaf& leaf, const Write& write) const;

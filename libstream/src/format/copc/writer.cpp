@@ -34,7 +34,7 @@ std::string_view text_of_bytes(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// The least cube around points in steps of a lattice, at their lowest corner.
+/// The smallest cube around the records' points, starting at their lowest corner.
 Octree cube_around(const LasRecords& records) {
   const Lattice& lattice = records.lattice();
   Box3 box;
@@ -50,7 +50,7 @@ Octree cube_around(const LasRecords& records) {
   Octree octree;
   double side = lattice.scale[0];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // A little more than the points, as sums of its numbers are rounded.
+    // Slightly more than the points need, because sums of the cube's numbers are rounded.
     const double rounding = 0x1p-50 * (std::abs(box.min[axis]) + std::abs(box.max[axis]));
     side = std::max(side, box.max[axis] - box.min[axis] + 4 * rounding);
   }
@@ -62,15 +62,15 @@ Octree cube_around(const LasRecords& records) {
   return octree;
 }
 
-/// What the writer's parts may take of its memory. Results do not depend on it.
+/// How the parts of the writer share its memory. Results do not depend on it.
 struct Shares {
   unsigned threads = 1;
   std::size_t at_once = OctreeBuilder::kLeafPoints;  ///< records
   std::uint64_t together = 0;                        ///< records at one place
 
-  /// The most that is held.
+  /// Upper bound of the memory held.
   [[nodiscard]] std::uint64_t bytes(std::size_t record_bytes) const {
-    // Records and their coded bytes; a thread's, and those that wait.
+    // Records and their coded bytes, of each thread and of a node that waits.
     const std::uint64_t node = 8 * OctreeBuilder::kMostPromoted * record_bytes * 8 / 5;
     return OctreeBuilder::bytes_with(record_bytes, at_once) +
            (threads > 1 ? threads + 1 : 1) * node;
@@ -84,7 +84,7 @@ Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t r
   for (shares.threads = std::max(1u, threads);
        shares.threads > 1 && shares.bytes(record_bytes) > memory_bytes; --shares.threads) {
   }
-  // A record at one place takes as much as one in memory at once, and is encoded with the others.
+  // A record at one place takes as much as any record in memory, and is encoded with the others.
   const std::uint64_t fixed = shares.bytes(record_bytes);
   const std::uint64_t room = memory_bytes - std::min(memory_bytes, fixed);
   const std::uint64_t each =
@@ -169,12 +169,12 @@ class CopcWriter final : public PointWriter {
   std::uint64_t writing_bytes() const override { return Shares{}.bytes(record_bytes()); }
 
  private:
-  /// GPS time in the point formats 6 to 8.
+  /// Offset of the GPS time in the point formats 6 to 8.
   static constexpr std::size_t kGpsTimeAt = 22;
 
   [[nodiscard]] std::size_t record_bytes() const { return records_.layout().record_bytes; }
 
-  /// The chunk of the next node that has points.
+  /// Writes the chunk of the next node that has points.
   void write_chunk(std::span<const std::byte> coded) {
     while (octree_.nodes[written_].points == 0) ++written_;
     OctreeNode& node = octree_.nodes[written_++];
@@ -182,7 +182,7 @@ class CopcWriter final : public PointWriter {
       throw Error({.file = path_,
                    .where = {},
                    .cause = counted(node.points, "point") +
-                            " in one place are more bytes than a node of COPC can have",
+                            " in one place take more bytes than a node of COPC can have",
                    .remedy = "leave them out, or write LAZ"});
     }
     node.offset = sink_.size();
@@ -214,12 +214,12 @@ class CopcWriter final : public PointWriter {
   laz::Vlr vlr_;
   Shares shares_;
   OctreeBuilder builder_;
-  Octree octree_;            ///< nodes as they come from the builder
-  std::size_t written_ = 0;  ///< of them
+  Octree octree_;            ///< nodes in the builder's order
+  std::size_t written_ = 0;  ///< how many of them have been written
   std::vector<laz::Chunk> chunks_;
   double first_time_ = std::numeric_limits<double>::infinity();
   double last_time_ = -std::numeric_limits<double>::infinity();
-  LazEncoders encoders_;  ///< last: it hands on to the others
+  LazEncoders encoders_;  ///< declared last: its callback uses the others
 };
 
 }  // namespace

@@ -21,7 +21,7 @@
 namespace terrace::stream {
 namespace {
 
-/// "D-X-Y-Z"; nullopt unless it names a node of an octree.
+/// Parses "D-X-Y-Z"; nullopt unless it names a node of an octree.
 std::optional<OctreeNode> node_of(std::string_view name) {
   OctreeNode node;
   const auto read = [&](std::uint32_t& value) {
@@ -42,14 +42,14 @@ std::optional<OctreeNode> node_of(std::string_view name) {
   return node;
 }
 
-/// Depth and place: a file of the hierarchy is named by the node that it begins with.
+/// Depth and place. A file of the hierarchy is named after its topmost node.
 using NodeKey = std::array<std::uint32_t, 4>;
 
 NodeKey key_of(const OctreeNode& node) {
   return {node.depth, node.place[0], node.place[1], node.place[2]};
 }
 
-/// What is known of the hierarchy so far.
+/// The part of the hierarchy read so far.
 struct EptReading {
   std::uint64_t points = 0;  ///< promised
   std::uint64_t found = 0;
@@ -70,7 +70,7 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
   bool number_unsigned(number_unsigned_t value) override {
     OctreeNode node = place();
     if (value == 0) return true;
-    // What is too much is so at once, whatever the sum would wrap to.
+    // Compared before adding, because the sum could overflow.
     if (value > reading_.points - reading_.found) {
       fail_ept(
           file_, "node " + name_,
@@ -107,7 +107,7 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
  private:
   [[noreturn]] bool refuse() const {
     fail_ept(file_, name_.empty() ? std::string() : "node " + in_quotes(name_),
-             "it does not hold the numbers of points of nodes");
+             "it does not hold the point counts of nodes");
   }
   [[nodiscard]] OctreeNode place() const {
     if (depth_ == 0) refuse();
@@ -127,7 +127,7 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
 std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
                                            std::uint64_t points) {
   const NodeKey root = key_of(OctreeNode{});
-  /// Some 800,000 nodes in one file; Entwine begins another after a few depths.
+  /// Enough for some 800,000 nodes; Entwine begins another file after a few depths.
   constexpr std::uint64_t kMostBytes = 16u << 20;
   EptReading reading{.points = points};
   reading.seen.insert(root);

@@ -28,7 +28,7 @@ namespace {
 struct KnownDimension {
   std::string_view ept, name;
 };
-// PDAL's names, which Entwine has too, and laspy's, which are those of LAS here.
+// PDAL's names, which Entwine uses too, and laspy's names, which we use for LAS.
 constexpr std::array<KnownDimension, 19> kKnown{{{"Intensity", "intensity"},
                                                  {"ReturnNumber", "return_number"},
                                                  {"NumberOfReturns", "number_of_returns"},
@@ -89,7 +89,7 @@ class EptMetadataReader {
  private:
   using Json = nlohmann::json;
 
-  /// A schema takes a hundred bytes a dimension, WKT a few kilobytes.
+  /// A schema takes about a hundred bytes per dimension, WKT a few kilobytes.
   static constexpr std::uint64_t kMostBytes = 8u << 20;
   static constexpr std::size_t kMostRecordBytes = 65535;
   static constexpr std::size_t kMostDimensions = 4096;
@@ -214,13 +214,13 @@ class EptMetadataReader {
       if (stream.record_bytes > kMostRecordBytes) fail("schema", "has too many dimensions");
       if (name.size() == 1 && name[0] >= 'X' && name[0] <= 'Z') {
         const auto axis = static_cast<std::size_t>(name[0] - 'X');
-        if (found[axis]) fail(where, "is " + name + " once more");
+        if (found[axis]) fail(where, "repeats " + name);
         found[axis] = true;
         stream.coordinate_offsets[axis] = offset;
         place(channel, axis, info);
         continue;
       }
-      if (!names.insert(channel.name).second) fail(where, "is " + name + " once more");
+      if (!names.insert(channel.name).second) fail(where, "repeats " + name);
       if (channel.name.empty()) fail(where, "has no name");
       stream.fields.push_back({.channel = channel, .offset = offset});
       info.attributes.push_back(channel);
@@ -272,7 +272,7 @@ void fail_ept(const std::string& file, std::string where, std::string cause) {
   throw Error({.file = file,
                .where = std::move(where),
                .cause = std::move(cause),
-               .remedy = "the data set is damaged or not EPT 1.0: get it anew"});
+               .remedy = "the data set is damaged or not EPT 1.0: download it again"});
 }
 
 EptMetadata read_ept_metadata(const std::string& file) { return EptMetadataReader(file).read(); }

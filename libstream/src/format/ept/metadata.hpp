@@ -31,11 +31,11 @@ struct EptMetadata {
   Crs crs;
 };
 
-/// Throws the Error of a damaged dataset.
+/// Throws: Error with the remedy for a damaged data set.
 [[noreturn]] void fail_ept(const std::string& file, std::string where, std::string cause);
 
-/// Reads ept.json. Attributes that LAS also has are named as there. Throws: Error unless it has
-/// version 1, with X, Y and Z of known types.
+/// Reads ept.json. Attributes that LAS also has get the names that we use for LAS. Throws: Error
+/// unless the file has version 1 and X, Y and Z of known types.
 EptMetadata read_ept_metadata(const std::string& file);
 
 }  // namespace terrace::stream

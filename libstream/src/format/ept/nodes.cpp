@@ -24,16 +24,16 @@ namespace {
 
 [[noreturn]] void fail_count(const std::string& file, std::uint64_t points,
                              const std::string& found) {
-  fail_ept(file, {}, "the hierarchy counts " + counted(points, "point") + ", the file " + found);
+  fail_ept(file, {}, "the hierarchy counts " + counted(points, "point") + ", but the file " + found);
 }
 
-/// Records that zstandard has compressed, in one frame or several.
+/// Records compressed with Zstandard, in one frame or several.
 class ZstdRecords final : public RecordReader {
  public:
   ZstdRecords(Input& input, std::size_t record_bytes, std::uint64_t points)
       : input_(&input), record_bytes_(record_bytes), points_(points), left_(points) {
     if (stream_ == nullptr) throw std::bad_alloc();
-    // What levels beyond 19 ask for; a damaged frame may ask for any.
+    // Compression levels above 19 need this much; a damaged frame may claim any size.
     constexpr int kLargestWindow = 25;
     ZSTD_DCtx_setParameter(stream_.get(), ZSTD_d_windowLogMax, kLargestWindow);
   }
@@ -44,7 +44,7 @@ class ZstdRecords final : public RecordReader {
         {wanted, left_, std::max<std::size_t>(1, kPieceBytes / record_bytes_)});
     records_.resize(static_cast<std::size_t>(records) * record_bytes_);
     if (decode(records_) < records_.size()) {
-      fail_count(input_->name(), points_, "ends before");
+      fail_count(input_->name(), points_, "ends earlier");
     }
     left_ -= records;
     std::byte more{};
@@ -57,7 +57,7 @@ class ZstdRecords final : public RecordReader {
     void operator()(ZSTD_DStream* stream) const { ZSTD_freeDStream(stream); }
   };
 
-  /// How many of the bytes are there.
+  /// Decodes to `room`. Returns the number of bytes decoded, fewer only at the end of the file.
   std::size_t decode(std::span<std::byte> room) {
     constexpr std::size_t kWindowBytes = 128u << 10;
     ZSTD_outBuffer out{.dst = room.data(), .size = room.size(), .pos = 0};
@@ -85,7 +85,7 @@ class ZstdRecords final : public RecordReader {
   std::uint64_t points_, left_;
   std::unique_ptr<ZSTD_DStream, Free> stream_{ZSTD_createDStream()};
   std::vector<std::byte> records_;
-  bool ended_ = true;  ///< a frame, and no other has begun
+  bool ended_ = true;  ///< not within a frame
 };
 
 /// What all nodes share.
@@ -106,7 +106,7 @@ class NodeReader final : public PartReader {
     const std::string file = ept_node_file(nodes_->folder, nodes_->data, node).string();
     records_.reset();
     constexpr std::size_t kWindowBytes = 256u << 10;
-    // Records of numbers may begin like anything.
+    // Binary records may begin like gzip by chance.
     input_.emplace(file, std::stop_token(), kWindowBytes, Input::Packed::as_it_is);
     switch (nodes_->data) {
       case EptData::laszip:
@@ -146,7 +146,7 @@ class NodeReader final : public PartReader {
     const LasHeader& first = nodes_->first;
     if (header.point_format != first.point_format || header.record_bytes != first.record_bytes ||
         header.scale != first.scale || header.offset != first.offset) {
-      fail_ept(file, "header", "its point format, scale or offset is not that of the other nodes");
+      fail_ept(file, "header", "its point format, scale or offset differs from the other nodes");
     }
     if (header.compressed) {
       records_ = open_laz_records(*input_, file, header, SourceOptions{});
@@ -174,7 +174,7 @@ RecordParts ept_parts(const std::filesystem::path& folder, const EptMetadata& me
                       const LasHeader& first) {
   RecordParts parts{.record_bytes = metadata.stream.record_bytes};
   for (const OctreeNode& node : metadata.octree.nodes) {
-    // Coded points are held as one where LAZ codes them in layers.
+    // LAZ coded in layers holds all coded points of a node at once.
     const bool is_laz = metadata.data == EptData::laszip;
     parts.parts.push_back(
         {.points = node.points, .bytes = is_laz ? node.points * parts.record_bytes : 0});

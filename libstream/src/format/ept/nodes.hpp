@@ -13,9 +13,9 @@ namespace terrace::stream {
 std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData data,
                                     const OctreeNode& node);
 
-/// The nodes of `metadata.octree`, in its order. first: the header of a node of LAZ, with which all
-/// others must agree. A reader holds a window of the node's file and the memory of its decoder; it
-/// refuses a file that does not have exactly the points that the hierarchy counts.
+/// One part for each node of `metadata.octree`, in its order. first: the header of one LAZ node,
+/// with which all others must agree. A reader holds a window of the node's file and the memory of
+/// its decoder. It refuses a file that does not have exactly as many points as the hierarchy says.
 RecordParts ept_parts(const std::filesystem::path& folder, const EptMetadata& metadata,
                       const LasHeader& first);
 

@@ -29,7 +29,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Takes the records from the header of the node, and the CRS where ept.json has none.
+/// Takes the record layout from the header of a node, and the CRS if ept.json has none.
 LasHeader read_node_header(const std::filesystem::path& file, EptMetadata& metadata) {
   Input input(file.string());
   std::vector<std::string> comments;
@@ -50,7 +50,7 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   Octree& octree = metadata.octree;
   octree.nodes = read_ept_hierarchy(folder, metadata.points);
   if (const OctreeNode* const twice = octree.arrange()) {
-    fail_ept((folder / "ept-hierarchy").string(), "node " + name_of(*twice), "is there twice");
+    fail_ept((folder / "ept-hierarchy").string(), "node " + name_of(*twice), "is listed twice");
   }
   LasHeader header;
   if (metadata.data == EptData::laszip && !octree.nodes.empty()) {
@@ -86,7 +86,8 @@ std::unique_ptr<PointSource> open_ept(std::span<const std::string> files,
   });
 }
 
-/// An object that has what no other JSON has, near its beginning as its names are in order.
+/// True for a JSON object with a member that only EPT has. Its names are sorted, so the member is
+/// near the beginning.
 bool recognise_ept(std::span<const std::byte> head) {
   std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
