@@ -28,7 +28,7 @@ using Json = nlohmann::ordered_json;
 struct Walked {
   std::vector<Point3> positions;
   std::vector<std::vector<Point3>> lines;
-  std::uint64_t single = 0;  ///< positions in no line
+  std::uint64_t single = 0;  ///< positions outside lines
 };
 
 Point3 position_of(const Json& json) {
@@ -244,7 +244,7 @@ class Maker {
   std::mt19937_64 random_;
 };
 
-TEST_F(GeoJson, GivesWhatAWalkFinds) {
+TEST_F(GeoJson, MatchesAWalkOverTheDocument) {
   constexpr std::uint64_t kSeed = 20261123;
   std::cout << "seed " << kSeed << '\n';
   for (std::uint64_t round = 0; round < 60; ++round) {
@@ -273,7 +273,7 @@ TEST_F(GeoJson, GivesWhatAWalkFinds) {
   }
 }
 
-TEST_F(GeoJson, ALineOfSeveralPiecesIsWhole) {
+TEST_F(GeoJson, PiecesJoinToTheWholeLine) {
   for (const int count : {2, 3, 4, 5, 7, 8, 1000}) {
     Json line{{"type", "LineString"}, {"coordinates", Json::array()}};
     for (int i = 0; i < count; ++i) line["coordinates"].push_back({i, i * i, 0.5});
@@ -283,7 +283,7 @@ TEST_F(GeoJson, ALineOfSeveralPiecesIsWhole) {
   }
 }
 
-TEST_F(GeoJson, LinesOfSeveralFilesAreNumberedOn) {
+TEST_F(GeoJson, NumbersLinesOfSeveralFilesConsecutively) {
   const std::string two =
       R"({"type":"MultiLineString","coordinates":[[[0,0],[1,1]],[[2,2],[3,3],[4,4]]]})";
   const std::vector<std::string> files{put("a.geojson", two), put("b.geojson", two),
@@ -294,7 +294,7 @@ TEST_F(GeoJson, LinesOfSeveralFilesAreNumberedOn) {
   EXPECT_EQ(points_of(files).size(), 15u);
 }
 
-TEST_F(GeoJson, SaysWhereItsCoordinatesLie) {
+TEST_F(GeoJson, ReadsTheCrs) {
   const auto crs_of = [&](const std::string& member) {
     const std::string file =
         put("crs.geojson", "{" + member + R"("type":"FeatureCollection","features":[]})");
@@ -323,7 +323,7 @@ TEST_F(GeoJson, SaysWhereItsCoordinatesLie) {
   EXPECT_EQ(source->info().crs.epsg, 3857);
 }
 
-TEST_F(GeoJson, IsRefusedWhereItIsNone) {
+TEST_F(GeoJson, RejectsInvalidGeoJson) {
   const auto line = [](const std::string& coordinates) {
     return R"({"type":"LineString","coordinates":)" + coordinates + "}";
   };
@@ -347,13 +347,13 @@ TEST_F(GeoJson, IsRefusedWhereItIsNone) {
                "the type 'Arc'");
   expect_error(R"({"type":"Feature","geometry":{"coordinates":[]}})", "has no type");
   expect_error(R"({"type":"Feature","geometry":5})", "a number");
-  expect_error(R"({"type":"Point","features":[]})", "no FeatureCollection");
+  expect_error(R"({"type":"Point","features":[]})", "not a FeatureCollection");
   expect_error(R"({"type":"FeatureCollection","features":[{"type":"Feature","geometry":null}})",
                "comma");
-  expect_error(R"({"type":"FeatureCollection","features":[,]})", "a feature must begin");
-  expect_error(R"({"type":"FeatureCollection","features":[7]})", "a feature must begin");
+  expect_error(R"({"type":"FeatureCollection","features":[,]})", "a feature is expected");
+  expect_error(R"({"type":"FeatureCollection","features":[7]})", "a feature is expected");
   expect_error(R"({"type":"FeatureCollection","features":[],"features":[]})", "second list");
-  expect_error(line("[[0,0],[1,1]]") + "x", "an object must begin");
+  expect_error(line("[[0,0],[1,1]]") + "x", "an object is expected");
   expect_error(
       R"({"type":"Feature","geometry":{"type":"LineString","coordinates":[],"coordinates":[]}})",
       "twice");

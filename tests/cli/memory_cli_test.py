@@ -235,7 +235,7 @@ class LongFeatureTest(MemoryCase):
             with self.subTest(args=args):
                 code, out, err, peak = run(*args, '--memory', '64M')
                 self.assertEqual((code, out), (1, ''), err)
-                self.assertIn('give it more --memory', err)
+                self.assertIn('raise --memory', err)
                 self.assertLessEqual(peak, 64 * MIB)
                 self.within(256, *args)
 

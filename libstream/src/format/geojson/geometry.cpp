@@ -26,7 +26,7 @@ constexpr std::array<GeometryType, 6> kGeometryTypes{{{"Point", 1, false},
                                                       {"Polygon", 3, true},
                                                       {"MultiPolygon", 4, true}}};
 
-/// Takes positions as they are parsed: of a feature only what its geometry holds is kept.
+/// Takes positions as they are parsed, so that only the geometry of a feature is held in memory.
 class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
  public:
   GeometryTaker(const std::string& file, std::uint64_t offset, GeoJsonGeometry& geometry)
@@ -114,7 +114,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     if (!left_out()) refuse("a truth value");
     return true;
   }
-  bool binary(binary_t&) override { return true; }  // no text has it
+  bool binary(binary_t&) override { return true; }  // text has no binary values
   bool parse_error(std::size_t byte, const std::string&,
                    const nlohmann::detail::exception& error) override {
     offset_ += byte > 0 ? byte - 1 : 0;
@@ -122,7 +122,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
-  /// What the value that comes next is for; other: nothing that counts.
+  /// The role of the next value; other: ignored.
   enum class Awaited : std::uint8_t { other, type, coordinates, object, list, item };
   static constexpr std::size_t kMostObjects = 16, kMostBrackets = 4;
 
@@ -130,15 +130,15 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     std::string type;
     bool has_coordinates = false;
     bool in_list = false;  ///< between the brackets of its list of objects
-    std::size_t position_depth =
-        0;                        ///< brackets around the numbers of its positions; 0: no position
-    std::size_t empty_depth = 0;  ///< brackets around the deepest nothing
+    /// Brackets around the numbers of its positions; 0: it has no positions.
+    std::size_t position_depth = 0;
+    std::size_t empty_depth = 0;  ///< brackets down to the deepest empty one
     std::size_t first_run = 0;
   };
   struct Bracket {
     std::size_t numbers = 0;
     std::size_t first_position = 0;
-    bool brackets = false;        ///< within
+    bool brackets = false;        ///< has brackets directly within
     std::uint8_t dimensions = 2;  ///< of positions directly within
   };
 
@@ -205,9 +205,9 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
       return;
     }
     if (!object.has_coordinates) fail("a " + object.type + " has no coordinates");
-    const bool has_nothing_for_a_position = type->depth > 1 && object.empty_depth >= type->depth;
+    const bool has_empty_position = type->depth > 1 && object.empty_depth >= type->depth;
     if ((object.position_depth != 0 && object.position_depth != type->depth) ||
-        has_nothing_for_a_position) {
+        has_empty_position) {
       fail("the coordinates are not those of a " + object.type);
     }
     if (!type->lines) return;
@@ -218,14 +218,12 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     }
   }
 
-  [[noreturn]] void refuse(const std::string& what) const {
-    fail(what + " stands where it means nothing");
-  }
+  [[noreturn]] void refuse(const std::string& what) const { fail(what + " is not allowed here"); }
   [[noreturn]] void fail(const std::string& cause) const {
     throw Error({.file = file_,
                  .where = "the feature at byte " + std::to_string(offset_),
                  .cause = cause,
-                 .remedy = "the file is damaged or no GeoJSON; write it anew, e.g. with ogr2ogr"});
+                 .remedy = "the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr"});
   }
 
   const std::string& file_;
@@ -233,8 +231,8 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   GeoJsonGeometry& geometry_;
   std::vector<Object> objects_;
   Awaited awaited_ = Awaited::other;
-  std::size_t left_out_ = 0;  ///< brackets and braces that are open in what does not count
-  std::size_t depth_ = 0;     ///< brackets that are open in coordinates
+  std::size_t left_out_ = 0;  ///< open brackets and braces of an ignored value
+  std::size_t depth_ = 0;     ///< open brackets of coordinates
   std::array<Bracket, kMostBrackets> brackets_{};
   Point3 position_{};
   std::vector<GeoJsonGeometry::Line> runs_;

@@ -21,7 +21,7 @@ struct GeoJsonGeometry {
   };
 
   std::vector<Point3> positions;  ///< missing heights are 0
-  std::vector<Line> lines;        ///< positions in no line are single points
+  std::vector<Line> lines;        ///< positions outside lines are single points
 
   void clear() {
     positions.clear();
@@ -29,9 +29,9 @@ struct GeoJsonGeometry {
   }
 };
 
-/// Appends the geometries of a GeoJSON object, however nested in collections. Properties, and
-/// numbers beyond the third of a position, are ignored. item: the object's text, from byte `offset`
-/// of `file` on, for messages. Throws: Error.
+/// Appends the geometries of a GeoJSON object, including those in nested collections. Properties,
+/// and numbers beyond the third of a position, are ignored. item: the object's text, which begins
+/// at byte `offset` of `file`, for messages. Throws: Error.
 void append_geometry(std::string_view item, const std::string& file, std::uint64_t offset,
                      GeoJsonGeometry& geometry);
 

@@ -25,8 +25,8 @@ Crs longitude_and_latitude() {
           .geo_keys = {}};
 }
 
-/// Of "EPSG:2056", "urn:ogc:def:crs:EPSG::2056" and "urn:ogc:def:crs:OGC:1.3:CRS84"; nothing for
-/// other names.
+/// The CRS of names such as "EPSG:2056", "urn:ogc:def:crs:EPSG::2056" and
+/// "urn:ogc:def:crs:OGC:1.3:CRS84"; nullopt for other names.
 std::optional<Crs> crs_named(std::string_view name) {
   if (name.ends_with("CRS84")) return longitude_and_latitude();
   if (name.find("EPSG") == std::string_view::npos) return std::nullopt;
@@ -56,18 +56,18 @@ void GeoJsonItems::fail(const std::string& cause, std::size_t ahead) const {
   throw Error({.file = input_->name(),
                .where = "byte " + std::to_string(input_->offset() + ahead),
                .cause = cause,
-               .remedy = "the file is damaged or no GeoJSON; write it anew, e.g. with ogr2ogr"});
+               .remedy = "the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr"});
 }
 
-/// The byte at a place of the window, which grows for it; 0 at the end of the input.
+/// The byte at a position of the window, which grows as needed; 0 at the end of the input.
 char GeoJsonItems::at(std::size_t place) {
   window_ = input_->window();
   if (place < window_.size()) return window_[place];
   if (place >= most_bytes_) {
     throw Error({.file = input_->name(),
                  .where = "byte " + std::to_string(input_->offset()),
-                 .cause = "a feature of more than " + std::to_string(most_bytes_ >> 20) + " MiB",
-                 .remedy = "give it more `memory_bytes`, or cut its lines"});
+                 .cause = "a feature has more than " + std::to_string(most_bytes_ >> 20) + " MiB",
+                 .remedy = "raise `memory_bytes`, or split the feature's lines"});
   }
   window_ = input_->fill(std::min(most_bytes_, std::max(place + 1, 2 * window_.size())));
   return place < window_.size() ? window_[place] : '\0';
@@ -81,8 +81,8 @@ void GeoJsonItems::skip_white_space() {
 }
 
 GeoJsonItems::Stop GeoJsonItems::scan_object(std::size_t depth, bool stop_at_list) {
-  std::size_t name_begin = 0, name_end = 0;  // of the last string one level down: a key, maybe
-  const bool behind_list = depth > 0;
+  std::size_t name_begin = 0, name_end = 0;  // of the last string at depth 1: perhaps a key
+  const bool after_list = depth > 0;
   for (std::size_t i = 0;; ++i) {
     switch (at(i)) {
       case '"': {
@@ -101,7 +101,7 @@ GeoJsonItems::Stop GeoJsonItems::scan_object(std::size_t depth, bool stop_at_lis
       case '[': {
         const std::string_view name = window_.substr(name_begin, name_end - name_begin);
         if (stop_at_list && depth == 1 && (name == "features" || name == "geometries")) {
-          if (behind_list) fail("a second list of features", i);
+          if (after_list) fail("has a second list of features", i);
           return {.at = i + 1, .in_list = true};
         }
         ++depth;
@@ -133,7 +133,7 @@ void GeoJsonItems::take_members(std::string_view text, bool before) {
   const auto type = members.find("type");
   if (before && type != members.end() && *type != "FeatureCollection" &&
       *type != "GeometryCollection") {
-    fail("has features, and is no FeatureCollection");
+    fail("has features but is not a FeatureCollection");
   }
   const auto crs = members.find("crs");
   if (!wants_crs_ || crs == members.end()) return;
@@ -145,11 +145,11 @@ void GeoJsonItems::take_members(std::string_view text, bool before) {
     named = crs_named(crs->at(name).get_ref<const std::string&>());
   }
   if (before) {
-    // What it is called is kept, so that the user can say what it is.
+    // Keep an unknown name for messages, so that the user can tell which CRS it is.
     crs_ = named ? *named : Crs{};
     if (!named) crs_.name = in_quotes(crs->dump());
   } else if (!named || *named != crs_) {
-    fail("its crs stands behind its features, which is too late: move it before \"features\"");
+    fail("its crs follows its features, which is too late: move it before \"features\"");
   }
 }
 
@@ -174,12 +174,12 @@ void GeoJsonItems::advance() {
         continue;
       }
       if (!first_of_list_) {
-        if (at(0) != ',') fail("a comma must stand between features");
+        if (at(0) != ',') fail("a comma is missing between features");
         input_->consume(1);
         skip_white_space();
       }
       first_of_list_ = false;
-      if (at(0) != '{') fail("a feature must begin here");
+      if (at(0) != '{') fail("a feature is expected here");
       found_ = scan_object(0, false).at;
       return;
     }
@@ -188,7 +188,7 @@ void GeoJsonItems::advance() {
       continue;
     }
     if (window_.empty()) return;
-    if (at(0) != '{') fail("is not GeoJSON: an object must begin here");
+    if (at(0) != '{') fail("is not GeoJSON: an object is expected here");
     const Stop stop = scan_object(0, true);
     if (!stop.in_list) {
       found_ = stop.at;

@@ -12,8 +12,8 @@
 
 namespace terrace::stream {
 
-/// Cuts GeoJSON (RFC 7946) into the texts of its features, without parsing them: those of a
-/// FeatureCollection or GeometryCollection, and of consecutive objects, as in newline-delimited
+/// Splits GeoJSON (RFC 7946) into the texts of its features, without parsing them: the features of
+/// a FeatureCollection or GeometryCollection, or consecutive objects, as in newline-delimited
 /// GeoJSON and GeoJSON text sequences (RFC 8142). Holds one feature at a time.
 class GeoJsonItems {
  public:
@@ -27,8 +27,8 @@ class GeoJsonItems {
   [[nodiscard]] std::optional<std::string_view> next();
   /// Offset in the file of the object last returned by next().
   [[nodiscard]] std::uint64_t offset() const { return input_->offset(); }
-  /// The member "crs" of the collection (GeoJSON of 2008), otherwise longitude and latitude of WGS
-  /// 84. A member after the features comes too late.
+  /// The collection's member "crs" (GeoJSON of 2008), otherwise longitude and latitude of WGS 84.
+  /// A different member after the features is an error, because it comes too late.
   [[nodiscard]] const Crs& crs() const { return crs_; }
 
  private:
@@ -42,7 +42,7 @@ class GeoJsonItems {
   void skip_white_space();
   void advance();
   void leave_list();
-  /// depth: 0 if the object's brace is still to come.
+  /// depth: 0 if the object's opening brace is next, 1 if it has been read.
   Stop scan_object(std::size_t depth, bool stop_at_list);
   void take_members(std::string_view text, bool before);
   [[noreturn]] void fail(const std::string& cause, std::size_t ahead = 0) const;

@@ -23,7 +23,7 @@
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 
-/// The positions of GeoJSON as points, and its lines as segments or polylines.
+/// Reads the positions of GeoJSON as points, or its lines as segments or polylines.
 
 namespace terrace::stream {
 namespace {
@@ -34,7 +34,7 @@ constexpr std::array kAxes{"x", "y", "z"};
   throw Error({.file = file,
                .where = {},
                .cause = "has more than 4,294,967,295 lines",
-               .remedy = "make several stores"});
+               .remedy = "build several stores"});
 }
 
 class GeoJsonSource final : public PointSource {
@@ -88,7 +88,8 @@ class GeoJsonSource final : public PointSource {
   }
 
  private:
-  /// Of the memory a quarter: what a feature's text holds takes no more again, and vectors grow.
+  /// A quarter of the memory for a feature's text: its parsed geometry takes at most as much, and
+  /// vectors have spare capacity.
   static std::size_t item_bytes(const SourceOptions& options) {
     constexpr std::uint64_t kLeast = 1u << 20;
     return static_cast<std::size_t>(std::max(kLeast, options.memory_bytes / 4));
@@ -131,7 +132,7 @@ class GeoJsonSource final : public PointSource {
     if (line_ < geometry_.lines.size()) vertex_ = geometry_.lines[line_].begin;
   }
 
-  /// A piece ends with the vertex that the next one begins with.
+  /// Appends the next piece of a line, which begins with the last vertex of the previous one.
   void append_piece(PointBlock& block) {
     const GeoJsonGeometry::Line& line = geometry_.lines[line_];
     const std::size_t count = std::min(most_vertices_, line.end - vertex_);
@@ -157,18 +158,17 @@ class GeoJsonSource final : public PointSource {
   GeoJsonItems items_;
   std::size_t block_points_, most_vertices_;
   SourceInfo info_;
-  GeoJsonGeometry geometry_;  ///< of the feature that is being delivered
+  GeoJsonGeometry geometry_;  ///< of the feature being delivered
   std::size_t line_ = 0, vertex_ = 0;
-  std::uint32_t lines_ = 0, part_ = 0;  ///< of all lines so far; of the pieces of this one
+  std::uint32_t lines_ = 0, part_ = 0;  ///< lines finished so far; number of the next piece
   std::vector<std::byte> record_;
   Progress progress_;
 };
 
-/// Lines of several files, numbered on from file to file: those of each begin with part 0 of line
-/// 0.
-class NumberedOn final : public PointSource {
+/// Numbers the lines of several files consecutively. A new file begins with part 0 of line 0.
+class NumberedLines final : public PointSource {
  public:
-  explicit NumberedOn(std::unique_ptr<PointSource> files)
+  explicit NumberedLines(std::unique_ptr<PointSource> files)
       : files_(std::move(files)),
         line_at_(files_->info().attribute_offset(files_->info().attributes.size() - 4)) {}
 
@@ -221,7 +221,7 @@ std::unique_ptr<PointSource> open_geojson(std::span<const std::string> files,
                                           const SourceOptions& options) {
   auto source = open_in_turn(files, options, &open_one_geojson);
   if (files.size() == 1 || options.entities == Entities::points) return source;
-  return std::make_unique<NumberedOn>(std::move(source));
+  return std::make_unique<NumberedLines>(std::move(source));
 }
 
 }  // namespace
