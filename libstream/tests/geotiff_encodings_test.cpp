@@ -27,7 +27,7 @@ constexpr std::array<ScalarType, 10> kTypes{
 
 bool is_float(ScalarType type) { return type == ScalarType::f32 || type == ScalarType::f64; }
 
-/// Samples with long runs and noise, of any bits for integers, finite for floats.
+/// Samples with long runs and noise: any bits for integers, finite floats.
 std::vector<std::byte> random_samples(std::mt19937_64& random, ScalarType type, std::size_t count) {
   std::vector<std::byte> bytes(count * size_of(type));
   std::uint64_t value = random();
@@ -56,7 +56,7 @@ std::vector<std::byte> band_of(const std::vector<std::byte>& samples, const Tiff
   return bytes;
 }
 
-/// Reads the file as a whole, in random windows with little memory, and as points.
+/// Checks the file read as a whole, in random windows with little memory, and as points.
 void expect_samples(const std::string& path, const TiffSpec& spec,
                     const std::vector<std::byte>& expected, int band, std::mt19937_64& random) {
   const std::size_t size = size_of(spec.type);
@@ -137,7 +137,7 @@ void round_trip(TiffSpec spec, std::uint64_t seed) {
   }
 }
 
-TEST(GeoTiffEncodings, EveryTypeAndCodecReadsBack) {
+TEST(GeoTiffEncodings, ReadsEveryTypeAndCodec) {
   std::uint64_t seed = 1;
   for (const ScalarType type : kTypes) {
     for (const int codec :
@@ -181,7 +181,7 @@ TEST(GeoTiffEncodings, EveryTypeAndCodecReadsBack) {
   }
 }
 
-TEST(GeoTiffEncodings, OneCompressedStripLargerThanMemoryIsReadByRows) {
+TEST(GeoTiffEncodings, ReadsACompressedStripLargerThanMemoryByRows) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   TiffSpec spec;
@@ -206,9 +206,9 @@ TEST(GeoTiffEncodings, OneCompressedStripLargerThanMemoryIsReadByRows) {
   EXPECT_EQ(points, values.size());
 }
 
-/// Large strips are read row by row, in windows in any order; and the memory reported for a file
+/// Large strips are read row by row, in windows in any order, and the memory reported for the file
 /// does not include the decoded strip.
-TEST(GeoTiffEncodings, ALargeStripIsNotHeldDecoded) {
+TEST(GeoTiffEncodings, DoesNotHoldALargeStripDecoded) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   for (const int codec : {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_PACKBITS}) {
@@ -237,7 +237,7 @@ TEST(GeoTiffEncodings, ALargeStripIsNotHeldDecoded) {
   }
 }
 
-TEST(GeoTiffEncodings, ATileLargerThanMemoryIsRefusedWithItsNeeds) {
+TEST(GeoTiffEncodings, RejectsATileLargerThanMemoryAndStatesItsSize) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   TiffSpec spec;
@@ -254,7 +254,7 @@ TEST(GeoTiffEncodings, ATileLargerThanMemoryIsRefusedWithItsNeeds) {
   EXPECT_NO_THROW(open_geotiff(path));
 }
 
-/// Cells without data, where `hidden` is 1 for the cells that a mask leaves out.
+/// Checks a mask: cells for which `hidden` is 1 have no data.
 void expect_hidden(const std::string& path, const std::vector<std::uint8_t>& hidden) {
   const WholeRaster whole = read_whole(*open_geotiff(path));
   ASSERT_EQ(whole.cells(), hidden.size());
@@ -264,7 +264,7 @@ void expect_hidden(const std::string& path, const std::vector<std::uint8_t>& hid
   }
 }
 
-TEST(GeoTiffEncodings, AMaskLeavesCellsOut) {
+TEST(GeoTiffEncodings, MaskedCellsHaveNoData) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   TiffSpec spec;
@@ -296,7 +296,7 @@ TEST(GeoTiffEncodings, AMaskLeavesCellsOut) {
   expect_hidden(path, hidden);
 }
 
-TEST(GeoTiffEncodings, AMaskOfAnotherSizeIsRefused) {
+TEST(GeoTiffEncodings, RejectsAMaskOfAnotherSize) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   TiffSpec spec;
@@ -307,7 +307,7 @@ TEST(GeoTiffEncodings, AMaskOfAnotherSizeIsRefused) {
   EXPECT_THROW(open_geotiff(path), Error);
 }
 
-/// Packs unsigned numbers of `bits` bits, each row starting at a byte, from the highest bit on.
+/// Packs unsigned numbers of `bits` bits, highest bit first; each row starts at a byte.
 std::vector<std::uint8_t> packed(const std::vector<std::uint32_t>& values, std::size_t columns,
                                  unsigned bits) {
   std::vector<std::uint8_t> out;
@@ -326,7 +326,7 @@ std::vector<std::uint8_t> packed(const std::vector<std::uint32_t>& values, std::
   return out;
 }
 
-TEST(GeoTiffEncodings, IntegersOfOddWidths) {
+TEST(GeoTiffEncodings, ReadsIntegersOfOddWidths) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   std::mt19937_64 random(7);
@@ -363,7 +363,7 @@ TEST(GeoTiffEncodings, IntegersOfOddWidths) {
   }
 }
 
-TEST(GeoTiffEncodings, OddWidthsAreWhatGdalWrites) {
+TEST(GeoTiffEncodings, ReadsOddWidthsThatGdalWrites) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   const TempFolder folder;
   const std::string from = (folder.path() / "a.tif").string();
@@ -371,7 +371,7 @@ TEST(GeoTiffEncodings, OddWidthsAreWhatGdalWrites) {
   std::mt19937_64 random(9);
   constexpr std::uint32_t kColumns = 21, kRows = 19, kBands = 2;
   for (int round = 0; round < 30 / TERRACE_TEST_SHARE; ++round) {
-    // 24 bits are what libtiff swaps.
+    // libtiff swaps samples of 24 bits.
     const unsigned bits = round % 3 == 0 ? 24 : 1 + static_cast<unsigned>(random() % 31);
     std::vector<std::uint32_t> values(std::size_t{kColumns} * kRows * kBands);
     for (auto& v : values) v = static_cast<std::uint32_t>(random()) & ((1u << bits) - 1);
@@ -403,7 +403,7 @@ TEST(GeoTiffEncodings, OddWidthsAreWhatGdalWrites) {
   }
 }
 
-/// The definition of IEEE 754's formats, in powers of two.
+/// The definition of the IEEE 754 formats, in powers of two.
 double small_float(std::uint32_t bits, int exponent_bits, int mantissa_bits) {
   const std::uint32_t mantissa = bits & ((1u << mantissa_bits) - 1);
   const int most = (1 << exponent_bits) - 1;
@@ -417,7 +417,7 @@ double small_float(std::uint32_t bits, int exponent_bits, int mantissa_bits) {
   return sign * std::ldexp(mantissa + (1u << mantissa_bits), exponent - bias - mantissa_bits);
 }
 
-TEST(GeoTiffEncodings, EverySmallFloatWidensExactly) {
+TEST(GeoTiffEncodings, WidensEverySmallFloatExactly) {
   for (std::uint32_t bits = 0; bits < 0x10000; ++bits) {
     const double expected = small_float(bits, 5, 10);
     const auto got = static_cast<double>(float_from_16(static_cast<std::uint16_t>(bits)));

@@ -37,7 +37,7 @@ void set_keys(TIFF* tiff, std::vector<std::uint16_t> keys, const char* ascii = n
   if (ascii != nullptr) TIFFSetField(tiff, 34737, ascii);
 }
 
-TEST(GeoReference, CellsStandForAreasUnlessPoints) {
+TEST(GeoReference, PixelsAreAreasUnlessTheKeysSayPoints) {
   const auto place = placed_at(100, 200, 10);
   EXPECT_EQ(info_with(place).world, (WorldTransform{{10, 0, 105, 0, -10, 195}}));
   const auto point = [&](TIFF* tiff) {
@@ -47,7 +47,7 @@ TEST(GeoReference, CellsStandForAreasUnlessPoints) {
   EXPECT_EQ(info_with(point).world, (WorldTransform{{10, 0, 100, 0, -10, 200}}));
 }
 
-TEST(GeoReference, ATiePointInsideTheRaster) {
+TEST(GeoReference, ReadsATiePointInsideTheRaster) {
   const auto set = [](TIFF* tiff) {
     const std::array<double, 3> scale{2, 4, 0};
     const std::array<double, 6> tie{3, 1, 0, 100, 200, 0};
@@ -57,7 +57,7 @@ TEST(GeoReference, ATiePointInsideTheRaster) {
   EXPECT_EQ(info_with(set).world, (WorldTransform{{2, 0, 95, 0, -4, 202}}));
 }
 
-TEST(GeoReference, AMatrixMayRotateAndTurn) {
+TEST(GeoReference, ReadsAMatrixWithRotation) {
   const auto set = [](TIFF* tiff) {
     const std::array<double, 16> m{2, 1, 0, 100, -1, 2, 0, 200, 0, 0, 0, 0, 0, 0, 0, 1};
     TIFFSetField(tiff, 34264, 16, m.data());
@@ -65,14 +65,14 @@ TEST(GeoReference, AMatrixMayRotateAndTurn) {
   EXPECT_EQ(info_with(set).world, (WorldTransform{{2, 1, 101.5, -1, 2, 200.5}}));
 }
 
-TEST(GeoReference, WithoutAnyItIsAPlainGrid) {
+TEST(GeoReference, IsAPlainGridWithoutGeoreferencing) {
   const RasterInfo info = info_with({});
   EXPECT_EQ(info.world, (WorldTransform{{1, 0, 0, 0, -1, 0}}));
   ASSERT_EQ(info.comments.size(), 1u);
   EXPECT_EQ(info.crs, Crs{});
 }
 
-TEST(GeoReference, RefusesControlPointsAndDegenerateTransforms) {
+TEST(GeoReference, RejectsControlPointsAndDegenerateTransforms) {
   EXPECT_THROW(info_with([](TIFF* tiff) {
                  const std::array<double, 12> ties{0, 0, 0, 1, 2, 0, 3, 3, 0, 5, 6, 0};
                  TIFFSetField(tiff, 33922, 12, ties.data());
@@ -88,7 +88,7 @@ TEST(GeoReference, RefusesControlPointsAndDegenerateTransforms) {
   }
 }
 
-TEST(GeoReference, ProjectedAndVerticalKeys) {
+TEST(GeoReference, ReadsProjectedAndVerticalKeys) {
   const RasterInfo info = info_with([](TIFF* tiff) {
     set_keys(tiff, {1024, 0,     1,    1, 1026, 34737, 6,    0, 2054, 0,    1,    9102, 3072, 0,
                     1,    32632, 3076, 0, 1,    9003,  4096, 0, 1,    5773, 4099, 0,    1,    9002},
@@ -103,7 +103,7 @@ TEST(GeoReference, ProjectedAndVerticalKeys) {
   EXPECT_EQ(info.sample.unit, "foot");
 }
 
-TEST(GeoReference, GeographicKeysAndUserDefinedOnes) {
+TEST(GeoReference, ReadsGeographicAndUserDefinedKeys) {
   const RasterInfo geographic = info_with([](TIFF* tiff) {
     set_keys(tiff, {1024, 0, 1, 2, 2048, 0, 1, 4326, 2054, 0, 1, 9102});
   });
@@ -115,7 +115,7 @@ TEST(GeoReference, GeographicKeysAndUserDefinedOnes) {
   });
   EXPECT_EQ(own.crs.epsg, 0);
   EXPECT_EQ(own.crs.name, "my grid");
-  // As GDAL writes projections that GeoTIFF has no keys for.
+  // GDAL writes projections without GeoKeys like this.
   const RasterInfo esri = info_with([](TIFF* tiff) {
     set_keys(tiff, {1024, 0, 1, 32767, 2048, 0, 1, 4326, 3073, 34737, 13, 0, 3076, 0, 1, 9001},
              "ESRI PE = X |");
@@ -131,7 +131,7 @@ TEST(GeoReference, GeographicKeysAndUserDefinedOnes) {
   EXPECT_EQ(site.crs.horizontal_unit, "US survey foot");
 }
 
-TEST(GeoReference, KeysOfTheCrsAreDeliveredAsTheyStand) {
+TEST(GeoReference, DeliversKeysOfTheCrsUnchanged) {
   const GeoKeys keys(
       std::vector<std::uint16_t>{1,    1,     0, 5, 1024, 0,     1, 1, 3072, 0,     1, 32767,
                                  3080, 34736, 1, 1, 3092, 34736, 1, 0, 3073, 34737, 4, 0},
@@ -149,7 +149,7 @@ TEST(GeoReference, KeysOfTheCrsAreDeliveredAsTheyStand) {
   EXPECT_TRUE(crs_of(cut).geo_keys.empty());
 }
 
-TEST(GeoReference, KeysThatPointNowhereAreLeftOut) {
+TEST(GeoReference, IgnoresKeysThatPointOutsideTheirArrays) {
   const GeoKeys keys(
       std::vector<std::uint16_t>{1, 1, 0, 500, 1026, 34737, 100, 0, 3072, 0, 1, 32632}, {},
       "short|");
@@ -160,7 +160,7 @@ TEST(GeoReference, KeysThatPointNowhereAreLeftOut) {
   EXPECT_TRUE(GeoKeys({}, {}, "").faults().empty());
 }
 
-TEST(GeoReference, ScaleOffsetAndUnitOfABand) {
+TEST(GeoReference, ReadsScaleOffsetAndUnitOfABand) {
   const std::string xml =
       "<GDALMetadata>\n"
       "  <Item name=\"OFFSET\" sample=\"0\" role=\"offset\"> -100 </Item>\n"
@@ -183,7 +183,7 @@ TEST(GeoReference, ScaleOffsetAndUnitOfABand) {
 }
 
 /// GDAL gives the outer corner of the first cell, we the position of its sample.
-TEST(GeoReference, RealFilesLieWhereGdalPutsThem) {
+TEST(GeoReference, AgreesWithGdalOnRealFiles) {
   const auto folder = real_data();
   if (!folder) GTEST_SKIP() << "needs TERRACE_DATA";
   if (!has_gdal()) GTEST_SKIP() << "needs gdalinfo";

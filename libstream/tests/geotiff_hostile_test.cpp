@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
-// Files with false contents: each gives one Error, or exactly what a correct reader would read;
-// never a crash, a hang, a huge allocation or output on standard error.
+// SPDX-License-Identifier: Apache-2.0 Invalid files: each gives one Error, or exactly what a
+// correct reader would read, and never a crash, a hang, a huge allocation or output on standard
+// error.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -39,13 +39,13 @@ std::uint64_t points_in(const std::string& path) {
   return points;
 }
 
-/// A new file each time: truncating and rewriting one makes ext4 flush it.
-void write_anew(const std::string& path, const std::string& bytes) {
+/// Writes a new file each time: truncating and rewriting one makes ext4 flush it.
+void write_new(const std::string& path, const std::string& bytes) {
   std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
-/// GDAL's collection of malformed files with valid contents; all the others are refused.
+/// The files with valid contents in GDAL's collection of malformed ones; all others are refused.
 const std::map<std::string, std::uint64_t> kSound{
     {"byte_bigtiff_invalid_slong8_for_stripoffsets.tif", 400},
     {"huge-implied-number-strips.tif", 400},
@@ -85,7 +85,7 @@ int read_confined(const std::string& path, const std::string& log) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
 }
 
-TEST(GeoTiffHostile, TheZooIsRefusedOrReadSoundly) {
+TEST(GeoTiffHostile, RejectsOrReadsEachFileOfTheZoo) {
   const auto folder = real_data();
   if (!folder) GTEST_SKIP() << "needs TERRACE_DATA";
   const TempFolder temp;
@@ -100,7 +100,7 @@ TEST(GeoTiffHostile, TheZooIsRefusedOrReadSoundly) {
   EXPECT_GT(files, 25u);
 }
 
-/// A file truncated at any byte gives an Error, or all samples in their places.
+/// Checks that a file truncated at any byte gives an Error, or all samples in their places.
 void cut_everywhere(const TiffSpec& spec, const std::vector<std::byte>& samples) {
   const TempFolder folder;
   const std::string path = (folder.path() / "whole.tif").string();
@@ -112,7 +112,7 @@ void cut_everywhere(const TiffSpec& spec, const std::vector<std::byte>& samples)
   std::size_t refused = 0;
   for (std::size_t n = 0; n < bytes.size(); ++n) {
     SCOPED_TRACE(std::to_string(n) + " of " + std::to_string(bytes.size()) + " bytes");
-    write_anew(cut, bytes.substr(0, n));
+    write_new(cut, bytes.substr(0, n));
     try {
       const WholeRaster part = read_whole(*open_geotiff(cut));
       ASSERT_EQ(part.info.columns, whole.info.columns);
@@ -151,13 +151,13 @@ std::vector<std::byte> cuttable_samples() {
   return as_samples(values);
 }
 
-TEST(GeoTiffHostile, CutAtAnyByteStrips) {
+TEST(GeoTiffHostile, RejectsStripsTruncatedAtAnyByte) {
   TiffSpec spec = cuttable();
   spec.rows_per_strip = 5;
   cut_everywhere(spec, cuttable_samples());
 }
 
-TEST(GeoTiffHostile, CutAtAnyByteDeflatedTilesOfABigTiff) {
+TEST(GeoTiffHostile, RejectsBigTiffTilesTruncatedAtAnyByte) {
   TiffSpec spec = cuttable();
   spec.mode = "w8";
   spec.tile_columns = spec.tile_rows = 16;
@@ -166,7 +166,7 @@ TEST(GeoTiffHostile, CutAtAnyByteDeflatedTilesOfABigTiff) {
   cut_everywhere(spec, cuttable_samples());
 }
 
-TEST(GeoTiffHostile, AnyByteChangedIsAnErrorOrARaster) {
+TEST(GeoTiffHostile, AnyChangedByteGivesAnErrorOrARaster) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   for (const int codec : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE}) {
@@ -181,7 +181,7 @@ TEST(GeoTiffHostile, AnyByteChangedIsAnErrorOrARaster) {
       for (const int value : {0, 1, 0x7f, 0xff}) {
         std::string changed = bytes;
         changed[n] = static_cast<char>(value);
-        write_anew(path, changed);
+        write_new(path, changed);
         try {
           const auto source = points_of(open_geotiff(path));
           if (*source->info().points > 1000000) continue;  // sparse or deflated: valid but long
@@ -201,7 +201,7 @@ TEST(GeoTiffHostile, AnyByteChangedIsAnErrorOrARaster) {
   }
 }
 
-TEST(GeoTiffHostile, NotAFile) {
+TEST(GeoTiffHostile, RejectsMissingEmptyAndSpecialFiles) {
   const TempFolder folder;
   EXPECT_THROW(open_geotiff((folder.path() / "none.tif").string()), Error);
   EXPECT_THROW(open_geotiff(folder.path().string()), Error);
@@ -211,7 +211,7 @@ TEST(GeoTiffHostile, NotAFile) {
   EXPECT_THROW(open_geotiff(empty), Error);
 }
 
-TEST(GeoTiffHostile, BandsThatAreNotThere) {
+TEST(GeoTiffHostile, RejectsMissingBands) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   write_tiff(path, {}, std::vector<std::byte>(2));
@@ -221,7 +221,7 @@ TEST(GeoTiffHostile, BandsThatAreNotThere) {
   EXPECT_NO_THROW(open_geotiff(path, {.band = 1}));
 }
 
-TEST(GeoTiffHostile, OnlyNodataIsAnEmptyStream) {
+TEST(GeoTiffHostile, NodataAloneIsAnEmptyStream) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
   TiffSpec spec;

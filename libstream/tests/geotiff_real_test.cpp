@@ -60,7 +60,7 @@ int checksum(const WholeRaster& raster, double without_data) {
   return sum;
 }
 
-TEST(GeoTiffReal, SamplesAreThoseGdalReads) {
+TEST(GeoTiffReal, SamplesMatchGdal) {
   const auto folder = real_data();
   if (!folder) GTEST_SKIP() << "needs TERRACE_DATA";
   std::size_t files = 0;
@@ -100,7 +100,7 @@ TEST(GeoTiffReal, SamplesAreThoseGdalReads) {
       EXPECT_EQ(max, std::stod(f.max));
       EXPECT_NEAR(sum / static_cast<double>(count), std::stod(f.mean), 1e-6 * (max - min));
     }
-    // GDAL's sum uses the nodata value for cells without data, or NaN as it is.
+    // GDAL's sum takes the nodata value for cells without data, or NaN unchanged.
     EXPECT_EQ(checksum(whole, whole.info.nodata.value_or(std::nan(""))), f.checksum);
   }
   EXPECT_GT(files, 100u);

@@ -41,7 +41,7 @@ std::vector<std::byte> random_bytes(std::mt19937_64& random, std::size_t size) {
   return bytes;
 }
 
-TEST(GeoTiffWriter, WhatIsWrittenIsReadBack) {
+TEST(GeoTiffWriter, ReadsBackWhatItWrote) {
   std::mt19937_64 random(11);
   const TempFolder folder;
   for (int round = 0; round < 60; ++round) {
@@ -148,7 +148,7 @@ TEST(GeoTiffWriter, GdalReadsTheSame) {
     EXPECT_EQ(band["minimum"], 0.0);
     EXPECT_EQ(band["maximum"], 249.75);
     EXPECT_EQ(info["metadata"]["IMAGE_STRUCTURE"]["COMPRESSION"], geographic ? "ZSTD" : "DEFLATE");
-    // There must be no complaint of any kind.
+    // There must be no errors or warnings.
     EXPECT_EQ(output_of("gdalinfo '" + path + "' 2>&1 >/dev/null | head -3"), "");
   }
 }
@@ -170,14 +170,14 @@ TEST(GeoTiffWriter, TilesNotWrittenHaveNoData) {
   EXPECT_EQ(whole.valid[31], 0);
 }
 
-/// A level of a GeoTIFF as libtiff reads it; tiles that are left out hold `missing`.
+/// A level of a GeoTIFF as libtiff reads it; omitted tiles are filled with `missing`.
 template <class T>
 struct ReadLevel {
   std::uint32_t columns = 0, rows = 0;
   std::vector<T> samples;
 
   ReadLevel(const fs::path& path, unsigned level, T missing) {
-    TIFFSetWarningHandler(nullptr);  // of tags that libtiff does not know
+    TIFFSetWarningHandler(nullptr);  // libtiff warns of tags that it does not know
     TIFF* const tiff = TIFFOpen(path.c_str(), "r");
     EXPECT_NE(tiff, nullptr);
     EXPECT_EQ(TIFFSetDirectory(tiff, static_cast<std::uint16_t>(level)), 1);
@@ -205,8 +205,8 @@ struct ReadLevel {
   }
 };
 
-/// Writes samples with overviews, tiles without data left out: in a random order, or the order of a
-/// quadtree, in which some are never told of.
+/// Writes samples with overviews and without the tiles that have no data: in a random order, or in
+/// quadtree order, in which some tiles are never passed to the writer.
 template <class T>
 void write_with_overviews(const fs::path& path, const GeoTiffOptions& options,
                           const std::vector<T>& samples, std::mt19937_64& random) {
@@ -220,7 +220,7 @@ void write_with_overviews(const fs::path& path, const GeoTiffOptions& options,
   }
   std::shuffle(places.begin(), places.end(), random);
   for (const auto& [across, down] : places) {
-    // What hangs over the edge is not to be seen.
+    // Cells beyond the edge must not be visible.
     std::vector<T> tile(std::size_t{side} * side, T(99));
     bool any = false;
     for (std::uint32_t r = 0; r < std::min(side, options.rows - down * side); ++r) {
@@ -261,7 +261,7 @@ void expect_overviews(std::mt19937_64& random, GeoTiffOverviews overviews,
   options.overviews = overviews;
   options.replace = true;
   std::vector<T> samples(std::size_t{options.columns} * options.rows);
-  // Data in squares of 100 cells here and there, with holes.
+  // Scattered squares of 100 cells with data, with holes.
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const std::size_t column = i % options.columns, row = i / options.columns;
     const bool there =
@@ -313,7 +313,7 @@ void expect_overviews(std::mt19937_64& random, GeoTiffOverviews overviews,
   EXPECT_GE(level, 1u);
 }
 
-TEST(GeoTiffWriter, OverviewsAreTheMeansOfWhatHasData) {
+TEST(GeoTiffWriter, OverviewsAverageTheCellsWithData) {
   constexpr std::uint64_t kSeed = 5;
   std::cout << "seed " << kSeed << '\n';
   std::mt19937_64 random(kSeed);
@@ -327,8 +327,8 @@ TEST(GeoTiffWriter, OverviewsAreTheMeansOfWhatHasData) {
   }
 }
 
-/// Means of opposite samples are not taken for no data.
-TEST(GeoTiffWriter, OverviewsHaveDataWhereTheMeanIsTheValueOfNone) {
+/// A mean of opposite samples that equals the nodata value must not become nodata.
+TEST(GeoTiffWriter, OverviewsKeepDataWhereTheMeanIsTheNodataValue) {
   const TempFolder folder;
   const fs::path path = folder.path() / "x.tif";
   GeoTiffOptions options;
@@ -349,7 +349,7 @@ TEST(GeoTiffWriter, OverviewsHaveDataWhereTheMeanIsTheValueOfNone) {
   EXPECT_EQ(std::count(read.samples.begin(), read.samples.end(), 0), 0);
 }
 
-/// GDAL calls it a COG, and reads from its overviews.
+/// GDAL recognises it as a COG and reads from its overviews.
 TEST(GeoTiffWriter, GdalFindsTheOverviews) {
   if (!has_gdal()) GTEST_SKIP() << "needs gdalinfo";
   const TempFolder folder;
@@ -386,7 +386,7 @@ TEST(GeoTiffWriter, GdalFindsTheOverviews) {
   }
 }
 
-TEST(GeoTiffWriter, LeavesNothingWithoutCommitAndKeepsWhatIsThere) {
+TEST(GeoTiffWriter, LeavesNothingWithoutCommitAndKeepsExistingFiles) {
   const TempFolder folder;
   const fs::path path = folder.path() / "x.tif";
   GeoTiffOptions options;
@@ -450,8 +450,8 @@ TEST_P(FileSizeLimit, IsAnErrorAndLeavesNothing) {
 INSTANTIATE_TEST_SUITE_P(GeoTiffWriter, FileSizeLimit,
                          ::testing::Values(GeoTiffOverviews::none, GeoTiffOverviews::average));
 
-/// Sparse, so that the file stays small: what counts is that offsets are 64 bits wide.
-TEST(GeoTiffWriter, IsABigTiffWhereFourGigabytesMightNotDo) {
+/// The file is sparse, so that it stays small: the test is that offsets have 64 bits.
+TEST(GeoTiffWriter, WritesBigTiffWhereFourGigabytesMightNotSuffice) {
   const TempFolder folder;
   const auto magic_of = [&](std::uint32_t rows) {
     const fs::path path = folder.path() / (std::to_string(rows) + ".tif");

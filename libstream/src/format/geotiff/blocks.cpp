@@ -13,18 +13,18 @@
 namespace terrace::stream {
 namespace {
 
-constexpr char kDamaged[] = "fetch the file again; it is damaged or cut short";
+constexpr char kDamaged[] = "the file is damaged or truncated: download it again";
 
-/// Codecs may store a block larger than it is, but not by much.
+/// Codecs may enlarge a block, but not by much.
 constexpr std::uint64_t kMostGrowth = 4, kMostOverhead = 1u << 16;
 
-/// Strips larger than this are decoded row by row where the codec can: a file that is one strip
-/// then takes no more memory than its compressed bytes.
+/// Strips larger than this are decoded row by row if the codec can: a file of one strip then takes
+/// no more memory than its compressed bytes.
 constexpr std::uint64_t kMostWholeStrip = 4u << 20;
 
 constexpr std::uint64_t kRawBytes = 1u << 20;  // of an uncompressed block, read at a time
 
-/// Whether libtiff decodes a strip of this codec row by row without holding all of it decoded.
+/// True if libtiff decodes a strip of this codec row by row without holding all of it decoded.
 bool decodes_by_rows(std::uint16_t compression) {
   switch (compression) {
     case COMPRESSION_LZW:
@@ -39,7 +39,7 @@ bool decodes_by_rows(std::uint16_t compression) {
   }
 }
 
-/// What a codec holds for itself while it decodes a block.
+/// Memory that a codec needs, besides input and output, while it decodes a block.
 std::uint64_t codec_bytes(std::uint16_t compression, std::uint64_t block_bytes) {
   constexpr std::uint64_t kOther = 256u << 10, kZstdWindow = 8u << 20, kLzmaWindow = 64u << 20;
   switch (compression) {
@@ -84,8 +84,8 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
       nodata_(nodata),
       memory_bytes_(memory_bytes),
       cache_bytes_(cache_bytes) {
-  // Row and block sizes fit 64 bits: 2^31 columns x 2^16 samples x 2^6 bits x 2^31 rows do not, so
-  // the rows are divided and not multiplied.
+  // The size of a row fits 64 bits, but that of a block may not (2^31 columns x 2^16 samples x 2^6
+  // bits x 2^31 rows), so divide by the rows instead of multiplying.
   const std::uint64_t row = layout_.row_bytes();
   if (layout_.plain) return;
   most_stored_ = most_stored();
@@ -103,7 +103,7 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
           (countable ? std::to_string((row * (layout_.tiled ? layout_.block_rows : 1) >> 20) + 1)
                      : "beyond 2^44") +
           " MiB each, the limit is " + std::to_string(memory_bytes_ >> 20) + " MiB",
-      "allow more memory, or rewrite it in small tiles: gdal_translate -co TILED=YES");
+      "allow more memory, or convert it to small tiles: gdal_translate -co TILED=YES");
 }
 
 void GeoTiffBlocks::fail(const Part& part, std::uint64_t offset, std::string cause,
@@ -112,7 +112,7 @@ void GeoTiffBlocks::fail(const Part& part, std::uint64_t offset, std::string cau
                std::move(cause), remedy.empty() ? kDamaged : std::move(remedy));
 }
 
-/// Bytes of the largest block of the band. Not more than the file has: larger claims are refused
+/// Bytes of the largest block of the band, at most those of the file: larger claims are refused
 /// when the block is read.
 std::uint64_t GeoTiffBlocks::most_stored() const {
   std::uint64_t most = 0;
@@ -194,7 +194,7 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
       fail(part, offset,
            "needs " + std::to_string((bytes >> 20) + 1) + " MiB, the limit is " +
                std::to_string(memory_bytes_ >> 20) + " MiB",
-           "allow more memory, or rewrite it in tiles: gdal_translate -co TILED=YES");
+           "allow more memory, or convert it to tiles: gdal_translate -co TILED=YES");
     }
     return read_by_rows(part, out);
   }
@@ -207,7 +207,7 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
   return any;
 }
 
-/// Uncompressed blocks are read straight from the file, and only the rows wanted.
+/// Reads the needed rows of an uncompressed block directly from the file.
 bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint64_t bytes,
                                const CellBuffer& out) {
   const std::uint64_t row_bytes = layout_.row_bytes();
@@ -215,10 +215,10 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   if (bytes / row_bytes < rows) {
     fail(part, offset,
          "has " + counted(bytes, "byte") + " where " + counted(rows, "row") + " of " +
-             counted(row_bytes, "byte") + " are due");
+             counted(row_bytes, "byte") + " are expected");
   }
   const std::uint64_t pixel_bytes = layout_.samples_per_pixel() * size_of(layout_.type);
-  // Whole rows at a time, unless the part is so narrow that most of them would be for nothing.
+  // Read whole rows, unless the part is so narrow that most bytes would be read in vain.
   const bool whole = part.columns >= layout_.block_columns / 4 && row_bytes <= memory_bytes_ / 4;
   const std::uint64_t piece_bytes = whole ? row_bytes : part.columns * pixel_bytes;
   const std::uint64_t skip = whole ? 0 : part.column * pixel_bytes;
@@ -242,7 +242,7 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   return any;
 }
 
-/// A large compressed strip: libtiff decodes it row by row, in order.
+/// Reads from a large compressed strip, which libtiff decodes row by row, in order.
 bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
   if (block_.size() < layout_.row_bytes()) block_.resize(layout_.row_bytes());
   const std::uint64_t first = std::uint64_t{part.down} * layout_.block_rows + part.row;
@@ -263,8 +263,8 @@ bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
   return any;
 }
 
-/// A block that the file leaves out has no data, even if the file's nodata value is overridden. It
-/// is zero in a file without a nodata value.
+/// Fills cells of a block that the file omits: without data if there is a nodata value, even if the
+/// file's is overridden; with zeros otherwise.
 bool GeoTiffBlocks::fill_sparse(const Part& part, const CellBuffer& out) {
   if (nodata_.value || !handle_.text(kGdalNodata).empty()) return false;
   wide_.assign(part.columns * size_of(layout_.type), std::byte{0});
@@ -276,7 +276,7 @@ bool GeoTiffBlocks::fill_sparse(const Part& part, const CellBuffer& out) {
   return any;
 }
 
-/// Row `row` of the part; its first cell is number `column` of `stored`.
+/// Overlays row `row` of the part; its first cell is number `column` of `stored`.
 bool GeoTiffBlocks::overlay_part_row(const Part& part, const std::byte* stored,
                                      std::uint32_t column, std::uint32_t row,
                                      const CellBuffer& out) {
@@ -339,7 +339,7 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
     return block_;
   }
   const std::size_t room = static_cast<std::size_t>(cache_bytes_ / block_.size());
-  if (cache_.size() >= room) {  // the oldest gives its buffer
+  if (cache_.size() >= room) {  // reuse the buffer of the oldest
     const auto oldest = std::prev(cache_.end());
     cached_.erase(oldest->block);
     std::swap(oldest->samples, block_);
@@ -354,7 +354,7 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
 }
 
 void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t bytes) {
-  // Some writers leave out a tile's rows beyond the lower edge of the image.
+  // Some writers omit a tile's rows beyond the lower edge of the image.
   const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
   if (bytes > kMostGrowth * due + kMostOverhead) {
     fail(part, offset,

@@ -17,7 +17,7 @@
 
 namespace terrace::stream {
 
-/// Reads windows of one band block by block. Blocks that a window has used only in part are kept,
+/// Reads windows of one band block by block. Blocks that a window uses only in part are kept,
 /// within the cache size, for the window that uses the rest.
 class GeoTiffBlocks {
  public:
@@ -25,8 +25,8 @@ class GeoTiffBlocks {
   GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout, NodataRule nodata,
                 std::uint64_t memory_bytes, std::uint64_t cache_bytes);
 
-  /// From now on cells without data in `mask`, of the same size, have none here. It must outlive
-  /// this.
+  /// From now on, cells without data in `mask` have no data here. The mask must have the same size
+  /// and outlive this object.
   void set_mask(GeoTiffBlocks& mask) { mask_ = &mask; }
   /// Maximum bytes held between windows: see RasterInfo::held_bytes.
   [[nodiscard]] std::uint64_t held_bytes() const;
@@ -67,9 +67,9 @@ class GeoTiffBlocks {
   GeoTiffLayout layout_;
   NodataRule nodata_;
   std::uint64_t memory_bytes_, cache_bytes_;
-  bool by_rows_ = false;                  // strips that are not decoded as a whole
+  bool by_rows_ = false;                  // strips are decoded row by row
   std::uint64_t most_stored_ = 0;         // bytes of the largest block in the file
-  std::uint64_t next_row_ = 0;            // of the raster: the row libtiff decodes next, by rows
+  std::uint64_t next_row_ = 0;            // of the raster: what libtiff decodes next, if by_rows_
   std::vector<std::byte> raw_;            // as stored
   std::vector<std::byte> block_;          // decoded, native byte order
   std::optional<std::uint32_t> decoded_;  // the block in block_

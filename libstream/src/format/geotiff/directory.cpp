@@ -55,7 +55,7 @@ std::string TiffDirectory::bytes(bool big, std::uint64_t at, std::uint64_t next)
   assert(at % 2 == 0);
   const std::size_t offset_bytes = big ? 8 : 4, count_bytes = big ? 8 : 2;
   const std::size_t entry_bytes = 4 + 2 * offset_bytes;
-  std::string head, behind;
+  std::string head, values;
   const std::uint64_t values_at = at + count_bytes + entries_.size() * entry_bytes + offset_bytes;
   if (big) {
     append_native(head, std::uint64_t{entries_.size()});
@@ -70,13 +70,13 @@ std::string TiffDirectory::bytes(bool big, std::uint64_t at, std::uint64_t next)
       head += entry.values;
       head.append(offset_bytes - entry.values.size(), '\0');
     } else {
-      append_size(head, big, values_at + behind.size());
-      behind += entry.values;
-      behind.append(behind.size() % 2, '\0');
+      append_size(head, big, values_at + values.size());
+      values += entry.values;
+      values.append(values.size() % 2, '\0');
     }
   }
   append_size(head, big, next);
-  return head + behind;
+  return head + values;
 }
 
 std::string tiff_head(bool big, std::uint64_t first) {

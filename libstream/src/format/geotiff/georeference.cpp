@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr char kSetAnew[] = "set the georeferencing anew (gdal_edit.py -a_ullr)";
+constexpr char kSetAgain[] = "set the georeferencing again (gdal_edit.py -a_ullr)";
 
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -52,7 +52,7 @@ std::optional<double> number_in(std::string_view text) {
   return value;
 }
 
-/// The place that the file itself gives; nullopt if it gives none, or only ground control points.
+/// The file's own georeferencing; nullopt if it has none, or only ground control points.
 std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
                                             std::vector<std::string>& comments) {
   const auto matrix = handle.doubles(kModelTransformation);
@@ -61,14 +61,14 @@ std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const G
   const double to_sample =
       keys.number(kGTRasterType).value_or(kPixelIsArea) == kPixelIsPoint ? 0.0 : 0.5;
 
-  // As in GDAL, scale and tie point override a matrix if a file has both against the rules.
+  // As in GDAL, scale and tie point override the matrix if a file has both, which is not allowed.
   if (scale.size() >= 2 && tie.size() >= 6) {
     if (!all_finite(scale) || !all_finite(tie)) {
-      handle.fail("ModelPixelScale", "is not finite", kSetAnew);
+      handle.fail("ModelPixelScale", "is not finite", kSetAgain);
     }
-    if (scale[0] == 0 || scale[1] == 0) handle.fail("ModelPixelScale", "is zero", kSetAnew);
+    if (scale[0] == 0 || scale[1] == 0) handle.fail("ModelPixelScale", "is zero", kSetAgain);
     if (scale[1] < 0) {
-      comments.emplace_back("the pixel scale's negative y is read as positive, as by GDAL");
+      comments.emplace_back("the pixel scale's negative y is read as positive, as in GDAL");
     }
     const double sx = scale[0], sy = std::abs(scale[1]);
     return shifted({{sx, 0, tie[3] - tie[0] * sx, 0, -sy, tie[4] + tie[1] * sy}}, to_sample);
@@ -77,23 +77,23 @@ std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const G
     const WorldTransform world{{matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}};
     const double determinant = world.xy[0] * world.xy[4] - world.xy[1] * world.xy[3];
     if (!all_finite(matrix) || !std::isfinite(determinant) || determinant == 0) {
-      handle.fail("ModelTransformation", "does not map cells to distinct places", kSetAnew);
+      handle.fail("ModelTransformation", "does not map cells to distinct places", kSetAgain);
     }
     return shifted(world, to_sample);
   }
   return std::nullopt;
 }
 
-/// Notes that a world file places the raster elsewhere than the file itself does.
+/// Adds a note if a world file places the raster elsewhere than the file itself does.
 void compare_with_world_file(const std::string& file, RasterInfo& info) {
-  std::optional<WorldFile> beside;
+  std::optional<WorldFile> world_file;
   try {
-    beside = world_file_of(file);
+    world_file = world_file_of(file);
   } catch (const Error&) {
-    return;  // it does not count
+    return;  // it is ignored
   }
-  if (!beside) return;
-  const auto &m = info.world.xy, &n = beside->world.xy;
+  if (!world_file) return;
+  const auto &m = info.world.xy, &n = world_file->world.xy;
   const double cell = std::max({std::abs(m[0]), std::abs(m[1]), std::abs(m[3]), std::abs(m[4])});
   double most = 0;
   for (const double c : {0.0, static_cast<double>(info.columns)}) {
@@ -105,8 +105,8 @@ void compare_with_world_file(const std::string& file, RasterInfo& info) {
     }
   }
   if (most <= kNearestCell * cell) return;
-  info.notes.push_back(beside->name + " places the raster elsewhere than " + file +
-                       " itself, which counts; remove the wrong one");
+  info.notes.push_back(world_file->name + " is ignored: " + file +
+                       " itself places the raster elsewhere; remove the wrong one");
 }
 
 }  // namespace

@@ -11,13 +11,13 @@
 
 namespace terrace::stream {
 
-/// Sets the transform from column and row to the sample's position, from pixel scale and tie point,
-/// from the matrix, or else from a world file. Resolved oddities are added to the comments, a world
-/// file that differs to the notes. `info` has the size already. Throws: Error for values that are
-/// not finite, a degenerate matrix, or several tie points only.
+/// Sets the transform from column and row to the sample's position: from pixel scale and tie point,
+/// else from the matrix, else from a world file. Adds a comment on what it had to interpret, and a
+/// note if a world file differs. `info` must have the size already. Throws: Error for values that
+/// are not finite, for a degenerate matrix, and if there are only ground control points.
 void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo& info);
 
-/// The contents of GDAL_METADATA for one band (counted from 0).
+/// The contents of GDAL_METADATA for one band, counted from 0.
 struct BandMetadata {
   std::optional<double> scale, offset;
   std::string unit;

@@ -21,8 +21,8 @@
 namespace terrace::stream {
 namespace {
 
-/// The transparency mask of a raster, in its file or beside it (FILE.msk, as GDAL writes it): where
-/// it is 0 there is no data.
+/// The transparency mask of a raster, in the same file or next to it (FILE.msk, as GDAL writes it):
+/// cells where it is 0 have no data.
 class GeoTiffMask {
  public:
   /// Null if there is none.
@@ -38,9 +38,9 @@ class GeoTiffMask {
       handle = open(raster.file());
       if (!handle->go_to_mask()) handle.reset();
     }
-    const std::string beside = raster.file() + ".msk";
-    if (handle == nullptr && std::filesystem::is_regular_file(beside, ignored)) {
-      handle = open(beside);
+    const std::string mask_file = raster.file() + ".msk";
+    if (handle == nullptr && std::filesystem::is_regular_file(mask_file, ignored)) {
+      handle = open(mask_file);
       if (handle->value_or<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1) > layout.band) {
         band = layout.band;
       }
@@ -49,7 +49,7 @@ class GeoTiffMask {
     std::unique_ptr<GeoTiffMask> mask(new GeoTiffMask(std::move(handle), band, options));
     if (mask->layout_.columns != layout.columns || mask->layout_.rows != layout.rows) {
       mask->handle_->fail("mask", "is not as large as its raster",
-                          "write both anew: gdal_translate");
+                          "export both again: gdal_translate");
     }
     return mask;
   }
@@ -107,7 +107,7 @@ class GeoTiffRaster final : public Raster {
     if (TIFFGetField(handle_.tiff(), TIFFTAG_EXTRASAMPLES, &extra, &kinds) == 1 && extra > 0 &&
         kinds[extra - 1] != EXTRASAMPLE_UNSPECIFIED) {
       info_.comments.push_back("band " + std::to_string(layout_.bands) +
-                               " is alpha, which leaves no cell out; where it means no data, write "
+                               " is alpha, which is ignored; if it marks cells without data, write "
                                "a nodata value: gdalwarp -dstnodata");
     }
     if (nodata_.unmatched) {
@@ -130,7 +130,7 @@ class GeoTiffRaster final : public Raster {
     if (info_.sample.scale == 0 || !std::isfinite(info_.sample.scale) ||
         !std::isfinite(info_.sample.offset)) {
       handle_.fail("GDAL_METADATA", "scale or offset of the band is zero or not finite",
-                   "set it anew (gdal_edit.py -scale -offset)");
+                   "set them again (gdal_edit.py -scale -offset)");
     }
   }
 

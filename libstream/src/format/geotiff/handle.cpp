@@ -31,8 +31,8 @@ bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
 }
 
-/// libtiff would go on without a field it cannot read, or with blocks that have no place; but a
-/// file cut short must not pass for a whole one.
+/// True for warnings that must be errors: libtiff would go on without a field that it cannot read,
+/// or with blocks that have no offset, but a truncated file must not pass for a complete one.
 bool is_fatal(std::string_view line) {
   return contains(line, "IO error during reading") || contains(line, "Out of memory") ||
          (contains(line, "Incorrect count") &&
@@ -41,7 +41,7 @@ bool is_fatal(std::string_view line) {
 
 }  // namespace
 
-/// The file as libtiff sees it: a descriptor and a position of its own.
+/// The file as libtiff sees it: a descriptor and a separate position.
 struct GeoTiffHandle::Io {
   int descriptor = -1;
   std::uint64_t position = 0, size = 0;
@@ -66,9 +66,9 @@ struct GeoTiffHandle::Io {
   static tmsize_t read(thandle_t handle, void* out, tmsize_t bytes) {
     Io& io = *static_cast<Io*>(handle);
     if (bytes < 0) return -1;
-    const std::uint64_t there = io.position < io.size ? io.size - io.position : 0;
+    const std::uint64_t left = io.position < io.size ? io.size - io.position : 0;
     const std::int64_t n = io.read_some(io.position, static_cast<std::byte*>(out),
-                                        std::min(static_cast<std::uint64_t>(bytes), there));
+                                        std::min(static_cast<std::uint64_t>(bytes), left));
     if (n > 0) io.position += static_cast<std::uint64_t>(n);
     return n;
   }
@@ -93,7 +93,7 @@ struct GeoTiffHandle::Io {
 
 int GeoTiffHandle::on_error(TIFF*, void* self, const char* module, const char* format,
                             va_list values) {
-  // The first complaint names the cause; those after it are its consequences.
+  // The first complaint names the cause; later ones are its consequences.
   auto& handle = *static_cast<GeoTiffHandle*>(self);
   if (handle.complaint_.empty()) handle.complaint_ = printed(module, format, values);
   return 1;
@@ -116,21 +116,20 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
   io_->descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (io_->descriptor < 0) throw system_error(file, "cannot be opened", errno);
   struct stat status {};
-  if (::fstat(io_->descriptor, &status) != 0)
-    throw system_error(file, "cannot be looked at", errno);
+  if (::fstat(io_->descriptor, &status) != 0) throw system_error(file, "cannot be examined", errno);
   if (!S_ISREG(status.st_mode)) {
-    fail({}, "is not a regular file", "a TIFF is read by position; store it in a file first");
+    fail({}, "is not a regular file", "a TIFF is read out of order: save it to a file first");
   }
-  if (status.st_size == 0) fail({}, "is empty", "fetch or write the file again");
+  if (status.st_size == 0) fail({}, "is empty", "download or export the file again");
   io_->size = file_bytes_ = static_cast<std::uint64_t>(status.st_size);
 
-  // The longest arrays of a directory are those of the blocks' places: 8 bytes in memory for at
-  // least 2 in the file. Codecs need a decoded block at most.
+  // The longest arrays of a directory are the offsets and sizes of blocks: 8 bytes in memory for at
+  // least 2 in the file. Codecs need at most a decoded block.
   const std::uint64_t most =
       std::max({memory_bytes, std::min(4 * file_bytes_ + kMiB, 1024 * kMiB), 4 * kMiB});
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(),
                                                                              TIFFOpenOptionsFree);
-  if (options == nullptr) fail({}, "no memory to open it");
+  if (options == nullptr) fail({}, "there is no memory to open it");
   TIFFOpenOptionsSetMaxSingleMemAlloc(
       options.get(), static_cast<tmsize_t>(std::min<std::uint64_t>(most, INT64_MAX)));
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), on_error, this);
@@ -139,7 +138,7 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
   // c: leave a single large strip as it is.
   tiff_ = TIFFClientOpenExt(file.c_str(), "rmhc", io_.get(), Io::read, Io::write, Io::seek,
                             Io::close, Io::size_of_file, nullptr, nullptr, options.get());
-  const std::string remedy = "check that it is a whole TIFF file (gdalinfo, tiffinfo)";
+  const std::string remedy = "check that it is a complete TIFF file (gdalinfo, tiffinfo)";
   if (tiff_ == nullptr) fail({}, "is not a TIFF file: " + take_complaint(), remedy);
   try {
     for (int directory = 0;; ++directory) {
@@ -163,7 +162,7 @@ GeoTiffHandle::~GeoTiffHandle() { TIFFClose(tiff_); }
 
 bool GeoTiffHandle::go_to_mask() {
   bool found = false, ours = true;
-  // A damaged directory behind the image is no reason not to read the image.
+  // A damaged directory after the image must not prevent reading the image.
   while (!found && ours && TIFFLastDirectory(tiff_) == 0 && TIFFReadDirectory(tiff_) == 1) {
     const auto kind = value_or<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
     found = (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == FILETYPE_MASK;
@@ -185,8 +184,8 @@ std::string GeoTiffHandle::take_complaint() { return std::exchange(complaint_, {
 std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) const {
   const TIFFField* const known = TIFFFindField(tiff_, tag, TIFF_ANY);
   if (known == nullptr) return {};
-  // A field that libtiff does not know passes a 32-bit count; where the program around us has
-  // taught it these fields, it may be a 16-bit one, or none for a text.
+  // For a field that libtiff does not know it passes a 32-bit count. If the program around us has
+  // registered these fields, the count may have 16 bits, or a text may have none.
   const void* data = nullptr;
   std::uint32_t count = 0;
   int found = 0;
@@ -208,7 +207,7 @@ std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) con
     fail("field " + std::to_string(tag),
          "has TIFF type " + std::to_string(TIFFFieldDataType(known)) + " instead of " +
              std::to_string(type),
-         "check that it is a whole GeoTIFF file (gdalinfo)");
+         "check that it is a complete GeoTIFF file (gdalinfo)");
   }
   const auto size = static_cast<std::size_t>(TIFFDataWidth(static_cast<TIFFDataType>(type)));
   return {static_cast<const std::byte*>(data), count * size};

@@ -30,7 +30,7 @@ class GeoTiffHandle {
   [[nodiscard]] TIFF* tiff() const { return tiff_; }
   [[nodiscard]] const std::string& file() const { return file_; }
   [[nodiscard]] std::uint64_t file_bytes() const { return file_bytes_; }
-  /// Moves on to the transparency mask of the image; false if it has none.
+  /// Moves on to the transparency mask of the image. Returns false if it has none.
   [[nodiscard]] bool go_to_mask();
   /// libtiff's warnings: fields it ignored because they are damaged.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }

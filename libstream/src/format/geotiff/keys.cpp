@@ -12,7 +12,7 @@
 namespace terrace::stream {
 namespace {
 
-/// EPSG codes of the units that heights and coordinates come in, by the names that Crs has.
+/// Units of heights and coordinates: their EPSG codes and their names in Crs.
 struct UnitCode {
   std::uint16_t code;
   std::string_view name;
@@ -42,7 +42,7 @@ std::string unit_name(std::uint16_t code) {
   return code == 0 || code == kUserDefined ? std::string() : "EPSG:" + std::to_string(code);
 }
 
-/// 0 for one without a code.
+/// The EPSG code of a unit by its name in Crs, 0 if it has none.
 std::uint16_t unit_code(std::string_view name) {
   for (const UnitCode& unit : kUnitCodes) {
     if (unit.name == name) return unit.code;
@@ -60,15 +60,15 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
                  const std::string& ascii) {
   if (directory.empty()) return;
   if (directory.size() < 4) {
-    faults_.push_back("GeoKeyDirectory is cut short");
+    faults_.push_back("GeoKeyDirectory is truncated");
     return;
   }
-  const std::size_t there = directory.size() / 4 - 1;
+  const std::size_t present = directory.size() / 4 - 1;
   std::size_t count = directory[3];
-  if (count > there) {
-    faults_.push_back("GeoKeyDirectory claims " + counted(count, "key") + " and has " +
-                      std::to_string(there));
-    count = there;
+  if (count > present) {
+    faults_.push_back("GeoKeyDirectory claims " + counted(count, "key") + " but has " +
+                      std::to_string(present));
+    count = present;
   }
   for (std::size_t i = 1; i <= count; ++i) {
     const std::uint16_t key = directory[4 * i], place = directory[4 * i + 1],
@@ -129,7 +129,7 @@ Crs crs_of(const GeoKeys& keys) {
   const auto projected = keys.number(kProjectedCrs), geodetic = keys.number(kGeodeticCrs);
   std::uint16_t model = keys.number(kGTModelType).value_or(0);
   if (model != kModelProjected && model != kModelGeographic && model != kModelGeocentric) {
-    // Under a user-defined model, the name of a projected CRS may be its whole definition.
+    // With a user-defined model, the name of a projected CRS may be its whole definition.
     const bool named = !keys.text(kProjectedCitation).empty();
     model = projected || named ? kModelProjected : geodetic ? kModelGeographic : 0;
   }
@@ -147,7 +147,7 @@ Crs crs_of(const GeoKeys& keys) {
     crs.horizontal_unit = unit_name(keys.number(kLinearUnit).value_or(0));
   }
   crs.vertical_unit = unit_name(keys.number(kVerticalUnit).value_or(0));
-  constexpr std::uint16_t kLastOfCrs = 5119;  // of the vertical keys
+  constexpr std::uint16_t kLastOfCrs = 5119;  // the last of the vertical keys
   crs.geo_keys = keys.range(kGTModelType, kGTModelType);
   for (GeoKey& key : keys.range(kGeodeticCrs, kLastOfCrs)) crs.geo_keys.push_back(std::move(key));
   return crs;
@@ -195,7 +195,7 @@ GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type
   GeoKeyDirectory keys;
   const std::span<const GeoKey> own =
       epsg == 0 ? std::span(crs.geo_keys) : std::span<const GeoKey>();
-  // Longitudes and latitudes of no known datum.
+  // Longitudes and latitudes whose datum is unknown.
   const bool angles = epsg == 0 && own.empty() && crs.geographic && unit != 0;
   if (epsg != 0) keys.add(kGTModelType, crs.geographic ? kModelGeographic : kModelProjected);
   if (angles) keys.add(kGTModelType, kModelGeographic);

@@ -13,8 +13,8 @@
 
 namespace terrace::stream {
 
-/// The GeoKeys of a TIFF: small numbers and texts by key. Entries that point outside their arrays,
-/// or are truncated, are dropped and listed in `faults`.
+/// The GeoKeys of a TIFF: numbers and texts by key. Entries that point outside their arrays, or are
+/// truncated, are dropped and listed in faults().
 class GeoKeys {
  public:
   GeoKeys(std::span<const std::uint16_t> directory, std::span<const double> doubles,
@@ -39,13 +39,13 @@ class GeoKeys {
 /// The coordinate reference system named by the keys; user-defined codes count as none.
 Crs crs_of(const GeoKeys& keys);
 
-/// GeoKeys to be written, which are added in ascending order.
+/// Collects GeoKeys to write; they must be added in ascending order.
 class GeoKeyDirectory {
  public:
   void add(std::uint16_t key, std::uint16_t value) { entries_.push_back({key, 0, 1, value}); }
   void add(std::uint16_t key, const std::string& text);
   void add(std::uint16_t key, const std::vector<double>& values);
-  /// As a file had it: what measures something is a double, what names something a short.
+  /// Adds a key as it was read: measures are doubles, codes are shorts.
   void add(const GeoKey& key);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
@@ -59,9 +59,9 @@ class GeoKeyDirectory {
   std::string ascii_;
 };
 
-/// The keys that name a system and its units. raster_type: of a raster, kPixelIsArea or
-/// kPixelIsPoint; heights without a vertical CRS have a unit only where there is none, since the
-/// samples of a raster have their own.
+/// The keys that describe a CRS and its units. raster_type: kPixelIsArea or kPixelIsPoint for a
+/// raster, nullopt for points. A vertical unit without a vertical CRS is written only for points,
+/// because the samples of a raster state their own unit.
 GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type);
 
 }  // namespace terrace::stream

@@ -9,7 +9,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint32_t kMostCells = 1u << 30;  // columns and rows are 30-bit integers downstream
+constexpr std::uint32_t kMostCells = 1u << 30;  // later code has 30-bit columns and rows
 
 const char* name_of_codec(std::uint16_t compression) {
   switch (compression) {
@@ -40,7 +40,7 @@ const char* name_of_codec(std::uint16_t compression) {
   }
 }
 
-/// The type in memory of a stored sample; nothing if there is none.
+/// The type in memory of a stored sample; nullopt if it is not supported.
 std::optional<ScalarType> type_in_memory(std::uint16_t format, unsigned bits) {
   if (format == SAMPLEFORMAT_IEEEFP) {
     if (bits == 16 || bits == 24 || bits == 32) return ScalarType::f32;
@@ -59,7 +59,7 @@ std::optional<ScalarType> type_in_memory(std::uint16_t format, unsigned bits) {
 void check_codec(const GeoTiffHandle& handle, const GeoTiffLayout& layout) {
   const std::string name = std::string(name_of_codec(layout.compression)) + " (" +
                            std::to_string(layout.compression) + ")";
-  const char* remedy = "rewrite it: gdal_translate -co COMPRESS=DEFLATE -co TILED=YES";
+  const char* remedy = "convert it: gdal_translate -co COMPRESS=DEFLATE -co TILED=YES";
   if (TIFFIsCODECConfigured(layout.compression) == 0) {
     handle.fail({}, "compression " + name + " is not in this system's libtiff", remedy);
   }
@@ -140,7 +140,7 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   if (layout.block_columns == 0 || layout.block_rows == 0 ||
       layout.block_columns > (1u << 31) - 1 || layout.block_rows > (1u << 31) - 1) {
     handle.fail({},
-                std::string("absurd ") + what + " size " + std::to_string(layout.block_columns) +
+                std::string("invalid ") + what + " size " + std::to_string(layout.block_columns) +
                     " x " + std::to_string(layout.block_rows),
                 "check the file (tiffinfo)");
   }
@@ -148,14 +148,15 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   layout.blocks_down = (layout.rows + layout.block_rows - 1) / layout.block_rows;
   const std::uint64_t planes = layout.separate ? layout.bands : 1;
   const std::uint64_t across = layout.blocks_across, down = layout.blocks_down;
-  // Both factors are below 2^30 and planes below 2^16: 2^60 first, then checked against the file.
-  // Each block has at least one byte in the file's tables of places and sizes.
+  // Each block has at least one byte in the file's tables of offsets and sizes. Both factors are
+  // below 2^30, so their product fits 64 bits; it is checked against the file before multiplying by
+  // `planes`, which is below 2^16.
   if (across * down > handle.file_bytes() || across * down * planes > handle.file_bytes() ||
       across * down * planes > UINT32_MAX) {
     handle.fail({},
                 "claims " + std::to_string(across) + " x " + std::to_string(down) + " " + what +
                     "s, more than a file of " + counted(handle.file_bytes(), "byte") + " can list",
-                "fetch the file again; it is damaged or cut short");
+                "the file is damaged or truncated: download it again");
   }
 }
 

@@ -23,7 +23,7 @@ struct GeoTiffLayout {
   std::uint16_t sample_format = 1;
   unsigned bits = 8;                 ///< of a stored sample
   ScalarType type = ScalarType::u8;  ///< of a sample in memory
-  bool plain = false;                ///< uncompressed complete bytes: readable without libtiff
+  bool plain = false;                ///< uncompressed whole bytes: readable without libtiff
   bool swapped = false;              ///< the byte order is not native
 
   /// Interleaved samples per pixel in a block.

@@ -77,7 +77,7 @@ void add_georeference(TiffDirectory& directory, const GeoTiffOptions& options) {
   if (!keys.ascii().empty()) directory.add(kGeoAsciiParams, keys.ascii());
 }
 
-/// As short as it can be, as libtiff writes it.
+/// Adds a length with the shortest type that fits, as libtiff does.
 void add_length(TiffDirectory& directory, std::uint32_t tag, std::uint32_t length) {
   if (length <= 0xFFFF) {
     directory.add(tag, std::vector<std::uint16_t>{static_cast<std::uint16_t>(length)});

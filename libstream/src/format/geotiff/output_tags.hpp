@@ -8,7 +8,8 @@
 
 namespace terrace::stream {
 
-/// The tags of the raster (level 0) or of an overview of that size, but for where its tiles are.
+/// The tags of the raster (level 0) or of an overview of that size, without those that say where
+/// its tiles are.
 TiffDirectory tags_of(const GeoTiffOptions& options, unsigned level, std::uint32_t columns,
                       std::uint32_t rows);
 

@@ -24,12 +24,12 @@ void fill(std::vector<std::byte>& samples, std::size_t bytes, T value) {
   }
 }
 
-/// As a sample; nullopt for one that no sample can be.
+/// The nodata value as a sample; nullopt if no sample can have it.
 template <class T>
 std::optional<T> sample_of(const std::optional<double>& nodata) {
   if (!nodata) return std::nullopt;
   if constexpr (std::is_integral_v<T>) {
-    // 2^63 and 2^64 are doubles, the largest integers below them are not.
+    // 2^63 and 2^64 are doubles, but the largest integers below them are not.
     constexpr double kEnd = 2.0 * static_cast<double>(std::numeric_limits<T>::max() / 2 + 1);
     const bool fits = *nodata >= static_cast<double>(std::numeric_limits<T>::min()) &&
                       *nodata < kEnd && std::trunc(*nodata) == *nodata;
@@ -38,7 +38,7 @@ std::optional<T> sample_of(const std::optional<double>& nodata) {
   return static_cast<T>(*nodata);
 }
 
-/// One out of up to four.
+/// The mean of up to four samples, rounded; the first of them if the mean is the nodata value.
 template <class T>
 T average(std::span<const T> values, const std::optional<T>& nodata) {
   double sum = 0;
@@ -47,7 +47,7 @@ T average(std::span<const T> values, const std::optional<T>& nodata) {
   T result;
   if constexpr (std::is_integral_v<T>) {
     const auto range = std::minmax_element(values.begin(), values.end());
-    // Beyond 2^53 the mean is rounded.
+    // Beyond 2^53 rounding may take the mean out of the samples' range.
     const double rounded = std::floor(mean + 0.5);
     result = rounded >= static_cast<double>(*range.second)  ? *range.second
              : rounded <= static_cast<double>(*range.first) ? *range.first
@@ -115,13 +115,13 @@ void Overviews::finish() {
   }
 }
 
-/// Lays a tile, halved, over its quarter of the parent.
+/// Writes a tile, at half its resolution, to its quarter of the parent.
 template <class T>
 void Overviews::reduce(std::size_t level, std::uint32_t across, std::uint32_t down,
                        std::span<const std::byte> samples, std::vector<std::byte>& parent) const {
   const std::size_t side = options_.tile;
   const std::optional<T> nodata = sample_of<T>(options_.nodata);
-  // Readers take what is not there for no data, or 0.
+  // Readers interpret missing cells as nodata, or as 0 without a nodata value.
   const T missing = nodata.value_or(T{});
   if (parent.empty()) fill(parent, side * side * sizeof(T), missing);
   const GeoTiffLevel& here = levels_[level];

@@ -21,31 +21,32 @@ struct GeoTiffLevel {
   [[nodiscard]] std::size_t tiles() const { return std::size_t{across} * down; }
 };
 
-/// The raster and its overviews, each with half the columns and rows of the one before (rounded
-/// up), down to the first of at most 512 x 512 cells; the raster alone if no overviews are wanted.
+/// The raster and its overviews, each with half the columns and rows of the previous one (rounded
+/// up), down to the first with at most 512 x 512 cells; only the raster if options.overviews is
+/// none.
 std::vector<GeoTiffLevel> levels_of(const GeoTiffOptions& options);
 
-/// Makes the tiles of overviews out of the raster's, in any order. Holds the overview tiles that
-/// are not complete: one for each level if tiles come in the order of a quadtree, half a row of
-/// them for each level if they come by rows.
+/// Computes the tiles of overviews from those of the raster, which may come in any order. Holds the
+/// incomplete overview tiles: one per level if tiles come in quadtree order, half a row of tiles
+/// per level if they come by rows.
 class Overviews {
  public:
-  /// Takes a tile of a level of 1 or above.
+  /// Receives a tile of level 1 or above.
   using Write = std::function<void(std::size_t level, std::uint32_t across, std::uint32_t down,
                                    std::span<const std::byte> samples)>;
 
   Overviews(const GeoTiffOptions& options, std::vector<GeoTiffLevel> levels, Write write);
 
-  /// A tile of the raster; without samples: of no data.
+  /// Adds a tile of the raster; without samples it has no data.
   void add(std::uint32_t across, std::uint32_t down, std::span<const std::byte> samples) {
     add(0, across, down, samples);
   }
-  /// The tiles that were not added have no data. Writes what is not complete.
+  /// Writes the incomplete tiles; tiles that were not added have no data.
   void finish();
 
  private:
   struct Tile {
-    std::vector<std::byte> samples{};  ///< none: no data so far
+    std::vector<std::byte> samples{};  ///< empty: no data so far
     unsigned children = 0;
   };
   using Place = std::pair<std::uint32_t, std::uint32_t>;  ///< across, down

@@ -19,7 +19,7 @@
 namespace terrace::stream {
 namespace {
 
-/// What GDAL and libtiff call predictor 2: each sample less the one to its left.
+/// Predictor 2 of GDAL and libtiff: each sample minus the one to its left.
 template <class T>
 void difference_row(std::byte* row, std::size_t columns) {
   using Bits = std::make_unsigned_t<T>;
@@ -33,8 +33,8 @@ void difference_row(std::byte* row, std::size_t columns) {
   }
 }
 
-/// Predictor 3 (Adobe Photoshop TIFF Technical Note 3): the first bytes of all samples, then the
-/// second ones and so on, from the sign down; each byte less the one before.
+/// Predictor 3 (Adobe Photoshop TIFF Technical Note 3): the most significant bytes of all samples,
+/// then the next ones, and so on; each byte minus the previous one.
 void difference_floats(std::byte* row, std::size_t columns, std::size_t size,
                        std::vector<std::byte>& scratch) {
   scratch.assign(row, row + columns * size);

@@ -12,7 +12,7 @@ struct libdeflate_compressor;
 
 namespace terrace::stream {
 
-/// Codes the tiles of a GeoTIFF: differences of neighbours, then what is repeated.
+/// Compresses the tiles of a GeoTIFF: applies the predictor, then the compression of the options.
 class TileEncoder {
  public:
   explicit TileEncoder(const GeoTiffOptions& options);
@@ -20,7 +20,7 @@ class TileEncoder {
   TileEncoder(const TileEncoder&) = delete;
   TileEncoder& operator=(const TileEncoder&) = delete;
 
-  /// samples: of a whole tile, used up. The result stays until the next call.
+  /// samples: of a whole tile; overwritten. The result is valid until the next call.
   std::span<const std::byte> encode(std::span<std::byte> samples);
 
  private:

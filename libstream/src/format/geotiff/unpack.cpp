@@ -11,7 +11,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Small floats to single precision: every value fits, subnormal ones become normal.
+/// Converts small floats to single precision, which has every value; subnormals become normal.
 template <unsigned kExponentBits, unsigned kMantissaBits>
 float widen(std::uint32_t bits) {
   constexpr std::uint32_t kMantissaMask = (1u << kMantissaBits) - 1;
@@ -45,7 +45,7 @@ std::uint32_t native_24(const std::byte* from) {
   }
 }
 
-/// `bits` bits from bit number `position` on, counted from the highest bit of the first byte.
+/// `bits` bits beginning at bit `position`, counted from the highest bit of the first byte.
 std::uint32_t bits_at(const std::byte* from, std::uint64_t position, unsigned bits) {
   std::uint64_t value = 0;
   const std::uint64_t first = position / 8, last = (position + bits - 1) / 8;

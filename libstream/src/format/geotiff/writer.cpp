@@ -26,8 +26,8 @@
 namespace terrace::stream {
 namespace {
 
-/// Tells readers how the file is laid out: GDAL's "Cloud Optimized GeoTIFF" driver defines it. The
-/// space behind is for YES in place of NO.
+/// Describes the file's layout to readers, as defined by GDAL's "Cloud Optimized GeoTIFF" driver.
+/// The space at the end leaves room for YES instead of NO.
 constexpr std::string_view kLayout =
     "GDAL_STRUCTURAL_METADATA_SIZE=000140 bytes\n"
     "LAYOUT=IFDS_BEFORE_DATA\n"
@@ -36,7 +36,7 @@ constexpr std::string_view kLayout =
     "BLOCK_TRAILER=LAST_4_BYTES_REPEATED\n"
     "KNOWN_INCOMPATIBLE_EDITION=NO\n ";
 constexpr std::size_t kAround = 4;          ///< bytes of a leader, and of a trailer
-constexpr std::size_t kTilesPerThread = 2;  ///< that wait to be compressed
+constexpr std::size_t kTilesPerThread = 2;  ///< waiting to be compressed
 
 /// Where the tiles of a level are; 0 for those that are left out.
 struct TileIndex {
@@ -48,7 +48,7 @@ struct TileIndex {
 
 std::uint64_t even(std::uint64_t number) { return number + number % 2; }
 
-/// Whether 4 GiB might not do. Compression may also make noise a little larger.
+/// True if 4 GiB might not suffice. Compression may enlarge noise slightly.
 bool needs_big(const GeoTiffOptions& options, const std::vector<GeoTiffLevel>& levels) {
   const double tile_bytes = static_cast<double>(options.tile) * options.tile *
                             static_cast<double>(size_of(options.sample.type));
@@ -67,7 +67,7 @@ struct GeoTiffWriter::Impl {
   std::vector<TileIndex> tiles;  ///< of each level
   bool big;
   AtomicFile file;
-  std::optional<Spool> spool;  ///< tiles of a file with overviews, in the order in which they come
+  std::optional<Spool> spool;  ///< tiles of a file with overviews, in the order of arrival
   /// A tile on its way to the file.
   struct Waiting {
     std::size_t level, number;
@@ -78,8 +78,8 @@ struct GeoTiffWriter::Impl {
   std::vector<Waiting> waiting;
   std::size_t waiting_count = 0;
   Overviews overviews;
-  std::vector<std::byte> band;  ///< a row of tiles, by rows
-  std::vector<std::byte> tile;  ///< one of the row's
+  std::vector<std::byte> band;  ///< the rows of one row of tiles
+  std::vector<std::byte> tile;  ///< one tile of `band`
   std::uint32_t next_row = 0;   ///< of write_rows
   bool by_rows = false;
 
@@ -112,13 +112,13 @@ struct GeoTiffWriter::Impl {
   void put(std::size_t level, std::uint32_t across, std::uint32_t down,
            std::span<const std::byte> samples) {
     check_stop();
-    Waiting& tile_there = waiting[waiting_count++];
-    tile_there.level = level;
-    tile_there.number = std::size_t{down} * levels[level].across + across;
-    tile_there.samples.assign(samples.begin(), samples.end());
+    Waiting& added = waiting[waiting_count++];
+    added.level = level;
+    added.number = std::size_t{down} * levels[level].across + across;
+    added.samples.assign(samples.begin(), samples.end());
     if (waiting_count == waiting.size()) write_waiting();
   }
-  /// In the order in which they came.
+  /// Compresses the waiting tiles on all threads and writes them in the order of arrival.
   void write_waiting() {
     team.run(waiting_count, [this](std::size_t i, std::size_t worker) {
       const std::span<const std::byte> coded = encoders[worker].encode(waiting[i].samples);
@@ -142,14 +142,15 @@ struct GeoTiffWriter::Impl {
     put(0, across, down, samples);
   }
 
-  void flush_band(std::uint32_t rows_there);
+  void flush_band(std::uint32_t rows);
   [[nodiscard]] TiffDirectory directory(std::size_t level) const;
   void finish_plain();
   void finish_with_overviews();
 };
 
-/// Writes the band's tiles; what is beyond the raster repeats its edge, which costs least.
-void GeoTiffWriter::Impl::flush_band(std::uint32_t rows_there) {
+/// Writes the band's tiles. Cells beyond the raster repeat its edge, which compresses best. rows:
+/// how many the band has.
+void GeoTiffWriter::Impl::flush_band(std::uint32_t rows) {
   const std::size_t size = sample_bytes(), side = options.tile;
   const std::size_t row_bytes = options.columns * size;
   const std::uint32_t down = (next_row - 1) / options.tile;
@@ -157,7 +158,7 @@ void GeoTiffWriter::Impl::flush_band(std::uint32_t rows_there) {
     const std::size_t first = across * side;
     const std::size_t width = std::min<std::size_t>(side, options.columns - first);
     for (std::size_t row = 0; row < side; ++row) {
-      const std::size_t from = std::min<std::size_t>(row, rows_there - 1);
+      const std::size_t from = std::min<std::size_t>(row, rows - 1);
       std::byte* const out = tile.data() + row * side * size;
       std::memcpy(out, band.data() + from * row_bytes + first * size, width * size);
       for (std::size_t i = width; i < side; ++i) {
@@ -182,7 +183,7 @@ TiffDirectory GeoTiffWriter::Impl::directory(std::size_t level) const {
   return directory;
 }
 
-/// The directory goes behind the tiles.
+/// Writes the directory after the tiles.
 void GeoTiffWriter::Impl::finish_plain() {
   write_waiting();
   if (file.size() % 2 != 0) file.write(std::string_view("\0", 1));
@@ -192,7 +193,7 @@ void GeoTiffWriter::Impl::finish_plain() {
   file.write_at(0, std::as_bytes(std::span(head)));
 }
 
-/// The directories, then the tiles, those of the smallest overview first.
+/// Writes the directories, then the tiles, beginning with those of the smallest overview.
 void GeoTiffWriter::Impl::finish_with_overviews() {
   overviews.finish();
   write_waiting();
@@ -236,8 +237,8 @@ void GeoTiffWriter::Impl::finish_with_overviews() {
 }
 
 std::uint64_t geotiff_table_bytes(const GeoTiffOptions& options) {
-  // With overviews the table is held twice while the file is put together, and directories are made
-  // of it one after another.
+  // With overviews, two copies of the table are held while the file is assembled, and one directory
+  // at a time is built from it.
   constexpr std::uint64_t kTable = sizeof(std::uint64_t) + sizeof(std::uint32_t);
   const std::vector<GeoTiffLevel> levels = levels_of(options);
   std::uint64_t bytes = 3 * kTable * levels.front().tiles();
@@ -269,8 +270,8 @@ void GeoTiffWriter::write_rows(std::span<const std::byte> samples) {
     std::memcpy(impl.band.data() + at * row_bytes, samples.data(), rows * row_bytes);
     samples = samples.subspan(rows * row_bytes);
     impl.next_row += static_cast<std::uint32_t>(rows);
-    const auto there = static_cast<std::uint32_t>(at + rows);
-    if (there == impl.options.tile || impl.next_row == impl.options.rows) impl.flush_band(there);
+    const auto filled = static_cast<std::uint32_t>(at + rows);
+    if (filled == impl.options.tile || impl.next_row == impl.options.rows) impl.flush_band(filled);
   }
 }
 
