@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Scans by third parties, if TERRACE_DATA names a folder that has them.
+// SPDX-License-Identifier: Apache-2.0 Scans by third parties, if TERRACE_DATA names a folder that
+// contains them.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -29,7 +29,7 @@ std::filesystem::path data_folder() {
   return data == nullptr ? std::filesystem::path() : std::filesystem::path(data) / "lidar";
 }
 
-/// Reads a file and rewrites it, which must not move anything.
+/// Reads a file and writes it again, which must not move anything.
 void copy_points(const std::string& from, const std::string& to, unsigned threads = 1) {
   const auto source = open_source(std::span(&from, 1), {.threads = threads});
   const auto writer = open_point_writer(
@@ -44,7 +44,7 @@ void copy_points(const std::string& from, const std::string& to, unsigned thread
   EXPECT_EQ(writer->rounding(), 0.0);
 }
 
-/// The records of a file after it was read and rewritten.
+/// The records of a file that was read and written again.
 std::string records_through(const std::filesystem::path& file, const TempFolder& temp,
                             unsigned threads = 1) {
   const std::string path = temp.path() / "copy.las";
@@ -52,7 +52,7 @@ std::string records_through(const std::filesystem::path& file, const TempFolder&
   return records_of(path);
 }
 
-TEST(LasReal, EveryRecordComesBack) {
+TEST(LasReal, RoundTripsEveryRecord) {
   const std::filesystem::path folder = data_folder();
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no TERRACE_DATA";
   const TempFolder temp;
@@ -73,7 +73,7 @@ struct Survey {
   int epsg;
 };
 
-TEST(LasReal, PointsAreThoseThatWerePublished) {
+TEST(LasReal, PointsMatchThePublishedFacts) {
   constexpr Survey kSurveys[] = {
       {"1.2-with-color.las",
        1065,
@@ -115,7 +115,7 @@ TEST(LasReal, PointsAreThoseThatWerePublished) {
   }
 }
 
-TEST(LasReal, CompressedRecordsAreThoseLaszipDecodes) {
+TEST(LasReal, CompressedRecordsMatchLaszip) {
   const std::filesystem::path folder = data_folder();
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no TERRACE_DATA";
   const TempFolder temp;
@@ -128,16 +128,16 @@ TEST(LasReal, CompressedRecordsAreThoseLaszipDecodes) {
     ++seen;
     std::filesystem::path file = folder / name;
     if (name.ends_with(".copc.laz")) {
-      // Without the mark of COPC, which is read by its octree, it is read in the order of the file.
+      // Remove the mark of COPC, so that the file is read in its own order, not by its octree.
       std::string bytes = read_text(file);
       bytes.replace(377, 4, "none");
       file = write_text(temp.path() / "plain.laz", bytes);
     }
     EXPECT_EQ(fnv1a(records_through(file, temp, 3)), hash);
-    // That they come back in all the other ways is seen with the small files where reading is slow.
+    // Other ways of reading are slow, so they are tested with the small files only.
     if (points > 200'000 / TERRACE_TEST_SHARE && TERRACE_TEST_SHARE > 1) continue;
     EXPECT_EQ(fnv1a(records_through(file, temp, 1)), hash);
-    // Compressed here, and from a pipe.
+    // Compressed by us, and from a pipe.
     const std::string laz = temp.path() / "copy.laz";
     copy_points(temp.path() / "copy.las", laz);
     EXPECT_EQ(fnv1a(records_through(laz, temp)), hash);

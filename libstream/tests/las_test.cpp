@@ -61,7 +61,7 @@ std::string record_of_format_3() {
   return record;
 }
 
-TEST_F(Las, FieldsAreAttributesOfTheirTypes) {
+TEST_F(Las, DeliversFieldsAsAttributesOfTheirTypes) {
   const LasParts parts{.point_format = 3,
                        .record_bytes = 34,
                        .points = 1,
@@ -103,7 +103,7 @@ TEST_F(Las, FieldsAreAttributesOfTheirTypes) {
   EXPECT_EQ(records_of(copy_of(all)), parts.records);
 }
 
-TEST_F(Las, AnyRecordsOfAnyFormatComeBack) {
+TEST_F(Las, RoundTripsRecordsOfAllFormats) {
   constexpr std::size_t kBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
   std::mt19937_64 random(1);
   for (unsigned format = 0; format <= 10; ++format) {
@@ -125,7 +125,7 @@ TEST_F(Las, AnyRecordsOfAnyFormatComeBack) {
   }
 }
 
-TEST_F(Las, KeysOfGeoTiffNameTheCrs) {
+TEST_F(Las, ReadsTheCrsFromGeoTiffKeys) {
   LasParts parts;
   std::string keys(24, '\0');
   const std::uint16_t shorts[] = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32633};
@@ -142,15 +142,15 @@ TEST_F(Las, KeysOfGeoTiffNameTheCrs) {
   EXPECT_EQ(read_file(put_file("wkt.las", parts), {.crs = given}).info.crs, given);
 }
 
-TEST_F(Las, LatticesOfSeveralFilesMeet) {
+TEST_F(Las, ReadsFilesWithDifferentOffsetsOntoOneLattice) {
   LasParts first{.points = 1, .records = std::string(28, '\0')}, second = first;
   second.offset = {1.25, -3, 0};
   const AllPoints both = read_all({put_file("1.las", first), put_file("2.las", second)});
   EXPECT_EQ(both.points.positions, (std::vector<Point3>{{0, 0, 0}, {125, -300, 0}}));
 }
 
-// Whatever the scales and offsets: each coordinate stays what it is in its own file.
-TEST_F(Las, FilesOfAnyScaleAndOffsetComeTogether) {
+// Each coordinate stays what it is in its own file, whatever the scales and offsets.
+TEST_F(Las, ReadsFilesOfAnyScaleAndOffsetTogether) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
@@ -187,7 +187,7 @@ TEST_F(Las, FilesOfAnyScaleAndOffsetComeTogether) {
   }
 }
 
-TEST_F(Las, ACommonLatticeIsAsCoarseAsItCanBe) {
+TEST_F(Las, UsesTheCoarsestCommonLattice) {
   LasParts first{.points = 1, .records = std::string(28, '\0')}, second = first;
   const auto together = [&] {
     return read_all({put_file("1.las", first), put_file("2.las", second)});
@@ -195,7 +195,7 @@ TEST_F(Las, ACommonLatticeIsAsCoarseAsItCanBe) {
   second.scale = {0.001, 0.001, 0.00025};
   second.offset = {1, 1, 0.25};
   EXPECT_EQ(lattice_of(together().info), (Lattice{.scale = second.scale, .offset = {}}));
-  // Steps of one size in x and y stay so, though only one axis asks for finer ones.
+  // Equal steps in x and y stay equal even if only one axis needs finer ones.
   second.scale = first.scale;
   second.offset = {1.255, 0, 0};
   const AllPoints finer = together();
@@ -204,19 +204,19 @@ TEST_F(Las, ACommonLatticeIsAsCoarseAsItCanBe) {
   EXPECT_EQ(finer.info.note, "");
 }
 
-TEST_F(Las, DoublesHoldWhatNoLatticeDoes) {
+TEST_F(Las, UsesDoublesWithoutACommonLattice) {
   LasParts first{.points = 1, .records = std::string(28, '\0')}, second = first;
   first.offset = {1e5, 0, 0};
   put(second.records, 0, std::int32_t{12345});
   const auto together = [&] {
     return read_all({put_file("1.las", first), put_file("2.las", second)});
   };
-  second.scale = {0.0123456789, 0.01, 0.01};  // as of a range cut into 2^32 steps
+  second.scale = {0.0123456789, 0.01, 0.01};  // like a range divided into 2^32 steps
   AllPoints all = together();
   EXPECT_EQ(all.info.coordinates[0].type, ScalarType::f64);
   EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1e5, 0, 0}, {12345 * 0.0123456789, 0, 0}}));
   EXPECT_NE(all.info.note.find("kept as doubles"), std::string::npos);
-  // On a lattice, but further apart than its steps reach.
+  // On one lattice, but too far apart for 32 bits.
   second.scale = first.scale;
   second.offset = {1e8, 0, 0};
   second.bounds = {{1e8, 0, 0}, {1e8 + 1000, 0, 0}};
@@ -225,18 +225,18 @@ TEST_F(Las, DoublesHoldWhatNoLatticeDoes) {
   EXPECT_EQ(all.points.positions, (std::vector<Point3>{{1e5, 0, 0}, {1e8 + 123.45, 0, 0}}));
   ASSERT_TRUE(all.info.stated_bounds);
   EXPECT_EQ(all.info.stated_bounds->max[0], 1e8 + 1000);
-  // The offset moves where that is enough.
+  // The offset moves if that suffices.
   second.offset = {3e7, 0, 0};
   second.bounds = {{3e7, 0, 0}, {3e7 + 1000, 0, 0}};
   all = together();
   ASSERT_TRUE(lattice_of(all.info));
   EXPECT_NEAR(world_point(all.info, all.points.positions[1])[0], 3e7 + 123.45, 1e-8);
-  // Headers without bounds leave it to the points.
+  // If headers have no bounds, it depends on the points.
   first.bounds = second.bounds = {.min = {}, .max = {}};
-  EXPECT_NE(error_of(together).find("out of reach"), std::string::npos);
+  EXPECT_NE(error_of(together).find("out of range"), std::string::npos);
 }
 
-TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
+TEST_F(Las, UsesAsManyDecimalsAsThePointsNeed) {
   const auto written = [&](std::vector<Point3> points, std::optional<Box3> bounds = {},
                            bool degrees = false) {
     const std::string path = folder_.path() / "decimals.las";
@@ -270,7 +270,7 @@ TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
   EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{0.001, 0.001, 0.001}));
   bounds.max[1] = 1e12;
   EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{1000, 1000, 0.001}));
-  // Without bounds more points may follow: millimetres are kept over 200 km, finer steps over less.
+  // Without bounds more points may follow: millimetre steps cover 200 km, finer steps less.
   EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5, 5.1e6 + 0.125, 7}}), (Point3{0.001, 0.001, 0.001}));
   EXPECT_EQ(written({{4e5, 5e6, 7}, {5e5 + 1 / 3.0, 5.1e6, 7}}), (Point3{0.001, 0.001, 0.001}));
   EXPECT_EQ(written({{4e5, 5e6, 7}, {4e5 + 1 / 3.0, 5e6 + 400, 7}}), (Point3{1e-4, 1e-4, 0.001}));
@@ -278,7 +278,7 @@ TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
   EXPECT_EQ(written({{8, 46, 7}, {9, 47 - 1 / 3.0, 7}}, {}, true), (Point3{1e-7, 1e-7, 0.001}));
 }
 
-TEST_F(Las, LaterPointsKeepTheirDecimalsWhateverTheFirstAre) {
+TEST_F(Las, KeepsTheDecimalsOfLaterPoints) {
   for (const char* const name : {"sea.las", "sea.laz", "sea.copc.laz"}) {
     const std::string path = folder_.path() / name;
     PointBlock sea, land;
@@ -297,7 +297,7 @@ TEST_F(Las, LaterPointsKeepTheirDecimalsWhateverTheFirstAre) {
   }
 }
 
-TEST_F(Las, DamageIsOneLine) {
+TEST_F(Las, ReportsDamageInOneLine) {
   const std::string good = LasParts{.points = 2, .records = std::string(56, '\0')}.bytes();
   EXPECT_EQ(refusal(good), "");
   EXPECT_NE(refusal(good.substr(0, 200)).find("ends in its header"), std::string::npos);
@@ -311,23 +311,23 @@ TEST_F(Las, DamageIsOneLine) {
             std::string::npos);
 }
 
-TEST_F(Las, RefusesCoordinatesThatAreNotFinite) {
+TEST_F(Las, RejectsCoordinatesThatAreNotFinite) {
   const std::string records(28, '\1');
   LasParts parts{.points = 1, .records = records};
   EXPECT_EQ(refusal(parts.bytes()), "");
   parts.scale = {0.01, 1e301, 0.01};
   EXPECT_NE(refusal(parts.bytes())
-                .find("the scale and the offset of y lead to coordinates that are "
+                .find("the scale and the offset of y give coordinates that are "
                       "not finite"),
             std::string::npos);
   parts.scale = {0.01, 0.01, 1e301};
-  EXPECT_NE(refusal(parts.bytes()).find("of z lead to"), std::string::npos);
+  EXPECT_NE(refusal(parts.bytes()).find("of z give"), std::string::npos);
   parts.scale = {0.01, 0.01, 1e290};
   parts.offset = {0, 0, 1.79e308};
   EXPECT_EQ(refusal(parts.bytes()), "");
 }
 
-TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
+TEST_F(Las, RoundTripsCompressedFilesOfSeveralChunks) {
   std::mt19937_64 random(2);
   for (const unsigned format : {3U, 7U}) {
     LasParts parts{.point_format = format,
@@ -359,8 +359,8 @@ TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
   }
 }
 
-// Complete chunks remain, the same by any number of threads; the damaged one is named.
-TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
+// Intact chunks remain, with any number of threads; the damaged one is named.
+TEST_F(Las, SkipsDamagedChunksOnRequest) {
   std::mt19937_64 random(3);
   for (const unsigned format : {3U, 7U}) {
     SCOPED_TRACE(format);
@@ -405,7 +405,7 @@ TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
       rest.erase(rest.begin() + 50000, rest.begin() + 100000);
       EXPECT_TRUE(same_bits(some.points.positions, rest));
     }
-    // Without their table the chunks are found one after the other, up to the end of the file.
+    // Without their table, chunks are found one after the other, up to the end of the file.
     const AllPoints cut = read(good.substr(0, good.size() / 2), 2);
     ASSERT_EQ(told.size(), 2U);
     EXPECT_NE(told[0].what.find("chunk table"), std::string::npos) << told[0].what;
@@ -425,16 +425,16 @@ TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
   }
 }
 
-TEST_F(Las, WhatDoesNotFitIsRefused) {
+TEST_F(Las, RejectsValuesThatDoNotFit) {
   const std::string path = folder_.path() / "out.las";
   const auto error = [&](const PointHeader& header, const PointBlock& block) {
     return error_of([&] { open_point_writer(path, header, {})->append(block); });
   };
   const Lattice fine{.scale = {1e-9, 1, 1}};
   EXPECT_NE(
-      error({.lattice = fine}, {.positions = {{3, 0, 0}}, .payload = {}}).find("out of reach"),
+      error({.lattice = fine}, {.positions = {{3, 0, 0}}, .payload = {}}).find("out of range"),
       std::string::npos);
-  EXPECT_NE(error({}, {.positions = {{NAN, 0, 0}}, .payload = {}}).find("out of reach"),
+  EXPECT_NE(error({}, {.positions = {{NAN, 0, 0}}, .payload = {}}).find("out of range"),
             std::string::npos);
   PointBlock block{.positions = {{0, 0, 0}}, .payload = {}};
   append_values(block.payload, 32.0);
@@ -445,7 +445,7 @@ TEST_F(Las, WhatDoesNotFitIsRefused) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST_F(Las, FilesWhoseCrsDiffersGoTogetherIfTheCallerSaysSo) {
+TEST_F(Las, JoinsFilesWithEquivalentCrsIfTheCallerAgrees) {
   LasParts parts{.points = 1, .records = std::string(28, '\0')};
   std::vector<std::string> files;
   for (const char* const wkt :
@@ -464,13 +464,13 @@ TEST_F(Las, FilesWhoseCrsDiffersGoTogetherIfTheCallerSaysSo) {
     return a.wkt.find("\"a\"") != a.wkt.npos && b.wkt.find("\"c\"") == b.wkt.npos;
   };
   EXPECT_NE(error_of([&] { read(options); }).find("3.las"), std::string::npos);
-  EXPECT_EQ(asked, 2);  // of each description once
+  EXPECT_EQ(asked, 2);  // once per definition
   files.pop_back();
   EXPECT_EQ(read_all(files, options).points.size(), 3u);
 }
 
-// The header's box may be wrong: it selects nothing.
-TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
+// The header's bounds may be wrong, so they select nothing.
+TEST_F(Las, ReadsARegionWhateverBoundsTheHeaderStates) {
   LasParts parts{.points = 1, .records = std::string(28, '\0')};
   parts.bounds = {{1e6, 1e6, 1e6}, {1e6 + 1, 1e6 + 1, 1e6 + 1}};
   const std::string path = folder_.path() / "wrong_box.las";
@@ -480,7 +480,7 @@ TEST_F(Las, ARegionIsReadWhateverBoxTheHeaderStates) {
   EXPECT_EQ(read_file(path, options).points.size(), 1u);
 }
 
-TEST_F(Las, RecordsThatTheHeaderDoesNotCountAreNoted) {
+TEST_F(Las, NotesRecordsThatTheHeaderDoesNotCount) {
   for (const std::uint32_t counted : {0u, 1u, 3u}) {
     LasParts parts{.points = counted, .records = std::string(3 * 28, '\0')};
     const std::string path = folder_.path() / "uncounted.las";

@@ -35,7 +35,7 @@ std::vector<LazFacts> laz_facts() {
   return all;
 }
 
-TEST(LazReal, RecordsAreThoseLaszipDecodes) {
+TEST(LazReal, RecordsMatchLaszip) {
   const auto folder = real_data();
   if (!folder) GTEST_SKIP() << "needs TERRACE_DATA";
   const std::vector<LazFacts> facts = laz_facts();

@@ -30,7 +30,7 @@ inline ByteVector read_bytes(const std::filesystem::path& path) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// Not the usual offset basis: the one with which the published hashes were made.
+/// The offset basis with which the published hashes were made, which is not the usual one.
 inline constexpr std::uint64_t kFnvStart = 1469598103934665603u;
 
 inline std::uint64_t fnv1a(std::span<const std::byte> bytes, std::uint64_t hash = kFnvStart) {

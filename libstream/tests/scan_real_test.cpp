@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Scans by third parties, if TERRACE_DATA names a folder that has them.
+// SPDX-License-Identifier: Apache-2.0 Scans by third parties, if TERRACE_DATA names a folder that
+// contains them.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -46,7 +46,7 @@ const Scan kScans[] = {
      {0.09475, 0.187605, 0.0611871}},
 };
 
-/// Reads a file; a compressed one through a pipe.
+/// Reads a file, through a pipe if it is compressed.
 AllPoints read_scan(const std::filesystem::path& path) {
   if (path.extension() != ".gz") return read_file(path);
   FILE* pipe = popen(("gzip -dc '" + path.string() + "'").c_str(), "r");
@@ -57,7 +57,7 @@ AllPoints read_scan(const std::filesystem::path& path) {
   return all;
 }
 
-TEST(ScanReal, PointsAreThoseThatWerePublished) {
+TEST(ScanReal, PointsMatchThePublishedFacts) {
   const char* data = std::getenv("TERRACE_DATA");
   const auto folder = std::filesystem::path(data == nullptr ? "" : data) / "scan";
   if (data == nullptr || !std::filesystem::is_directory(folder)) GTEST_SKIP() << "no TERRACE_DATA";

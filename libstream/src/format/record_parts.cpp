@@ -47,14 +47,14 @@ class PartsInTurn final : public RecordReader {
   RecordParts parts_;
   std::unique_ptr<PartReader> reader_;
   std::vector<std::byte> records_;
-  std::size_t number_ = 0;  ///< of the part
-  std::uint64_t left_ = 0;  ///< points of it
+  std::size_t number_ = 0;  ///< of the current part
+  std::uint64_t left_ = 0;  ///< points of it that have not been read
 };
 
 class PartsAhead final : public RecordReader {
  public:
-  /// Takes `slots` times a part's bytes and records, and a reader per thread. threads: 0 for the
-  /// caller's alone.
+  /// Holds up to `slots` parts, coded and decoded, and a reader per thread. threads: 0 to read on
+  /// the caller's.
   PartsAhead(RecordParts parts, unsigned threads, std::size_t slots, OnDamage on_damage)
       : parts_(std::move(parts)),
         wanted_threads_(threads),
@@ -102,7 +102,7 @@ class PartsAhead final : public RecordReader {
     bool ready = false;
   };
 
-  /// Throws what it is, if it is not damage or nobody wants to be told.
+  /// Skips a part that failed to read. Rethrows unless it is damage and a handler is set.
   void leave_out(Slot& slot) {
     try {
       std::rethrow_exception(std::exchange(slot.error, nullptr));
@@ -115,13 +115,13 @@ class PartsAhead final : public RecordReader {
     release(slot);
   }
 
-  /// Only when records are asked for: files are opened to be looked at, too.
+  /// Called only when records are requested, because files are also opened just for their header.
   void start() {
     started_ = true;
     try {
       for (unsigned i = 0; i < wanted_threads_; ++i) threads_.emplace_back([this] { run(); });
     } catch (const std::system_error&) {
-      // The system grants no more threads.
+      // The system has no more threads.
     }
     if (threads_.empty()) own_ = parts_.make_reader();  // the caller reads
   }
@@ -204,7 +204,7 @@ class PartsAhead final : public RecordReader {
   std::vector<std::thread> threads_;
 };
 
-/// How many readers, and how many parts at once, there is memory for.
+/// How many readers, and how many parts at once, fit into memory.
 struct Ahead {
   std::size_t readers = 0, slots = 0;
 };
@@ -220,8 +220,8 @@ Ahead ahead_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigne
   }
   const std::uint64_t readers = std::min<std::uint64_t>(
       {threads, memory_bytes / (largest + kReaderBytes), parts.parts.size()});
-  // One for each reader and two that wait are enough if all are equal; while one reads the largest,
-  // the others read as many points in more parts.
+  // If all parts are equal, one slot for each reader and two for waiting parts are enough. While
+  // one reader has the largest part, the others read as many points in a larger number of parts.
   const std::uint64_t wanted =
       readers * std::max<std::uint64_t>(1, most_points * parts.parts.size() / points) + 2;
   return {static_cast<std::size_t>(readers),
@@ -237,7 +237,7 @@ std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const Source
     return std::make_unique<PartsAhead>(parts, static_cast<unsigned>(ahead.readers), ahead.slots,
                                         options.on_damage);
   }
-  // What is damaged is known at the end of a part: it is read whole before any of it is given out.
+  // Damage may show only at the end of a part, so a part is read whole before it is delivered.
   if (ahead.readers == 0 || !options.on_damage) return nullptr;
   return std::make_unique<PartsAhead>(parts, 0, 1, options.on_damage);
 }

@@ -21,9 +21,9 @@ class PartReader {
   virtual ~PartReader() = default;
   /// Moves to the first record of a part. Throws: Error.
   virtual void start(std::size_t part) = 0;
-  /// Reads records of the part to the beginning of `room`: as many as fit or fewer, at least one.
+  /// Reads records of the part to the beginning of `room`: at least one, at most as many as fit.
   /// Returns their bytes. Called only for records that RecordParts promises. Throws: Error if they
-  /// do not exist, and with the last one unless the part ends there.
+  /// do not exist, or if the part does not end after the last one.
   virtual std::size_t read(std::span<std::byte> room) = 0;
 };
 
@@ -40,13 +40,13 @@ struct RecordParts {
 };
 
 /// The records of the parts, in order, read by up to options.threads threads, a few parts ahead of
-/// the current one and within options.memory_bytes. Null if several threads would bring no gain and
-/// damage is not to be reported, or if there is no memory for them.
+/// the current one and within options.memory_bytes. Null if several threads would not help and
+/// there is no handler for damage, or if the memory does not suffice.
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options);
-/// The same on the caller's thread, in small pieces: however many points a part has, its records
-/// are not held at once.
+/// Like parts_ahead(), but on the caller's thread and in small pieces: a part's records are never
+/// all in memory, however many points it has.
 std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts);
-/// Ahead where that is of use, otherwise in turn.
+/// parts_ahead() if that returns a reader, otherwise parts_in_turn().
 std::unique_ptr<RecordReader> records_of_parts(RecordParts parts, const SourceOptions& options);
 
 }  // namespace terrace::stream

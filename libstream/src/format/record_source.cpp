@@ -21,8 +21,8 @@ namespace {
 
 bool is_wide_integer(ScalarType type) { return type == ScalarType::i64 || type == ScalarType::u64; }
 
-/// Brings fields of records into payloads. What lies together in both is moved together, as each
-/// pass over the records costs the same however little it moves.
+/// Copies fields of records to payloads. Fields that are adjacent in both are copied together,
+/// because a pass over the records costs the same however few bytes it copies.
 class PayloadUnpacker {
  public:
   PayloadUnpacker(std::span<const LasField> fields, std::size_t payload_bytes)
@@ -69,7 +69,7 @@ class PayloadUnpacker {
     PartsOfBytes parts{};
   };
 
-  /// Fields that lie behind one another, as few numbers: the last two may overlap.
+  /// Adds consecutive fields as few wide numbers, of which the last two may overlap.
   void add_values(std::span<const LasField> fields, std::size_t& i, std::size_t& to) {
     const std::size_t first = i, from = fields[i].offset;
     std::size_t bytes = 0;
@@ -93,7 +93,7 @@ class PayloadUnpacker {
     to += bytes;
   }
 
-  /// Fields that are parts of one byte.
+  /// Adds fields that are bits of one byte.
   void add_bits(std::span<const LasField> fields, std::size_t& i, std::size_t& to) {
     constexpr std::array<decltype(Bits::unpack), 9> kUnpack{
         nullptr,         &unpack_bits<1>, &unpack_bits<2>, &unpack_bits<3>, &unpack_bits<4>,
@@ -140,7 +140,7 @@ class RecordSource final : public PointSource {
       types_[axis] = type;
       checked_ = checked_ || size_of(type) == 8 || type == ScalarType::f32;
       check_reach(axis);
-      // Coordinates are doubles in memory; what these cannot hold is refused.
+      // Coordinates are doubles in memory; check() refuses integers that these cannot hold.
       if (is_wide_integer(type)) type = ScalarType::f64;
     }
     if (onto != nullptr) move_onto(*onto);
@@ -219,7 +219,7 @@ class RecordSource final : public PointSource {
     for (std::size_t i = 0; i < marks.size(); ++i) withheld_ += marks[i] != 0 ? 1 : 0;
   }
 
-  /// The scale and the offset that lead to coordinates in the CRS.
+  /// The scale and offset from stored coordinates to the CRS.
   [[nodiscard]] std::array<double, 2> scale_and_offset(std::size_t axis) const {
     const std::array<double, 6>& xy = stream_.info.world.xy;
     const Channel& z = stream_.info.coordinates[2];
@@ -228,7 +228,7 @@ class RecordSource final : public PointSource {
                        : std::array{z.scale, z.offset};
   }
 
-  /// Throws: Error if integers of the type lead to coordinates that are not finite.
+  /// Throws: Error if some integer of the type gives a coordinate that is not finite.
   void check_reach(std::size_t axis) const {
     const ScalarType type = types_[axis];
     if (type == ScalarType::f32 || type == ScalarType::f64) return;
@@ -240,8 +240,8 @@ class RecordSource final : public PointSource {
     throw Error({.file = file(),
                  .where = "header",
                  .cause = std::string("the scale and the offset of ") + "xyz"[axis] +
-                          " lead to coordinates that are not finite",
-                 .remedy = "the header is wrong: write the file again"});
+                          " give coordinates that are not finite",
+                 .remedy = "the header is wrong: export the file again"});
   }
 
   void check(const PointBlock& block) const {
@@ -253,7 +253,7 @@ class RecordSource final : public PointSource {
         const auto [scale, offset] = scale_and_offset(axis);
         if (!(std::abs(value) <= most) || !std::isfinite(value * scale + offset)) {
           fail(i, std::string("its ") + "xyz"[axis] + " is not a number that can be kept exactly",
-               "the file is damaged: get it anew");
+               "the file is damaged: download it again");
         }
       }
     }
@@ -267,16 +267,16 @@ class RecordSource final : public PointSource {
     } catch (const std::domain_error& axis) {
       throw Error({.file = file(),
                    .where = {},
-                   .cause = std::string(axis.what()) + " is on another lattice than that of the " +
-                            "other files: its scale or the fraction of its offset differs",
-                   .remedy = "name files instead of pipes, or read it on its own"});
+                   .cause = std::string(axis.what()) + " is not on the lattice of the other " +
+                            "files: its scale or the fraction of its offset differs",
+                   .remedy = "name files instead of pipes, or read it separately"});
     }
     info.world = placement.world;
     info.coordinates = placement.coordinates;
     if (placement.coordinates[0].type == ScalarType::f64) {
       info.note =
-          "the files' steps of coordinates have no common lattice of 32 bits: coordinates "
-          "are kept as doubles";
+          "the files' coordinate steps have no common 32-bit lattice: coordinates are kept as "
+          "doubles";
     }
     if (!info.stated_bounds) return;
     Box3 box;
@@ -301,8 +301,8 @@ class RecordSource final : public PointSource {
       point = moved(point);
       for (const double value : point) {
         if (value < -most - 1 || value > most) {
-          fail(i, "is out of reach of the lattice that the headers of all files ask for",
-               "its header states a wrong box: write the file anew, or read it on its own");
+          fail(i, "is out of range of the lattice chosen from the headers of all files",
+               "its header states wrong bounds: export the file again, or read it separately");
         }
       }
     }
@@ -313,7 +313,7 @@ class RecordSource final : public PointSource {
   PayloadUnpacker payload_;
   std::array<ScalarType, 3> types_{};  ///< of the coordinates in the records
   std::optional<Move> move_;           ///< to the placement of all files
-  bool checked_ = false;               ///< coordinates could be out of reach
+  bool checked_ = false;               ///< coordinates could be out of range
   std::optional<std::size_t> withheld_attribute_;
   std::uint64_t wanted_points_ = 0, delivered_ = 0, withheld_ = 0;
 };

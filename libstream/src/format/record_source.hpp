@@ -15,9 +15,9 @@
 
 namespace terrace::stream {
 
-/// Points in little-endian records of one length, and their interpretation.
+/// Points in little-endian records of equal length, and their interpretation.
 struct RecordStream {
-  /// info.points: the number in `records`. A coordinate's type is that in the record.
+  /// info.points: the number in `records`. The coordinates have the types of the record.
   SourceInfo info{};
   std::size_t record_bytes = 0;
   std::array<std::size_t, 3> coordinate_offsets{0, 4, 8};
@@ -27,9 +27,10 @@ struct RecordStream {
   std::uint64_t points = 0;  ///< number in the file, wanted or not
 };
 
-/// Blocks of these points. onto: the common_placement() of several files, onto which they are
-/// moved; null for a single file. Throws: Error if they are not on its lattice; in next(): Error as
-/// the RecordReader, and for coordinates that are not finite or out of range once moved.
+/// Returns a source of these points. onto: the common_placement() of several files, onto which the
+/// points are moved; null for a single file. Throws: Error if they are not on its lattice. next()
+/// throws what the RecordReader throws, and Error for coordinates that are not finite or are out of
+/// range after the move.
 std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points,
                                                const Placement* onto);
 

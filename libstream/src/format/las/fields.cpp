@@ -17,10 +17,10 @@ namespace {
 constexpr std::array<std::size_t, kLastLasPointFormat + 1> kRecordBytes{20, 28, 26, 34, 57, 63,
                                                                         30, 36, 38, 59, 67};
 
-/// Collects fields that follow one another.
+/// Collects consecutive fields.
 struct FieldList {
   std::vector<LasField> fields{};
-  std::size_t offset = 12;  ///< behind the coordinates
+  std::size_t offset = 12;  ///< of the next field: first after the coordinates
 
   void add(Channel channel) {
     const std::size_t bytes = size_of(channel.type);
@@ -28,7 +28,7 @@ struct FieldList {
     offset += bytes;
   }
   void add(const char* name, ScalarType type) { add(Channel{.name = name, .type = type}); }
-  /// Parts of the byte here, from its lowest bit on.
+  /// Adds the parts of the next byte, beginning at its lowest bit.
   void add_bits(std::initializer_list<std::pair<const char*, unsigned>> parts) {
     unsigned shift = 0;
     for (const auto& [name, bits] : parts) {
@@ -42,12 +42,12 @@ struct FieldList {
   }
 };
 
-/// The types of the specification's table of extra bytes, from 1 on.
+/// The types in the specification's table of extra bytes, which counts from 1.
 constexpr std::array kExtraTypes{ScalarType::u8,  ScalarType::i8,  ScalarType::u16, ScalarType::i16,
                                  ScalarType::u32, ScalarType::i32, ScalarType::u64, ScalarType::i64,
                                  ScalarType::f32, ScalarType::f64};
 
-/// Text that may stand in a header: no control characters.
+/// The text up to a NUL, with control characters replaced so that headers can contain it.
 std::string plain_text(std::string_view text) {
   std::string out(text.substr(0, text.find('\0')));
   for (char& c : out) {
@@ -124,13 +124,13 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
     const std::size_t type = static_cast<unsigned char>(row[2]);
     const unsigned options = static_cast<unsigned char>(row[3]);
     const std::string name = plain_text({row + 4, 32});
-    // Types above 10 are the deprecated arrays of two or three; type 0 is bytes without a meaning.
+    // Types above 10 are the deprecated arrays of two or three; type 0 is undocumented bytes.
     const bool opaque = type == 0 || type > 3 * kExtraTypes.size();
     const std::size_t count = opaque ? options : 1 + (type - 1) / kExtraTypes.size();
     const ScalarType scalar =
         opaque ? ScalarType::u8 : kExtraTypes[(type - 1) % kExtraTypes.size()];
     if (count * size_of(scalar) > record_bytes - list.offset) {
-      comments.push_back("extra bytes " + name + " do not fit the records");
+      comments.push_back("extra bytes " + name + " do not fit into the records");
       break;
     }
     for (std::size_t i = 0; i < count; ++i) {
@@ -143,12 +143,12 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
         channel.offset = load_little_endian<double>(row + 136 + 8 * i);
       }
       if (!std::isfinite(channel.scale) || channel.scale == 0 || !std::isfinite(channel.offset)) {
-        comments.push_back("extra bytes " + name + ": an impossible scale or offset is left out");
+        comments.push_back("extra bytes " + name + ": an impossible scale or offset is ignored");
         channel.scale = 1.0;
         channel.offset = 0.0;
       }
       if (!opaque && (options & 1U) != 0) {
-        // Widened to eight bytes, as an integer of the same sign or a double.
+        // The value is widened to eight bytes, as an integer of the same signedness or a double.
         std::string value;
         const char* const no_data = row + 40 + 8 * i;
         if (scalar == ScalarType::f32 || scalar == ScalarType::f64) {
@@ -158,7 +158,7 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
         } else {
           append_number(value, load_little_endian<std::int64_t>(no_data));
         }
-        comments.push_back("extra bytes " + name + ": " + value + " stands for no data");
+        comments.push_back("extra bytes " + name + ": " + value + " means no data");
       }
       add(std::move(channel));
     }

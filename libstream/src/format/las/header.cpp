@@ -21,10 +21,10 @@
 namespace terrace::stream {
 namespace {
 
-constexpr char kBadHeader[] = "the file is damaged or its header is wrong";
-/// Reserved bytes and the user's name, alike in VLRs and EVLRs.
+constexpr char kBadHeader[] = "the file is damaged or its header is wrong: export it again";
+/// Length of the user's name in VLRs and EVLRs.
 constexpr std::size_t kUserBytes = 16;
-/// WKT of a file is a few kilobytes, a hundred where a vertical grid is part of it.
+/// The WKT of a file takes a few kilobytes, about a hundred if it includes a vertical grid.
 constexpr std::uint64_t kMostEvlrBytes = 1u << 20;
 constexpr std::uint64_t kMostEvlrs = 1u << 16;
 
@@ -41,7 +41,7 @@ std::string text_of_field(const char* at, std::size_t bytes) {
   return std::string(field.substr(0, field.find('\0')));
 }
 
-/// Whether a record tells something that is used here.
+/// True if a record contains something that is used here.
 bool is_used(const LasVlr& record) {
   if (record.is(kCopcUser, kCopcInfo)) return true;
   if (record.is(kLasSpec, kLasExtraBytes) || record.is(laz::Vlr::kUserId, laz::Vlr::kRecordId))
@@ -53,8 +53,8 @@ bool is_used(const LasVlr& record) {
           record.id == kGeoAsciiParams);
 }
 
-/// The records between the header and the points. Their number is not relied on: writers have
-/// miscounted them.
+/// Reads the records between the header and the points. Does not rely on their number, because some
+/// writers miscount them.
 void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
                std::vector<std::string>& comments) {
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -72,7 +72,7 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
     const std::size_t bytes = load_little_endian<std::uint16_t>(head.data() + 20);
     if (bytes > left - kLasVlrHeaderBytes) {
       comments.push_back("VLR " + std::to_string(i) +
-                         " reaches into the points: it and the rest are left out");
+                         " extends into the points: it and the rest are ignored");
       return;
     }
     input.consume(kLasVlrHeaderBytes);
@@ -93,7 +93,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
   std::array<char, kLasEvlrHeaderBytes> head{};
   for (std::uint32_t i = 0; i < count; ++i) {
     if (at > file.size() || file.size() - at < kLasEvlrHeaderBytes || i == kMostEvlrs) {
-      comments.push_back("the header counts " + std::to_string(count) + " EVLRs, " +
+      comments.push_back("the header counts " + std::to_string(count) + " EVLRs, but only " +
                          std::to_string(i) + " are read");
       return;
     }
@@ -116,7 +116,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
   }
 }
 
-/// Shorts, doubles, ...: a record's data as an array.
+/// A record's data as an array of numbers.
 template <class T>
 std::vector<T> array_of(const std::string& data) {
   std::vector<T> values(data.size() / sizeof(T));
@@ -163,7 +163,7 @@ void read_lattice(const char* head, LasHeader& header) {
     header.bounds.max[axis] = load_little_endian<double>(head + 179 + 16 * axis);
     header.bounds.min[axis] = load_little_endian<double>(head + 187 + 16 * axis);
   }
-  // Writers leave the box at 0 if they do not fill it in.
+  // Some writers do not fill in the box and leave it at 0.
   const auto& [low, high] = header.bounds;
   const bool is_finite = std::isfinite(low[0] + low[1] + low[2] + high[0] + high[1] + high[2]);
   if (!is_finite || low == high) header.bounds = {};
@@ -180,7 +180,7 @@ bool has_lattice(const LasHeader& header) {
   return is_sound;
 }
 
-/// Whether keys name a system at all.
+/// True if GeoKeys name a system at all.
 bool names_something(const Crs& crs) {
   return crs.epsg != 0 || crs.vertical_epsg != 0 || !crs.geo_keys.empty() || !crs.name.empty();
 }
@@ -191,7 +191,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
                           const OnDamage& on_damage) {
   std::string_view head = input.fill(kLasFirstBytes);
   if (!head.starts_with("LASF")) {
-    fail(input, "header", "does not begin with 'LASF'", "this is no LAS file");
+    fail(input, "header", "does not begin with 'LASF'", "this is not a LAS file");
   }
   if (head.size() < kLasFirstBytes) fail(input, "header", "the file ends in its header");
   LasHeader header;
@@ -235,7 +235,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
     const auto points = load_little_endian<std::uint64_t>(at + 247);
     if (header.points != 0 && points != 0 && points != header.points) {
       comments.push_back("the header counts " + counted(points, "point") + " and, for old " +
-                         "readers, " + std::to_string(header.points) + ": the former is taken");
+                         "readers, " + std::to_string(header.points) + ": the former is used");
     }
     if (points != 0) header.points = points;
   }
@@ -252,14 +252,14 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
              counted(record, "byte") + ", not " + std::to_string(header.record_bytes));
   }
   if (header.points_offset < header_bytes) {
-    fail(input, "header", "the points begin inside of the header");
+    fail(input, "header", "the points begin inside the header");
   }
   if (!has_lattice(header)) {
     fail(input, "header", "the scale is not positive, or scale or offset are not finite");
   }
   if (header.scale[0] != header.scale[1]) {
     comments.emplace_back(
-        "x and y have steps of different sizes; triangulations are Delaunay in steps");
+        "x and y have steps of different sizes; triangulations are Delaunay in units of steps");
   }
   if (const auto size = input.size(); size && !header.compressed && !on_damage) {
     const std::uint64_t left = *size - std::min(*size, header.points_offset);
@@ -268,7 +268,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
            "the header promises " + counted(header.points, "point") + " of " +
                counted(header.record_bytes, "byte") + ", but only " + counted(left, "byte") +
                (left == 1 ? " is" : " are") + " left",
-           "the file is cut off or its header is wrong");
+           "the file is truncated or its header is wrong: download it again");
     }
     // EVLRs or packets of waveforms may follow the points.
     const std::uint64_t others = evlrs > 0 ? evlr_offset : *size;
@@ -308,8 +308,8 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
   if (header.wkt && by_wkt.wkt.empty() && header.unread_evlrs) {
     throw Error({.file = name,
                  .where = {},
-                 .cause = "its coordinate reference system stands behind the points, where it "
-                          "cannot be read from a pipe",
+                 .cause = "the record of its coordinate reference system (an EVLR) follows the "
+                          "points, so it cannot be read from a pipe",
                  .remedy = "name the file, or the system: `crs` EPSG:n"});
   }
   if (header.wkt && !by_wkt.wkt.empty()) return by_wkt;

@@ -35,20 +35,20 @@ inline constexpr std::uint16_t kLasExtraBytes = 4;
 
 inline constexpr std::size_t kLasVlrHeaderBytes = 54, kLasEvlrHeaderBytes = 60;
 inline constexpr std::size_t kLas14HeaderBytes = 375;
-inline constexpr std::size_t kLasFirstBytes = 227;  ///< of LAS 1.0 to 1.2, the beginning of all
+inline constexpr std::size_t kLasFirstBytes = 227;  ///< header of LAS 1.0 to 1.2; all begin with it
 
 struct LasHeader {
   unsigned minor = 0;          ///< of the version 1.minor
   unsigned point_format = 0;   ///< 0 to 10
   bool compressed = false;     ///< LAZ
   bool wkt = false;            ///< WKT applies, not GeoKeys
-  bool adjusted_time = false;  ///< GPS time is not that of the week
+  bool adjusted_time = false;  ///< GPS time is adjusted standard time, not time of the week
   std::size_t record_bytes = 0;
   std::uint64_t points = 0, points_offset = 0;
-  std::uint64_t uncounted = 0;  ///< records that follow those of an uncompressed file, at least
+  std::uint64_t uncounted = 0;  ///< more records than counted, at least, in an uncompressed file
   std::array<double, 3> scale{}, offset{};
   Box3 bounds;               ///< in the CRS, as stated; empty if not filled in or not finite
-  std::vector<LasVlr> vlrs;  ///< those used here, including EVLRs that can be reached
+  std::vector<LasVlr> vlrs;  ///< those used here, including EVLRs unless from a pipe
   /// There are EVLRs, but the input is a pipe.
   bool unread_evlrs = false;
 };
@@ -59,8 +59,8 @@ struct LasHeader {
 LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
                           const OnDamage& on_damage = {});
 
-/// Scale, offset and bounds as told by the first kLasFirstBytes of a file; nullopt if it has fewer,
-/// is not LAS, or its scale or offset cannot be.
+/// Scale, offset and bounds from the first kLasFirstBytes of a file; nullopt if it has fewer bytes,
+/// is not LAS, or has an impossible scale or offset.
 std::optional<LasHeader> peek_las_header(std::string_view head);
 
 /// The coordinate reference system named by the records. Throws: Error if it cannot be reached in a

@@ -13,10 +13,10 @@ namespace {
 constexpr int kMostDecimals = 9;
 constexpr std::array<double, kMostDecimals + 1> kPowers{1e0, 1e1, 1e2, 1e3, 1e4,
                                                         1e5, 1e6, 1e7, 1e8, 1e9};
-/// A step less than what 32 bits reach, so that rounding stays inside.
+/// One step less than the range of 32 bits, so that rounding stays within it.
 constexpr double kReach = std::numeric_limits<std::int32_t>::max() - 1.0;
 
-/// The fewest decimals that give every coordinate of the axis back.
+/// The fewest decimals, at least `decimals`, that reproduce every coordinate of the axis.
 int decimals_of(std::span<const Point3> points, std::size_t axis, int decimals) {
   for (const Point3& p : points) {
     while (decimals < kMostDecimals &&
@@ -49,7 +49,7 @@ Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int usual = degrees && axis < 2 ? 7 : 3;
     int decimals = std::max(wanted[axis], usual);
-    const auto reach = [&] {  // from the offset, which is a whole number
+    const auto reach = [&] {  // measured from the offset, which is rounded to a whole number
       return half[axis] * (bounds ? 1 : decimals > usual ? 1000 : 20) + 1;
     };
     while (decimals > 0 && reach() * kPowers[static_cast<std::size_t>(decimals)] > kReach) {

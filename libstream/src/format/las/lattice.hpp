@@ -9,11 +9,11 @@
 
 namespace terrace::stream {
 
-/// A lattice for coordinates that have none: steps of a power of ten from 1e-9 on, the same for x
-/// and y. They are 0.001 (1e-7 for degrees), whatever decimals `points` have, as the points that
-/// follow may have more; smaller where `points` require it; and larger where 32 bits would not
-/// reach all of `bounds`. Without bounds they reach twenty times as far as the points, smaller
-/// steps than those a thousand times.
+/// Chooses a lattice for coordinates that have none. Its steps are powers of ten, at least 1e-9,
+/// and the same for x and y. They are 0.001 (1e-7 for degrees) or smaller if `points` need it;
+/// points with fewer decimals do not make them larger, because later ones may have more. Steps are
+/// larger where 32 bits would not cover `bounds`. Without bounds, 32 bits must cover twenty times
+/// the extent of the points, or a thousand times if the steps are smaller than usual.
 Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds,
                         bool degrees);
 

@@ -73,11 +73,11 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     });
     if (field != standard.end()) {
       layout.fields.push_back(*field);
-      standard.erase(field);  // A second attribute of the name goes to extra bytes.
+      standard.erase(field);  // a second attribute with this name goes to extra bytes
       continue;
     }
     LasField extra{.channel = channel, .offset = layout.record_bytes};
-    // A name may fill its place; the number that makes it distinct takes the end of it.
+    // If a name has the maximal length, its end is replaced by the number that makes it distinct.
     std::string name = channel.name.empty() ? "extra" : channel.name.substr(0, kExtraNameBytes);
     for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
       const std::string number = std::string("_").append(std::to_string(n));

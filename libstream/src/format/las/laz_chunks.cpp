@@ -53,8 +53,8 @@ class LazChunkReader final : public PartReader {
   std::shared_ptr<const LazFile> file_;
   laz::Decoder decoder_;
   std::vector<std::byte> coded_;
-  std::size_t number_ = 0, used_ = 0;  ///< the chunk and its bytes that are decoded
-  std::uint64_t left_ = 0;             ///< points of it
+  std::size_t number_ = 0, used_ = 0;  ///< of the chunk; bytes of it that have been decoded
+  std::uint64_t left_ = 0;             ///< points of it that have not been decoded
 };
 
 }  // namespace
@@ -63,7 +63,7 @@ void fail_laz(const std::string& file, std::string where, std::string cause) {
   throw Error({.file = file,
                .where = std::move(where),
                .cause = std::move(cause),
-               .remedy = "the file is damaged: get it anew"});
+               .remedy = "the file is damaged: download it again"});
 }
 void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
                 const std::string& cause) {

@@ -10,7 +10,7 @@
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/laz.hpp"
 
-/// Chunks of LAZ, read from anywhere in a file.
+/// Reads chunks of LAZ in any order.
 
 namespace terrace::stream {
 
@@ -21,12 +21,13 @@ struct LazLayout {
   std::uint64_t first = 0;           ///< byte of the first chunk
 };
 
-/// Throws the Error of a damaged file; `where` names the position in it.
+/// Throws: Error with the remedy for a damaged file; `where` names the position in it.
 [[noreturn]] void fail_laz(const std::string& file, std::string where, std::string cause);
 [[noreturn]] void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
                              const std::string& cause);
 
-/// The layout's chunks. A reader holds the coded bytes of one chunk and a decoder's models.
+/// One part per chunk of the layout. A reader holds the coded bytes of one chunk and the models of
+/// a decoder.
 RecordParts laz_parts(std::unique_ptr<ByteSource> file, LazLayout layout);
 
 }  // namespace terrace::stream

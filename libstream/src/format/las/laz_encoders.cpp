@@ -27,7 +27,7 @@ void LazEncoders::encode(std::span<const std::byte> records) {
     write_(coded_);
     return;
   }
-  while (jobs_.size() > threads_.size()) hand_on();
+  while (jobs_.size() > threads_.size()) pass_on();
   std::unique_ptr<Job> job;
   if (free_.empty()) {
     job = std::make_unique<Job>();
@@ -46,7 +46,7 @@ void LazEncoders::encode(std::span<const std::byte> records) {
 }
 
 void LazEncoders::finish() {
-  while (!jobs_.empty()) hand_on();
+  while (!jobs_.empty()) pass_on();
 }
 
 void LazEncoders::start() {
@@ -56,12 +56,12 @@ void LazEncoders::start() {
       threads_.emplace_back([this] { run(); });
     }
   } catch (const std::system_error&) {
-    // The system grants no more threads.
+    // The system has no more threads.
   }
   if (threads_.empty()) own_ = std::make_unique<laz::Encoder>(vlr_);
 }
 
-void LazEncoders::hand_on() {
+void LazEncoders::pass_on() {
   std::unique_ptr<Job> job;
   {
     std::unique_lock lock(mutex_);

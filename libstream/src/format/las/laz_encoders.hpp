@@ -28,9 +28,9 @@ class LazEncoders {
   LazEncoders(const LazEncoders&) = delete;
   LazEncoders& operator=(const LazEncoders&) = delete;
 
-  /// Takes the records of a chunk. Throws: what `write` throws, possibly for earlier chunks.
+  /// Queues the records of a chunk. Throws: what `write` throws, possibly for earlier chunks.
   void encode(std::span<const std::byte> records);
-  /// Passes on the rest.
+  /// Waits for the remaining chunks and passes them on.
   void finish();
 
  private:
@@ -43,13 +43,13 @@ class LazEncoders {
   void start();
   void run();
   /// Waits for the oldest job and passes its chunk on.
-  void hand_on();
+  void pass_on();
 
   laz::Vlr vlr_;
   unsigned wanted_threads_;
   Write write_;
   bool started_ = false;
-  std::unique_ptr<laz::Encoder> own_;  ///< without threads
+  std::unique_ptr<laz::Encoder> own_;  ///< used if there are no threads
   std::vector<std::byte> coded_;       ///< coded by own_
   std::vector<std::unique_ptr<Job>> free_;
 

@@ -21,7 +21,7 @@
 namespace terrace::stream {
 namespace {
 
-/// The position of the chunk table, which precedes the first chunk.
+/// Size of the chunk table's position, which precedes the first chunk.
 constexpr std::size_t kPositionBytes = sizeof(std::int64_t);
 
 laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
@@ -34,10 +34,10 @@ laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
       fail_laz(name, "header", error.what());
     }
   }
-  fail_laz(name, "header", "its points are compressed, but the VLR that tells how is missing");
+  fail_laz(name, "header", "its points are compressed, but the VLR that describes how is missing");
 }
 
-/// The chunks as the file's table lists them; empty if its writer left the table out.
+/// The chunks as the file's table lists them; empty if the writer omitted the table.
 std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layout,
                                    std::uint64_t points) {
   constexpr std::size_t kHeadBytes = 8;
@@ -55,9 +55,9 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
   if (at == position_at) return {};
   if (at < layout.first || at > file.size() || file.size() - at < kHeadBytes) {
     fail_laz(file.name(), "byte " + std::to_string(position_at),
-             "the chunk table lies outside of the file");
+             "the chunk table is outside the file");
   }
-  // An entry takes 12 bytes at the most; what else the file has may follow the table.
+  // An entry takes at most 12 bytes; other data may follow the table.
   const std::uint64_t chunks = number_at(at) >> 32;
   std::vector<std::byte> table(std::min(kHeadBytes + 64 + 12 * chunks, file.size() - at));
   file.read(at, table);
@@ -68,7 +68,7 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
   }
 }
 
-/// One chunk after the other, through a window of the input.
+/// Reads one chunk after the other through a window of the input.
 class LazInTurn final : public RecordReader {
  public:
   LazInTurn(Input& input, LazLayout layout, std::uint64_t points, OnDamage on_damage)
@@ -86,7 +86,7 @@ class LazInTurn final : public RecordReader {
       return read_on(wanted);
     } catch (const Error& damage) {
       if (!on_damage_) throw;
-      // Where the next chunk begins is not known.
+      // The start of the next chunk is unknown.
       lost_ = std::exchange(left_, 0);
       on_damage_(damage, lost_);
       return {};
@@ -147,7 +147,7 @@ class LazInTurn final : public RecordReader {
     decoder_.start(chunk_left_);
   }
 
-  /// Decodes from a window of `need` bytes or what there is of the chunk.
+  /// Decodes from a window of `need` bytes, or as many as the chunk has.
   laz::Decoder::Step decode(std::size_t need, std::span<std::byte> room) {
     std::uint64_t most = need;
     if (chunk_bytes_) most = std::min(most, *chunk_bytes_ - (input_->offset() - begin_));
@@ -189,8 +189,8 @@ class LazInTurn final : public RecordReader {
   laz::Decoder decoder_;
   std::vector<std::byte> records_;
   std::uint64_t number_ = 0, begin_ = 0;      ///< of the chunk
-  std::uint64_t chunk_left_ = 0;              ///< points of it
-  std::optional<std::uint64_t> chunk_bytes_;  ///< of it, if known
+  std::uint64_t chunk_left_ = 0;              ///< points left in the chunk
+  std::optional<std::uint64_t> chunk_bytes_;  ///< size of the chunk, if known
 };
 
 }  // namespace
@@ -215,19 +215,18 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
         layout.chunks = read_table(*bytes, layout, header.points);
       } catch (const Error& damage) {
         if (!options.on_damage) throw;
-        options.on_damage(damage, 0);  // most chunks can be found without
+        options.on_damage(damage, 0);  // most chunks can be found without the table
       }
       if (!layout.chunks.empty() && (options.threads > 1 || options.on_damage)) {
         if (auto reader = parts_ahead(laz_parts(std::move(bytes), layout), options)) return reader;
       }
     }
-    const bool told_by_table = layout.vlr.chunk_size == laz::Vlr::kVariable &&
-                               layout.vlr.compressor != laz::Compressor::layered;
-    if (layout.chunks.empty() && told_by_table) {
+    const bool needs_table = layout.vlr.chunk_size == laz::Vlr::kVariable &&
+                             layout.vlr.compressor != laz::Compressor::layered;
+    if (layout.chunks.empty() && needs_table) {
       throw Error({.file = input.name(),
                    .where = {},
-                   .cause = "its chunks are told by a table behind the points, where it cannot be "
-                            "read from a pipe",
+                   .cause = "its chunk table follows the points, so it cannot be read from a pipe",
                    .remedy = "name the file"});
     }
     if (!input.skip(kPositionBytes)) {
@@ -241,7 +240,7 @@ RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& he
                            const Octree& octree) {
   LazLayout layout{.vlr = laz_vlr(header, file->name())};
   if (layout.vlr.compressor != laz::Compressor::layered) {
-    fail_laz(file->name(), "header", "its points are not coded in layers, as those of COPC are");
+    fail_laz(file->name(), "header", "its points are not coded in layers, as COPC requires");
   }
   for (const OctreeNode& node : octree.nodes) {
     layout.chunks.push_back({.offset = node.offset, .bytes = node.bytes, .points = node.points});

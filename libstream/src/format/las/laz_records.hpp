@@ -15,15 +15,15 @@
 
 namespace terrace::stream {
 
-/// The records of a LAZ file. input: at the first byte after the header and VLRs. Chunks of a file
-/// with a chunk table are decoded ahead by options.threads concurrently; from a pipe, without a
-/// table, and if chunks are too large for that, one after the other. Throws: Error naming chunk and
-/// byte for damage, and if the layout cannot be read from a pipe.
+/// Reads the records of a LAZ file. input: at the first byte after the header and VLRs. In a file
+/// with a chunk table, up to options.threads threads decode chunks ahead. From a pipe, without a
+/// table, or if chunks are too large for that, chunks are decoded one after the other. Throws:
+/// Error naming chunk and byte for damage, and if the layout cannot be read from a pipe.
 std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
                                                const LasHeader& header,
                                                const SourceOptions& options);
 
-/// The parts that are the octree's nodes, in its order. Throws: Error as open_laz_records().
+/// One part per node of the octree, in its order. Throws: Error as open_laz_records().
 RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
                            const Octree& octree);
 

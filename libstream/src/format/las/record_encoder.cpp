@@ -32,7 +32,7 @@ void append_text_field(std::string& out, std::string_view text, std::size_t byte
   out.append(bytes - std::min(bytes, text.size()), '\0');
 }
 
-/// Whether the bits of the field hold a value of its type.
+/// True if the value fits into the bits of the field.
 template <class Value>
 bool fits(Value value, const LasField& field) {
   if constexpr (std::is_floating_point_v<Value>) {
@@ -54,13 +54,13 @@ void LasSums::include(const LasSums& other) {
   rounding = std::max(rounding, other.rounding);
 }
 
-/// Records with their sums.
+/// Encoded records and their summary.
 struct LasRecords::Records final : PointWriter::Encoded {
   std::uint64_t first = 0;  ///< number of the first point, for messages
   std::string bytes;
   LasSums sums;
-  /// Points that take() must pack: before there is a lattice, and those that have a fault, which
-  /// tells the number of the point.
+  /// Points that take() must pack: those that came before the lattice was known, and those with a
+  /// fault, whose message needs the number of the point.
   std::optional<PointBlock> unpacked;
 };
 
@@ -73,7 +73,7 @@ LasRecords::LasRecords(const std::string& path, const PointHeader& header, LasFo
       has_lattice_(header.lattice.has_value()),
       lattice_(header.lattice.value_or(Lattice{})) {
   for (const Channel& channel : attributes_) payload_bytes_ += size_of(channel.type);
-  // Columns of a raster may count against the axis; files with such steps are unusual.
+  // A raster's rows or columns may run against an axis, but negative steps are unusual in files.
   for (double& step : lattice_.scale) step = std::abs(step);
 }
 
@@ -140,7 +140,7 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
   const double scale = lattice_.scale[axis], offset = lattice_.offset[axis];
   constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
                    kMost = std::numeric_limits<std::int32_t>::max();
-  // Added and taken off again, it rounds what is below 2^51 to the nearest integer, ties to even.
+  // Adding and subtracting it rounds numbers below 2^51 to the nearest integer, ties to even.
   constexpr double kToInteger = 0x1.8p52;
   std::int32_t least = INT32_MAX, most = INT32_MIN;
   double rounding = 0;
@@ -150,7 +150,7 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
     const double step = ((value - offset) / scale + kToInteger) - kToInteger;
     if (!(step >= kLeast && step <= kMost)) {
       fail("point " + std::to_string(out.first + i),
-           std::string("its ") + "xyz"[axis] + " is out of reach for 32 bits in steps of " +
+           std::string("its ") + "xyz"[axis] + " is out of range for 32 bits in steps of " +
                text_of(scale),
            "write PLY, or build a store and write its points, whose bounds are known");
     }
@@ -186,7 +186,7 @@ void LasRecords::put_attribute(const std::byte* from, const Channel& channel, co
   }
   with_type(field.channel.type, [&](auto value) {
     using Value = decltype(value);
-    // A rank stands for all angles that round to it.
+    // A rank represents all angles that round to it.
     const double exact = channel.name == "scan_angle_rank" ? 0.5 : 1e-6;
     for (std::size_t i = 0; i < count; ++i) {
       if (same) std::memcpy(&value, from + i * payload_bytes_, sizeof value);
@@ -204,7 +204,7 @@ void LasRecords::put_attribute(const std::byte* from, const Channel& channel, co
   });
 }
 
-/// A value of another type as the field has it. exact: how far it may lie from what is stored.
+/// Converts a value to the type of the field. exact: the tolerance, in steps of the field.
 template <class Value>
 Value LasRecords::converted(const std::byte* from, const Channel& channel, const LasField& field,
                             double exact, std::uint64_t point) const {
@@ -219,14 +219,14 @@ Value LasRecords::converted(const std::byte* from, const Channel& channel, const
     if (!(whole >= static_cast<double>(std::numeric_limits<Value>::min()) && whole <= most &&
           std::abs(step - whole) <= exact)) {
       fail("point " + std::to_string(point),
-           text_of(real) + " is no value that the field " + field.channel.name + " of LAS can have",
-           "rename the column: it becomes extra bytes then");
+           text_of(real) + " does not fit into the field " + field.channel.name + " of LAS",
+           "rename the column, so that it becomes extra bytes");
     }
     return static_cast<Value>(whole);
   }
 }
 
-/// What says nothing of returns is the only one.
+/// Makes every point the only return of its pulse, for points without attributes for returns.
 void LasRecords::set_single_returns(std::string& records) const {
   for (std::size_t at = 14; at < records.size(); at += layout_.record_bytes) {
     records[at] = legacy() ? '\x09' : '\x11';
@@ -258,13 +258,13 @@ std::string las_header_text(const LasRecords& records, const LasFile& file) {
   out += "\x01\x04";
   append_text_field(out, "EXTRACTION", 32);
   append_text_field(out, "terrace", 32);
-  append_text_field(out, {}, 4);  // the day, which would make files differ
+  append_text_field(out, {}, 4);  // the date, which would make files differ
   append_little_endian(out, static_cast<std::uint16_t>(kLas14HeaderBytes));
   append_little_endian(out, static_cast<std::uint32_t>(file.points_offset));
   append_little_endian(out, file.vlrs);
   out += static_cast<char>(records.layout().point_format | (file.compressed ? 0x80U : 0U));
   append_little_endian(out, static_cast<std::uint16_t>(records.layout().record_bytes));
-  // Programs older than LAS 1.4 read these of the old point formats.
+  // Programs older than LAS 1.4 read these fields for the old point formats.
   const bool old = records.legacy() && sums.points <= std::numeric_limits<std::uint32_t>::max();
   append_little_endian(out, static_cast<std::uint32_t>(old ? sums.points : 0));
   for (std::size_t i = 0; i < 5; ++i) {

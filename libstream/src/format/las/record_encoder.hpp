@@ -17,12 +17,12 @@
 
 namespace terrace::stream {
 
-/// What the header tells of the records.
+/// The header's summary of the records.
 struct LasSums {
   static constexpr std::size_t kReturns = 15;
 
   std::uint64_t points = 0;
-  /// In steps of the lattice; without points least exceeds greatest.
+  /// In steps of the lattice; without points `least` exceeds `most`.
   std::array<std::int32_t, 3> least{INT32_MAX, INT32_MAX, INT32_MAX},
       most{INT32_MIN, INT32_MIN, INT32_MIN};
   std::array<std::uint64_t, kReturns> returns{};
@@ -34,14 +34,15 @@ struct LasSums {
 /// Converts points to LAS records, and collects the sums for the header.
 class LasRecords {
  public:
-  /// Throws: Error naming `path` for attributes that LAS has no room for.
+  /// Throws: Error naming `path` if LAS has no room for the attributes.
   LasRecords(const std::string& path, const PointHeader& header, LasFormats formats);
   ~LasRecords();
 
   /// As PointWriter::encode(), for take().
   [[nodiscard]] PointWriter::EncodedPtr encode(const PointBlock& block) const;
-  /// The records of the next points, by now counted; valid until the next call. Throws: Error for a
-  /// coordinate beyond the lattice's range and a value that its field cannot hold.
+  /// Returns the records of the next points and includes them in sums(); valid until the next call.
+  /// Throws: Error for a coordinate outside the lattice's range and for a value that does not fit
+  /// its field.
   std::string_view take(PointWriter::EncodedPtr points);
 
   [[nodiscard]] const LasLayout& layout() const { return layout_; }
@@ -49,9 +50,9 @@ class LasRecords {
   [[nodiscard]] const Crs& crs() const { return crs_; }
   /// The lattice of the records; arbitrary before the first point.
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
-  /// Whether the point format is one of LAS before 1.4.
+  /// True if the point format existed before LAS 1.4.
   [[nodiscard]] bool legacy() const { return layout_.point_format < 6; }
-  /// About all records taken so far.
+  /// The summary of all records taken so far.
   [[nodiscard]] const LasSums& sums() const { return sums_; }
 
  private:
@@ -74,7 +75,7 @@ class LasRecords {
   Crs crs_;
   std::optional<Box3> bounds_;
   std::size_t payload_bytes_ = 0;
-  std::atomic<bool> has_lattice_;  ///< else the first points make it
+  std::atomic<bool> has_lattice_;  ///< if false, the first points determine it
   Lattice lattice_;
   LasSums sums_;
   std::unique_ptr<Records> taken_;

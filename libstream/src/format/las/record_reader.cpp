@@ -10,7 +10,8 @@
 namespace terrace::stream {
 
 std::string_view PlainRecords::read(std::uint64_t wanted) {
-  /// Most bytes at once: they are walked through once per field, so they stay in a near cache.
+  /// Bytes read at once: few, because each field makes a pass over them, so they must stay in
+  /// cache.
   constexpr std::size_t kPieceBytes = 64u << 10;
   input_->consume(std::exchange(used_, 0));
   if (left_ == 0) return {};
@@ -18,10 +19,11 @@ std::string_view PlainRecords::read(std::uint64_t wanted) {
       std::min<std::uint64_t>(wanted, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
   const std::string_view window = input_->fill(static_cast<std::size_t>(records) * record_bytes_);
   if (window.size() < records * record_bytes_) {
-    const Error damage({.file = input_->name(),
-                        .where = "byte " + std::to_string(input_->offset() + window.size()),
-                        .cause = "the file ends before the points that its header promises",
-                        .remedy = "the file is cut off or its header is wrong"});
+    const Error damage(
+        {.file = input_->name(),
+         .where = "byte " + std::to_string(input_->offset() + window.size()),
+         .cause = "the file ends before the points that its header promises",
+         .remedy = "the file is truncated or its header is wrong: download it again"});
     if (!on_damage_) throw damage;
     records = window.size() / record_bytes_;
     if (records == 0) {

@@ -15,17 +15,17 @@ namespace terrace::stream {
 class RecordReader {
  public:
   virtual ~RecordReader() = default;
-  /// The next records, at most `wanted`, but at least one; valid until the next call. Called only
+  /// The next records, at least one and at most `wanted`; valid until the next call. Called only
   /// for records that the header promises, not counting lost(). Empty if all remaining records are
-  /// lost. Throws: Error if they do not exist and damage is not reported, Stopped.
+  /// lost. Throws: Error if they do not exist and there is no handler for damage; Stopped.
   virtual std::string_view read(std::uint64_t wanted) = 0;
   /// Number of records in damaged parts so far (see SourceOptions::on_damage).
   [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
-  /// Minimum memory, as far as it depends on the file.
+  /// The part of the minimum memory, in bytes, that depends on the file.
   [[nodiscard]] virtual std::uint64_t held_bytes() const { return 0; }
 };
 
-/// The records of LAS, stored as they are.
+/// Reads uncompressed records.
 class PlainRecords final : public RecordReader {
  public:
   /// points: the expected number.

@@ -48,7 +48,7 @@ class LasOpener {
         options_.crs ? *options_.crs : las_crs(header_, stream_.input->name(), info.comments);
     if (header_.uncounted > 0) {
       info.note = stream_.input->name() + ": the header counts " +
-                  counted(header_.points, "point") + ", and the bytes of " +
+                  counted(header_.points, "point") + ", but the bytes of " +
                   std::to_string(header_.uncounted) +
                   " more follow, which are left out; a writer may have been interrupted";
       info.comments.push_back(info.note);
@@ -71,7 +71,7 @@ class LasOpener {
     }
   }
 
-  /// Those that the selection needs, as far as the file can tell.
+  /// Opens the records that the selection needs, as far as the file's structure allows.
   void open_records() {
     const Selection& wanted = options_.selection;
     stream_.info.points = stream_.points;
@@ -80,7 +80,7 @@ class LasOpener {
     if (wanted.resolution > 0) {
       throw Error({.file = stream_.input->name(),
                    .where = {},
-                   .cause = "its points lie in no octree that could be read down to a resolution",
+                   .cause = "it has no octree, so `resolution` does not apply",
                    .remedy = "name a COPC file, not piped, or EPT, or leave `resolution` out"});
     }
     if (header_.compressed) {
@@ -91,8 +91,8 @@ class LasOpener {
     }
   }
 
-  /// COPC, unless it comes from a pipe, is read node by node. Where its hierarchy is damaged, as by
-  /// programs that copy its VLRs to files of other points, it is a LAZ file like others.
+  /// Reads COPC node by node, unless it comes from a pipe. A file with a damaged hierarchy is read
+  /// as a normal LAZ file: some programs copy the VLRs of COPC to files with other points.
   void open_nodes() {
     const bool is_copc = header_.compressed && header_.minor == 4 && !header_.vlrs.empty() &&
                          header_.vlrs.front().is(kCopcUser, kCopcInfo);
@@ -126,8 +126,8 @@ bool recognise_las(std::span<const std::byte> head) {
       .starts_with("LASF");
 }
 
-/// As the heads of the files tell, pipes included; nullopt for a single one. Heads that cannot be
-/// are left out here and refused when their files are opened.
+/// The common placement according to the headers of the files, including pipes; nullopt for a
+/// single file. Ignores invalid headers, which are refused when their files are opened.
 std::optional<Placement> placement_of_all(std::span<const std::string> files,
                                           const std::stop_token& stop) {
   if (files.size() == 1) return std::nullopt;

@@ -34,7 +34,7 @@ RecordStream las_stream(const LasHeader& header, const std::string& name,
                  .where = "header",
                  .cause = "its records have " + std::to_string(header.record_bytes - standard) +
                           " extra bytes; up to " + std::to_string(kMostExtraBytes) + " are read",
-                 .remedy = "the file is damaged or its header is wrong"});
+                 .remedy = "the file is damaged or its header is wrong: export it again"});
   }
   RecordStream stream{.record_bytes = header.record_bytes, .points = header.points};
   SourceInfo& info = stream.info;

@@ -12,9 +12,9 @@ namespace terrace::stream {
 /// The placement of the records' coordinates, without a CRS.
 Placement las_placement(const LasHeader& header);
 
-/// The header's description of the points: their lattice, their attributes and the positions of
-/// these in the records. `comments` are added to the stream's. Throws: Error naming `name` for too
-/// many extra bytes.
+/// The header's description of the points: their lattice, attributes and the positions of these in
+/// the records. Adds `comments` to the stream's. Throws: Error naming `name` for too many extra
+/// bytes.
 RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments);
 

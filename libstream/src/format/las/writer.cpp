@@ -23,7 +23,7 @@
 namespace terrace::stream {
 namespace {
 
-/// The chunks of LAZ, on their way from records to a sink.
+/// Encodes records as chunks of LAZ and writes these to a sink.
 class LazChunks {
  public:
   LazChunks(const laz::Vlr& vlr, unsigned threads, Sink& sink)
@@ -33,7 +33,7 @@ class LazChunks {
     pending_.reserve(vlr_.chunk_size * vlr_.record_length());
   }
 
-  /// Takes records, and writes the chunks that they fill.
+  /// Adds records, and writes the chunks that they complete.
   void append(std::string_view records) {
     const std::size_t whole = vlr_.chunk_size * vlr_.record_length();
     while (!records.empty()) {
@@ -43,7 +43,7 @@ class LazChunks {
       if (pending_.size() == whole) encode();
     }
   }
-  /// Writes the last chunk and the table, and returns the table's place from the first chunk on.
+  /// Writes the last chunk and the table; returns the table's offset from the first chunk.
   std::uint64_t finish() {
     if (!pending_.empty()) encode();
     encoders_.finish();
@@ -68,15 +68,15 @@ class LazChunks {
   laz::Vlr vlr_;
   Sink& sink_;
   std::vector<laz::Chunk> chunks_;
-  std::size_t written_ = 0;  ///< of the chunks
+  std::size_t written_ = 0;  ///< number of chunks written
   std::string pending_;      ///< records of the next chunk
   std::uint64_t bytes_ = 0;
   LazEncoders encoders_;
 };
 
-/// As many threads as were asked for and whose chunks fit: one being filled, and the records and
-/// coded bytes of one per thread and one more.
-/// Throws: Error if the memory does not hold the chunk of one.
+/// The number of threads, at most options.threads, whose chunks fit into memory: one chunk being
+/// filled, and the records and coded bytes of one per thread and one more. Throws: Error if the
+/// memory does not suffice for one thread.
 unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
                         const std::string& path) {
   const std::uint64_t chunk = vlr.chunk_size * vlr.record_length();
@@ -84,9 +84,9 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
   if (chunks < 2) {
     throw Error({.file = path,
                  .where = {},
-                 .cause = "writing LAZ of " + counted(vlr.record_length(), "byte") +
-                          " a point needs " + std::to_string((2 * chunk >> 20) + 1) +
-                          "M of memory, more than there is for it",
+                 .cause = "writing LAZ with " + counted(vlr.record_length(), "byte") +
+                          " per point needs " + std::to_string((2 * chunk >> 20) + 1) +
+                          "M of memory, more than it may use",
                  .remedy = "raise `memory_bytes`"});
   }
   const std::uint64_t most = chunks < 5 ? 1 : (chunks - 3) / 2;
@@ -147,7 +147,7 @@ class LasWriter final : public PointWriter {
   Sink sink_;
   LasRecords records_;
   LasFile file_;
-  std::optional<LazChunks> chunks_;  ///< of LAZ
+  std::optional<LazChunks> chunks_;  ///< only for LAZ
 };
 
 }  // namespace
