@@ -18,15 +18,15 @@
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 
-/// Binary glTF as input. The tests put files together themselves, from JSON and a buffer; what
-/// nodes do to vertices is worked out from the definition, with quaternions instead of matrices.
+/// Binary glTF as input. The tests assemble files themselves, from JSON and a buffer, and compute
+/// the transforms of nodes from their definition, with quaternions instead of matrices.
 
 namespace terrace::stream {
 namespace {
 
 using GlbJson = nlohmann::json;
 
-/// A file in the making.
+/// Assembles a file.
 struct GlbMaker {
   GlbJson json{{"asset", {{"version", "2.0"}}}};
   std::string binary;
@@ -57,7 +57,7 @@ struct GlbMaker {
                                  {"type", type}});
     return json["accessors"].size() - 1;
   }
-  /// stride: of each position, with other numbers behind it.
+  /// stride: of positions, each followed by other numbers.
   std::uint64_t add_positions(const std::vector<std::array<float, 3>>& positions,
                               std::uint64_t stride = 12) {
     std::vector<float> numbers;
@@ -82,7 +82,7 @@ struct GlbMaker {
                                      : 5125,
                         "SCALAR");
   }
-  /// A mesh of one primitive in a node of its own, which is at the top unless it becomes a child.
+  /// A mesh with one primitive in its own node, which is a root unless it becomes a child.
   void add_mesh(const GlbJson& primitive, GlbJson node = GlbJson::object()) {
     json["meshes"].push_back({{"primitives", GlbJson::array({primitive})}});
     node["mesh"] = json["meshes"].size() - 1;
@@ -118,7 +118,7 @@ class GlbFiles : public ::testing::Test {
     std::ofstream(path, std::ios::binary) << bytes;
     return path;
   }
-  /// Reads a mesh that is there.
+  /// Reads a mesh that must exist.
   MeshFile read(const GlbMaker& glb) {
     auto mesh = read_mesh(put(glb.bytes()));
     EXPECT_TRUE(mesh);
@@ -164,7 +164,7 @@ struct Placement3 {
   }
 };
 
-TEST_F(GlbFiles, NodesPutTheirMeshesInPlace) {
+TEST_F(GlbFiles, AppliesTheTransformsOfNodes) {
   std::mt19937_64 random(41);
   const auto number = [&](double most) {
     return most * (static_cast<double>(random() % 2001) / 1000 - 1);
@@ -248,14 +248,14 @@ TEST_F(GlbFiles, NodesPutTheirMeshesInPlace) {
       double largest = 1;
       for (const double c : expected[v]) largest = std::max(largest, std::abs(c));
       for (std::size_t k = 0; k < 3; ++k) {
-        // Up to twelve nodes deep, each of which may stretch what was rounded before.
+        // Up to twelve nested nodes, each of which may enlarge earlier rounding errors.
         EXPECT_NEAR(mesh.vertices.positions[v][k], expected[v][k], 1e-5 * largest);
       }
     }
   }
 }
 
-TEST_F(GlbFiles, TrianglesComeFromListsStripsAndFans) {
+TEST_F(GlbFiles, ReadsTrianglesFromListsStripsAndFans) {
   GlbMaker glb;
   const std::uint64_t positions =
       glb.add_positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {1, 2, 0}});
@@ -286,12 +286,12 @@ TEST_F(GlbFiles, TrianglesComeFromListsStripsAndFans) {
                                                           {0, 1, 2},
                                                           {3, 4, 5}}));
   for (const Point3& p : mesh.vertices.positions) EXPECT_FALSE(std::signbit(p[1]));
-  // Where no node moves them, floats stay floats.
+  // Without transforms, floats stay floats.
   EXPECT_EQ(mesh.info.coordinates[0].type, ScalarType::f32);
 }
 
-/// Time grows with the bytes of the JSON, not with their square, and memory neither.
-TEST_F(GlbFiles, LargeJsonIsReadInLinearTime) {
+/// Time and memory grow linearly with the bytes of the JSON.
+TEST_F(GlbFiles, ReadsLargeJsonInLinearTime) {
   GlbMaker glb;
   const std::uint64_t positions = glb.add_positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
   const GlbJson triangle{{"attributes", {{"POSITION", positions}}}};
@@ -307,8 +307,8 @@ TEST_F(GlbFiles, LargeJsonIsReadInLinearTime) {
   EXPECT_NE(error_of([&] { read(glb); }).find("more than 1048576 primitives"), std::string::npos);
 }
 
-/// Vertices that lie far behind one another in the file, more than are read at once.
-TEST_F(GlbFiles, LargeMeshesAreReadAsPointsAndAsTriangles) {
+/// Vertices that are far apart in the file, and more of them than are read at once.
+TEST_F(GlbFiles, ReadsLargeMeshesAsPointsAndAsTriangles) {
   GlbMaker glb;
   constexpr std::uint32_t kVertices = 70'000;
   std::vector<std::array<float, 3>> positions;
@@ -320,7 +320,7 @@ TEST_F(GlbFiles, LargeMeshesAreReadAsPointsAndAsTriangles) {
     if (i >= 2) corners.insert(corners.end(), {i - 2, i, kVertices - i});
   }
   corners.resize(corners.size() / 3 * 3);
-  // Its numbers come before the vertices.
+  // Its indices precede the vertices.
   const std::uint64_t indices = glb.add_indices(corners, 4);
   glb.add_mesh(
       {{"attributes", {{"POSITION", glb.add_positions(positions, 24)}}}, {"indices", indices}},
@@ -340,7 +340,7 @@ TEST_F(GlbFiles, LargeMeshesAreReadAsPointsAndAsTriangles) {
   }
 }
 
-TEST_F(GlbFiles, VerticesWithoutACoordinateAreLeftOutAndCounted) {
+TEST_F(GlbFiles, SkipsAndCountsVerticesWithNaN) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   for (const bool moved : {false, true}) {
     GlbMaker glb;
@@ -369,7 +369,7 @@ TEST_F(GlbFiles, VerticesWithoutACoordinateAreLeftOutAndCounted) {
   EXPECT_NE(error_of([&] { read_all({file}); }).find("infinite"), std::string::npos);
 }
 
-TEST_F(GlbFiles, WhatIsWrongIsNamed) {
+TEST_F(GlbFiles, ErrorsNameTheFault) {
   const auto message = [&](const std::string& bytes) -> std::string {
     const std::string file = put(bytes);
     try {
@@ -404,24 +404,24 @@ TEST_F(GlbFiles, WhatIsWrongIsNamed) {
            {good.bytes_of("{\"a\": 1e999}"), "too large for a double"},
            {good.bytes_of(std::string(100, '[') + std::string(100, ']')), "nested too deeply"},
            {with("/extensionsRequired", {"KHR_draco_mesh_compression"}), "KHR_draco"},
-           {with("/accessors/0/count", 4), "reaches beyond"},
-           {with("/accessors/0/count", 4294967295), "reaches beyond"},
-           {with("/accessors/0/byteOffset", 4), "reaches beyond"},
+           {with("/accessors/0/count", 4), "extends beyond"},
+           {with("/accessors/0/count", 4294967295), "extends beyond"},
+           {with("/accessors/0/byteOffset", 4), "extends beyond"},
            {with("/accessors/0/count", -1), "is not a number"},
-           {with("/accessors/0/count", 0), "which is not there"},
+           {with("/accessors/0/count", 0), "which does not exist"},
            {with("/accessors/0/componentType", 5125), "not floats"},
-           {with("/accessors/0/componentType", 5130), "not read"},
+           {with("/accessors/0/componentType", 5130), "not supported"},
            {with("/accessors/0/type", "VEC2"), "VEC3"},
            {with("/accessors/0/sparse", GlbJson::object()), "sparse"},
            {with("/meshes/0/primitives/0/indices", 0), "SCALAR"},
            {with("/meshes/0/primitives/0/indices", 2), "floats"},
            {with("/accessors/1/count", 2), "not three for each"},
            {with("/bufferViews/0/byteStride", 4), "overlap"},
-           {with("/bufferViews/0/byteOffset", 4294967295), "reaches beyond"},
-           {with("/bufferViews/0/byteLength", 4294967295), "reaches beyond"},
+           {with("/bufferViews/0/byteOffset", 4294967295), "extends beyond"},
+           {with("/bufferViews/0/byteLength", 4294967295), "extends beyond"},
            {with("/bufferViews/0/buffer", 1), "another file"},
            {with("/buffers", {{{"byteLength", 1}, {"uri", "a.bin"}}}), "another file"},
-           {with("/meshes/0/primitives/0/mode", 7), "does not know"},
+           {with("/meshes/0/primitives/0/mode", 7), "does not have"},
            {with("/meshes/0/primitives/0/indices", 9), "is missing"},
            {with("/nodes/0/mesh", 1), "is missing"},
            {with("/nodes/0/children", {0}), ""},
@@ -433,11 +433,11 @@ TEST_F(GlbFiles, WhatIsWrongIsNamed) {
     const std::string found = message(content);
     EXPECT_NE(found.find(words), std::string::npos) << words << ": " << found;
   }
-  // A node that is its own child is nobody's root; the mesh has no faces then.
+  // A node that is its own child is not a root, so the mesh has no faces.
   EXPECT_FALSE(read_mesh(put(with("/nodes/0/children", {0}))));
 }
 
-TEST_F(GlbFiles, SurviveDamage) {
+TEST_F(GlbFiles, SurvivesDamage) {
   GlbMaker glb;
   const std::uint64_t positions = glb.add_positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, 16);
   glb.add_mesh(

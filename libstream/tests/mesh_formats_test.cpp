@@ -22,8 +22,7 @@
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/source.hpp"
 
-/// OBJ, OFF and STL: their vertices as points, and as meshes. This test writes one random mesh in
-/// all of them.
+/// OBJ, OFF and STL as points and as meshes. This test writes one random mesh in all formats.
 
 namespace terrace::stream {
 namespace {
@@ -37,7 +36,7 @@ SmallMesh random_mesh(std::mt19937_64& random) {
   SmallMesh mesh;
   const std::size_t count = 3 + random() % 60;
   for (std::size_t i = 0; i < count; ++i) {
-    // Floats, which all of the formats can hold; all vertices at different places.
+    // Floats, which all formats can hold exactly; all vertices are distinct.
     const auto coordinate = [&] {
       return static_cast<double>(static_cast<float>(random() % 100000) / 7);
     };
@@ -132,7 +131,7 @@ class MeshFormats : public ::testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(MeshFormats, VerticesAreThePointsOfTheFile) {
+TEST_F(MeshFormats, ReadsVerticesAsPoints) {
   std::mt19937_64 random(31);
   for (int round = 0; round < 40; ++round) {
     SCOPED_TRACE("seed 31, round " + std::to_string(round));
@@ -171,7 +170,7 @@ TEST_F(MeshFormats, VerticesAreThePointsOfTheFile) {
   }
 }
 
-TEST_F(MeshFormats, FacesAreTheSameInAll) {
+TEST_F(MeshFormats, AllFormatsGiveTheSameFaces) {
   std::mt19937_64 random(32);
   for (int round = 0; round < 40; ++round) {
     SCOPED_TRACE("seed 32, round " + std::to_string(round));
@@ -192,7 +191,7 @@ TEST_F(MeshFormats, FacesAreTheSameInAll) {
         for (const std::uint32_t v : t) found.push_back(file->vertices.positions.at(v));
       }
       EXPECT_EQ(found, corners);
-      // Coincident corners are one vertex.
+      // Coincident corners are merged to one vertex.
       const std::set<Point3> places(corners.begin(), corners.end());
       const bool soup = name.ends_with("stl");
       EXPECT_EQ(file->vertices.size(), soup ? places.size() : mesh.vertices.size());
@@ -200,8 +199,8 @@ TEST_F(MeshFormats, FacesAreTheSameInAll) {
   }
 }
 
-/// A vertex of NaN is no point, and triangles that have it are left out; the others are as before.
-TEST_F(MeshFormats, CornersOfNanTakeTheirTrianglesAlong) {
+/// A vertex with NaN is not a point, and its triangles are dropped; the others do not change.
+TEST_F(MeshFormats, DropsTrianglesWithNaNCorners) {
   const std::string ply =
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
       "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
@@ -231,7 +230,7 @@ TEST_F(MeshFormats, CornersOfNanTakeTheirTrianglesAlong) {
   }
 }
 
-TEST_F(MeshFormats, DamageIsNamed) {
+TEST_F(MeshFormats, ErrorsNameTheDamage) {
   std::mt19937_64 random(33);
   SmallMesh mesh = random_mesh(random);
   mesh.faces.push_back({0, 1, 2});
@@ -262,7 +261,7 @@ TEST_F(MeshFormats, DamageIsNamed) {
             "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",
             "fewer than three"},
            {"m.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "ends within"},
-           {"n.stl", "solid a\nvertex 0 0 0\n", "outside of a loop"}}) {
+           {"n.stl", "solid a\nvertex 0 0 0\n", "outside a loop"}}) {
     SCOPED_TRACE(name);
     const std::string file = put(name, content);
     const std::string found = message([&] { read_all({file}); });
@@ -279,8 +278,8 @@ TEST_F(MeshFormats, DamageIsNamed) {
   }
 }
 
-/// Four vertices and two triangles, in all the ways that OBJ allows.
-TEST_F(MeshFormats, ObjLinesMayBeContinuedIndentedAndSeparatedByTabs) {
+/// Four vertices and two triangles, in all notations that OBJ allows.
+TEST_F(MeshFormats, ReadsObjLinesThatAreContinuedIndentedOrTabbed) {
   const std::vector<Point3> square{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
   for (const std::string& text : std::vector<std::string>{
@@ -302,12 +301,12 @@ TEST_F(MeshFormats, ObjLinesMayBeContinuedIndentedAndSeparatedByTabs) {
   }
   std::string endless = "v 0 0 \\\n";
   for (int i = 0; i < 100000; ++i) endless += "\\\n";
-  EXPECT_NE(error_of([&] { read_all({put("endless.obj", endless)}); }).find("continue each other"),
+  EXPECT_NE(error_of([&] { read_all({put("endless.obj", endless)}); }).find("its continuations"),
             std::string::npos);
 }
 
 /// Text in UTF-16 is not read as text without points.
-TEST_F(MeshFormats, TextInUtf16IsRefusedWithTheRemedy) {
+TEST_F(MeshFormats, RejectsUtf16WithARemedy) {
   const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   const std::pair<const char*, std::string> files[] = {
       {"a.obj", obj},
@@ -337,7 +336,7 @@ TEST_F(MeshFormats, TextInUtf16IsRefusedWithTheRemedy) {
 }
 
 // Facts of real files, if they are available.
-TEST(MeshFormatsReal, HaveTheFactsOfTheirReadme) {
+TEST(MeshFormatsReal, MatchTheirReadme) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
   const std::string scan = std::string(data) + "/scan/";

@@ -33,7 +33,7 @@ constexpr const char* kSquare =
     "property list uchar int vertex_indices\nend_header\n"
     "0 0 1 0\n1 0 2 1\n1 1 3 2\n0 1 4 3\n4 0 1 2 3\n";
 
-TEST_F(MeshReader, CutsPolygonsIntoFans) {
+TEST_F(MeshReader, SplitsPolygonsIntoFans) {
   const auto file = read("a.ply", kSquare);
   ASSERT_TRUE(file);
   EXPECT_EQ(file->vertices.positions[2], (Point3{1, 1, 3}));
@@ -65,7 +65,7 @@ TEST_F(MeshReader, ReadsObjWithAllKindsOfIndices) {
   EXPECT_EQ(file->triangles[0], (std::array<std::uint32_t, 3>{0, 1, 2}));
 }
 
-TEST_F(MeshReader, LeavesCloudsToOthers) {
+TEST_F(MeshReader, ReturnsNothingForClouds) {
   EXPECT_FALSE(read("c.ply",
                     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
                     "property float z\nend_header\n1 2 3\n"));
@@ -98,7 +98,7 @@ TEST_F(MeshReader, ReadsWhatTheLibraryWrites) {
   }
 }
 
-/// GLB holds floats beside the middle of the mesh.
+/// GLB stores floats relative to the middle of the mesh.
 TEST_F(MeshReader, ReadsTheGlbThatTheLibraryWrites) {
   const Box3 bounds{{5e5, 5e6, 100}, {5e5 + 64, 5e6 + 64, 300}};
   const std::vector<Point3> positions{
@@ -122,7 +122,7 @@ TEST_F(MeshReader, ReadsTheGlbThatTheLibraryWrites) {
   }
 }
 
-// A damaged file is read as it stands, or refused: never beyond its end.
+// A damaged file is read as it is or refused, and never read beyond its end.
 TEST_F(MeshReader, SurvivesDamage) {
   const std::string good = kSquare;
   for (std::size_t end = 0; end < good.size(); ++end) {
@@ -147,8 +147,8 @@ TEST_F(MeshReader, SurvivesDamage) {
   }
 }
 
-// Nothing may be dropped silently: the faces' vertices are not known yet.
-TEST_F(MeshReader, RefusesFacesBeforeTheVertices) {
+// Faces before the vertices cannot be read, and must not be dropped silently.
+TEST_F(MeshReader, RejectsFacesBeforeTheVertices) {
   EXPECT_THROW(read("f.ply",
                     "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\n"
                     "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -157,7 +157,7 @@ TEST_F(MeshReader, RefusesFacesBeforeTheVertices) {
 }
 
 // Their properties could differ, and only some vertices would have levels.
-TEST_F(MeshReader, RefusesASecondElementOfVertices) {
+TEST_F(MeshReader, RejectsASecondVertexElement) {
   std::string twice = kSquare;
   const std::string faces = "element face", row = "4 0 1 2 3";
   twice.insert(twice.find(faces), "element vertex 1\nproperty float x\n");
@@ -166,7 +166,7 @@ TEST_F(MeshReader, RefusesASecondElementOfVertices) {
 }
 
 // Facts of the real scans, if they are available.
-TEST(MeshReaderReal, HasTheFactsOfItsReadme) {
+TEST(MeshReaderReal, MatchesItsReadme) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
   struct Fact {

@@ -71,7 +71,7 @@ class MeshFile : public ::testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(MeshFile, ObjHoldsExactDoublesAndCountsFromOne) {
+TEST_F(MeshFile, ObjHasExactDoublesAndCountsFromOne) {
   const Mesh mesh = random_mesh(1, 2500, 4000);
   write(path("m.obj"), mesh, {.attributes = {"level"}, .comments = {"one", "two\nthree"}});
   std::istringstream lines(read_text(path("m.obj")));
@@ -103,7 +103,7 @@ TEST_F(MeshFile, ObjHoldsExactDoublesAndCountsFromOne) {
   EXPECT_EQ(back.triangles, mesh.triangles);
 }
 
-TEST_F(MeshFile, PlyIsReadBackBitForBit) {
+TEST_F(MeshFile, RoundTripsPlyBitForBit) {
   const Mesh mesh = random_mesh(2, 2500, 4000);
   for (const std::string format : {"ply", "ply-ascii"}) {
     SCOPED_TRACE(format);
@@ -172,7 +172,7 @@ struct Glb {
   }
 };
 
-TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
+TEST_F(MeshFile, GlbStoresPositionsRelativeToItsOrigin) {
   const Mesh mesh = random_mesh(3, 3000, 5001);
   Box3 bounds;
   for (const Point3& p : mesh.positions) bounds.include(p);
@@ -218,7 +218,7 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
       EXPECT_EQ(glb.value<float>(level, i, 0), mesh.levels[i]);
     }
     for (std::size_t k = 0; k < 3; ++k) {
-      // As a reader sees them: the decimal numbers are exactly the stored floats.
+      // The decimal numbers are exactly the stored floats.
       EXPECT_EQ(accessor["min"][k].get<double>(), static_cast<double>(min[k]));
       EXPECT_EQ(accessor["max"][k].get<double>(), static_cast<double>(max[k]));
     }
@@ -230,7 +230,7 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
   }
 }
 
-TEST_F(MeshFile, GlbIsInTheMetresOfItsFrame) {
+TEST_F(MeshFile, GlbIsInMetres) {
   Mesh mesh = random_mesh(6, 1000, 300);
   const Point3 far{500, -300, 1000};
   for (Point3& p : mesh.positions) {
@@ -274,7 +274,7 @@ TEST_F(MeshFile, GlbIsInTheMetresOfItsFrame) {
   EXPECT_EQ(mesh_format(path("m.glb"), {.format = "obj"}), "obj");
 }
 
-TEST_F(MeshFile, OtherFormatsRoundNothing) {
+TEST_F(MeshFile, OtherFormatsDoNotRound) {
   const Box3 bounds{{691000, 5338000, 0}, {692000, 5340000, 500}};
   const Point3 p{691000.1, 5338000.2, 0.3};
   for (const char* name : {"a.ply", "a.obj"}) {
@@ -301,7 +301,7 @@ TEST_F(MeshFile, GlbWithoutTrianglesIsACloudAndWithoutVerticesAnEmptyScene) {
   EXPECT_TRUE(empty.binary.empty());
 }
 
-TEST_F(MeshFile, GlbRefusesWhatItCannotHoldBeforeItWrites) {
+TEST_F(MeshFile, GlbRejectsMeshesTooLargeForItBeforeWriting) {
   for (const MeshHeader& header : {MeshHeader{.vertices = 400'000'000, .triangles = 0},
                                    MeshHeader{.vertices = 3, .triangles = 1ull << 62},
                                    MeshHeader{.vertices = 200'000'000, .triangles = 200'000'000}}) {
@@ -311,7 +311,7 @@ TEST_F(MeshFile, GlbRefusesWhatItCannotHoldBeforeItWrites) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(MeshFile, EmptyMeshesAndPiecesOfAnySizeGiveTheSameBytes) {
+TEST_F(MeshFile, BytesDoNotDependOnThePieces) {
   const Mesh mesh = random_mesh(5, 900, 1700);
   for (const std::string ending : {".ply", ".obj", ".glb"}) {
     SCOPED_TRACE(ending);
@@ -325,7 +325,7 @@ TEST_F(MeshFile, EmptyMeshesAndPiecesOfAnySizeGiveTheSameBytes) {
   }
 }
 
-TEST_F(MeshFile, FormatsAreChosenByNameThenByEnding) {
+TEST_F(MeshFile, ChoosesFormatsByNameThenByEnding) {
   const auto refusal = [&](const std::string& file, const WriterOptions& options = {}) {
     return error_of([&] { open_mesh_writer(file, {}, options); });
   };

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-/// Numbers of glTF 2.0 (ISO/IEC 12113) and of its binary form, GLB: a header of 12 bytes (magic,
-/// version, all bytes), then chunks of a header (bytes, kind) and their contents, JSON and numbers.
+/// Constants of glTF 2.0 (ISO/IEC 12113) and of its binary form, GLB: a header of 12 bytes (magic,
+/// version, total bytes), then two chunks, JSON and binary, each with a header (bytes, kind).
 
 namespace terrace::stream::glb {
 

@@ -26,15 +26,16 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::string_view kGlbRemedy = "the file is damaged; write it anew";
+constexpr std::string_view kGlbRemedy = "the file is damaged: export it again";
+constexpr std::string_view kTruncatedRemedy = "the file is truncated: download it again";
 constexpr const char* kInfinite = "has a vertex with an infinite coordinate";
-constexpr std::string_view kPlainRemedy = "write it as plain glTF 2.0 in one .glb file";
+constexpr std::string_view kPlainRemedy = "export it as plain glTF 2.0 in one .glb file";
 
-/// A linear map and a translation: rows of four numbers.
+/// A linear map and a translation: three rows of four numbers.
 using Transform = std::array<double, 12>;
 constexpr Transform kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// First b, then a.
+/// The transform that applies b, then a.
 Transform product(const Transform& a, const Transform& b) {
   Transform out{};
   for (std::size_t row = 0; row < 3; ++row) {
@@ -52,19 +53,19 @@ double determinant(const Transform& t) {
          t[2] * (t[4] * t[9] - t[5] * t[8]);
 }
 
-/// Numbers of the binary chunk.
+/// An array of numbers or vectors in the binary chunk.
 struct Accessor {
   std::uint64_t begin = 0, count = 0, stride = 0, bytes = 0;  ///< `bytes`: of one element
 };
 
-/// The elements of an accessor in their order, through a window.
+/// Reads the elements of an accessor in order, through a window.
 class Elements {
  public:
   Elements() = default;
   Elements(const ByteSource& source, const Accessor& accessor)
       : source_(&source), accessor_(accessor) {}
 
-  /// The bytes of the next element; nullptr behind the last. Valid until the next call.
+  /// The bytes of the next element; nullptr after the last. Valid until the next call.
   const char* next() {
     if (done_ == accessor_.count) return nullptr;
     if (done_ == end_) fill();
@@ -88,8 +89,8 @@ class Elements {
   std::vector<char> window_;
 };
 
-/// The primitives of the meshes of a scene's nodes, in the order of the tree. Section numbers are
-/// those of the specification.
+/// Reads the primitives of the meshes of a scene's nodes, in the order of the tree. Section numbers
+/// are those of the specification.
 class GlbParser final : public MeshParser {
  public:
   GlbParser(Input& input, bool faces)
@@ -119,13 +120,13 @@ class GlbParser final : public MeshParser {
 
   static constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t kMostJsonBytes = std::size_t{64} << 20;
-  /// Primitives that nodes place, each in each place.
+  /// Limit of the primitives that nodes place, counting each place.
   static constexpr std::size_t kMostParts = std::size_t{1} << 20;
 
   /// A primitive (3.7.2.1).
   struct Part {
     Transform transform = kIdentity;
-    bool mirrored = false;    ///< the transform turns triangles over
+    bool mirrored = false;    ///< the transform flips the orientation of triangles
     Accessor positions;       ///< count 0: an earlier part has delivered them
     std::uint64_t first = 0;  ///< the number of the first of its vertices
     std::uint64_t vertices = 0;
@@ -159,9 +160,9 @@ class GlbParser final : public MeshParser {
     }
     const std::uint64_t all = word(8), json_bytes = word(12);
     if (input_->size() && *input_->size() < all) {
-      fail_here("is cut off: its header promises " + counted(all, "byte") + " and there are " +
+      fail_here("is truncated: its header promises " + counted(all, "byte") + ", but it has " +
                     std::to_string(*input_->size()),
-                "get it anew");
+                kTruncatedRemedy);
     }
     if (word(16) != glb::kJson) fail_here("its first chunk is not JSON");
     if (all < kHeaders + json_bytes) fail_here("its JSON is larger than the file");
@@ -180,10 +181,10 @@ class GlbParser final : public MeshParser {
     left -= glb::kChunkHeaderBytes;
     if (!binary) return;
     if (bytes > left) fail_here("its binary chunk is larger than the file");
-    // Positions and corners may lie in any order and are read side by side.
+    // Positions and corners may be in any order and are read in parallel, so keep them in a file.
     while (bytes > 0) {
       const std::string_view some = input_->fill(1);
-      if (some.empty()) fail_here("ends within its binary chunk", "get it anew");
+      if (some.empty()) fail_here("ends within its binary chunk", kTruncatedRemedy);
       const auto taken = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, some.size()));
       numbers_.append(std::as_bytes(std::span(some.data(), taken)));
       input_->consume(taken);
@@ -192,10 +193,10 @@ class GlbParser final : public MeshParser {
   }
 
   void parse(std::string_view text, std::uint64_t promised) {
-    if (text.size() < promised) fail_here("ends within its JSON", "get it anew");
+    if (text.size() < promised) fail_here("ends within its JSON", kTruncatedRemedy);
     try {
-      // A million values are far more than a scene of many thousand nodes has, and few enough to
-      // fit into memory.
+      // Even a scene of many thousand nodes has far fewer than a million values, and a million fit
+      // into memory.
       json_ = parse_bounded_json(text, {.depth = 16, .values = std::size_t{1} << 20},
                                  [this](const char* cause) { fail_here(cause, kPlainRemedy); });
     } catch (const Json::parse_error& error) {
@@ -206,7 +207,7 @@ class GlbParser final : public MeshParser {
     if (!json_.is_object()) fail_here("its JSON is not an object");
   }
 
-  // What the JSON holds.
+  // Access to the JSON.
 
   /// The list of that name; an empty one if there is none.
   const Json& list(const Json& object, const char* name) const {
@@ -217,7 +218,7 @@ class GlbParser final : public MeshParser {
     return *found;
   }
 
-  /// Entry `index` of a list at the top.
+  /// Entry `index` of a list at the top level.
   const Json& entry(const char* name, std::uint64_t index) const {
     const Json& all = list(json_, name);
     if (index >= all.size() || !all[index].is_object()) {
@@ -239,7 +240,7 @@ class GlbParser final : public MeshParser {
     return value;
   }
 
-  /// So many finite numbers; false if there is no such list.
+  /// Reads a list of out.size() finite numbers; false if there is no such list.
   bool take_numbers(const Json& object, const char* name, std::span<double> out) const {
     if (!object.contains(name)) return false;
     const Json& all = list(object, name);
@@ -254,7 +255,7 @@ class GlbParser final : public MeshParser {
     return true;
   }
 
-  /// An accessor (3.6.2) whose elements lie in the binary chunk as a whole.
+  /// An accessor (3.6.2); its elements must be entirely in the binary chunk.
   Accessor accessor(std::uint64_t index, const char* type, std::uint64_t& component) const {
     const std::string where = "accessors " + std::to_string(index);
     const Json& json = entry("accessors", index);
@@ -264,15 +265,15 @@ class GlbParser final : public MeshParser {
                                 : component == glb::kUnsignedShort                           ? 2
                                 : component == glb::kUnsignedInt || component == glb::kFloat ? 4
                                                                                              : 0;
-    if (bytes == 0) fail(where, "has a type of numbers that is not read", kPlainRemedy);
+    if (bytes == 0) fail(where, "has a number type that is not supported", kPlainRemedy);
     const std::optional<std::uint64_t> view_index = count(json, "bufferView");
     if (json.contains("sparse") || !view_index) {
-      fail(where, "is sparse, which is not read", kPlainRemedy);
+      fail(where, "is sparse, which is not supported", kPlainRemedy);
     }
     const Json& view = entry("bufferViews", *view_index);
     const std::uint64_t buffer = count(view, "buffer").value_or(0);
     if (buffer != 0 || entry("buffers", 0).contains("uri")) {
-      fail(where, "lies in another file, which is not read", kPlainRemedy);
+      fail(where, "is in another file, which is not supported", kPlainRemedy);
     }
     Accessor out;
     out.bytes = bytes * (std::string_view(type) == "VEC3" ? 3 : 1);
@@ -284,19 +285,20 @@ class GlbParser final : public MeshParser {
     if (out.stride < out.bytes) fail(where, "has elements that overlap");
     if (out.begin > numbers_.size() || view_bytes > numbers_.size() - out.begin ||
         (out.count > 0 && offset + (out.count - 1) * out.stride + out.bytes > view_bytes)) {
-      fail(where, "reaches beyond the binary chunk");
+      fail(where, "extends beyond the binary chunk");
     }
     out.begin += offset;
     return out;
   }
 
-  /// Compressed geometry, for example. What concerns colours alone is no hindrance.
+  /// Throws: Error for required extensions, such as compressed geometry, except those that only
+  /// concern colours.
   void refuse_extensions() const {
     for (const Json& extension : list(json_, "extensionsRequired")) {
       const std::string name = extension.is_string() ? extension.get<std::string>() : "?";
       const auto begins = [&](const char* text) { return name.starts_with(text); };
       if (begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_")) continue;
-      fail({}, "needs the extension " + name + ", which is not read", kPlainRemedy);
+      fail({}, "needs the extension " + name + ", which is not supported", kPlainRemedy);
     }
   }
 
@@ -333,14 +335,13 @@ class GlbParser final : public MeshParser {
     return out;
   }
 
-  /// The nodes that a scene begins with: those of the scene to be shown, or else all without a
-  /// parent.
+  /// The root nodes: those of the default scene, or all without a parent if there are no scenes.
   std::vector<std::uint64_t> roots() const {
     std::vector<std::uint64_t> out;
     const auto add = [&](const Json& nodes) {
       for (const Json& node : nodes) {
         const std::optional<std::uint64_t> number = whole(node);
-        if (!number) fail("nodes", "a number of a node is wrong");
+        if (!number) fail("nodes", "a node index is invalid");
         out.push_back(*number);
       }
     };
@@ -375,21 +376,21 @@ class GlbParser final : public MeshParser {
       const Json& children = list(node, "children");
       for (std::size_t i = children.size(); i-- > 0;) {
         const std::optional<std::uint64_t> child = whole(children[i]);
-        if (!child) fail("nodes " + std::to_string(index), "a number of a child is wrong");
+        if (!child) fail("nodes " + std::to_string(index), "the index of a child is invalid");
         stack.emplace_back(*child, transform);
       }
     }
   }
 
   void add_mesh(std::uint64_t index, const Transform& transform) {
-    // By accessor, the first vertex in this mesh: primitives may share their vertices.
+    // The first vertex of each accessor in this mesh: primitives may share their vertices.
     std::map<std::uint64_t, std::uint64_t> placed;
     const std::string where = "meshes " + std::to_string(index);
     for (const Json& primitive : list(entry("meshes", index), "primitives")) {
       const auto attributes = primitive.find("attributes");
       const std::optional<std::uint64_t> positions =
           attributes == primitive.end() ? std::nullopt : count(*attributes, "POSITION");
-      if (!positions) continue;  // there is nothing to be seen (3.7.2.1)
+      if (!positions) continue;  // it has nothing to draw (3.7.2.1)
       Part part;
       part.transform = transform;
       part.mirrored = determinant(transform) < 0;
@@ -410,7 +411,7 @@ class GlbParser final : public MeshParser {
       if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
       moved_ = moved_ || transform != kIdentity;
       if (parts_.size() == kMostParts) {
-        fail(where, "is one of more than " + std::to_string(kMostParts) + " primitives in places",
+        fail(where, "is one of more than " + std::to_string(kMostParts) + " placed primitives",
              kPlainRemedy);
       }
       parts_.push_back(part);
@@ -418,12 +419,12 @@ class GlbParser final : public MeshParser {
   }
 
   void add_corners(const Json& primitive, const std::string& where, Part& part) const {
-    if (part.mode > glb::kFan) fail(where, "is drawn in a way that glTF does not know");
+    if (part.mode > glb::kFan) fail(where, "has a drawing mode that glTF does not have");
     part.corners = part.vertices;
     if (const auto indices = count(primitive, "indices")) {
       std::uint64_t component = 0;
       part.indices = accessor(*indices, "SCALAR", component);
-      if (component == glb::kFloat) fail(where, "has numbers of vertices that are floats");
+      if (component == glb::kFloat) fail(where, "has vertex indices that are floats");
       part.corners = part.indices->count;
     }
     if (part.mode == glb::kTriangles && part.corners % 3 != 0) {
@@ -455,7 +456,7 @@ class GlbParser final : public MeshParser {
       world[row] = moved_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
       if (std::isinf(world[row])) fail({}, kInfinite);
     }
-    vertex_ = {world[0], 0.0 - world[2], world[1]};  // y up to z up; zero stays without a sign
+    vertex_ = {world[0], 0.0 - world[2], world[1]};  // from y up to z up, without negative zero
     return true;
   }
 
@@ -469,7 +470,7 @@ class GlbParser final : public MeshParser {
                                           : load_little_endian<std::uint32_t>(at);
     }
     if (vertex >= part.vertices) {
-      fail({}, "a face names the vertex " + std::to_string(vertex) + ", which is not there");
+      fail({}, "a face names the vertex " + std::to_string(vertex) + ", which does not exist");
     }
     return static_cast<std::uint32_t>(part.first + vertex);
   }
@@ -484,20 +485,20 @@ class GlbParser final : public MeshParser {
         if (part.mirrored) std::swap(face_[1], face_[2]);
         return true;
       }
-      // Strips and fans: two corners, then a triangle with each.
+      // Strips and fans begin with two corners; each further one makes a triangle.
       const std::uint64_t number = corner_;
       const std::uint32_t corner = read_corner();
       if (number < 2) {
         last_[number] = corner;
         continue;
       }
-      // In a strip every other triangle runs the other way.
+      // Every second triangle of a strip has the opposite orientation.
       face_ = {last_[0], last_[1], corner};
       const bool turned = part.mode == glb::kStrip && number % 2 == 1;
       if (turned != part.mirrored) std::swap(face_[1], face_[2]);
       if (part.mode == glb::kStrip) last_[0] = last_[1];
       last_[1] = corner;
-      // Triangles without area join strips.
+      // Triangles without area connect strips; skip them.
       if (face_[0] != face_[1] && face_[1] != face_[2] && face_[2] != face_[0]) return true;
     }
     return false;
@@ -509,12 +510,12 @@ class GlbParser final : public MeshParser {
   Json json_;
   std::vector<Part> parts_;
   std::uint64_t vertices_ = 0;
-  bool moved_ = false;  ///< by a node
+  bool moved_ = false;  ///< a node has a transform
 
-  std::size_t at_ = 0;  ///< the part in work
+  std::size_t at_ = 0;  ///< the current part
   bool begun_ = false;
   Elements positions_, indices_;
-  std::uint64_t corner_ = 0;  ///< of the part in work, that have been read
+  std::uint64_t corner_ = 0;  ///< corners of the current part that have been read
   std::array<std::uint32_t, 2> last_{};
 };
 

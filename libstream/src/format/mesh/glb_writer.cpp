@@ -14,8 +14,8 @@
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/sink.hpp"
 
-/// The bounds of the positions stand in the JSON, before the positions: its place is kept, and it
-/// is written at the end.
+/// Writes GLB. The JSON precedes the positions but contains their bounds, so room is left for it
+/// and it is written at the end.
 
 namespace terrace::stream {
 namespace {
@@ -23,13 +23,14 @@ namespace {
 constexpr std::size_t kGlbPieceBytes = 64u << 10;
 constexpr std::size_t kMaxStride = 252;  // of a vertex buffer, by the specification
 
-/// z up to y up: a rotation, so that triangles keep their sense.
+/// From z up to y up: a rotation, so that triangles keep their orientation.
 template <class Number>
 std::array<Number, 3> y_up(const std::array<Number, 3>& p) {
   return {p[0], p[2], -p[1]};
 }
 
-/// Application-specific attributes begin with an underscore and are upper case by convention.
+/// The name of an application-specific attribute: it must begin with an underscore, and is upper
+/// case by convention.
 std::string attribute_name(const std::string& name) {
   std::string out = "_";
   for (const char c : name) {
@@ -54,7 +55,7 @@ class GlbWriter final : public MeshWriter {
                    .remedy = "write PLY, or a smaller part"});
     };
     if (stride_ > kMaxStride) refuse("GLB holds at most 60 attributes");
-    // Two sizes that cannot overflow first, then the whole.
+    // Check two sizes that cannot overflow first, then the sum.
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
     if (header.vertices >= kMost / stride_ || header.triangles >= kMost / 12 ||
         glb::kHeaderBytes + 2 * glb::kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
@@ -66,7 +67,7 @@ class GlbWriter final : public MeshWriter {
       origin_ = glb_origin(*header.bounds);
       origin_known_ = true;
     }
-    // The longest numbers show how much room the JSON may need; blanks fill what is left.
+    // The longest numbers show how much room the JSON may need; blanks fill the rest.
     constexpr double kLongest = -1.2345678901234567e-300;
     constexpr std::array<double, 3> kAny{kLongest, kLongest, kLongest};
     json_bytes_ = json(kAny, kAny, kAny, kAny).size() + 36;
@@ -129,7 +130,7 @@ class GlbWriter final : public MeshWriter {
     const auto widened = [](const std::array<float, 3>& v) {
       return std::array<double, 3>{v[0], v[1], v[2]};
     };
-    // Where the local origin is in the scene, and the scene's in the coordinates.
+    // The local origin in the scene, and the origin of the scene in the coordinates.
     Point3 place{}, scene{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (frame_.local && axis < 2) {
@@ -212,7 +213,7 @@ class GlbWriter final : public MeshWriter {
     primitive["mode"] = header_.triangles > 0 ? glb::kTriangles : glb::kPoints;
     primitive["material"] = 0;
     out["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
-    // Without a material glTF's default is a mirror of metal, dark in most viewers.
+    // The default material of glTF is shiny metal, which is dark in most viewers.
     out["materials"] =
         Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},
                       {"doubleSided", true}}});
@@ -221,7 +222,7 @@ class GlbWriter final : public MeshWriter {
     out["buffers"] = Json::array({{{"byteLength", binary_bytes()}}});
     return text_of(out);
   }
-  /// Names of reference systems may have bytes that are not UTF-8.
+  /// The JSON as text. Names of reference systems may have bytes that are not UTF-8.
   static std::string text_of(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
   }

@@ -26,8 +26,8 @@ std::string_view take_word(std::string_view& line) {
   return word;
 }
 
-/// Wavefront OBJ: statements "v x y z" and "f a b c ...", the rest left out. A backslash at its end
-/// continues a line.
+/// Parses Wavefront OBJ: statements "v x y z" and "f a b c ..."; others are ignored. A backslash at
+/// the end of a line continues it on the next one.
 class ObjParser final : public MeshParser {
  public:
   ObjParser(Input& input, bool faces) : input_(&input), lines_(input), faces_(faces) {
@@ -48,7 +48,7 @@ class ObjParser final : public MeshParser {
       }
       const std::string_view word = take_word(line);
       if (word == "v") {
-        if (!read_vertex(line, vertex_)) fail("a vertex without three coordinates");
+        if (!read_vertex(line, vertex_)) fail("a vertex needs three coordinates");
         ++vertices_;
         return Item::vertex;
       }
@@ -68,11 +68,11 @@ class ObjParser final : public MeshParser {
     throw Error({.file = input_->name(),
                  .where = "line " + std::to_string(lines_.number()),
                  .cause = std::move(cause),
-                 .remedy = "the file is damaged; write it anew"});
+                 .remedy = "the file is damaged: export it again"});
   }
 
-  /// The next line without the blanks around it, and with those that continue it. Comments are not
-  /// continued: paths in them may end in a backslash.
+  /// Reads the next line, with its continuation lines and without surrounding blanks. Comments are
+  /// not continued, because paths in them may end in a backslash.
   bool next_statement(std::string_view& line) {
     if (!lines_.next(line)) return false;
     line = trim(line);
@@ -82,7 +82,7 @@ class ObjParser final : public MeshParser {
       const bool continued = line.ends_with('\\');
       joined_.append(line.substr(0, line.size() - (continued ? 1 : 0))).append(" ");
       if (joined_.size() > LineReader::kMaxLine) {
-        fail("lines that continue each other are longer than " +
+        fail("a line and its continuations are longer than " +
              counted(LineReader::kMaxLine, "byte"));
       }
       more = continued && lines_.next(line);
@@ -92,8 +92,8 @@ class ObjParser final : public MeshParser {
     return true;
   }
 
-  /// Corners are "7", "7/2", "7/2/3" or "7//3": the first number is the vertex. Negative ones count
-  /// back from the last vertex so far, positive ones from 1.
+  /// Corners are "7", "7/2", "7/2/3" or "7//3": the first number is the vertex. Positive numbers
+  /// count from 1, negative ones back from the last vertex so far.
   void read_face(std::string_view text) {
     face_.clear();
     while (!text.empty()) {
@@ -104,7 +104,7 @@ class ObjParser final : public MeshParser {
       const std::int64_t vertex = number < 0 ? number + vertices_ : number - 1;
       if (error != std::errc{} || !ends || vertex < 0 || vertex >= vertices_ ||
           vertex >= std::numeric_limits<std::uint32_t>::max()) {
-        fail("a face names the vertex " + in_quotes(word) + ", which is not there");
+        fail("a face names the vertex " + in_quotes(word) + ", which does not exist");
       }
       face_.push_back(static_cast<std::uint32_t>(vertex));
     }
@@ -130,7 +130,7 @@ bool read_vertex(std::string_view& text, Point3& vertex) {
   return true;
 }
 
-/// True if the first line that says something is one of an OBJ.
+/// True if the first line that is not a comment or a group is a statement of OBJ.
 bool recognise_obj(std::span<const std::byte> bytes) {
   std::string_view head(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (head.starts_with(kByteOrderMark)) head.remove_prefix(kByteOrderMark.size());

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kObjTextBytes = 64u << 10;
 
-/// Wavefront OBJ: "v x y z" per vertex, "f a b c" per triangle, vertices counted from 1.
+/// Writes Wavefront OBJ: "v x y z" per vertex, "f a b c" per triangle, vertices counted from 1.
 class ObjWriter final : public MeshWriter {
  public:
   ObjWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)

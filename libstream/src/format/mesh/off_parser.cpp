@@ -15,10 +15,11 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::string_view kOffRemedy = "the file is damaged; write it anew";
+constexpr std::string_view kOffRemedy = "the file is damaged: export it again";
 
-/// Geomview's OFF as text: "OFF" (or "COFF", "NOFF", "CNOFF", "STOFF": more numbers behind each
-/// vertex, left out), counts of vertices, faces and edges, then a line for each vertex and face.
+/// Parses Geomview's OFF as text: "OFF" (or "COFF", "NOFF", "CNOFF", "STOFF", which have more
+/// numbers per vertex, which are ignored), the counts of vertices, faces and edges, then a line for
+/// each vertex and face.
 class OffParser final : public MeshParser {
  public:
   OffParser(Input& input, bool faces) : input_(&input), lines_(input), wants_faces_(faces) {
@@ -29,14 +30,14 @@ class OffParser final : public MeshParser {
     line.remove_prefix(key + 3);
     line = trim(line);
     if (line.starts_with("BINARY")) {
-      fail("is OFF in its binary form, which is not read", "write it as text");
+      fail("is binary OFF, which is not supported", "export it as text");
     }
     if (!line.empty() && (line.front() == '4' || line.front() == 'n')) {
-      fail("is OFF of another dimension than three", "write plain OFF");
+      fail("is OFF of another dimension than three", "export plain OFF");
     }
     if (line.empty() && !next_line(line)) fail("ends before its counts");
     if (!take_count(line, vertices_) || !take_count(line, faces_)) {
-      fail("does not say how many vertices and faces it has");
+      fail("does not state how many vertices and faces it has");
     }
   }
 
@@ -50,7 +51,7 @@ class OffParser final : public MeshParser {
       if (!next_line(line)) {
         fail("ends after " + std::to_string(read_) + " of " + counted(vertices_, "vertex"));
       }
-      if (!read_vertex(line, vertex_)) fail("a vertex without three coordinates");
+      if (!read_vertex(line, vertex_)) fail("a vertex needs three coordinates");
       ++read_;
       return Item::vertex;
     }
@@ -92,16 +93,16 @@ class OffParser final : public MeshParser {
     return text.empty() || is_blank(text.front());
   }
 
-  /// "n a b c ...", colours behind it.
+  /// Reads "n a b c ...", which colours may follow.
   void read_face(std::string_view text) {
     face_.clear();
     std::uint64_t corners = 0;
-    if (!take_count(text, corners)) fail("a face without the number of its corners");
+    if (!take_count(text, corners)) fail("a face lacks the number of its corners");
     for (std::uint64_t i = 0; i < corners; ++i) {
       std::uint64_t vertex = 0;
-      if (!take_count(text, vertex)) fail("a face with fewer corners than it says");
+      if (!take_count(text, vertex)) fail("a face has fewer corners than it states");
       if (vertex >= vertices_ || vertex >= std::numeric_limits<std::uint32_t>::max()) {
-        fail("a face names the vertex " + std::to_string(vertex) + ", which is not there");
+        fail("a face names the vertex " + std::to_string(vertex) + ", which does not exist");
       }
       face_.push_back(static_cast<std::uint32_t>(vertex));
     }

@@ -13,8 +13,9 @@
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/schema.hpp"
 
-/// Meshes read front to back: GLB, OBJ, OFF and STL have one parser each, for read_mesh(), for the
-/// points of the vertices and for triangles; PLY has one for triangles (in ply/source.cpp).
+/// Parsers that read meshes from front to back. GLB, OBJ, OFF and STL have one each, for
+/// read_mesh(), for vertices as points and for triangles; PLY has one for triangles (in
+/// ply/source.cpp).
 
 namespace terrace::stream {
 
@@ -28,9 +29,9 @@ class MeshParser {
   /// Stopped.
   virtual Item next() = 0;
 
-  /// Its coordinates are finite or NaN (see is_missing()).
+  /// The current vertex; its coordinates are finite or NaN (see is_missing()).
   [[nodiscard]] const Point3& vertex() const { return vertex_; }
-  /// Three or more corners: vertex indices from 0, all of them already read.
+  /// The current face: three or more indices, from 0, of vertices that have been read.
   [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
   /// The format's name in the registry.
   [[nodiscard]] virtual const char* format() const = 0;
@@ -41,7 +42,7 @@ class MeshParser {
   /// The number of vertices, if the file states it before them.
   [[nodiscard]] virtual std::optional<std::uint64_t> vertices() const { return std::nullopt; }
   [[nodiscard]] virtual ScalarType type() const { return ScalarType::f64; }
-  /// So far.
+  /// The comments read so far.
   [[nodiscard]] const std::vector<std::string>& comments() const { return comments_; }
 
  protected:
@@ -55,7 +56,7 @@ class MeshParser {
 bool read_vertex(std::string_view& text, Point3& vertex);
 
 /// input: at its first byte; must outlive the parser. faces: false skips them.
-/// Sets the binary part of the file aside in a temporary file.
+/// The parser of GLB copies the binary chunk to a temporary file.
 std::unique_ptr<MeshParser> glb_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> obj_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> off_parser(Input& input, bool faces);
@@ -65,7 +66,7 @@ std::unique_ptr<MeshParser> stl_parser(Input& input, bool faces);
 bool recognise_glb(std::span<const std::byte> head);
 bool recognise_obj(std::span<const std::byte> head);
 bool recognise_off(std::span<const std::byte> head);
-/// Only the text form: the binary one has no signature.
+/// Recognises only the text form: the binary one has no signature.
 bool recognise_stl(std::span<const std::byte> head);
 
 }  // namespace terrace::stream

@@ -16,7 +16,7 @@
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
-/// The vertices of meshes as points, and their triangles.
+/// Reads the vertices or triangles of meshes as points.
 
 namespace terrace::stream {
 namespace {

@@ -31,7 +31,7 @@ constexpr std::array<SimpleFormat, 4> kSimpleFormats{{{&glb_format, &glb_parser}
                                                       {&off_format, &off_parser},
                                                       {&stl_format, &stl_parser}}};
 
-/// Gives vertices at one place one number.
+/// Merges vertices at the same place: gives them one number.
 class Welder {
  public:
   explicit Welder(MeshFile& mesh) : mesh_(&mesh) {}
@@ -57,7 +57,7 @@ MeshFile read_simple(const std::string& file, const SourceOptions& options,
   const auto parser = kind.parser(input, true);
   MeshFile mesh;
   Welder welder(mesh);
-  std::vector<std::uint32_t> numbers;  // of the vertices of a soup that are not in a face yet
+  std::vector<std::uint32_t> numbers;  // of a soup's vertices that are not yet in a face
   for (;;) {
     const MeshParser::Item item = parser->next();
     if (item == MeshParser::Item::end) break;
@@ -87,7 +87,7 @@ MeshFile read_simple(const std::string& file, const SourceOptions& options,
   return mesh;
 }
 
-/// Leaves out vertices of which a coordinate is NaN, and the triangles that have one.
+/// Removes vertices with a coordinate that is NaN, and their triangles.
 void leave_out_missing(MeshFile& mesh) {
   PointBlock& vertices = mesh.vertices;
   constexpr std::uint32_t kLeftOut = std::numeric_limits<std::uint32_t>::max();
@@ -112,15 +112,14 @@ void leave_out_missing(MeshFile& mesh) {
 }
 
 std::optional<MeshFile> read_any_mesh(const std::string& file, const SourceOptions& options) {
-  // What a pipe has given would be missing where the file is read as a cloud, unless its format is
-  // told by name.
+  // Do not peek into a pipe: its first bytes would be missing if it is later read as a cloud.
   std::vector<char> head;
   if (options.format.empty() && is_rereadable(file)) head = peek_head(file, 4096, options.stop);
   const auto is_in = [&](const Format& format) {
     if (!options.format.empty()) return options.format == format.name;
     if (!head.empty() && format.recognise(std::as_bytes(std::span(head)))) return true;
-    const Format* const told = format_of_name(file);
-    return told != nullptr && told->name == format.name && format.name != ply_format().name;
+    const Format* const known = format_of_name(file);
+    return known != nullptr && known->name == format.name && format.name != ply_format().name;
   };
   if (is_in(ply_format())) return read_ply_mesh(file, options);
   for (const SimpleFormat& kind : kSimpleFormats) {

@@ -16,9 +16,9 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::string_view kStlRemedy = "the file is damaged; write it anew";
+constexpr std::string_view kStlRemedy = "the file is damaged: export it again";
 
-/// What both forms share: three vertices, then the face of them.
+/// Common part of both forms: delivers three vertices, then their face.
 class StlParser : public MeshParser {
  public:
   explicit StlParser(bool faces) : wants_faces_(faces) {}
@@ -42,12 +42,12 @@ class StlParser : public MeshParser {
   }
 
  protected:
-  /// The next corner to vertex_; false behind the last.
+  /// Reads the next corner to vertex_; false after the last.
   virtual bool read_corner() = 0;
   [[noreturn]] virtual void fail(std::string cause, std::string_view remedy = kStlRemedy) const = 0;
 
-  std::uint64_t faces_ = 0;  ///< that are done
-  unsigned corner_ = 0;      ///< of the face in work, that have been read
+  std::uint64_t faces_ = 0;  ///< number of finished faces
+  unsigned corner_ = 0;      ///< corners of the current face that have been read
 
  private:
   void begin_face() {
@@ -58,7 +58,8 @@ class StlParser : public MeshParser {
   bool wants_faces_;
 };
 
-/// Lines "vertex x y z", three between "outer loop" and "endloop"; "endsolid" ends a part.
+/// Parses text: lines "vertex x y z", three between "outer loop" and "endloop"; "endsolid" ends a
+/// solid.
 class StlText final : public StlParser {
  public:
   StlText(Input& input, bool faces) : StlParser(faces), input_(&input), lines_(input) {}
@@ -72,16 +73,16 @@ class StlText final : public StlParser {
       line = trim_left(line);
       if (line.starts_with("vertex") || line.starts_with("VERTEX")) {
         line.remove_prefix(6);
-        if (!in_loop_) fail("a vertex outside of a loop");
-        if (!read_vertex(line, vertex_)) fail("a vertex without three coordinates");
+        if (!in_loop_) fail("a vertex is outside a loop");
+        if (!read_vertex(line, vertex_)) fail("a vertex needs three coordinates");
         if (corner_ == 2) in_loop_ = false;
         return true;
       }
       if (line.starts_with("outer") || line.starts_with("OUTER")) {
-        if (corner_ != 0) fail("a loop of fewer than three vertices");
+        if (corner_ != 0) fail("a loop has fewer than three vertices");
         in_loop_ = true;
       } else if (line.starts_with("endloop") || line.starts_with("ENDLOOP")) {
-        if (corner_ != 0) fail("a loop of fewer than three vertices");
+        if (corner_ != 0) fail("a loop has fewer than three vertices");
         in_loop_ = false;
       } else if (line.starts_with("endsolid") || line.starts_with("ENDSOLID")) {
         ended_ = true;
@@ -89,7 +90,8 @@ class StlText final : public StlParser {
         ended_ = false;
       }
     }
-    if (corner_ != 0 || !ended_) fail("ends within a part", "the file is cut off: get it anew");
+    if (corner_ != 0 || !ended_)
+      fail("ends within a solid", "the file is truncated: download it again");
     lines_.release();
     return false;
   }
@@ -107,8 +109,8 @@ class StlText final : public StlParser {
   bool in_loop_ = false, ended_ = false;
 };
 
-/// 80 bytes of anything, the number of triangles, then 50 bytes for each: a normal, three corners,
-/// all 32-bit floats, and two bytes that are left out.
+/// Parses the binary form: 80 arbitrary bytes, the number of triangles, then 50 bytes for each: a
+/// normal and three corners as 32-bit floats, and two bytes that are ignored.
 class StlBinary final : public StlParser {
  public:
   StlBinary(Input& input, bool faces) : StlParser(faces), input_(&input) {
@@ -116,7 +118,7 @@ class StlBinary final : public StlParser {
     if (head.size() < kHeadBytes) fail("is too short for STL");
     count_ = load_little_endian<std::uint32_t>(head.data() + 80);
     if (input.size() && (*input.size() - kHeadBytes) / kFaceBytes < count_) {
-      fail("promises " + counted(count_, "triangle") + " and has bytes for " +
+      fail("promises " + counted(count_, "triangle") + " but has bytes for " +
            std::to_string((*input.size() - kHeadBytes) / kFaceBytes));
     }
     input.consume(kHeadBytes);
@@ -165,7 +167,8 @@ class StlBinary final : public StlParser {
 bool recognise_stl(std::span<const std::byte> bytes) {
   const std::string_view head(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!head.starts_with("solid") && !head.starts_with("SOLID")) return false;
-  // Some write "solid" into the free bytes of the binary form; what follows those is no text.
+  // Some programs write "solid" to the free bytes of the binary form, which are not followed by
+  // text.
   return std::all_of(head.begin(), head.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);
     return byte >= 0x20 || c == '\n' || c == '\r' || c == '\t';

@@ -21,8 +21,8 @@
 namespace terrace::stream {
 namespace {
 
-/// Vertices by number, in a temporary file behind a cache of pages: faces mostly name vertices near
-/// those of the face before.
+/// Vertices by number, in a temporary file with a cache of pages: faces mostly name vertices near
+/// those of the previous face.
 class VertexTable {
  public:
   explicit VertexTable(std::string name) : name_(std::move(name)), slots_(kSlots) {}
@@ -39,7 +39,7 @@ class VertexTable {
     if (page == (count_ - 1) / kPage) return tail_[number % kPage];
     Slot& slot = slots_[page % kSlots];
     if (slot.page != page) {
-      slot.page = kNone;  // should reading fail
+      slot.page = kNone;  // in case reading fails
       slot.vertices.resize(kPage);
       spool_->read(page * kPage * sizeof(Point3), std::as_writable_bytes(std::span(slot.vertices)));
       slot.page = page;
@@ -65,7 +65,7 @@ class VertexTable {
   std::string name_;
   std::optional<Spool> spool_;
   std::vector<Slot> slots_;
-  std::vector<Point3> tail_;  ///< the last page, which is in no file yet
+  std::vector<Point3> tail_;  ///< the last page, not yet in the file
   std::uint64_t count_ = 0;
 };
 
@@ -120,7 +120,7 @@ class TriangleSource final : public PointSource {
     if (delivered_ + nodata_ == 0) {
       throw Error({.file = info_.files.front(),
                    .where = {},
-                   .cause = "has no faces, so no triangles",
+                   .cause = "has no faces, so it has no triangles",
                    .remedy = "read it as points: leave `entities` out"});
     }
     return !block.empty();
@@ -151,7 +151,7 @@ class TriangleSource final : public PointSource {
       for (const double value : point) {
         std::array<std::byte, sizeof(double)> bytes{};
         if (type_ == ScalarType::f32) {
-          const auto narrow = static_cast<float>(value);  // exact: it was one
+          const auto narrow = static_cast<float>(value);  // exact: it was a float
           std::memcpy(bytes.data(), &narrow, sizeof narrow);
         } else {
           std::memcpy(bytes.data(), &value, sizeof value);
@@ -167,7 +167,7 @@ class TriangleSource final : public PointSource {
   ScalarType type_;
   SourceInfo info_;
   VertexTable vertices_;
-  std::array<Point3, 3> soup_{};  ///< the last corners of what has no shared vertices
+  std::array<Point3, 3> soup_{};  ///< the last corners, if vertices are not shared
   std::uint64_t soup_size_ = 0, delivered_ = 0, nodata_ = 0;
   std::size_t fan_ = 0;  ///< the last corner of the next triangle of the face
   bool in_face_ = false;

@@ -9,13 +9,13 @@
 
 namespace terrace::stream {
 
-/// A mesh that is being read.
+/// A mesh being read.
 struct OpenMesh {
   std::unique_ptr<Input> input;  ///< the parser's input, unless it has its own
   std::unique_ptr<MeshParser> parser;
 };
 
-/// The triangles of a mesh as described in SourceOptions::entities; polygons are cut into fans.
+/// The triangles of a mesh as described in SourceOptions::entities; polygons are split into fans.
 /// Memory: 17 MiB; vertices referenced by index are kept in a temporary file, 24 bytes each.
 std::unique_ptr<PointSource> triangles_of(OpenMesh mesh, const SourceOptions& options);
 
