@@ -155,7 +155,7 @@ TEST_F(Ply, SkipsListsAndOtherElements) {
   }
 }
 
-TEST_F(Ply, CutAtAnyByteItIsRefusedOrWhole) {
+TEST_F(Ply, RejectsTruncationAtAnyByteOrReadsAllVertices) {
   for (const std::string& encoding : kEncodings) {
     SCOPED_TRACE(encoding);
     const std::string text = crowded(encoding);
@@ -165,8 +165,8 @@ TEST_F(Ply, CutAtAnyByteItIsRefusedOrWhole) {
       AllPoints all;
       const std::string error = error_of([&] { all = read(cut, {.format = "ply"}); });
       if (error.empty()) {
-        // Only the faces are cut: all vertices are complete. In ASCII the last digits of a number
-        // can be missing unnoticed.
+        // Only the faces are truncated: all vertices are complete. In ASCII, missing last digits of
+        // a number may go unnoticed.
         EXPECT_EQ(all.points.size(), 3u);
         if (encoding != "ascii") {
           EXPECT_TRUE(same_bits(all.points.positions, kCrowdedPoints));
@@ -195,14 +195,14 @@ TEST_F(Ply, RefusesHostileHeaders) {
       {ascii + "format ascii 1.0\n", "a second format line"},
       {ascii + "end_header\n", "no element 'vertex'"},
       {ascii + "element vertex\n", "line 3: not 'element NAME COUNT'"},
-      {ascii + "element vertex -1\n", "'-1' is no number of items"},
-      {ascii + "element vertex 1e3\n", "'1e3' is no number of items"},
-      {ascii + "element vertex 99999999999999999999999\n", "is no number of items"},
+      {ascii + "element vertex -1\n", "'-1' is not a number of items"},
+      {ascii + "element vertex 1e3\n", "'1e3' is not a number of items"},
+      {ascii + "element vertex 99999999999999999999999\n", "is not a number of items"},
       {ascii + "property float x\n", "a property before the first element"},
       {ascii + "element vertex 1\nproperty half x\n", "unknown type 'half'"},
       {ascii + "element vertex 1\nproperty float\n", "line 4: not 'property"},
       {ascii + "element vertex 1\nproperty list float int l\n",
-       "the length of a list is no integer"},
+       "the length of a list is not an integer"},
       {ascii + "element vertex 1\nproperty float x\nproperty float x\n", "a second property 'x'"},
       {ascii + "element vertex 1\nelement vertex 1\n", "a second element 'vertex'"},
       {ascii + "element vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
@@ -252,12 +252,12 @@ TEST_F(Ply, RefusesDamagedBodies) {
       "property float z\nproperty uchar red\nend_header\n";
   const std::pair<std::string, std::string_view> cases[] = {
       {"1 2 3 4\n5 6 7\n0000\n", "line 10: the line ends before property 'red'"},
-      {"1 2 3 4\n5 6 7 8 9\n", "line 10: more values"},
-      {"1 2 3 4\n5 6 7 256\n", "line 10: '256' is no uint8 for property 'red'"},
-      {"1 2 3 4\n5 6 7 -1\n", "line 10: '-1' is no uint8"},
-      {"1 2 3 4\n5 6 7 1.5\n", "line 10: '1.5' is no uint8"},
-      {"1 2 3 4\n5 abc 7 8\n", "line 10: 'abc' is no float32 for property 'y'"},
-      {"1 2 3 4\n5 1e39 7 8\n", "'1e39' is no float32"},
+      {"1 2 3 4\n5 6 7 8 9\n", "line 10: has more values"},
+      {"1 2 3 4\n5 6 7 256\n", "line 10: '256' is not of type uint8 for property 'red'"},
+      {"1 2 3 4\n5 6 7 -1\n", "line 10: '-1' is not of type uint8"},
+      {"1 2 3 4\n5 6 7 1.5\n", "line 10: '1.5' is not of type uint8"},
+      {"1 2 3 4\n5 abc 7 8\n", "line 10: 'abc' is not of type float32 for property 'y'"},
+      {"1 2 3 4\n5 1e39 7 8\n", "'1e39' is not of type float32"},
       {"1 2 3 4\n5 inf 7 8\n", "vertex 1: a coordinate is infinite"},
       {"1 2 3 4\n\n\n\n\n\n\n\n\n\n\n", "the file ends in item 1 of element 'vertex'"},
   };
@@ -283,8 +283,8 @@ TEST_F(Ply, RefusesDamagedBodies) {
             std::string::npos);
 }
 
-/// Scanners write NaN where nothing came back.
-TEST_F(Ply, VerticesWithNanAreLeftOutAndCounted) {
+/// Scanners write NaN for rays without a return.
+TEST_F(Ply, SkipsAndCountsVerticesWithNaN) {
   const std::string types = "property float x\nproperty float y\nproperty float z\n";
   std::string body;
   for (const float value : {NAN, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, NAN, NAN, NAN, 6.0f, 7.0f, NAN}) {
@@ -324,7 +324,7 @@ TEST_F(Ply, ReadsHeadersOfOtherPrograms) {
             0u);
 }
 
-/// The law of the writers: coordinates and columns of every type are read back bit for bit.
+/// Coordinates and columns of every type are read back bit for bit.
 TEST_F(Ply, WritesWhatItReadsBitForBit) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
@@ -370,7 +370,7 @@ TEST_F(Ply, WritesWhatItReadsBitForBit) {
   }
 }
 
-TEST_F(Ply, AWriterThatIsGivenUpLeavesNothing) {
+TEST_F(Ply, AnAbandonedWriterLeavesNothing) {
   const auto path = folder_.path() / "gone.ply";
   {
     const auto writer = open_point_writer(path, {});

@@ -28,7 +28,7 @@ const char* parse_integer(const char* at, const char* end, T& value) {
   if (end - at > 1 && at[0] == '+' && at[1] != '-') ++at;
   const auto [rest, error] = std::from_chars(at, end, value);
   if (error == std::errc{} && ends_word(rest, end)) return rest;
-  // "3.0", "1e2": some programs print every number as a real one.
+  // Some programs print every number as a real one, such as "3.0" or "1e2".
   double real = 0;
   const char* const real_end = parse_real(at, end, real);
   if (real_end == nullptr || real != std::trunc(real)) return nullptr;

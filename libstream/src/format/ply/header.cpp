@@ -18,7 +18,7 @@ constexpr std::uint64_t kMaxHeaderBytes = 1u << 20;
 constexpr std::size_t kMaxElements = 100;
 constexpr std::size_t kMaxProperties = 1000;
 
-/// The lines of the header, with the errors that name them.
+/// Reads the lines of the header and throws errors that name them.
 class HeaderReader {
  public:
   explicit HeaderReader(Input& input) : input_(&input), lines_(input) {}
@@ -27,14 +27,14 @@ class HeaderReader {
     std::string_view line;
     if (input_->offset() > kMaxHeaderBytes) {
       fail("the header is longer than " + counted(kMaxHeaderBytes, "byte"),
-           "this is no PLY file, or its end_header is missing");
+           "this is not a PLY file, or its end_header is missing");
     }
     if (!lines_.next(line)) {
       if (lines_.number() == 0) {
         throw Error(
             {.file = input_->name(), .where = {}, .cause = "the file is empty", .remedy = {}});
       }
-      fail("the file ends before end_header", "the file is cut off");
+      fail("the file ends before end_header", "the file is truncated: download it again");
     }
     return line;
   }
@@ -72,7 +72,7 @@ PlyElement parse_element(const std::vector<std::string_view>& words, const Heade
   const char* const end = words[2].data() + words[2].size();
   const auto [rest, error] = std::from_chars(words[2].data(), end, element.count);
   if (error != std::errc{} || rest != end) {
-    reader.fail(in_quotes(words[2]) + " is no number of items", "correct the header");
+    reader.fail(in_quotes(words[2]) + " is not a number of items", "correct the header");
   }
   return element;
 }
@@ -88,7 +88,7 @@ PlyProperty parse_property(const std::vector<std::string_view>& words, const Hea
     property.list = true;
     property.count_type = type_of(words[2]);
     if (property.count_type == ScalarType::f32 || property.count_type == ScalarType::f64) {
-      reader.fail("the length of a list is no integer", "correct the header");
+      reader.fail("the length of a list is not an integer", "correct the header");
     }
     property.type = type_of(words[3]);
   } else if (words.size() == 3) {
@@ -100,7 +100,7 @@ PlyProperty parse_property(const std::vector<std::string_view>& words, const Hea
   return property;
 }
 
-/// Refuses counts that the file has no bytes for, before anything is made ready for them.
+/// Throws: Error for counts that the file has too few bytes for, before anything is allocated.
 void check_counts(const PlyHeader& header, const Input& input) {
   if (!input.size()) return;
   // The last number of an ASCII file needs no separator after it.
@@ -118,7 +118,7 @@ void check_counts(const PlyHeader& header, const Input& input) {
                             in_quotes(element.name) + " of at least " + counted(least, "byte") +
                             ", but only " + counted(left, "byte") + (left == 1 ? " is" : " are") +
                             " left",
-                   .remedy = "the file is cut off or its header is wrong"});
+                   .remedy = "the file is truncated or its header is wrong: download it again"});
     }
     left -= element.count * least;
   }
@@ -140,7 +140,8 @@ std::size_t PlyElement::binary_bytes() const {
 PlyHeader read_ply_header(Input& input) {
   PlyHeader header;
   HeaderReader reader(input);
-  if (trim(reader.next()) != "ply") reader.fail("does not begin with 'ply'", "this is no PLY file");
+  if (trim(reader.next()) != "ply")
+    reader.fail("does not begin with 'ply'", "this is not a PLY file");
   bool format_seen = false;
   for (;;) {
     const std::string_view line = reader.next();
@@ -176,16 +177,16 @@ PlyHeader read_ply_header(Input& input) {
       properties.push_back(std::move(property));
       if (properties.size() > kMaxProperties) {
         reader.fail("more than " + std::to_string(kMaxProperties) + " properties",
-                    "this is no file of points");
+                    "this is not a file of points");
       }
     } else if (words[0] == "end_header") {
       break;
     } else {
-      reader.fail("unknown keyword " + in_quotes(words[0]), "this is no PLY 1.0 header");
+      reader.fail("unknown keyword " + in_quotes(words[0]), "this is not a PLY 1.0 header");
     }
     if (header.elements.size() > kMaxElements) {
       reader.fail("more than " + std::to_string(kMaxElements) + " elements",
-                  "this is no file of points");
+                  "this is not a file of points");
     }
   }
   if (!format_seen) reader.fail("the header has no format line", "correct the header");

@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// A PLY, whose vertices have attributes. Throws and returns as read_mesh() does.
+/// Like read_mesh() for PLY, whose vertices may have attributes.
 std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptions& options);
 
 }  // namespace terrace::stream

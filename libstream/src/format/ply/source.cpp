@@ -30,21 +30,21 @@
 namespace terrace::stream {
 namespace {
 
-/// Most bytes that are decoded at once.
+/// Upper limit of the bytes decoded at once.
 constexpr std::size_t kChunkBytes = 128u << 10;
 
-/// A property of the vertices and where its values go: to a coordinate, to an attribute, or, a
-/// list, nowhere.
+/// A property of the vertices and the destination of its values: a coordinate or an attribute;
+/// lists are skipped.
 struct Field {
   PlyProperty property;
   std::size_t offset = 0;  ///< in a row of fixed size
   int axis = -1;
-  int attribute = -1;  ///< where it begins in a point's record
+  int attribute = -1;  ///< its offset in a point's record
 };
 
 class PlySource final : public PointSource {
  public:
-  /// keeps_missing: also delivers vertices of which a coordinate is NaN, as faces count them.
+  /// keeps_missing: also delivers vertices with a coordinate that is NaN, because faces count them.
   PlySource(const std::string& file, const SourceOptions& options, bool keeps_missing)
       : input_(file, options.stop),
         lines_(input_),
@@ -57,7 +57,7 @@ class PlySource final : public PointSource {
       throw Error({.file = input_.name(),
                    .where = "header",
                    .cause = "there is no element 'vertex'",
-                   .remedy = "only PLY files of points or meshes are read"});
+                   .remedy = "name a PLY file of points or of a mesh"});
     }
     count_ = vertex->count;
     stride_ = vertex->binary_bytes();
@@ -84,19 +84,19 @@ class PlySource final : public PointSource {
     return !block.empty();
   }
 
-  /// Appends the triangles of the next polygon or strip behind the vertices, which have all been
-  /// read. False behind the last.
+  /// Appends the triangles of the next polygon or strip, after all vertices have been read. Returns
+  /// false after the last.
   bool next_triangles(std::vector<TriangleIndices>& triangles) {
     for (; element_ < header_.elements.size(); ++element_, item_ = 0) {
       const PlyElement& element = header_.elements[element_];
       const PlyProperty* const corners = corners_of(element);
       if (element.name == "vertex") {
-        is_behind_ = true;
+        past_vertices_ = true;
       } else if (corners == nullptr) {
-        if (is_behind_) skip_element(element);
-      } else if (!is_behind_) {
-        fail("header", "the element " + in_quotes(element.name) + " stands before the vertices",
-             "write the file anew, vertices first");
+        if (past_vertices_) skip_element(element);
+      } else if (!past_vertices_) {
+        fail("header", "the element " + in_quotes(element.name) + " precedes the vertices",
+             "export the file with the vertices first");
       } else if (item_ < element.count) {
         read_corners(element, *corners, item_++);
         if (element.name == "tristrips") {
@@ -134,7 +134,7 @@ class PlySource final : public PointSource {
   [[noreturn]] void fail_end(const std::string& element, std::uint64_t item) const {
     fail("byte " + std::to_string(input_.offset()),
          "the file ends in item " + std::to_string(item) + " of element " + in_quotes(element),
-         "the file is cut off or its header is wrong");
+         "the file is truncated or its header is wrong: download it again");
   }
 
   void make_fields(const PlyElement& vertex) {
@@ -164,12 +164,11 @@ class PlySource final : public PointSource {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!found[axis]) {
         fail("header", std::string("the vertices have no property '") + "xyz"[axis] + "'",
-             "only PLY files of points or meshes are read");
+             "name a PLY file of points or of a mesh");
       }
     }
   }
 
-  /// Moves past an element that comes before the vertices.
   void skip_element(const PlyElement& element) {
     if (element.properties.empty()) return;
     if (header_.encoding == PlyEncoding::ascii) {
@@ -193,7 +192,7 @@ class PlySource final : public PointSource {
     }
   }
 
-  /// Brings the next value of a binary file into `raw`; false if the file ends before.
+  /// Reads the next value of a binary file to `raw`; false if the file ends before it.
   bool read_scalar(ScalarType type, std::byte* raw) {
     const std::size_t bytes = size_of(type);
     const std::string_view window = input_.fill(bytes);
@@ -212,7 +211,7 @@ class PlySource final : public PointSource {
       fail("byte " + std::to_string(input_.offset()),
            "list " + in_quotes(property.name) + " in item " + std::to_string(item) +
                " of element " + in_quotes(element) + " has the length " + std::to_string(length),
-           "the file is damaged");
+           "the file is damaged: export it again");
     }
     const auto size = static_cast<std::uint64_t>(size_of(property.type));
     const auto items = static_cast<std::uint64_t>(length);
@@ -238,7 +237,7 @@ class PlySource final : public PointSource {
     read_ += wanted;
   }
 
-  /// Vertices of fixed size in a binary file.
+  /// Reads vertices of fixed size in a binary file.
   void read_rows(PointBlock& block, std::size_t wanted) {
     for (std::size_t done = 0; done < wanted;) {
       const std::size_t rows =
@@ -265,7 +264,7 @@ class PlySource final : public PointSource {
     }
   }
 
-  /// A vertex that has lists, in a binary file.
+  /// Reads a vertex with lists in a binary file.
   void read_row(PointBlock& block, std::size_t i) {
     std::array<std::byte, 8> raw{};
     for (const Field& field : fields_) {
@@ -276,7 +275,7 @@ class PlySource final : public PointSource {
     }
   }
 
-  /// A vertex in an ASCII file: one line that is not blank.
+  /// Reads a vertex in an ASCII file: the next line that is not blank.
   void read_line(PointBlock& block, std::size_t i) {
     std::string_view line;
     do {
@@ -289,7 +288,7 @@ class PlySource final : public PointSource {
       read_word(line, property.list ? property.count_type : property.type, property, raw.data());
       if (property.list) {
         const std::int64_t length = to_integer(raw.data(), property.count_type);
-        // Each item takes two bytes of the line but the last: a longer list cannot be there.
+        // Each item takes at least two bytes of the line, except the last, which may take one.
         if (length < 0 || static_cast<std::uint64_t>(length) > line.size()) {
           fail_line("list " + in_quotes(property.name) + " has the length " +
                     std::to_string(length));
@@ -301,10 +300,10 @@ class PlySource final : public PointSource {
         store(block, field, i, raw.data());
       }
     }
-    if (!line.empty()) fail_line("more values than the vertex has properties");
+    if (!line.empty()) fail_line("has more values than the vertex has properties");
   }
 
-  /// The list of vertices of an element's items; null if it is no list of faces or strips.
+  /// The property with the vertices of an element's items; null if they are not faces or strips.
   static const PlyProperty* corners_of(const PlyElement& element) {
     if (element.name != "face" && element.name != "tristrips") return nullptr;
     for (const PlyProperty& p : element.properties) {
@@ -313,7 +312,7 @@ class PlySource final : public PointSource {
     return nullptr;
   }
 
-  /// Reads an item of faces or strips, and of it `wanted` into corners_.
+  /// Reads a face or a strip; stores its property `wanted` in corners_.
   void read_corners(const PlyElement& element, const PlyProperty& wanted, std::uint64_t item) {
     const bool is_ascii = header_.encoding == PlyEncoding::ascii;
     std::string_view line;
@@ -336,7 +335,7 @@ class PlySource final : public PointSource {
       if (length < 0) {
         fail(element.name + " " + std::to_string(item),
              "list " + in_quotes(property.name) + " has the length " + std::to_string(length),
-             "the file is damaged");
+             "the file is damaged: export it again");
       }
       const bool is_wanted = &property == &wanted;
       if (is_wanted) corners_.clear();
@@ -345,7 +344,7 @@ class PlySource final : public PointSource {
         if (is_wanted) corners_.push_back(corner(property.type, raw.data(), element, item));
       }
     }
-    if (!line.empty()) fail_line("more values than the " + element.name + " has properties");
+    if (!line.empty()) fail_line("has more values than the " + element.name + " has properties");
   }
 
   /// The number of a vertex; negative ones end a strip.
@@ -357,8 +356,8 @@ class PlySource final : public PointSource {
         number < std::numeric_limits<std::uint32_t>::max()) {
       return number < 0.0 ? -1 : static_cast<std::int64_t>(number);
     }
-    fail(element.name + " " + std::to_string(item), "names a vertex that is not there",
-         "the file is damaged");
+    fail(element.name + " " + std::to_string(item), "names a vertex that does not exist",
+         "the file is damaged: export it again");
   }
 
   void add_triangle(std::vector<TriangleIndices>& triangles, std::size_t a, std::size_t b,
@@ -370,7 +369,7 @@ class PlySource final : public PointSource {
   void add_fan(std::vector<TriangleIndices>& triangles) const {
     for (std::size_t k = 2; k < corners_.size(); ++k) add_triangle(triangles, 0, k - 1, k);
   }
-  /// Every other triangle of a strip turns the other way.
+  /// Appends the triangles of strips; every second triangle has the opposite orientation.
   void add_strips(std::vector<TriangleIndices>& triangles) const {
     std::size_t start = 0;
     for (std::size_t k = 0; k < corners_.size(); ++k) {
@@ -385,10 +384,10 @@ class PlySource final : public PointSource {
 
   [[noreturn]] void fail_line(std::string cause) const {
     fail("line " + std::to_string(header_.lines + lines_.number()), std::move(cause),
-         "the file is damaged or its header is wrong");
+         "the file is damaged or its header is wrong: export it again");
   }
 
-  /// Takes the first word of `line` as a value of `type`, and the blanks after it.
+  /// Reads the first word of `line` as a value of `type`; removes it and the blanks after it.
   void read_word(std::string_view& line, ScalarType type, const PlyProperty& property,
                  std::byte* raw) const {
     const char* const end = line.data() + line.size();
@@ -396,7 +395,7 @@ class PlySource final : public PointSource {
     if (rest == nullptr) {
       const std::string_view word = line.substr(0, line.find_first_of(" \t"));
       fail_line(word.empty() ? "the line ends before property " + in_quotes(property.name)
-                             : in_quotes(word) + " is no " + std::string(name_of(type)) +
+                             : in_quotes(word) + " is not of type " + std::string(name_of(type)) +
                                    " for property " + in_quotes(property.name));
     }
     line = trim_left({rest, static_cast<std::size_t>(end - rest)});
@@ -416,7 +415,7 @@ class PlySource final : public PointSource {
   }
 
   static bool is_finite(const PointBlock& block) {
-    // A number less itself is zero unless it is infinite or NaN, and a sum of zeros stays zero.
+    // A number minus itself is zero unless it is infinite or NaN, and a sum of zeros stays zero.
     double sum = 0.0;
     for (const Point3& p : block.positions) sum += (p[0] - p[0]) + (p[1] - p[1]) + (p[2] - p[2]);
     return sum == 0.0;
@@ -430,7 +429,7 @@ class PlySource final : public PointSource {
   }
 
   Input input_;
-  LineReader lines_;  ///< of what follows the header
+  LineReader lines_;  ///< the lines after the header
   PlyHeader header_;
   std::size_t block_points_;
   SourceInfo info_;
@@ -439,12 +438,12 @@ class PlySource final : public PointSource {
   std::size_t stride_ = 0, record_bytes_ = 0;
   bool has_lists_ = false, swap_ = false, keeps_missing_;
   std::vector<std::int64_t> corners_;  ///< of one face
-  std::size_t element_ = 0;            ///< whose items are read behind the vertices
+  std::size_t element_ = 0;            ///< the element read by next_triangles()
   std::uint64_t item_ = 0;
-  bool is_behind_ = false;  ///< the vertices
+  bool past_vertices_ = false;  ///< element_ follows the vertices
 };
 
-/// Vertices without their attributes, then triangles.
+/// Parses the vertices, without their attributes, and then the triangles.
 class PlyParser final : public MeshParser {
  public:
   PlyParser(const std::string& file, const SourceOptions& options)

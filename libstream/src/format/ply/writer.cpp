@@ -12,10 +12,10 @@
 namespace terrace::stream {
 namespace {
 
-/// Digits of the largest count: the place in the header that is kept for it.
+/// Digits of the largest count, for which the header has room.
 constexpr std::size_t kCountWidth = 20;
 
-/// A count and the blanks that fill its place.
+/// A count, padded with blanks to that width.
 std::string count_field(std::uint64_t count) {
   std::string text = std::to_string(count);
   text.resize(kCountWidth, ' ');

@@ -8,8 +8,8 @@
 
 namespace terrace::stream {
 
-/// The name of a type in the header of a PLY file: the old names, which every reader supports. The
-/// 64-bit integers, for which PLY has none, are "int64" and "uint64".
+/// The name of a type in the header of a PLY file: the old names, which every reader supports. PLY
+/// has no names for 64-bit integers; we write "int64" and "uint64".
 std::string ply_type_name(ScalarType type);
 
 /// "ply", the format and the comments: the first lines of a header.
