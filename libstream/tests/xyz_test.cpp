@@ -46,7 +46,7 @@ TEST_F(Xyz, LargeIntegersAreKeptOrRefused) {
   EXPECT_EQ(hash, 18446744073709551615u);
   EXPECT_EQ(ids[1], 1);
 
-  // Reals that happen to have no fraction may be rounded, as all reals.
+  // Reals without a fraction may be rounded like other reals.
   EXPECT_EQ(refusal("1 2 3 0.5\n1 2 3 9007199254740993\n"), "");
   EXPECT_EQ(refusal("1 2 3 9007199254740993\n1 2 3 0.5\n"), "");
   std::string late;
@@ -56,17 +56,17 @@ TEST_F(Xyz, LargeIntegersAreKeptOrRefused) {
                 .find("line 20001: column 4, '9007199254740993', is an integer that a double"),
             std::string::npos);
   EXPECT_NE(refusal("1 2 3 9007199254740993\n" + late + "1 2 3 0.5\n")
-                .find("'0.5', is not an integer that int64 holds"),
+                .find("'0.5', is not an integer that fits into int64"),
             std::string::npos);
   std::string csv = "1,2,3,9007199254740993\n";
   for (int i = 0; i < 1000; ++i) csv += "1,2,3,4\n";
   EXPECT_NE(refusal(csv + "1,2,3,\n")
-                .find("line 1002: column 4 is empty, not an integer that int64 holds, as those "
-                      "before are; correct it, or leave the column out"),
+                .find("line 1002: column 4 is empty, not an integer that fits into int64, as "
+                      "the previous ones do; correct it, or leave the column out"),
             std::string::npos);
 }
 
-TEST_F(Xyz, SeparatorsInQuotedNamesDoNotCount) {
+TEST_F(Xyz, IgnoresSeparatorsInQuotedNames) {
   const AllPoints all = read("x,y,z,\"a;b\",\"c,d\"\n1,2,3,4,5\n");
   ASSERT_EQ(all.info.attributes.size(), 2u);
   EXPECT_EQ(all.info.attributes[0].name, "a;b");
@@ -119,7 +119,7 @@ TEST_F(Xyz, NamesCoordinatesAndAttributesByTheHeader) {
   EXPECT_TRUE(std::isnan(all.values<double>(2)[1]));
 }
 
-TEST_F(Xyz, LettersGoBeforeWords) {
+TEST_F(Xyz, LettersTakePrecedenceOverWords) {
   const AllPoints all = read("lat,lon,x,y,z,height\n47,8,1,2,3,4\n");
   EXPECT_TRUE(same_bits(all.points.positions, std::vector<Point3>{{1, 2, 3}}));
   EXPECT_FALSE(all.info.crs.geographic);
@@ -127,7 +127,7 @@ TEST_F(Xyz, LettersGoBeforeWords) {
   EXPECT_EQ(all.info.attributes[2].name, "height");
 }
 
-TEST_F(Xyz, FindsCoordinatesBehindOtherColumnsByDecoratedNames) {
+TEST_F(Xyz, FindsDecoratedNamesOfCoordinatesAfterOtherColumns) {
   for (const std::string_view header :
        {"FID,POINT_X,POINT_Y,POINT_Z", "id,x_coord,y_coord,z_coord", "id,X [m],Y [m],Z [m]",
         "PointID,Easting(m),Northing(m),Elev(m)", "id,E,N,H", "n_id,XCoord,YCoord,Height_ft",
@@ -142,7 +142,7 @@ TEST_F(Xyz, FindsCoordinatesBehindOtherColumnsByDecoratedNames) {
   EXPECT_TRUE(read("id,lon_deg,lat_deg,h\n7,1,2,3\n").info.crs.geographic);
 }
 
-TEST_F(Xyz, RefusesAHeaderThatNamesNoCoordinates) {
+TEST_F(Xyz, RejectsAHeaderWithoutCoordinates) {
   for (const std::string_view header :
        {"id,first,second,third", "id,nx,ny,nz", "id,x_std,y_std,z_std", "point,x2,y2,z2"}) {
     EXPECT_NE(refusal(std::string(header) + "\n7,1,2,3\n").find("the header names no x column"),
@@ -151,14 +151,14 @@ TEST_F(Xyz, RefusesAHeaderThatNamesNoCoordinates) {
   }
 }
 
-TEST_F(Xyz, ColumnsOfOneNameStayDistinct) {
+TEST_F(Xyz, MakesDuplicateColumnNamesDistinct) {
   const AllPoints all = read("x,y,z,a,a_2,a,a\n1,2,3,4,5,6,7\n");
   ASSERT_EQ(all.info.attributes.size(), 4u);
   EXPECT_EQ(all.info.attributes[2].name, "a_3");
   EXPECT_EQ(all.info.attributes[3].name, "a_4");
 }
 
-TEST_F(Xyz, UnnamedColumnsAreNumbered) {
+TEST_F(Xyz, NumbersUnnamedColumns) {
   const AllPoints all = read("1 2 3 4 5\n6 7 8 9 10\n");
   ASSERT_EQ(all.info.attributes.size(), 2u);
   EXPECT_EQ(all.info.attributes[0].name, "a3");
@@ -171,16 +171,17 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
     std::string_view text, message;
   } cases[] = {
       {"", "the file is empty"},
-      {"\n\n", "there are no points"},
-      {"# nothing\n", "there are no points"},
-      {"x y z\n", "there are no points"},
-      {"1 2 3\n1 2\n", "line 2: has 2 columns, the lines before have 3"},
+      {"\n\n", "it has no points"},
+      {"# nothing\n", "it has no points"},
+      {"x y z\n", "it has no points"},
+      {"1 2 3\n1 2\n", "line 2: has 2 columns, but the previous lines have 3"},
       {"1 2 3\n1 2 3 4\n", "line 2: has 4 columns"},
       {"1,2,3\n1,2,3,\n", "line 2: has 4 columns"},
       {"1,2,3,\n1,2,3,9007199254740993\n", "line 2: column 4, '9007199254740993', is an integer"},
-      {"1,2,3,4\n1,2,3,none\n", "line 2: column 4, 'none', is not a number that a double holds"},
+      {"1,2,3,4\n1,2,3,none\n",
+       "line 2: column 4, 'none', is not a number that fits into a double"},
       {"x\ty\tz\tv\n1\t2\t3\n", "line 2: has 3 columns, but the header in line 1 names 4"},
-      {"1\t2\t3\t4\n1\t\t4\n", "line 2: has 3 columns, the lines before have 4"},
+      {"1\t2\t3\t4\n1\t\t4\n", "line 2: has 3 columns, but the previous lines have 4"},
       {"1,2,3\n1,null,3\n", "line 2: column 2, 'null'"},
       {"1,2,3\n1,-,3\n", "line 2: column 2, '-'"},
       {"1,2,3\n,inf,3\n", "line 2: column 2 is inf"},
@@ -199,7 +200,8 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
       {"x,x,y,z\n1,2,3,4\n", "line 1: columns 'x' and 'x' name the same coordinate"},
       {"x,y,z\n1,2,3,4\n", "line 2: has 4 columns, but the header in line 1 names 3"},
       {"x,y,z\nabc,y,z\n1,2,3\n", "line 2: column 1, 'abc'"},
-      {"1,5;2,5;3,5\n", "column 1, '1,5', is not a number that a double holds; write numbers with"},
+      {"1,5;2,5;3,5\n",
+       "column 1, '1,5', is not a number that fits into a double; write numbers with"},
       {"x,y,z,\"a, b\"\n1,2,3,\"c, d\"\n", "line 2: column 4, '\"c, d\"'"},
       {std::string_view("1 2 3\n1 2 \0003\n", 13), "line 2: column 3"},
   };
@@ -211,7 +213,7 @@ TEST_F(Xyz, RefusesBadTextWithItsLine) {
   }
 }
 
-TEST_F(Xyz, PointsWithoutACoordinateAreLeftOutAndCounted) {
+TEST_F(Xyz, SkipsAndCountsPointsWithNaN) {
   for (const std::string_view text : {"x,y,z,v\nnan,1,2,5\n3,4,5,6\n7,8,NaN,\"7\"\n7,nan,9,8\n",
                                       "1 2 NAN 3\nnan nan nan nan\n3 4 5 6\n1 -nan 3 1\n",
                                       "x,y,z,v\n1,,2,5\n3,4,5,6\n\"\",NA,2,7\n1,2, ,8\n",
@@ -253,7 +255,7 @@ TEST_F(Xyz, EmptyAttributesAreNaNAndCounted) {
 }
 
 TEST_F(Xyz, TabsSeparateFieldsWithBlanksAndAlignTables) {
-  // A name that is missing (an index) or has blanks; a text that nobody needs.
+  // A missing name (an index), a name with blanks, and a text that is not needed.
   AllPoints all = read("\tx\ty\tz\tpoint id\n0\t1\t2\t3\t5\n1\t4\t5\t6\t\n");
   ASSERT_EQ(all.info.attributes.size(), 2u);
   EXPECT_EQ(all.info.attributes[0].name, "a0");
@@ -276,7 +278,7 @@ TEST_F(Xyz, TabsSeparateFieldsWithBlanksAndAlignTables) {
   EXPECT_EQ(all.values<double>(2)[0], 6.0);
 }
 
-TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
+TEST_F(Xyz, ColumnsThatAreNotNeededMayContainAnything) {
   const std::string_view text =
       "x,y,z,v,\"place, name\"\n1,2,3,7,\"a \"\"b\"\", c\"\n4,5,6,8,\n7,8,9,9,2020-01-01T00:00\n";
   const std::string name = "place, name";
@@ -291,7 +293,7 @@ TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
     ASSERT_EQ(all.info.attributes.size(), 1u);
     EXPECT_EQ(all.values<double>(0)[2], 9.0);
   }
-  // What a condition names is needed.
+  // Columns that a condition names are needed.
   options.selection = {.where = "\"place, name\" > 0", .drop = {name}};
   EXPECT_NE(error_of([&] { read(text, options); }).find("line 2: column 5"), std::string::npos);
   options.selection = {.drop = {name}};
@@ -301,7 +303,7 @@ TEST_F(Xyz, ColumnsThatNobodyNeedsMayHoldAnything) {
             std::string::npos);
 }
 
-TEST_F(Xyz, RefusesDecimalCommasInPlainWords) {
+TEST_F(Xyz, RejectsDecimalCommasInPlainWords) {
   for (const char* text : {"1,5\t2,5\t3,5\n", "1,5\t2\t3\n", "1,5 2,5 3,5\n", "-1,5e3\t2,5\t+3,5\n",
                            "x\ty\tz\n1,5\t2,5\t3,5\n", "# points\n\"1,5\"\t\"2,5\"\t\"3,5\"\n",
                            "1,5;2,5;3,5\n", "1\t2\t3\n1,5\t2,5\t3,5\n"}) {
@@ -312,13 +314,13 @@ TEST_F(Xyz, RefusesDecimalCommasInPlainWords) {
   EXPECT_EQ(read("1,\t5,\t2\n").points.size(), 1u);
 }
 
-TEST_F(Xyz, RefusesLinesThatNeverEnd) {
+TEST_F(Xyz, RejectsEndlessLines) {
   const std::string error = refusal("1 2 3\n" + std::string(200000, '7'));
   EXPECT_NE(error.find("line 2: longer than 65536 bytes"), std::string::npos) << error;
   EXPECT_NE(refusal(std::string(1 << 20, ' ')).find("line 1: longer"), std::string::npos);
 }
 
-TEST_F(Xyz, SmallNumbersBecomeZeroAndLargeOnesAreRefused) {
+TEST_F(Xyz, RoundsTinyNumbersToZeroAndRejectsHugeOnes) {
   const AllPoints all = read("1e-999 -1e-400 0.000000001e-320\n4.9e-324 0e999 00012\n");
   EXPECT_TRUE(
       same_bits(all.points.positions, std::vector<Point3>{{0, -0.0, 0}, {4.9e-324, 0, 12}}));
@@ -360,7 +362,7 @@ TEST_F(Xyz, ReportsProgress) {
   EXPECT_EQ(last, 1.0);
 }
 
-/// The law of both text formats: the written values are read back bit for bit.
+/// Both text formats are read back bit for bit.
 TEST_F(Xyz, WritesWhatItReadsBitForBit) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
@@ -433,8 +435,8 @@ TEST_F(Xyz, WritesTheDecimalsOfALattice) {
   }
 }
 
-// Values on no lattice of decimals, or off its steps, keep every bit.
-TEST_F(Xyz, WritesOtherPlacesBitForBit) {
+// Values without a decimal lattice, or off its steps, keep every bit.
+TEST_F(Xyz, WritesCoordinatesOffTheLatticeBitForBit) {
   std::mt19937_64 random(42);
   for (const double scale : {1.0 / 3600, 0.01}) {
     const std::string path = (folder_.path() / "free.xyz").string();

@@ -19,13 +19,13 @@ bool is_degree(std::string_view word) {
   return is_among(word, {"deg", "degree", "degrees", "dd", "\xC2\xB0"});
 }
 
-/// Units that a name may end with, without brackets. Letters such as "h" and "n" are no units.
+/// True for a unit that may end a name without brackets. Single letters such as "h" do not count.
 bool is_suffix_unit(std::string_view word) {
   return is_among(word, {"m", "meter", "meters", "metre", "metres", "ft", "foot", "feet", "usft",
                          "ftus", "km", "cm", "mm"});
 }
 
-/// The longest beginning of the words that is a unit.
+/// The longest prefix of the words that is a unit.
 std::string unit_of_words(std::string_view words) {
   if (is_degree(words)) return "degree";
   for (std::size_t end = words.size(); end != 0 && end != words.npos;
@@ -36,15 +36,15 @@ std::string unit_of_words(std::string_view words) {
   return {};
 }
 
-/// Says that the rest of a name is a coordinate, or its unit.
+/// True for a word that shows that the rest of a name is a coordinate, or names its unit.
 bool is_decoration(std::string_view word) {
   return is_among(word, {"point", "pos", "position", "coord", "coordinate", "utm", "us", "survey",
                          "intl", "deg", "degree", "degrees", "dd"}) ||
          is_suffix_unit(word);
 }
 
-/// The name in lower case without brackets, decorations and what separates words. decorated: it had
-/// such words.
+/// The name in lower case without brackets, decorations and separators of words. decorated: set to
+/// true if it had any of these.
 std::string bare_name(std::string_view name, bool& decorated) {
   std::string bare, word;
   const auto end_word = [&] {
@@ -70,7 +70,7 @@ std::string bare_name(std::string_view name, bool& decorated) {
   return bare;
 }
 
-/// "pointx", "xcoord": written as one word.
+/// The letter of an axis in names such as "pointx" or "xcoord"; empty for other names.
 std::string_view letter_within(std::string_view bare) {
   for (const std::string_view before : {"point", "coord", "coordinate", "pos", "position"}) {
     if (bare.size() == before.size() + 1 && bare.starts_with(before)) {
@@ -120,7 +120,7 @@ std::string axis_unit(std::string_view name) {
     const std::string unit = unit_of_words(lower_case(words));
     return unit.empty() ? words : unit;
   }
-  // From the last word on, as long as the words are parts of one unit.
+  // Starts with the last word and adds words before it as long as they are parts of one unit.
   std::string unit;
   for (std::size_t at = name.find_last_of("_ -."); at != name.npos && at > 0;
        at = name.find_last_of("_ -.", at - 1)) {

@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t kMaxComments = 1000;
 
-/// True for a number, and for what begins like one ("1,5", "12m"): a damaged number is no name.
+/// True for a number and for text that begins like one ("1,5", "12m"), which is a damaged number
+/// rather than a name.
 bool is_number(std::string_view field) {
   field = unquoted(field);
   const std::size_t first = std::min(field.find_first_not_of("+-."), field.size());
@@ -26,19 +27,19 @@ bool is_number(std::string_view field) {
   return !field.empty() && parse_real(field.data(), end, value) == end;
 }
 
-/// The columns that the names say are coordinates.
+/// The columns with names of coordinates.
 struct NamedAxes {
   std::array<std::optional<std::size_t>, 3> columns;
   std::array<bool, 3> angle{};
-  /// A second column for one of x and y, with names of one kind.
+  /// A second column for an axis with a name of the same kind; only heights may have several words.
   std::optional<std::size_t> twice;
 
   [[nodiscard]] bool none() const { return !columns[0] && !columns[1] && !columns[2]; }
   [[nodiscard]] bool complete() const { return columns[0] && columns[1] && columns[2] && !twice; }
 };
 
-/// Letters go before words, so that in "x,y,z,lat,lon" the last two are attributes; of several
-/// words for the height the first one counts.
+/// Letters take precedence over words, so that in "x,y,z,lat,lon" the last two are attributes. Of
+/// several words for the height, the first one is used.
 NamedAxes named_axes(const std::vector<std::string_view>& names) {
   NamedAxes found;
   for (std::size_t kind = 0; kind < kAxisNameKinds; ++kind) {
@@ -59,8 +60,8 @@ NamedAxes named_axes(const std::vector<std::string_view>& names) {
   return found;
 }
 
-/// Finds the coordinates among the names of a header. Throws: Error if one is not named, or one of
-/// x and y twice.
+/// Finds the coordinates among the names of a header. Throws: Error if one of them is missing or
+/// ambiguous.
 void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
                const std::string& file, const std::string& where) {
   const NamedAxes found = named_axes(names);
@@ -90,7 +91,7 @@ void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
                       (layout.units[0] == "degree" && layout.units[1] == "degree");
 }
 
-/// Names and numbers the columns that are no coordinates; names become distinct and not empty.
+/// Lists the columns that are not coordinates, with distinct names that are not empty.
 void name_attributes(const std::vector<std::string_view>& names, TextLayout& layout) {
   DistinctNames distinct;
   for (std::size_t i = 0; i < layout.columns; ++i) {
@@ -112,8 +113,9 @@ bool is_several_numbers(std::string_view field) {
          });
 }
 
-/// True if tabs separate the first line of numbers and the header, if there is one: the fields of
-/// one of them are then complete (the name of the first may be missing).
+/// True if tabs separate the fields of the first line of numbers and of the header, if there is
+/// one. The fields of the header, or else of the line, must then be complete; only the first name
+/// may be missing.
 bool is_separated_by_tabs(std::string_view header, std::string_view line) {
   const std::vector<std::string_view> fields = split_fields(line, '\t');
   if (fields.size() < 3 || std::any_of(fields.begin(), fields.end(), is_several_numbers)) {
@@ -154,8 +156,8 @@ std::vector<std::string_view> header_names(std::string_view line, char separator
   return names;
 }
 
-/// A comment can be the header too ("//X Y Z Intensity"): if it names all coordinates and has as
-/// many names as there are columns.
+/// A comment ("//X Y Z Intensity") is the header if it names all coordinates and has as many names
+/// as there are columns.
 bool is_header_comment(const std::vector<std::string_view>& names, std::size_t columns) {
   return names.size() == columns && named_axes(names).complete();
 }
@@ -181,7 +183,7 @@ std::vector<std::string_view> split_row(std::string_view line, const TextLayout&
 }
 
 char separator_of(std::string_view line) {
-  // A quote that no other closes is one of a name's characters.
+  // An unclosed quote is part of a name.
   const bool quotes = std::count(line.begin(), line.end(), '"') % 2 == 0;
   char separator = ' ';
   bool quoted = false;
@@ -207,7 +209,7 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
     if (!lines.next(line)) {
       throw Error({.file = file,
                    .where = {},
-                   .cause = lines.number() == 0 ? "the file is empty" : "there are no points in it",
+                   .cause = lines.number() == 0 ? "the file is empty" : "it has no points",
                    .remedy = "each line needs three numbers: x, y and z"});
     }
     const std::string_view text = trim(line);

@@ -21,25 +21,24 @@ struct TextLayout {
   std::array<std::size_t, 3> xyz{0, 1, 2};  ///< columns of the coordinates
   std::vector<std::size_t> attributes;      ///< the other columns, in order
   std::vector<std::string> names;           ///< of the attributes
-  bool geographic = false;                  ///< the header says longitude and latitude
+  bool geographic = false;                  ///< the header names longitude and latitude
   std::array<std::string, 3> units;         ///< of the coordinates: see axis_unit()
   std::vector<std::string> comments;        ///< before the first point
 };
 
-/// The fields of a line. Where tabs do not give as many fields as there are columns, runs of blanks
-/// and tabs separate them, as in a table that is aligned by hand.
+/// The fields of a line. If tabs do not give as many fields as there are columns, runs of blanks
+/// and tabs separate them, as in a table aligned by hand.
 std::vector<std::string_view> split_row(std::string_view line, const TextLayout& layout);
-/// ';' if the line has one, else ',' if it has one, else ' '; what is in double quotes does not
-/// count.
+/// ';' if the line has one, else ',' if it has one, else ' '; text in double quotes is ignored.
 char separator_of(std::string_view line);
 /// True for a line that starts with '#' or "//" (after trim_left).
 bool is_comment(std::string_view line);
 /// True if no field is a number.
 bool is_header(const std::vector<std::string_view>& fields);
 
-/// Reads comments and the header line if there is one, and examines the first line of numbers,
-/// which `lines` then returns next. `file` is for messages. Throws: Error if there is no line of at
-/// least three columns, or the header does not match it.
+/// Reads the comments, the header line, if there is one, and examines the first line of numbers,
+/// which `lines` then returns next. file: for messages. Throws: Error if that line is missing, has
+/// fewer than three columns, or does not match the header.
 TextLayout read_text_layout(LineReader& lines, const std::string& file);
 
 }  // namespace terrace::stream

@@ -29,8 +29,8 @@
 namespace terrace::stream {
 namespace {
 
-/// Reads a number; `value` has the bits of an integer of 64 bits if the type is one. Null if there
-/// is none.
+/// Reads a number and returns its end, null if there is none. If the type is a 64-bit integer,
+/// `value` gets its bits.
 const char* parse_number(const char* at, const char* end, ScalarType type, double& value) {
   if (type == ScalarType::f64) return parse_real(at, end, value);
   if (at != end && *at == '+') {
@@ -46,7 +46,7 @@ const char* parse_number(const char* at, const char* end, ScalarType type, doubl
   return type == ScalarType::u64 ? parse(std::uint64_t{}) : parse(std::int64_t{});
 }
 
-/// What pandas, QGIS (nothing) and R (NA) write where there is no value; NaN is a number.
+/// True for what pandas and QGIS (nothing) and R (NA) write for a missing value. NaN is a number.
 bool is_missing_value(std::string_view field) {
   field = trim(unquoted(field));
   return field.empty() || field == "NA";
@@ -71,10 +71,10 @@ bool is_exact(std::string_view field, double value) {
 /// Doubles hold every integer up to this one.
 constexpr std::int64_t kMostOfDouble = std::int64_t{1} << 53;
 
-/// A column by its first fields.
+/// What the first fields of a column contain.
 struct ColumnContent {
-  bool whole = true;   ///< all that are not empty are integers
-  bool empty = false;  ///< some are
+  bool whole = true;   ///< all fields that are not empty are integers
+  bool empty = false;  ///< some fields are empty
   bool large = false, negative = false, unsigned_alone = false;
 
   void add(std::string_view field) {
@@ -102,8 +102,8 @@ struct ColumnContent {
   }
 };
 
-/// Reads numbers of these types that fill the line. False if anything is wrong with it.
-/// kSeparator is ',', ';' or a tab, or ' ' for runs of blanks. kReal: all types are f64.
+/// Reads a line of numbers of these types. Returns false if it has anything else.
+/// kSeparator: ',', ';' or a tab, or ' ' for runs of blanks. kReal: all types are f64.
 template <char kSeparator, bool kReal>
 bool parse_row(const char* at, const char* end, std::span<const ScalarType> types, double* row) {
   const auto is_skipped = [](char c) {
@@ -147,7 +147,7 @@ ParseRow row_parser(char separator) {
 
 class XyzSource final : public PointSource {
  public:
-  /// first: the attributes of the first of several files, which have those types in all of them.
+  /// first: the attributes of the first of several files, whose types all files must have.
   XyzSource(const std::string& file, const SourceOptions& options, std::span<const Channel> first)
       : input_(file, options.stop), lines_(input_), block_points_(options.block_points) {
     constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
@@ -204,7 +204,7 @@ class XyzSource final : public PointSource {
         if (!parse_fields(line)) refuse(line);
       }
       const Point3 point{row_[ix], row_[iy], row_[iz]};
-      // Infinities and NaN are what remains when a number less itself is not zero.
+      // A number minus itself is not zero only if it is infinite or NaN.
       if (!((point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0.0)) {
         if (is_infinite(point)) refuse(line);
         ++nodata_;
@@ -238,7 +238,7 @@ class XyzSource final : public PointSource {
   }
 
  private:
-  /// Those that the header names.
+  /// Sets the units that the header names, and notes those that are ignored.
   void set_units() {
     const auto& [x, y, z] = layout_.units;
     if (!layout_.geographic && x == y && is_length_unit(x)) {
@@ -253,16 +253,16 @@ class XyzSource final : public PointSource {
       if (unit.empty() || known) continue;
       info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") + in_quotes(unit) +
                     " in the header, after the name of " + "xyz"[axis] +
-                    ", is not a unit that is known and is ignored";
+                    ", is not a known unit and is ignored";
     }
     if (!layout_.geographic && x != y && (is_length_unit(x) || is_length_unit(y))) {
       info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") +
                     "x and y have different units in the header, which are ignored";
     }
   }
-  /// Integers that doubles do not hold are kept as integers where the first lines have them.
+  /// Makes columns 64-bit integers if the first lines have integers that doubles cannot hold.
   void choose_types(std::span<const Channel> first) {
-    // Some hundred lines; a pipe is waited for, as it is when formats are told apart.
+    // About a hundred lines. This waits for a pipe, as recognising the format does.
     constexpr std::size_t kHead = std::size_t{4} << 10;
     std::string_view head = input_.fill(kHead).substr(0, kHead);
     if (head.size() == kHead) head = head.substr(0, head.find_last_of("\r\n"));
@@ -289,20 +289,20 @@ class XyzSource final : public PointSource {
     }
   }
 
-  /// Throws: Error if the column has an integer that its double is not.
+  /// Throws: Error if the column has an integer that its double does not represent exactly.
   void check_exact(std::string_view line, std::size_t column) const {
     const std::string_view field = unquoted(split_row(line, layout_)[column]);
     if (!is_integer(field) || is_exact(field, row_[column])) return;
     throw Error({.file = input_.name(),
                  .where = "line " + std::to_string(lines_.number()),
                  .cause = "column " + std::to_string(column + 1) + ", " + in_quotes(field) +
-                          ", is an integer that a double does not hold",
-                 .remedy = "columns become integers of 64 bits if all are, none is empty, and one "
-                           "of the first lines of the first file has one so large: let this line "
-                           "come first, or leave the column out (`drop` of build and convert)"});
+                          ", is an integer that a double cannot hold",
+                 .remedy = "move this line to the top of the first file, which makes the column "
+                           "64-bit integers if all its values are integers and none is missing, or "
+                           "leave the column out (`drop` of build and convert)"});
   }
 
-  /// Reads a line of fields of which some are empty, in quotes, or text that nobody needs.
+  /// Reads a line with fields that are empty, in quotes, or text that is not needed.
   bool parse_fields(std::string_view line) {
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) return false;
@@ -325,7 +325,7 @@ class XyzSource final : public PointSource {
     return parse_number(field.data(), end, type, value) == end;
   }
 
-  /// Says what is wrong with a line that is no point.
+  /// Throws: Error that says what is wrong with a line that is not a point.
   [[noreturn]] void refuse(std::string_view line) const {
     const auto fail = [&](std::string cause, std::string remedy) {
       throw Error({.file = input_.name(),
@@ -335,7 +335,7 @@ class XyzSource final : public PointSource {
     };
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {
-      fail("has " + counted(fields.size(), "column") + ", the lines before have " +
+      fail("has " + counted(fields.size(), "column") + ", but the previous lines have " +
                std::to_string(layout_.columns),
            "every line needs the same columns");
     }
@@ -349,14 +349,14 @@ class XyzSource final : public PointSource {
         const std::string cause =
             column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
         if (!real) {
-          fail(cause + " an integer that " + std::string(name_of(types_[i])) +
-                   " holds, as those before are",
+          fail(cause + " an integer that fits into " + std::string(name_of(types_[i])) +
+                   ", as the previous ones do",
                "correct it, or leave the column out (`drop` of build and convert)");
         }
-        fail(cause + " a number that a double holds",
+        fail(cause + " a number that fits into a double",
              field.find(',') != field.npos ? "write numbers with a decimal point"
-             : coordinate                  ? "write numbers, or nothing or NA where there is none"
-                          : "write numbers, or nothing or NA where there is none, or leave the "
+             : coordinate                  ? "write numbers, or nothing or NA for missing values"
+                          : "write numbers, or nothing or NA for missing values, or leave the "
                             "column out (`drop` of build and convert)");
       }
       if (coordinate && std::isinf(value)) {
@@ -364,7 +364,7 @@ class XyzSource final : public PointSource {
              "leave the line out");
       }
     }
-    fail("is no point", "each line needs the same number of numbers");
+    fail("is not a point", "each line needs the same number of columns");
     std::abort();
   }
 
@@ -374,16 +374,15 @@ class XyzSource final : public PointSource {
   TextLayout layout_;
   ParseRow parse_row_ = nullptr;
   std::vector<double> row_;
-  std::vector<bool> optional_;     ///< columns that may hold anything
+  std::vector<bool> optional_;     ///< columns that may contain anything
   std::vector<ScalarType> types_;  ///< of the columns: f64, i64 or u64
   std::vector<bool> whole_;        ///< columns of doubles that seem to be integers
   SourceInfo info_;
   std::uint64_t delivered_ = 0, nodata_ = 0, empty_values_ = 0;
-  std::uint64_t empty_fields_ = 0;  ///< attributes of the row that are empty
+  std::uint64_t empty_fields_ = 0;  ///< empty attributes of the current row
 };
 
-/// True for text whose first line that is no comment, or the one after a header, begins a table of
-/// numbers.
+/// True for text that begins, after comments and at most one header line, with a row of numbers.
 bool recognise_xyz(std::span<const std::byte> head) {
   std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
   const auto is_text = [](char c) {
@@ -399,7 +398,7 @@ bool recognise_xyz(std::span<const std::byte> head) {
     if (line.empty() || is_comment(line)) continue;
     const auto fields = split_fields(line, separator_of(line));
     if (!is_header(fields)) {
-      // A line of one column or with words among its numbers is prose, or another format.
+      // A line with one column, or with words among its numbers, is prose or another format.
       return fields.size() >= 2 &&
              std::count_if(fields.begin(), fields.end(), [](std::string_view field) {
                return !is_header({field});

@@ -25,8 +25,9 @@ std::string csv_field(const std::string& name) {
   return out + "\"";
 }
 
-/// Writes a coordinate. Those of a lattice in decimal steps (LAS) are k * scale + offset, rounded:
-/// 849393.9500000001 where 849393.95 is meant. The decimals of the lattice are written then.
+/// Writes a coordinate. On a lattice with decimal steps (LAS) it is a rounded k * scale + offset,
+/// such as 849393.9500000001 where 849393.95 is meant, so it is written with the lattice's
+/// decimals.
 class CoordinateText {
  public:
   CoordinateText() = default;
@@ -52,7 +53,7 @@ class CoordinateText {
     if (error != std::errc{} || parse_real(digits, end, meant) != end) return;
     while (decimals_ > 0 && end[-1] == '0') --end;
     if (end[-1] == '.') --end;
-    // Equal but for what rounding the product and the sum can do.
+    // Equal except for the rounding of the product and the sum.
     const bool same = std::abs(value - meant) <= 0x1p-51 * (std::abs(value) + std::abs(offset_));
     if (same && static_cast<std::size_t>(end - digits) < text.size() - begin) {
       text.replace(begin, std::string::npos, std::string_view(digits, end));
@@ -61,10 +62,10 @@ class CoordinateText {
 
  private:
   static constexpr int kMostDecimals = 9;
-  static constexpr std::size_t kLongText = 15;  // shorter ones are no rounded sums
+  static constexpr std::size_t kLongText = 15;  // shorter texts show no rounding
 
   double offset_ = 0.0;
-  int decimals_ = kMostDecimals + 1;  ///< of the lattice; more: none
+  int decimals_ = kMostDecimals + 1;  ///< of the lattice; above kMostDecimals: not decimal
 };
 
 class XyzWriter final : public PlainPointWriter {
