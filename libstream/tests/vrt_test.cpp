@@ -15,7 +15,7 @@
 #include "terrace/stream/error.hpp"
 #include "tiff_writing.hpp"
 
-/// Virtual rasters, against GDAL, which makes GeoTIFFs of them.
+/// Virtual rasters, compared with the GeoTIFFs to which GDAL converts them.
 
 namespace terrace::stream {
 namespace {
@@ -69,7 +69,7 @@ class Vrt : public ::testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(Vrt, HasTheCellsThatGdalMakesOfIt) {
+TEST_F(Vrt, CellsMatchGdal) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   for (std::uint64_t seed = 1; seed <= 24 / TERRACE_TEST_SHARE; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -85,7 +85,7 @@ TEST_F(Vrt, HasTheCellsThatGdalMakesOfIt) {
                1 + static_cast<std::uint32_t>(random() % 50), own_nodata ? "3" : "", 9, random);
       files += " '" + path(name) + "'";
     }
-    // Without any, as the files say, one for all, another in the whole, only in the whole.
+    // Nodata: none, those of the files, one for all, another in the VRT, only in the VRT.
     const std::vector<std::string> ways{"", "-srcnodata 4", "-srcnodata 4 -vrtnodata 4",
                                         "-srcnodata 4 -vrtnodata -7", "-vrtnodata 5"};
     std::string options = ways[random() % ways.size()];
@@ -103,7 +103,7 @@ TEST_F(Vrt, HasTheCellsThatGdalMakesOfIt) {
     EXPECT_EQ(found.info.columns, wanted.info.columns);
     EXPECT_EQ(found.info.rows, wanted.info.rows);
     EXPECT_EQ(found.info.world.xy, wanted.info.world.xy);
-    // What no source covers is 0 to GDAL where the whole has no nodata, and nothing here.
+    // Cells without a source are 0 in GDAL if the VRT has no nodata value; here they have no data.
     std::vector<Point3> all = sorted_cells(wanted), some = sorted_cells(std::move(found));
     if (wanted.info.nodata) {
       EXPECT_EQ(some, all) << options;
@@ -129,13 +129,13 @@ TEST_F(Vrt, ItsNodataOverridesThatOfItsFiles) {
     return some;
   };
   const std::string body = "<SourceFilename relativeToVRT=\"1\">a.tif</SourceFilename>";
-  // As gdalbuildvrt -srcnodata 5 writes it, with and without a value of the whole.
+  // As gdalbuildvrt -srcnodata 5 writes it, with and without a nodata value of the VRT.
   const std::string complex = "<ComplexSource>" + body + "<NODATA>5</NODATA></ComplexSource>";
   EXPECT_EQ(cells(put_vrt("<NoDataValue>5</NoDataValue>" + complex)), without(5));
   EXPECT_EQ(cells(put_vrt(complex)), without(5));
   // As gdal_translate -a_nodata 5 writes it.
   EXPECT_EQ(cells(put_vrt("<NoDataValue>5</NoDataValue>" + source(""))), without(5));
-  // Without any, those of the files count, and a note says so.
+  // Without any, those of the files are used, and a note says so.
   const AllPoints undeclared = read_file(put_vrt(source("")));
   EXPECT_EQ(sorted_cells(undeclared), without(3));
   EXPECT_NE(undeclared.info.note.find("a.tif, 3, counts"), std::string::npos)
@@ -143,7 +143,7 @@ TEST_F(Vrt, ItsNodataOverridesThatOfItsFiles) {
   EXPECT_EQ(read_file(put_vrt(complex)).info.note, "");
 }
 
-TEST_F(Vrt, SourcesAFewHundredthsOfACellOffAreOnTheNearestCells) {
+TEST_F(Vrt, MovesSlightlyMisalignedSourcesToTheNearestCells) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   std::mt19937_64 random(12);
   put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
@@ -158,7 +158,7 @@ TEST_F(Vrt, SourcesAFewHundredthsOfACellOffAreOnTheNearestCells) {
                         .c_str()),
         0);
     const AllPoints found = read_file(vrt);
-    // GDAL fills the cells that a source touches, too.
+    // GDAL also fills the cells that a source only touches.
     const std::vector<Point3> cells = sorted_cells(found);
     const std::vector<Point3> all = sorted_cells(read_file(path("whole.tif")));
     EXPECT_EQ(cells.size(), 63U);
@@ -169,7 +169,7 @@ TEST_F(Vrt, SourcesAFewHundredthsOfACellOffAreOnTheNearestCells) {
   EXPECT_EQ(read_file(put_vrt(source(rects(whole, whole)))).info.note, "");
 }
 
-TEST_F(Vrt, ItsCrsMayBeACode) {
+TEST_F(Vrt, ReadsACodeAsCrs) {
   std::mt19937_64 random(13);
   put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
   const auto crs = [&](const std::string& text) {
@@ -178,7 +178,7 @@ TEST_F(Vrt, ItsCrsMayBeACode) {
   EXPECT_EQ(crs("EPSG:32632").epsg, 32632);
   EXPECT_EQ(crs("\n epsg:25832+7837 ").epsg, 25832);
   EXPECT_EQ(crs("EPSG:25832+7837").vertical_epsg, 7837);
-  // Other spellings are read with the WKT.
+  // Other notations are kept as WKT.
   for (const char* const text :
        {"EPSG:", "EPSG:12x", "EPSG:1+", "EPSG:99999999999", "ESRI:54030"}) {
     EXPECT_EQ(crs(text).wkt, text);
@@ -186,7 +186,7 @@ TEST_F(Vrt, ItsCrsMayBeACode) {
   }
 }
 
-TEST_F(Vrt, MayTakePartsAndHaveScaleAndOffset) {
+TEST_F(Vrt, ReadsPartsOfSourcesScaleAndOffset) {
   std::mt19937_64 random(7);
   put_tiff("a.tif", 0, 0, 12, 10, "", 99, random);
   const std::vector<Point3> whole = sorted_cells(read_file(path("a.tif")));
@@ -209,7 +209,7 @@ TEST_F(Vrt, MayTakePartsAndHaveScaleAndOffset) {
   EXPECT_EQ(world_point(all.info, {0, 0, 0}), (Point3{1005, 4995, 100}));
 }
 
-TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
+TEST_F(Vrt, RejectsElementsThatComputeSamples) {
   std::mt19937_64 random(8);
   put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
   put_tiff("small.tif", 0, 0, 19, 10, "", 99, random);
@@ -265,14 +265,14 @@ TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
             std::string::npos);
   EXPECT_NE(of_text("<VRTDataset rasterXSize='1' rasterYSize='99999999999'/>").find("rasterYSize"),
             std::string::npos);
-  EXPECT_NE(of_text("<VRTDataset rasterXSize='1' rasterYSize='1'/>").find("0 bands"),
+  EXPECT_NE(of_text("<VRTDataset rasterXSize='1' rasterYSize='1'/>").find("no band 1"),
             std::string::npos);
-  // A dataset's and a band's own kind is told before what their sources are.
+  // The kind of a dataset or band is reported before that of its sources.
   EXPECT_NE(of_text("<VRTDataset subClass='VRTWarpedDataset' rasterXSize='1' rasterYSize='1'>"
                     "<VRTRasterBand><SimpleSource/></VRTRasterBand></VRTDataset>")
                 .find("VRTWarpedDataset"),
             std::string::npos);
-  // Damage of any kind is an Error.
+  // Any damage is an Error.
   const std::string good = read_text(put_vrt(all));
   for (int round = 0; round < 400; ++round) {
     std::string bad = good;
@@ -281,7 +281,7 @@ TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
   }
 }
 
-TEST_F(Vrt, OnlyWhatIsNeededOfADescriptionIsHeld) {
+TEST_F(Vrt, HoldsOnlyTheElementsThatAreNeeded) {
   std::mt19937_64 random(9);
   put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
   const auto repeated = [](const std::string& text, std::size_t times) {
@@ -289,14 +289,14 @@ TEST_F(Vrt, OnlyWhatIsNeededOfADescriptionIsHeld) {
     for (std::size_t i = 0; i < times; ++i) all += text;
     return all;
   };
-  // More than is held, in parts that say nothing of the samples.
+  // More bytes than may be held, in elements that do not concern the samples.
   const std::string filler = repeated("<MDI key='a key'>some value</MDI>", 400'000);
   for (const std::string& file : {put_vrt(source(""), "<Metadata>" + filler + "</Metadata>"),
                                   put_vrt("<Metadata>" + filler + "</Metadata>" + source("")),
                                   put_vrt(filler + source(""))}) {
     EXPECT_EQ(read_file(file).points.size(), 200U);
   }
-  // Bands that are not asked for are skipped, with sources of any kind.
+  // Other bands are skipped, whatever their sources.
   const std::string other =
       "<VRTRasterBand>" + repeated("<KernelFilteredSource/>", 400'000) + "</VRTRasterBand>";
   EXPECT_EQ(read_file(put_vrt(source("") + "</VRTRasterBand>" + other +

@@ -43,7 +43,7 @@ class VrtReader {
       std::ostringstream note;
       note.precision(2);
       note << file_ << ": its sources are up to " << farthest_
-           << " of a cell off its cells, and are placed on the nearest ones";
+           << " of a cell off its cells and are moved to the nearest ones";
       info_.notes.push_back(note.str());
     }
     return {std::move(info_), std::move(sources_), nodata_};
@@ -51,10 +51,10 @@ class VrtReader {
 
  private:
   static constexpr std::string_view kAsGeoTiff =
-      "make a GeoTIFF of it: gdal_translate FILE out.tif";
+      "convert it to GeoTIFF: gdal_translate FILE out.tif";
 
   [[noreturn]] void fail(std::string where, std::string cause,
-                         std::string_view remedy = "write it anew: gdalbuildvrt") const {
+                         std::string_view remedy = "make it again: gdalbuildvrt") const {
     throw Error({.file = file_,
                  .where = std::move(where),
                  .cause = std::move(cause),
@@ -68,13 +68,13 @@ class VrtReader {
         parse_real(trimmed.data(), trimmed.data() + trimmed.size(), value) !=
             trimmed.data() + trimmed.size() ||
         !std::isfinite(value)) {
-      fail(where, in_quotes(text) + " is no number");
+      fail(where, in_quotes(text) + " is not a number");
     }
     return value;
   }
 
-  /// The sources, which there may be very many of, are read as they come; all that says nothing of
-  /// the samples is forgotten.
+  /// Reads the sources as they come, because there may be very many. Drops all elements that do not
+  /// concern the samples.
   bool take(std::span<const XmlElement> open, const XmlElement& done) {
     if (open.size() == 1) {
       if (done.name == kBand) ++bands_;
@@ -97,7 +97,7 @@ class VrtReader {
   }
 
   void read_dataset(const XmlElement& root) {
-    if (root.name != "VRTDataset") fail("", "is XML, but no VRTDataset");
+    if (root.name != "VRTDataset") fail("", "is XML, but not a VRTDataset");
     if (const std::string kind = root.attribute("subClass"); !kind.empty()) {
       fail("VRTDataset", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
     }
@@ -125,7 +125,7 @@ class VrtReader {
       return;
     }
     const std::vector<std::string_view> words = split_fields(trim(transform->text), ',');
-    if (words.size() != 6) fail("GeoTransform", "has not six numbers");
+    if (words.size() != 6) fail("GeoTransform", "does not have six numbers");
     std::array<double, 6> g{};
     for (std::size_t i = 0; i < 6; ++i) g[i] = number(std::string(words[i]), "GeoTransform");
     // From the corner of the first cell to its middle.
@@ -138,10 +138,10 @@ class VrtReader {
   }
 
   void read_band(const XmlElement& root) {
-    if (root.child("MaskBand") != nullptr) fail("MaskBand", "is not read", kAsGeoTiff);
+    if (root.child("MaskBand") != nullptr) fail("MaskBand", "is not supported", kAsGeoTiff);
     if (wanted_ > bands_) {
-      fail("", "has " + counted(bands_, "band") + ", and band " + std::to_string(wanted_) +
-                   " is asked for");
+      fail("", "has no band " + std::to_string(wanted_) + ", only " + std::to_string(bands_),
+           "choose another band");
     }
     int number_of_band = 0;
     for (const XmlElement& element : root.children) {
@@ -176,12 +176,12 @@ class VrtReader {
       if (name == known) return type;
     }
     if (name.empty()) return ScalarType::u8;  // GDAL's default
-    fail("dataType", in_quotes(name) + " is no type of heights", kAsGeoTiff);
+    fail("dataType", in_quotes(name) + " is not a type of heights", kAsGeoTiff);
   }
 
   void read_part(const XmlElement& part) {
     if (part.name.ends_with("Source") || part.name == "MaskBand") {
-      fail(part.name, "is not read", kAsGeoTiff);
+      fail(part.name, "is not supported", kAsGeoTiff);
     } else if (part.name == "NoDataValue") {
       nodata_ = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
     } else if (part.name == "Scale") {
@@ -204,7 +204,7 @@ class VrtReader {
         }
       } else if (part.name == "SourceBand") {
         const double band = number(part.text, "SourceBand");
-        if (!(band >= 1 && band < 65536)) fail("SourceBand", "is no number of a band");
+        if (!(band >= 1 && band < 65536)) fail("SourceBand", "is not a band number");
         source.band = static_cast<int>(band);
       } else if (part.name == "NODATA") {
         source.nodata = std::string(trim(part.text));
@@ -213,7 +213,7 @@ class VrtReader {
         continue;
       } else if (part.name != "SrcRect" && part.name != "DstRect" &&
                  part.name != "SourceProperties") {
-        fail(element.name, in_quotes(part.name) + " is not read", kAsGeoTiff);
+        fail(element.name, in_quotes(part.name) + " is not supported", kAsGeoTiff);
       }
     }
     if (source.file.empty()) fail(element.name, "names no file");
@@ -221,7 +221,7 @@ class VrtReader {
     return source;
   }
 
-  /// Whole cells, as many on either side.
+  /// Reads a source's place. It must be whole cells, and as many of the source as of the mosaic.
   void place(const XmlElement& element, VrtSource& source) {
     struct Rect {
       std::array<double, 4> v{};
@@ -236,12 +236,12 @@ class VrtReader {
         r.v[i] = std::round(value);
         const double off = std::abs(value - r.v[i]);
         if (off > kNearestCell) {
-          fail(name, "does not lie on whole cells: its source would be resampled",
+          fail(name, "is not on whole cells, so its source would be resampled",
                "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
         }
         farthest_ = std::max(farthest_, off);
         if (!(r.v[i] >= (i < 2 ? 0 : 1)) || r.v[i] >= static_cast<double>(kMostVrtCells)) {
-          fail(name, "lies outside of the raster", kAsGeoTiff);
+          fail(name, "is outside the raster", kAsGeoTiff);
         }
       }
       return r;
@@ -250,11 +250,11 @@ class VrtReader {
     const Rect whole{{0, 0, columns, rows}};
     const Rect from = rect("SrcRect").value_or(whole), to = rect("DstRect").value_or(whole);
     if (from.v[2] != to.v[2] || from.v[3] != to.v[3]) {
-      fail("DstRect", "is not as large as its SrcRect: its source would be resampled",
+      fail("DstRect", "is not as large as its SrcRect, so its source would be resampled",
            "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
     }
     if (to.v[0] + to.v[2] > columns || to.v[1] + to.v[3] > rows) {
-      fail("DstRect", "lies outside of the raster", kAsGeoTiff);
+      fail("DstRect", "is outside the raster", kAsGeoTiff);
     }
     const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
     source.from_column = cells(from.v[0]);
@@ -269,10 +269,10 @@ class VrtReader {
 
   const std::string& file_;
   int wanted_;
-  int bands_ = 0;  ///< that have come to their end
+  int bands_ = 0;  ///< number of bands read to their end
   RasterInfo info_;
   NodataRule nodata_;
-  double farthest_ = 0;  ///< that a source is off the whole's cells, in cells
+  double farthest_ = 0;  ///< largest distance of a source from the mosaic's cells, in cells
   std::vector<VrtSource> sources_;
 };
 

@@ -10,9 +10,9 @@
 #include "raster/nodata.hpp"
 #include "terrace/stream/raster.hpp"
 
-/// GDAL's virtual rasters (VRT) as far as they are mosaics: files whose cells coincide with those
-/// of the whole, to kNearestCell. Elements that would compute samples (resampling, scaling, masks,
-/// pixel functions, warping) are refused by name.
+/// GDAL's virtual rasters (VRT), as far as they are mosaics: the cells of their files must coincide
+/// with the cells of the mosaic, to within kNearestCell. Elements that would compute samples
+/// (resampling, scaling, masks, pixel functions, warping) are refused by name.
 
 namespace terrace::stream {
 
@@ -20,8 +20,8 @@ namespace terrace::stream {
 struct VrtSource {
   std::string file{};
   int band = 1;
-  /// The only nodata value of the source that counts, whatever its file has. Without it the source
-  /// replaces what is below, with or without data.
+  /// The source's nodata value, which overrides that of its file. Without it the source replaces
+  /// the cells below it, whether it has data or not.
   std::optional<std::string> nodata{};
   std::uint64_t from_column = 0, from_row = 0;  ///< of the source
   std::uint64_t column = 0, row = 0, columns = 0, rows = 0;
@@ -31,10 +31,10 @@ struct VrtSource {
 struct VrtDocument {
   RasterInfo info{};
   std::vector<VrtSource> sources{};  ///< in order of precedence, topmost last
-  NodataRule nodata{};               ///< of the whole
+  NodataRule nodata{};               ///< of the mosaic
 };
 
-/// The CRS of an SRS element, as a code ("EPSG:n", "EPSG:n+m") or else as text of any spelling.
+/// The CRS of an SRS element: a code ("EPSG:n", "EPSG:n+m"), or else the text as WKT.
 Crs crs_of_srs(std::string_view text);
 
 /// Reads the description; its sources are not opened. band: counted from 1. Throws: Error if it is

@@ -41,7 +41,7 @@ bool recognise_vrt(std::span<const std::byte> head) {
              .find("<VRTDataset") != std::string_view::npos;
 }
 
-/// A raster of any format but VRT, told by content, then by ending.
+/// Opens a raster of any format except VRT, recognised by content, then by ending.
 std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions& options) {
   struct Kind {
     const Format& (*format)();
@@ -51,33 +51,33 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
       {{&geotiff_format, &open_geotiff},
        {&hgt_format, &open_hgt},
        {&ascii_grid_format,
-        [](const std::string& name, const RasterOptions& how) {
-          return open_ascii_grid(name, {}, {}, how.nodata);
+        [](const std::string& name, const RasterOptions& opening) {
+          return open_ascii_grid(name, {}, {}, opening.nodata);
         }},
        {&usgs_dem_format,
         [](const std::string& name, const RasterOptions&) { return open_usgs_dem(name); }},
        {&png_format, &open_height_map},
        {&binary_grid_format, &open_binary_grid}}};
-  constexpr std::size_t kTellingBytes = 4096;
-  const std::vector<char> head = peek_head(file, kTellingBytes, {});
+  constexpr std::size_t kRecognisedBytes = 4096;
+  const std::vector<char> head = peek_head(file, kRecognisedBytes, {});
   if (recognise_vrt(std::as_bytes(std::span(head)))) {
     throw Error({.file = file,
                  .where = {},
-                 .cause = "is a virtual raster inside another, which is not read",
-                 .remedy = "name the rasters of both: gdalbuildvrt, or make a GeoTIFF of it: "
+                 .cause = "is a virtual raster inside another, which is not supported",
+                 .remedy = "name the rasters of both: gdalbuildvrt, or convert it to GeoTIFF: "
                            "gdal_translate FILE out.tif"});
   }
   for (const Kind& kind : kKinds) {
     if (kind.format().recognise(std::as_bytes(std::span(head)))) return kind.open(file, options);
   }
-  const Format* const told = format_of_name(file);
+  const Format* const known = format_of_name(file);
   for (const Kind& kind : kKinds) {
-    if (told != nullptr && told->name == kind.format().name) return kind.open(file, options);
+    if (known != nullptr && known->name == kind.format().name) return kind.open(file, options);
   }
   return open_geotiff(file, options);
 }
 
-/// A grid of text with integers as samples: its whole numbers are reals to us, integers to GDAL.
+/// An ASCII grid with integer samples: we read its whole numbers as reals, GDAL as integers.
 class WholeNumbers final : public Raster {
  public:
   WholeNumbers(std::unique_ptr<Raster> raster, ScalarType type)
@@ -118,9 +118,10 @@ class WholeNumbers final : public Raster {
           real != std::trunc(real)) {
         throw Error({.file = info_.files.front(),
                      .where = {},
-                     .cause = "has samples that are no " + std::string(name_of(info_.sample.type)) +
-                              ", which those of the whole are",
-                     .remedy = "make the virtual raster anew"});
+                     .cause = "has samples that are not " +
+                              std::string(name_of(info_.sample.type)) +
+                              ", the sample type of the virtual raster",
+                     .remedy = "make the virtual raster again: gdalbuildvrt"});
       }
       const T number = static_cast<T>(real);
       std::memcpy(samples + to * sizeof number, &number, sizeof number);
@@ -142,7 +143,7 @@ class VrtRaster final : public Raster {
     sources_ = std::move(document.sources);
     nodata_ = document.nodata;
     held_.resize(sources_.size());
-    options_.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
+    options_.cache_bytes /= kOpenAtOnce / 4;  // few of them overlap one window
     for (std::size_t i = 0; i < sources_.size(); ++i) {
       const std::unique_ptr<Raster> raster = open(sources_[i], std::nullopt);
       held_[i] = raster->info().held_bytes;
@@ -159,7 +160,7 @@ class VrtRaster final : public Raster {
       info_.held_bytes += sizeof source + source.file.capacity() + sizeof(std::uint64_t);
     }
     if (!direct_) {
-      constexpr std::uint64_t kWindowColumns = 4096;  // of most windows
+      constexpr std::uint64_t kWindowColumns = 4096;  // most windows are not wider
       info_.held_bytes += std::min(info_.columns, kWindowColumns) * kStripRows *
                           (2 * size_of(info_.sample.type) + 4);
     }
@@ -174,12 +175,12 @@ class VrtRaster final : public Raster {
     if (direct_) {
       for (std::size_t i = 0; i < sources_.size(); ++i) {
         const VrtSource& source = sources_[i];
-        const std::optional<Meeting> meeting = meeting_of(source, window);
-        if (!meeting) continue;
-        const std::size_t to = static_cast<std::size_t>(meeting->row) * out.stride +
-                               static_cast<std::size_t>(meeting->column);
+        const std::optional<Overlap> overlap = overlap_of(source, window);
+        if (!overlap) continue;
+        const std::size_t to = static_cast<std::size_t>(overlap->row) * out.stride +
+                               static_cast<std::size_t>(overlap->column);
         any |= opened(i).read_over(
-            meeting->inside,
+            overlap->inside,
             {.samples = out.samples + to * bytes, .valid = out.valid + to, .stride = out.stride});
       }
       return any;
@@ -201,19 +202,19 @@ class VrtRaster final : public Raster {
   static constexpr std::size_t kOpenAtOnce = 32;
   static constexpr std::uint64_t kStripRows = 256;
 
-  /// What a source and a window have in common.
-  struct Meeting {
-    CellWindow inside{};                ///< of the source
-    std::uint64_t column = 0, row = 0;  ///< where that begins in the window
+  /// The overlap of a source and a window.
+  struct Overlap {
+    CellWindow inside{};                ///< the overlap in the source
+    std::uint64_t column = 0, row = 0;  ///< its first cell in the window
   };
-  static std::optional<Meeting> meeting_of(const VrtSource& source, const CellWindow& window) {
+  static std::optional<Overlap> overlap_of(const VrtSource& source, const CellWindow& window) {
     const std::uint64_t l = std::max(window.column, source.column),
                         t = std::max(window.row, source.row),
                         r = std::min(window.column + window.columns,
                                      source.column + source.columns),
                         b = std::min(window.row + window.rows, source.row + source.rows);
     if (l >= r || t >= b) return std::nullopt;
-    return Meeting{.inside = {.column = source.from_column + (l - source.column),
+    return Overlap{.inside = {.column = source.from_column + (l - source.column),
                               .row = source.from_row + (t - source.row),
                               .columns = r - l,
                               .rows = b - t},
@@ -226,8 +227,8 @@ class VrtRaster final : public Raster {
     std::unique_ptr<Raster> raster;
   };
 
-  /// To GDAL, the nodata value of a file is a height in a mosaic that declares none. Here it has no
-  /// data all the same.
+  /// Notes a difference: a file's nodata value is nodata here even if the mosaic declares none; in
+  /// GDAL it is then a height.
   void note_own_nodata(const VrtSource& source, const RasterInfo& file) {
     if (source.nodata || nodata_.value || !file.nodata || noted_) return;
     noted_ = true;
@@ -235,7 +236,7 @@ class VrtRaster final : public Raster {
     append_number(value, *file.nodata);
     info_.notes.push_back(info_.files.front() + ": declares no nodata value, so that of " +
                           source.file + ", " + value +
-                          ", counts; GDAL takes such cells for heights");
+                          ", is used; GDAL reads such cells as heights");
   }
 
   /// nodata: see RasterOptions.
@@ -255,16 +256,16 @@ class VrtRaster final : public Raster {
       throw Error({.file = info_.files.front(),
                    .where = source.file,
                    .cause = cause,
-                   .remedy = "make a GeoTIFF of it: gdal_translate FILE out.tif"});
+                   .remedy = "convert it to GeoTIFF: gdal_translate FILE out.tif"});
     };
     if (found.sample.type != info_.sample.type) {
       refuse("its samples are " + std::string(name_of(found.sample.type)) +
-             ", those of the whole " + std::string(name_of(info_.sample.type)));
+             ", but those of the virtual raster are " + std::string(name_of(info_.sample.type)));
     }
     if (source.from_column + source.columns > found.columns ||
         source.from_row + source.rows > found.rows) {
       refuse("has " + std::to_string(found.columns) + " x " + std::to_string(found.rows) +
-             " cells, fewer than are asked of it");
+             " cells, fewer than the virtual raster uses");
     }
     return raster;
   }
@@ -282,13 +283,13 @@ class VrtRaster final : public Raster {
       open_.pop_back();
     }
     std::optional<std::string> nodata = sources_[source].nodata;
-    if (!nodata && nodata_.value) nodata = "";  // applied to all sources when they are composed
+    if (!nodata && nodata_.value) nodata = "";  // lay() applies nodata_ to all sources
     open_.push_front({source, open(sources_[source], nodata)});
     held_bytes_ += held_[source];
     return *open_.front().raster;
   }
 
-  /// What the rule leaves of a row of samples, to mask_.
+  /// Sets `mask` to 1 for the samples of a row that are data by the rule, to 0 for others.
   void mask(const std::byte* samples, std::size_t cells, const NodataRule& rule,
             std::vector<std::uint8_t>& mask) {
     mask.assign(cells, 0);
@@ -297,7 +298,7 @@ class VrtRaster final : public Raster {
                 ignored_.data(), mask.data());
   }
 
-  /// True if of the source only the cells count that its file has data for, each with its value.
+  /// True if the source contributes exactly the cells for which its file has data, unchanged.
   [[nodiscard]] bool is_direct(const VrtSource& source, const RasterInfo& file) const {
     if (source.nodata) {
       const NodataRule rule = NodataRule::parse(*source.nodata, info_.sample.type);
@@ -308,8 +309,8 @@ class VrtRaster final : public Raster {
     return !holes && !nodata_.value;
   }
 
-  /// Lays all sources over one another, then what has data over `out`: a source may take back what
-  /// one before it has given, but not what the caller has.
+  /// Composes all sources, then copies the cells with data to `out`. A source may clear cells of
+  /// earlier sources, but not those that the caller already has.
   bool compose(const CellWindow& window, const CellBuffer& out) {
     const std::size_t cells = static_cast<std::size_t>(window.columns * window.rows);
     const std::size_t bytes = size_of(info_.sample.type);
@@ -330,24 +331,24 @@ class VrtRaster final : public Raster {
     return any;
   }
 
-  /// Lays a source over the window, as GDAL composes bands.
+  /// Overlays a source on the window, as GDAL composes bands.
   void lay(std::size_t number, const CellWindow& window) {
     const VrtSource& source = sources_[number];
-    const std::optional<Meeting> meeting = meeting_of(source, window);
-    if (!meeting) return;
+    const std::optional<Overlap> overlap = overlap_of(source, window);
+    if (!overlap) return;
     const std::size_t bytes = size_of(info_.sample.type);
-    const auto columns = static_cast<std::size_t>(meeting->inside.columns),
-               rows = static_cast<std::size_t>(meeting->inside.rows);
+    const auto columns = static_cast<std::size_t>(overlap->inside.columns),
+               rows = static_cast<std::size_t>(overlap->inside.rows);
     part_.resize(columns * rows * bytes);
     part_valid_.assign(columns * rows, 0);
     opened(number).read_over(
-        meeting->inside, {.samples = part_.data(), .valid = part_valid_.data(), .stride = columns});
+        overlap->inside, {.samples = part_.data(), .valid = part_valid_.data(), .stride = columns});
     for (std::size_t row = 0; row < rows; ++row) {
       const std::byte* const samples = part_.data() + row * columns * bytes;
       const std::uint8_t* const has_data = part_valid_.data() + row * columns;
       mask(samples, columns, nodata_, data_);
       const std::size_t to =
-          static_cast<std::size_t>((meeting->row + row) * window.columns + meeting->column);
+          static_cast<std::size_t>((overlap->row + row) * window.columns + overlap->column);
       for (std::size_t i = 0; i < columns; ++i) {
         if (source.nodata && has_data[i] == 0) continue;
         const bool good = has_data[i] != 0 && data_[i] != 0;
@@ -362,10 +363,10 @@ class VrtRaster final : public Raster {
   std::vector<VrtSource> sources_;
   NodataRule nodata_;
   std::vector<std::uint64_t> held_;  ///< bytes, by source
-  std::list<Open> open_;             ///< the last used first
+  std::list<Open> open_;             ///< most recently used first
   std::uint64_t open_bytes_, held_bytes_ = 0;
   bool noted_ = false;  ///< see note_own_nodata()
-  bool direct_ = true;  ///< sources lie over one another as they are
+  bool direct_ = true;  ///< all sources are direct: see is_direct()
   std::vector<std::byte> samples_, part_, ignored_;
   std::vector<std::uint8_t> valid_, part_valid_, data_;
 };

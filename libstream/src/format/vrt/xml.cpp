@@ -27,20 +27,20 @@ constexpr std::size_t kDeepest = 32;
 /// The size of a node of a map with two short strings.
 constexpr std::size_t kAttributeBytes = 112;
 
-/// What the parser has read. Its handlers are C functions: they must not throw.
+/// What the parser has read. Its handlers are called from C and must not throw.
 struct XmlReading {
   XML_Parser parser = nullptr;
   const TakeElement* take = nullptr;
   XmlElement root{};
-  std::vector<XmlElement> open{};    ///< those whose end has not come
-  std::vector<std::size_t> bytes{};  ///< what each of them holds, with what is below
-  std::size_t held = 0;              ///< their sum
-  std::uint64_t parsed = 0;          ///< bytes of the file up to the end of the last piece of it
+  std::vector<XmlElement> open{};    ///< incomplete elements, the root first
+  std::vector<std::size_t> bytes{};  ///< held by each of these and its kept children
+  std::size_t held = 0;              ///< the sum of `bytes`
+  std::uint64_t parsed = 0;          ///< bytes of the file up to the end of the last event
   std::string refusal{};
   std::exception_ptr failure{};
 
   void stop() const { XML_StopParser(parser, XML_FALSE); }
-  /// So much more is held for the innermost element.
+  /// Counts more bytes held for the innermost element.
   void hold(std::size_t more) {
     bytes.back() += more;
     held += more;
@@ -111,7 +111,7 @@ void on_text(void* self, const XML_Char* text, int size) {
   });
 }
 
-/// Comments and the like.
+/// Called for comments and other content.
 void on_other(void* self, const XML_Char*, int) {
   XmlReading::safely(self, [](XmlReading&) {});
 }
@@ -145,7 +145,7 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
     throw Error({.file = file,
                  .where = "line " + std::to_string(XML_GetCurrentLineNumber(parser.get())),
                  .cause = cause,
-                 .remedy = "the file is damaged: write it anew"});
+                 .remedy = "the file is damaged: export it again"});
   };
   if (bytes->size() > kMostBytes) fail("is too large for a description");
   XML_SetUserData(parser.get(), &reading);
@@ -164,7 +164,7 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
                                         at == bytes->size() ? XML_TRUE : XML_FALSE);
     if (reading.failure) std::rethrow_exception(reading.failure);
     if (!reading.refusal.empty()) fail(reading.refusal);
-    // Some versions of the parser look at what is not whole yet only once it has doubled.
+    // Some versions of the parser look at an incomplete tag again only when it has doubled.
     if (at > reading.parsed + 2 * kMostTagBytes) fail("has a tag that is too long");
     if (status != XML_STATUS_OK) {
       fail(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
