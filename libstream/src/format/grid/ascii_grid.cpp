@@ -32,8 +32,8 @@ namespace {
 constexpr std::string_view kFormat = "ascii-grid";
 constexpr std::array<std::string_view, 15> kKeys{
     "ncols",    "nrows",  "xllcorner", "xllcenter", "yllcorner", "yllcenter",
-    "cellsize", "dx",     "dy",                                             // of ESRI
-    "north:",   "south:", "east:",     "west:",     "rows:",     "cols:"};  // of GRASS
+    "cellsize", "dx",     "dy",                                             // Esri
+    "north:",   "south:", "east:",     "west:",     "rows:",     "cols:"};  // GRASS
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
@@ -48,8 +48,8 @@ bool is_key(std::string_view word) {
                      [&](std::string_view key) { return is_word(word, key); });
 }
 
-/// A word for a cell without data, as 12D, GRASS, R and others write it, or NaN or infinity as the
-/// C library of Windows does.
+/// True for a word that marks a cell without data, as 12D, GRASS, R and others write it, and for
+/// NaN and infinity as the C library of Windows writes them.
 bool is_void_word(std::string_view word) {
   constexpr std::array<std::string_view, 6> kWords{"null", "*", "na", "n/a", "nodata", "no_data"};
   if (std::any_of(kWords.begin(), kWords.end(),
@@ -61,7 +61,7 @@ bool is_void_word(std::string_view word) {
   return value && !std::isfinite(*value);
 }
 
-/// The words of a text between white space, whatever the lengths of its lines.
+/// Splits text into words at white space, whatever the lengths of its lines.
 class Words {
  public:
   explicit Words(Input& input) : input_(input) { refuse_utf16(input); }
@@ -73,7 +73,7 @@ class Words {
       while (at_ != end_ && is_white_space(*at_)) ++at_;
       const char* const begin = at_;
       while (at_ != end_ && !is_white_space(*at_)) ++at_;
-      // A word at the end of the window may go on behind it.
+      // A word at the end of the window may continue after it.
       if (at_ != end_ || ended_) return {begin, static_cast<std::size_t>(at_ - begin)};
       at_ = begin;
       more();
@@ -88,8 +88,8 @@ class Words {
     if (left > kLongest) {
       throw Error({.file = input_.name(),
                    .where = "byte " + std::to_string(input_.offset()),
-                   .cause = "a word of more than 1,024 characters is no number",
-                   .remedy = "this is no ASCII grid, or it is damaged"});
+                   .cause = "a word of more than 1,024 characters is not a number",
+                   .remedy = "the file is damaged or not an ASCII grid: download it again"});
     }
     input_.consume(static_cast<std::size_t>(at_ - begin_));
     const std::string_view window = input_.fill(left + 1);
@@ -141,7 +141,7 @@ std::optional<double> grass_coordinate(std::string_view text) {
   return negative ? -sum : sum;
 }
 
-/// An ASCII grid that is being read.
+/// Reads an ASCII grid: its header when it is constructed, then its numbers.
 class AsciiReader {
  public:
   /// nodata: see RasterOptions.
@@ -170,11 +170,11 @@ class AsciiReader {
       header_.fail({},
                    "promises " + std::to_string(columns_) + " x " + std::to_string(rows_) +
                        " numbers, more than fit into " + counted(*input_.size(), "byte"),
-                   "fetch the file again; it is cut short");
+                   "the file is truncated: download it again");
     }
   }
 
-  /// A description whose file is `file`, as the caller named it.
+  /// Describes the grid, with samples of `type`.
   [[nodiscard]] PlainGrid grid(ScalarType type) const {
     PlainGrid grid = plain_grid(std::string(kFormat), input_.name(), columns_, rows_, type);
     grid.info.nodata = nodata().value;
@@ -185,8 +185,8 @@ class AsciiReader {
   [[nodiscard]] NodataRule nodata() const {
     NodataRule rule =
         NodataRule::parse(given_.value_or(header_.text("nodata_value")), ScalarType::f64);
-    // The lowest float stands for no data where programs compute with floats; with how many digits
-    // it is written may differ between head and cells.
+    // Programs that compute with floats often use the lowest float as nodata value, which may have
+    // another number of digits in the header than in the cells.
     constexpr double kNoHeight = 1e38;
     if (rule.value && *rule.value < -kNoHeight) rule.high = -kNoHeight;
     if (rule.value && *rule.value > kNoHeight) rule.low = kNoHeight;
@@ -194,7 +194,7 @@ class AsciiReader {
   }
   [[nodiscard]] const std::string& name() const { return input_.name(); }
 
-  /// Gives each number to take(double) until that returns false.
+  /// Passes each number to take(double) until that returns false.
   template <class Take>
   void read(Take&& take) {
     const std::uint64_t cells = columns_ * rows_;
@@ -204,8 +204,8 @@ class AsciiReader {
       if (word_.empty()) {
         header_.fail({},
                      "holds " + counted(cell, "number") + " where " + std::to_string(columns_) +
-                         " x " + std::to_string(rows_) + " are due",
-                     "fetch the file again; it is cut short");
+                         " x " + std::to_string(rows_) + " are expected",
+                     "the file is truncated: download it again");
       }
       if (parse_sample(word_, value) != word_.data() + word_.size()) {
         if (is_void(word_)) {
@@ -214,7 +214,7 @@ class AsciiReader {
           header_.fail("row " + std::to_string(cell / columns_) + ", column " +
                            std::to_string(cell % columns_),
                        in_quotes(word_) + " is not a number",
-                       "correct it, or name it as the NODATA_value if it means no data");
+                       "correct it, or make it the NODATA_value if it means no data");
         }
       }
       if (!take(value)) return;
@@ -222,8 +222,8 @@ class AsciiReader {
     if (!word_.empty()) {
       header_.fail({},
                    "holds more numbers than the " + std::to_string(columns_) + " x " +
-                       std::to_string(rows_) + " that its head promises",
-                   "correct the head");
+                       std::to_string(rows_) + " that its header promises",
+                   "correct the header");
     }
   }
 
@@ -237,7 +237,8 @@ class AsciiReader {
     return !word.empty() && is_letter(word.front()) &&
            parse_sample(word, number) != word.data() + word.size() && !is_void(word);
   }
-  /// Sets ESRI's keys from GRASS's (r.out.ascii): the borders of the grid instead of its cells.
+  /// Sets Esri's keys from GRASS's (r.out.ascii), which give the borders of the grid instead of the
+  /// size of its cells.
   void translate_grass_header() {
     const auto coordinate = [&](const char* key) {
       if (!header_.has(key)) header_.fail(key, "is missing");
@@ -253,7 +254,7 @@ class AsciiReader {
     const double north = coordinate("north:"), south = coordinate("south:"),
                  east = coordinate("east:"), west = coordinate("west:");
     const std::uint64_t columns = header_.count("cols:"), rows = header_.count("rows:");
-    if (columns == 0 || rows == 0) header_.fail("rows:", "the grid does not have a cell");
+    if (columns == 0 || rows == 0) header_.fail("rows:", "the grid has no cells");
     const double width = (east - west) / static_cast<double>(columns);
     const double height = (north - south) / static_cast<double>(rows);
     if (!(width > 0 && height > 0)) header_.fail("north:", "the borders enclose no area");
@@ -289,8 +290,7 @@ bool is_exact_float(double value) {
          static_cast<double>(static_cast<float>(value)) == value;
 }
 
-/// Samples on their way to a temporary file, as floats as long as these do; NaN where there is no
-/// data.
+/// Collects samples in a temporary file, as floats as long as these are exact; NaN is nodata.
 class SampleSpool {
  public:
   SampleSpool(const std::string& name, ScalarType type)
@@ -344,7 +344,7 @@ class SampleSpool {
   std::size_t filled_ = 0;
 };
 
-/// All samples; the type is what they came to.
+/// Reads all samples; returns them and the type that they turned out to need.
 std::pair<std::unique_ptr<ByteSource>, ScalarType> spooled_samples(AsciiReader& reader,
                                                                    ScalarType type) {
   SampleSpool samples(reader.name(), type);

@@ -27,7 +27,7 @@ constexpr std::uint64_t kMostHeaderBytes = 64u << 10;
 std::string text_of(const fs::path& path) {
   const std::unique_ptr<ByteSource> bytes = open_file(path);
   if (bytes->size() > kMostHeaderBytes) {
-    refuse_grid(path.string(), {}, "is no header of a grid: it is longer than 64 KiB");
+    refuse_grid(path.string(), {}, "is not the header of a grid: it is longer than 64 KiB");
   }
   std::string text(bytes->size(), '\0');
   bytes->read(0, std::as_writable_bytes(std::span(text)));
@@ -63,7 +63,7 @@ std::endian order_of(const GridHeader& header) {
   header.fail("byteorder", "is " + in_quotes(order) + ", neither I (LSBFIRST) nor M (MSBFIRST)");
 }
 
-/// Sizes of a header are as large as somebody wrote: products are checked.
+/// The product of two sizes. Throws: Error if it is too large, because headers may claim anything.
 std::uint64_t product(const GridHeader& header, const std::string& key, std::uint64_t a,
                       std::uint64_t b) {
   if (b != 0 && a > (std::uint64_t{1} << 62) / b) header.fail(key, "is too large");
@@ -75,7 +75,7 @@ std::unique_ptr<PointSource> open_binary_points(std::span<const std::string> fil
   return open_raster_points(files, options, &open_binary_grid);
 }
 
-/// The bytes are plain samples: only the name tells.
+/// The bytes are plain samples, so only the name shows the format.
 bool recognise_nothing(std::span<const std::byte>) { return false; }
 
 }  // namespace
@@ -133,10 +133,10 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
         header.count("totalrowbytes", product(header, "bandrowbytes", bands, band_row));
     band_start = product(header, "bandrowbytes", before, band_row);
   } else {
-    header.fail("layout", "is " + in_quotes(layout) + ", none of BIL, BIP and BSQ");
+    header.fail("layout", "is " + in_quotes(layout) + ", not BIL, BIP or BSQ");
   }
   if (grid.row_bytes < ((columns - 1) * grid.sample_step + 1) * size) {
-    header.fail("totalrowbytes", "is less than a row takes");
+    header.fail("totalrowbytes", "is less than the size of a row");
   }
   grid.first += band_start;
   grid.info.world = header.world(rows, grid.info.comments);
@@ -144,12 +144,12 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
 }
 
 std::unique_ptr<Raster> open_binary_grid(const std::string& file, const RasterOptions& options) {
-  const fs::path beside = binary_header_of(file);
-  if (beside.empty()) {
-    refuse_grid(file, {}, "has no header beside it (.hdr)",
-                "fetch that too: it tells size, type and place of the grid");
+  const fs::path header_file = binary_header_of(file);
+  if (header_file.empty()) {
+    refuse_grid(file, {}, "has no header file next to it (.hdr)",
+                "download that too: it has the size, type and place of the grid");
   }
-  const GridHeader header = read_binary_header(beside.string(), text_of(beside));
+  const GridHeader header = read_binary_header(header_file.string(), text_of(header_file));
   const bool floats = lower_case(fs::path(file).extension().string()) == ".flt";
   PlainGrid grid = describe_binary_grid(file, header, floats, options.band);
   if (options.nodata) set_nodata(*options.nodata, grid);

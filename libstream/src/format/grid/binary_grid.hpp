@@ -10,12 +10,12 @@
 
 namespace terrace::stream {
 
-/// ESRI's binary grids: rows of samples in NAME.flt, .bil, .bip, .bsq or .dem, described by
+/// Opens an Esri binary grid: rows of samples in NAME.flt, .bil, .bip, .bsq or .dem, described by
 /// NAME.hdr. Throws: Error.
 std::unique_ptr<Raster> open_binary_grid(const std::string& file,
                                          const RasterOptions& options = {});
 
-/// The header beside a binary grid; empty if there is none.
+/// The header file next to a binary grid; empty if there is none.
 std::filesystem::path binary_header_of(const std::string& file);
 
 /// The keys and values of a header's lines. file: for messages.

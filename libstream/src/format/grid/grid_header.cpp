@@ -27,7 +27,7 @@ std::optional<double> GridHeader::number(const std::string& key) const {
   double value = 0;
   const char* const end = digits.data() + digits.size();
   if (parse_real(digits.data(), end, value) != end || !std::isfinite(value)) {
-    fail(key, "is " + in_quotes(text(key)) + ", no number");
+    fail(key, "is " + in_quotes(text(key)) + ", not a number");
   }
   return value;
 }
@@ -38,7 +38,7 @@ std::uint64_t GridHeader::count(const std::string& key,
   if (!value && otherwise) return *otherwise;
   if (!value) fail(key, "is missing");
   if (!(*value >= 0 && *value < 0x1p53) || *value != std::floor(*value)) {
-    fail(key, "is " + in_quotes(text(key)) + ", no number of things");
+    fail(key, "is " + in_quotes(text(key)) + ", not a count");
   }
   return static_cast<std::uint64_t>(*value);
 }
@@ -53,14 +53,14 @@ WorldTransform GridHeader::world(std::uint64_t rows, std::vector<std::string>& c
   };
   const double width = first_of({"xdim", "dx", "cellsize"}).value_or(1);
   const double height = first_of({"ydim", "dy", "cellsize"}).value_or(1);
-  if (!(width > 0 && height > 0)) fail("cellsize", "is not above zero");
+  if (!(width > 0 && height > 0)) fail("cellsize", "is not positive");
   const double below = static_cast<double>(rows - 1) * height;
   std::optional<double> x = first_of({"ulxmap", "xllcenter"}), y = number("ulymap");
   if (const auto corner = number("xllcorner"); corner && !x) x = *corner + width / 2;
   if (const auto center = number("yllcenter"); center && !y) y = *center + below;
   if (const auto corner = number("yllcorner"); corner && !y) y = *corner + below + height / 2;
   if (x.has_value() != y.has_value()) {
-    fail(x ? "yllcorner" : "xllcorner", "is missing, although the other is there");
+    fail(x ? "yllcorner" : "xllcorner", "is missing, but the other one is given");
   }
   if (!x) {
     comments.push_back(kNoGeoreferencing);

@@ -12,14 +12,14 @@
 
 namespace terrace::stream {
 
-/// The keys and values in the header of ESRI's grids, or in a separate header file. Keys are in
-/// lower case.
+/// The keys and values of an Esri grid's header, which may be a separate file. Keys are in lower
+/// case.
 class GridHeader {
  public:
   /// file: for messages.
   explicit GridHeader(std::string file) : file_(std::move(file)) {}
 
-  /// The first value of a key counts.
+  /// Sets the value of a key, unless it already has one.
   void set(std::string_view key, std::string_view value);
 
   [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
@@ -32,8 +32,9 @@ class GridHeader {
   [[nodiscard]] std::uint64_t count(const std::string& key,
                                     std::optional<std::uint64_t> otherwise = {}) const;
   /// The transform to the centres of cells, from the lower left corner (xllcorner), the lower left
-  /// cell (xllcenter) or the upper left cell (ulxmap). Without any of them a plain grid, which a
-  /// comment reports. Throws: Error if only x or only y is given, or cells have no size.
+  /// cell (xllcenter) or the upper left cell (ulxmap). Without any of these it is kPlainWorld,
+  /// which is added to the comments. Throws: Error if only x or only y is given, or if the cell
+  /// size is not positive.
   [[nodiscard]] WorldTransform world(std::uint64_t rows, std::vector<std::string>& comments) const;
 
   [[noreturn]] void fail(const std::string& key, const std::string& cause,

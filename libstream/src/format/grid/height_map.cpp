@@ -29,11 +29,11 @@
 namespace terrace::stream {
 namespace {
 
-/// No sample that is made of colours has this value: they have 24 bits.
+/// Samples from colours have 24 bits, so none has this value.
 constexpr std::uint32_t kNoColour = std::numeric_limits<std::uint32_t>::max();
 
-/// What libpng says and does. It is C and leaves by longjmp: exceptions must not pass through it,
-/// so those of the functions that it calls wait here.
+/// State of a reading by libpng. That is C and reports errors by longjmp, so exceptions must not
+/// pass through it; exceptions of the functions that it calls are kept here.
 struct PngReading {
   const ByteSource* bytes = nullptr;
   std::uint64_t at = 0;
@@ -52,7 +52,7 @@ void on_png_read(png_structp png, png_bytep out, std::size_t count) {
   } catch (...) {
     reading->error = std::current_exception();
   }
-  png_error(png, "it ends too early");  // does not return
+  png_error(png, "the file is truncated");  // does not return
 }
 
 [[noreturn]] void on_png_error(png_structp png, png_const_charp message) {
@@ -66,22 +66,22 @@ void on_png_read(png_structp png, png_bytep out, std::size_t count) {
 
 void on_png_warning(png_structp, png_const_charp) {}
 
-/// What the image holds.
+/// The header of the image.
 struct PngHead {
   std::uint32_t columns = 0, rows = 0;
   int bits = 0, colour_type = 0, passes = 1;
   std::optional<unsigned> transparent_grey{};
 };
 
-/// Decoded rows on their way to a temporary file.
+/// Collects decoded rows in a temporary file.
 class RowSpool {
  public:
   RowSpool(const std::string& file, std::uint64_t row_bytes, PngReading& reading)
       : spool_(std::make_unique<Spool>(file)), row_(row_bytes), reading_(reading) {}
 
   [[nodiscard]] std::span<unsigned char> row() { return row_; }
-  /// What earlier passes of an interlaced image left of a row. False if it fails, with the error
-  /// kept for when libpng has returned; so put().
+  /// Reads a row as the earlier passes of an interlaced image left it. On failure this and put()
+  /// return false and keep the exception until libpng has returned.
   bool fetch(std::uint32_t row) noexcept {
     return guarded(
         [&] { spool_->read(row * row_.size(), std::as_writable_bytes(std::span(row_))); });
@@ -108,8 +108,9 @@ class RowSpool {
   PngReading& reading_;
 };
 
-/// Reads the head, and the rows too if there is a spool for them: grey as it is, colours as RGBA of
-/// 8 bits. False if libpng failed. Has no objects with destructors: it may be left by longjmp.
+/// Reads the header, and also the rows if `spool` is not null: grey unchanged, colours as RGBA with
+/// 8 bits each. Returns false if libpng failed. Must not have objects with destructors: longjmp
+/// skips them.
 bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
   png_structp png =
       png_create_read_struct(PNG_LIBPNG_VER_STRING, &reading, &on_png_error, &on_png_warning);
@@ -119,7 +120,7 @@ bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
     return false;
   }
   png_set_read_fn(png, &reading, &on_png_read);
-  // Sizes are judged by the caller. What is not needed is not kept: comments, colour profiles.
+  // The caller checks the sizes. Comments, colour profiles and the like are not kept.
   png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
   png_set_chunk_malloc_max(png, 1u << 20);
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
@@ -145,7 +146,7 @@ bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
     image.passes = png_set_interlace_handling(png);
     png_read_update_info(png, info);
     if (png_get_rowbytes(png, info) != spool->row().size()) {
-      png_error(png, "rows of another length");
+      png_error(png, "rows have another length");
     }
     for (int pass = 0; pass < image.passes; ++pass) {
       for (std::uint32_t row = 0; row < image.rows; ++row) {
@@ -176,7 +177,7 @@ std::unique_ptr<Spool> decode_rows(const std::string& file, std::uint64_t row_by
   return spool.take();
 }
 
-/// Colours as the 24-bit numbers that heights are steps of.
+/// Decodes colours to the 24-bit numbers that encode heights.
 std::unique_ptr<Spool> decode_colours(const std::string& file, std::uint32_t columns,
                                       std::uint32_t rows) {
   const std::uint64_t row_bytes = std::uint64_t{columns} * sizeof(std::uint32_t);
@@ -195,7 +196,7 @@ std::unique_ptr<Spool> decode_colours(const std::string& file, std::uint32_t col
   return spool;
 }
 
-/// Refuses what is larger than the file can hold, and rows that do not fit memory.
+/// Throws: Error if the image is larger than the file can hold, or a row does not fit into memory.
 void check_size(const std::string& file, const PngHead& image, std::uint64_t packed,
                 std::uint64_t row_bytes, std::uint64_t memory_bytes) {
   const std::uint64_t bits =
@@ -206,9 +207,9 @@ void check_size(const std::string& file, const PngHead& image, std::uint64_t pac
   if (image.rows > packed * kDeflateGrowth / stored) {
     refuse_grid(file, {},
                 "claims " + std::to_string(image.columns) + " x " + std::to_string(image.rows) +
-                    " pixels, which cannot be packed in " + counted(packed, "byte"));
+                    " pixels, which do not fit into " + counted(packed, "packed byte"));
   }
-  // libpng holds two rows beside ours.
+  // libpng holds two rows besides ours.
   if (row_bytes > memory_bytes / 4) {
     refuse_grid(file, {},
                 "its rows need " + std::to_string((row_bytes >> 18) + 1) + " MiB, the limit is " +
@@ -239,13 +240,13 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
   const HeightsOfColour colours = options.heights_of_colour;
   if (!grey && colours == HeightsOfColour::none) {
     refuse_grid(
-        file, {}, "is a picture in colours, not of heights",
-        "say how they mean heights, `heights_of_colour` mapbox or terrarium, or look for the "
-        "GeoTIFF");
+        file, {}, "is a colour picture, not a height map",
+        "if its colours encode heights, set `heights_of_colour` to mapbox or terrarium; otherwise "
+        "look for the GeoTIFF");
   }
   if (colours != HeightsOfColour::none &&
       (grey || image.bits == 16 || image.colour_type == PNG_COLOR_TYPE_GRAY_ALPHA)) {
-    refuse_grid(file, {}, "has no colours of 8 bits", "leave `heights_of_colour` out");
+    refuse_grid(file, {}, "has no 8-bit colours", "leave `heights_of_colour` out");
   }
   const ScalarType type = !grey              ? ScalarType::u32
                           : image.bits == 16 ? ScalarType::u16
@@ -279,7 +280,7 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
 }
 
 const Format& png_format() {
-  // `cell` and `crs` can replace a world file.
+  // `cell` and `crs` can replace the sidecars.
   static const Format format{.name = "png",
                              .endings = {".png"},
                              .self_contained = true,

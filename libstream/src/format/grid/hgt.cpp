@@ -35,7 +35,7 @@ struct Corner {
   int longitude = 0, latitude = 0;
 };
 
-/// "N46E008" at the head of a file's name, in any case.
+/// The corner in a file name that begins with "N46E008" or the like, in any case.
 std::optional<Corner> corner_of(const std::string& path) {
   const std::string name = std::filesystem::path(path).filename().string();
   if (name.size() < 7) return std::nullopt;
@@ -61,8 +61,8 @@ std::optional<Corner> corner_of(const std::string& path) {
                 .latitude = north == 'N' ? latitude : -latitude};
 }
 
-/// Columns and rows of so many bytes: a square, but for the tiles of the far north and south, which
-/// have half the columns.
+/// Columns and rows of a tile with that many bytes: a square, except in the far north and south,
+/// where tiles have half the columns.
 std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, std::uint64_t bytes) {
   constexpr std::uint64_t kHalfColumns = 1801, kFullRows = 3601;
   if (bytes == 2 * kHalfColumns * kFullRows) return {kHalfColumns, kFullRows};
@@ -70,25 +70,26 @@ std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, st
       static_cast<std::uint64_t>(std::lround(std::sqrt(static_cast<double>(bytes) / 2)));
   if (side < 2 || side > (1u << 20) || bytes != 2 * side * side) {
     refuse_grid(file, {},
-                "has " + counted(bytes, "byte") + ", which are no square of 16-bit samples",
-                "fetch the file again; it is cut short, or no tile of SRTM");
+                "has " + counted(bytes, "byte") + ", which is not a square of 16-bit samples",
+                "the file is truncated or not an SRTM tile: download it again");
   }
   return {side, side};
 }
 
-/// packed_name: of the tile in its archive; else that of the file tells the place.
+/// packed_name: the tile's name in its archive. If it does not give the place, the name of the file
+/// must.
 PlainGrid describe_tile(const std::string& file, const std::string& packed_name,
                         std::uint64_t bytes) {
   std::optional<Corner> corner = corner_of(packed_name);
   if (!corner) corner = corner_of(file);
   if (!corner) {
-    refuse_grid(file, packed_name, "its name does not tell its place",
-                "name it by its south-west corner, as N46E008.hgt");
+    refuse_grid(file, packed_name, "its name does not show its place",
+                "rename it after its south-west corner, such as N46E008.hgt");
   }
   const auto [columns, rows] = size_of_tile(file, bytes);
   PlainGrid grid = plain_grid("hgt", file, columns, rows, ScalarType::i16, "-32768");
   grid.order = std::endian::big;
-  // Samples lie on the lines of the grid: the outer ones are shared with the neighbours.
+  // Samples are on the lines of the grid: the outer ones are shared with the neighbours.
   grid.info.world.xy = {
       1 / static_cast<double>(columns - 1),   0,
       static_cast<double>(corner->longitude), 0,
@@ -109,22 +110,22 @@ Packing packing_of(const ByteSource& bytes) {
   std::array<std::byte, 4> head{};
   if (bytes.size() < head.size()) return Packing::none;
   bytes.read(0, head);
-  // No tile begins so: these would be heights above 8 km, or below the sea.
+  // No tile begins like this: these bytes would be heights above 8 km.
   if (std::memcmp(head.data(), "PK\3\4", 4) == 0) return Packing::zip;
   if (std::memcmp(head.data(), "\x1f\x8b\x08", 3) == 0) return Packing::gzip;
   return Packing::none;
 }
 
-/// True for a zip archive of which a tile is the first file, or behind small ones and folders.
+/// True for a zip archive whose first file, apart from small ones and folders, is a tile.
 bool recognise_hgt(std::span<const std::byte> head) {
-  // In the header before a packed file.
+  // Offsets in the header of a packed file.
   constexpr std::size_t kPackedBytes = 18, kNameLength = 26, kExtraLength = 28, kName = 30;
   while (head.size() >= kName && std::memcmp(head.data(), "PK\3\4", 4) == 0) {
     const char* const header = reinterpret_cast<const char*>(head.data());
     const std::size_t length = load_little_endian<std::uint16_t>(header + kNameLength);
     if (length > head.size() - kName) return false;
     if (lower_case(std::string(header + kName, length)).ends_with(kEnding)) return true;
-    // What states its size only behind its bytes ends the search, as no header follows there.
+    // A file that states its size after its bytes ends the search: no header is found after it.
     const std::uint64_t next = std::uint64_t{kName} + length +
                                load_little_endian<std::uint16_t>(header + kExtraLength) +
                                load_little_endian<std::uint32_t>(header + kPackedBytes);
@@ -142,7 +143,7 @@ PlainGrid describe_packed_tile(const std::string& file, const PackedFile& packed
   return grid;
 }
 
-/// The tiles of a zip archive: the only one, or a mosaic.
+/// Opens the only tile of a zip archive, or all of them as a mosaic.
 std::unique_ptr<Raster> open_archive(const std::string& file, const RasterOptions& options) {
   const auto archive = std::make_shared<const ZipArchive>(file);
   const std::vector<PackedFile> tiles = archive->find(kEnding);

@@ -15,7 +15,7 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::uint64_t kMostGridCells = 1u << 30;
-/// Bytes that are read at a time.
+/// Bytes read at a time.
 constexpr std::uint64_t kReadBytes = 256u << 10;
 
 class PlainRaster final : public Raster {
@@ -69,8 +69,8 @@ class PlainRaster final : public Raster {
   void check() const {
     const RasterInfo& info = grid_.info;
     const std::uint64_t row = ((info.columns - 1) * grid_.sample_step + 1) * size_;
-    const std::uint64_t there = bytes_->size() > grid_.first ? bytes_->size() - grid_.first : 0;
-    if (there >= row && (there - row) / grid_.row_bytes >= info.rows - 1) return;
+    const std::uint64_t present = bytes_->size() > grid_.first ? bytes_->size() - grid_.first : 0;
+    if (present >= row && (present - row) / grid_.row_bytes >= info.rows - 1) return;
     refuse_grid(bytes_->name(), {},
                 "has " + counted(bytes_->size(), "byte") + ", too few for " +
                     std::to_string(info.columns) + " x " + std::to_string(info.rows) +

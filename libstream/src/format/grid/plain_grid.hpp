@@ -14,8 +14,8 @@
 
 namespace terrace::stream {
 
-/// A raster whose samples are in rows of equal length, as plain bytes: the form of most elevation
-/// grids, possibly after decompression.
+/// A raster with rows of equal length as plain bytes: the form of most elevation grids, possibly
+/// after decompression.
 struct PlainGrid {
   RasterInfo info{};
   NodataRule nodata{};
@@ -26,7 +26,7 @@ struct PlainGrid {
 };
 
 /// The remedy for a damaged file.
-inline constexpr const char* kFetchAgain = "fetch the file again; it is damaged or cut short";
+inline constexpr const char* kFetchAgain = "the file is damaged or truncated: download it again";
 /// Maximum expansion factor of Deflate.
 inline constexpr std::uint64_t kDeflateGrowth = 1032;
 
@@ -35,22 +35,22 @@ inline constexpr std::uint64_t kDeflateGrowth = 1032;
                               std::string remedy = kFetchAgain);
 
 /// Describes a grid of one file: format, name, size, sample type and nodata (as the file's text).
-/// Rows are contiguous. Throws: Error if it has no cell, or 2^30 columns or rows.
+/// Rows are contiguous. Throws: Error if it has no cells, or 2^30 or more columns or rows.
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,
                      std::uint64_t rows, ScalarType type, const std::string& nodata = {});
 
-/// Sets the nodata value from a file's text; empty: none.
+/// Sets the nodata value from a file's text; empty for none.
 void set_nodata(const std::string& text, PlainGrid& grid);
 
 /// Throws: Error if there is no band with that number, counted from 1.
 void check_band(const std::string& file, int band, std::uint64_t bands);
 
-/// The raster over its bytes. Throws: Error if they end before the last sample does.
+/// Opens the raster in `bytes`. Throws: Error if they end before the last sample does.
 std::unique_ptr<Raster> open_plain_grid(PlainGrid grid, std::unique_ptr<ByteSource> bytes);
 
-/// The same with bytes that `unpack` produces when the first window is read. A raster of a mosaic
-/// is opened first for its placement, and again for its samples. RasterInfo::held_bytes of `grid`
-/// is the memory of unpacking.
+/// Like open_plain_grid(), with bytes that `unpack` produces when the first window is read: a
+/// raster of a mosaic is opened first for its placement, and again for its samples.
+/// grid.info.held_bytes: the memory that unpacking takes.
 std::unique_ptr<Raster> open_packed_grid(PlainGrid grid,
                                          std::function<std::unique_ptr<ByteSource>()> unpack);
 

@@ -18,16 +18,17 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::size_t kUnpackBytes = 256u << 10;
-/// Other methods of zip archives may make more of flat ground; no elevation grid needs it.
+/// Throws: Error beyond the growth of Deflate. Other methods of zip archives compress flat ground
+/// even better, but no elevation grid needs that.
 void check_growth(const std::string& file, const std::string& where, std::uint64_t packed,
                   std::uint64_t unpacked) {
   if (unpacked / kDeflateGrowth <= packed) return;
-  refuse_grid(file, where,
-              "states " + counted(unpacked, "byte") + ", which cannot be packed in " +
-                  std::to_string(packed));
+  refuse_grid(
+      file, where,
+      "states " + counted(unpacked, "byte") + ", too many for " + counted(packed, "packed byte"));
 }
 
-/// What is unpacked so far: never more than stated.
+/// Collects unpacked bytes, never more than stated.
 class Unpacked {
  public:
   Unpacked(const std::string& file, const PackedFile& packed)
@@ -43,10 +44,10 @@ class Unpacked {
   }
 
  private:
-  [[noreturn]] void differs(const char* how) const {
+  [[noreturn]] void differs(const char* relation) const {
     refuse_grid(file_, packed_.name,
-                "unpacks to " + std::string(how) + " than the " + counted(packed_.size, "byte") +
-                    " that it states");
+                "unpacks to " + std::string(relation) + " than the " +
+                    counted(packed_.size, "byte") + " that it states");
   }
 
   const std::string& file_;
@@ -79,13 +80,13 @@ std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
     if (zip_stat_index(archive_, number, 0, &status) != 0) continue;
     constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE;
     if ((status.valid & kNeeded) != kNeeded || !lower_case(status.name).ends_with(ending)) continue;
-    // What a Macintosh packs beside each file.
+    // macOS packs a companion file with each file.
     if (std::string_view(status.name).starts_with("__MACOSX/")) continue;
     check_growth(file_, status.name, status.comp_size, status.size);
     found.push_back({.name = status.name, .size = status.size, .number = number});
   }
   if (found.empty()) {
-    refuse_grid(file_, {}, "holds no " + std::string(ending) + " file", "unpack it: 'unzip FILE'");
+    refuse_grid(file_, {}, "has no " + std::string(ending) + " file", "unpack it: 'unzip FILE'");
   }
   return found;
 }
@@ -114,7 +115,7 @@ std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
 PackedFile find_in_gzip(const std::string& file) {
   const std::unique_ptr<ByteSource> bytes = open_file(file);
   constexpr std::uint64_t kLeast = 18;  // a header of 10 bytes and a trailer of 8
-  if (bytes->size() < kLeast) refuse_grid(file, "gzip", "is cut short");
+  if (bytes->size() < kLeast) refuse_grid(file, "gzip", "is truncated");
   std::array<std::byte, 4> trailer{};
   bytes->read(bytes->size() - trailer.size(), trailer);
   PackedFile packed;
@@ -141,7 +142,7 @@ std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFil
     if (stream.avail_in == 0) {
       const auto more =
           static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), bytes->size() - at));
-      if (more == 0) refuse_grid(file, "gzip", "is cut short");
+      if (more == 0) refuse_grid(file, "gzip", "is truncated");
       bytes->read(at, {in.data(), more});
       at += more;
       stream.next_in = reinterpret_cast<Bytef*>(in.data());

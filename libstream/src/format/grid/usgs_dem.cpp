@@ -27,13 +27,13 @@
 namespace terrace::stream {
 namespace {
 
-// Record A: where its fields begin.
+// Record A: the offsets of its fields.
 constexpr std::size_t kLevel = 144, kPattern = 150, kSystem = 156, kZone = 162, kGroundUnit = 528,
                       kHeightUnit = 534, kSides = 540, kCorners = 546, kResolution = 816,
                       kProfiles = 858, kOldEnd = 864, kVerticalDatum = 888, kHorizontalDatum = 890;
 constexpr std::size_t kInteger = 6, kReal = 24, kShortReal = 12, kRecord = 1024;
 constexpr int kNone = -32767;
-/// A profile's number of samples has six digits.
+/// The number of samples in a profile has at most six digits.
 constexpr double kMostRows = 999'999;
 
 std::optional<std::int32_t> integer_in(std::string_view field) {
@@ -44,7 +44,7 @@ std::optional<std::int32_t> integer_in(std::string_view field) {
   return value;
 }
 
-/// Fortran's numbers: the exponent may be a D.
+/// A number as Fortran writes it: the exponent may begin with D.
 std::optional<double> real_in(std::string_view field) {
   field = trim(field);
   if (field.empty() || field.size() > kReal) return std::nullopt;
@@ -57,7 +57,7 @@ std::optional<double> real_in(std::string_view field) {
   return value;
 }
 
-/// Record A.
+/// The fields of record A.
 struct Head {
   enum class Ground { utm, seconds, other };
 
@@ -74,7 +74,7 @@ struct Head {
 
 Head head_of(std::string_view record, const std::string& file) {
   const auto not_a_number = [&](std::size_t at, const char* what) {
-    refuse_grid(file, "byte " + std::to_string(at), std::string(what) + " is no number");
+    refuse_grid(file, "byte " + std::to_string(at), std::string(what) + " is not a number");
   };
   const auto integer = [&](std::size_t at, const char* what) {
     const auto value = integer_in(record.substr(at, kInteger));
@@ -92,7 +92,7 @@ Head head_of(std::string_view record, const std::string& file) {
   head.ground_unit = integer(kGroundUnit, "the unit of the ground");
   head.feet = integer(kHeightUnit, "the unit of heights") == 1;
   if (integer(kPattern, "the pattern") != 1 || integer(kSides, "the number of sides") != 4) {
-    refuse_grid(file, {}, "is no regular grid of four sides",
+    refuse_grid(file, {}, "is not a regular grid with four sides",
                 "convert it: gdal_translate FILE out.tif");
   }
   head.ground = system == 0 || head.ground_unit == 3 ? Head::Ground::seconds
@@ -106,13 +106,13 @@ Head head_of(std::string_view record, const std::string& file) {
   head.height = real(kResolution + kShortReal, kShortReal, "the resolution in y");
   head.step = real(kResolution + 2 * kShortReal, kShortReal, "the resolution of heights");
   if (!(head.width > 0 && head.height > 0 && head.step > 0)) {
-    refuse_grid(file, "byte " + std::to_string(kResolution), "a resolution is not above zero");
+    refuse_grid(file, "byte " + std::to_string(kResolution), "a resolution is not positive");
   }
   head.west = std::min(corners[0], corners[2]);
   head.south = std::min(corners[1], corners[7]);
   head.north = std::max(corners[3], corners[5]);
   if (head.ground != Head::Ground::seconds) {
-    // The corners are those of a quadrangle of the globe; samples lie on multiples of their
+    // The corners are those of a quadrangle of the globe; samples are at multiples of their
     // spacing.
     head.south = std::floor(head.south / head.height) * head.height;
     head.north = std::ceil(head.north / head.height) * head.height;
@@ -137,13 +137,13 @@ Crs usgs_crs(const Head& head, std::vector<std::string>& comments) {
   crs.geographic = head.ground == Head::Ground::seconds;
   crs.horizontal_unit = crs.geographic ? "degree" : head.ground_unit == 1 ? "foot" : "metre";
   crs.vertical_unit = head.feet ? "foot" : "metre";
-  // NAD 27, WGS 72, WGS 84, NAD 83: EPSG's codes of longitude and latitude, before UTM's zones, and
-  // how many zones have one.
+  // NAD 27, WGS 72, WGS 84, NAD 83: the EPSG code for longitude and latitude, the number to which
+  // the UTM zone is added, and the number of zones that have a code.
   constexpr std::array<std::array<int, 3>, 4> kDatums{
       {{4267, 26700, 22}, {4322, 32200, 60}, {4326, 32600, 60}, {4269, 26900, 23}}};
   const int datum = head.horizontal_datum.value_or(1);
   if (!head.horizontal_datum) {
-    comments.emplace_back("its head names no datum: NAD 27, as of all files before they named one");
+    comments.emplace_back("its header names no datum, so it is NAD 27, as in all early files");
   }
   if (datum >= 1 && datum <= 4) {
     const auto [degrees, utm, zones] = kDatums[static_cast<std::size_t>(datum - 1)];
@@ -151,14 +151,14 @@ Crs usgs_crs(const Head& head, std::vector<std::string>& comments) {
     if (head.ground == Head::Ground::seconds) crs.epsg = degrees;
     if (head.ground == Head::Ground::utm && zone) crs.epsg = utm + head.zone;
   }
-  if (crs.epsg == 0) comments.emplace_back("its head tells no CRS that has a code");
+  if (crs.epsg == 0) comments.emplace_back("its header names no CRS with an EPSG code");
   if (!head.feet && head.vertical_datum == 2) crs.vertical_epsg = 7968;  // NGVD 29
   if (!head.feet && head.vertical_datum == 3) crs.vertical_epsg = 5703;  // NAVD 88
   return crs;
 }
 
-/// The fields of profiles: numbers of so many characters at most, after any white space. Records
-/// are padded, and some files break lines.
+/// Reads the fields of profiles: numbers with a limited number of characters, after any white
+/// space. Records are padded, and some files have line breaks.
 class Fields {
  public:
   Fields(Input& input, const std::string& file) : input_(input), file_(file) {}
@@ -203,8 +203,8 @@ class Fields {
   }
   [[noreturn]] void refuse(std::string_view field, const char* what) const {
     const std::string where = "byte " + std::to_string(input_.offset());
-    if (field.empty()) refuse_grid(file_, where, std::string("ends where ") + what + " is due");
-    refuse_grid(file_, where, in_quotes(field) + " is no " + what);
+    if (field.empty()) refuse_grid(file_, where, std::string("the file ends before a ") + what);
+    refuse_grid(file_, where, in_quotes(field) + " is not a " + what);
   }
 
   Input& input_;
@@ -212,7 +212,7 @@ class Fields {
   std::size_t last_ = 0;  ///< characters of the field last returned
 };
 
-/// Columns of samples on their way to a file of rows: some columns at a time.
+/// Writes columns of samples to a file of rows, some columns at a time.
 class ColumnSpool {
  public:
   ColumnSpool(const std::string& name, std::uint64_t columns, std::uint64_t rows)
@@ -223,11 +223,11 @@ class ColumnSpool {
     band_.assign(at_once_ * rows_, kNone);
   }
 
-  /// Rows count from the north. Columns do not go backwards.
+  /// Sets a sample. Rows count from the north; columns must not decrease.
   void put(std::uint64_t column, std::uint64_t row, std::int32_t value) {
     band_[row * at_once_ + column % at_once_] = value;
   }
-  /// No more comes of columns before this one.
+  /// Announces that no more samples of earlier columns follow.
   void begin(std::uint64_t column) {
     for (; first_ + at_once_ <= column; first_ += at_once_) flush();
   }
@@ -254,7 +254,7 @@ class ColumnSpool {
   std::vector<std::int32_t> band_;
 };
 
-/// Record B after record B. west: x of the first one.
+/// Reads all records B. west: set to x of the first one.
 std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const std::string& file,
                                           const std::stop_token& stop, double& west) {
   Fields fields(input, file);
@@ -262,7 +262,7 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
   for (std::uint64_t column = 0; column < head.columns; ++column) {
     if (stop.stop_requested()) throw Stopped();
     const std::string where = "profile " + std::to_string(column + 1);
-    // A quadrangle's corners cut off little of the grid; one that is nearly empty is made up.
+    // A quadrangle fills most of its grid, so a nearly empty grid is a forgery.
     constexpr std::uint64_t kMostRowsPerByte = 1;
     if (column * head.rows > kMostRowsPerByte * input.offset()) {
       refuse_grid(file, where, "the grid has hardly any samples");
@@ -279,21 +279,21 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
     fields.real("greatest height");
     if (column == 0) west = x;
     if (!(std::abs(x - west - static_cast<double>(column) * head.width) < head.width)) {
-      refuse_grid(file, where, "is not beside the one before it");
+      refuse_grid(file, where, "is not next to the previous one");
     }
     const double offset = datum / head.step;
     if (std::abs(offset) > 1e9 || std::abs(offset - std::round(offset)) > 1e-6) {
-      refuse_grid(file, where, "its local datum is no multiple of the resolution of heights",
+      refuse_grid(file, where, "its local datum is not a multiple of the resolution of heights",
                   "convert it: gdal_translate FILE out.tif");
     }
     const double up = std::floor((y - head.south) / head.height + 0.5);
-    if (!(std::abs(up) < 0x1p31)) refuse_grid(file, where, "does not lie in the grid");
+    if (!(std::abs(up) < 0x1p31)) refuse_grid(file, where, "is outside the grid");
     spool.begin(column);
     for (std::int32_t i = 0; i < samples; ++i) {
       const std::int32_t raw = fields.integer("height");
       const std::int64_t row =
           static_cast<std::int64_t>(head.rows) - 1 - static_cast<std::int64_t>(up) - i;
-      // What lies outside is the rest of a quadrangle that the corners cut off.
+      // Samples outside belong to parts of the quadrangle beyond the corners.
       if (raw == kNone || row < 0 || row >= static_cast<std::int64_t>(head.rows)) continue;
       spool.put(column, static_cast<std::uint64_t>(row),
                 raw + static_cast<std::int32_t>(std::lround(offset)));
@@ -328,9 +328,9 @@ std::unique_ptr<Raster> open_usgs_dem(const std::string& file, const std::stop_t
   Input input(file, stop);
   const std::string_view record = input.fill(kRecord);
   if (record.size() < kOldEnd) {
-    refuse_grid(input.name(), {}, "is shorter than the head of a USGS DEM");
+    refuse_grid(input.name(), {}, "is shorter than the header of a USGS DEM");
   }
-  // In the old form record B follows at once where there is no padding.
+  // In the old form, record B follows immediately if there is no padding.
   const std::string_view rest =
       trim_left(record.substr(kOldEnd, std::min(record.size(), kRecord) - kOldEnd));
   const bool cut =
@@ -345,7 +345,7 @@ std::unique_ptr<Raster> open_usgs_dem(const std::string& file, const std::stop_t
   input.consume(bytes);
   double west = head.west;
   std::unique_ptr<ByteSource> samples = read_profiles(input, head, input.name(), stop, west);
-  // Longitudes and latitudes are those of the head, which has them to more digits.
+  // Take longitudes from the header, which has them with more digits.
   if (head.ground == Head::Ground::seconds) west = head.west;
   const double unit = head.ground == Head::Ground::seconds ? 3600.0 : 1.0;
   grid.info.world.xy = {head.width / unit, 0, west / unit, 0, -head.height / unit,
