@@ -19,7 +19,7 @@
 namespace terrace::stream {
 namespace {
 
-/// As a program would have it: coordinates that are not aligned, and an attribute between them.
+/// A row as a program might have it: unaligned coordinates with an attribute between them.
 #pragma pack(push, 1)
 struct PackedRow {
   std::uint8_t kind;
@@ -55,7 +55,7 @@ std::vector<PackedRow> some_rows() {
   return rows;
 }
 
-TEST(MemorySource, PointsComeInTheirOrderWithTheirAttributes) {
+TEST(MemorySource, DeliversPointsInOrderWithTheirAttributes) {
   const std::vector<PackedRow> rows = some_rows();
   for (const std::size_t ahead : {std::size_t{0}, std::size_t{3}}) {
     const auto source =
@@ -102,9 +102,9 @@ TEST(MemorySource, SelectsPointsAndReadsColumnsBackwards) {
   EXPECT_EQ(seen, 357U);
 }
 
-TEST(MemorySource, LeavesOutPointsWithoutACoordinateAndCountsThem) {
+TEST(MemorySource, SkipsAndCountsPointsWithNaN) {
   std::vector<PackedRow> rows = some_rows();
-  for (std::size_t i = 100; i < 350; ++i) rows[i].z = std::nan("");  // a block and more
+  for (std::size_t i = 100; i < 350; ++i) rows[i].z = std::nan("");  // more than a block
   rows.back().y = std::nanf("");
   const auto source = open_memory(points_of_rows(rows), {.block_points = 100});
   PointBlock block;
@@ -123,7 +123,7 @@ TEST(MemorySource, LeavesOutPointsWithoutACoordinateAndCountsThem) {
   EXPECT_EQ(source->progress().nodata, 251U);
 }
 
-TEST(MemorySource, RefusesPointsThatAreNowhere) {
+TEST(MemorySource, RejectsInfiniteCoordinates) {
   std::vector<PackedRow> rows = some_rows();
   rows[1234].z = -std::numeric_limits<double>::infinity();
   const auto source = open_memory(points_of_rows(rows));
@@ -140,7 +140,7 @@ TEST(MemorySource, RefusesPointsThatAreNowhere) {
 }
 
 TEST(MemorySource, RastersSkipCellsWithoutData) {
-  // Columns of a larger array, transposed: a step of a row in memory is a step of a column here.
+  // Part of a larger array, transposed: a row step in memory is a column step here.
   constexpr std::uint64_t kColumns = 37, kRows = 53;
   std::vector<float> samples(kColumns * kRows * 2);
   const auto index = [](std::uint64_t column, std::uint64_t row) {
@@ -182,7 +182,7 @@ TEST(MemorySource, RastersSkipCellsWithoutData) {
   EXPECT_EQ(source->progress().nodata, 8U * 18U);
 }
 
-TEST(MemorySource, EachAttributeHasAColumn) {
+TEST(MemorySource, RejectsColumnsThatDoNotMatchTheAttributes) {
   MemoryPoints points = points_of_rows({});
   points.attributes.emplace_back();
   EXPECT_THROW((void)open_memory(points), std::invalid_argument);

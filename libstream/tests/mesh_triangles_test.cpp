@@ -97,7 +97,7 @@ class MeshTriangles : public testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(MeshTriangles, AreThoseOfTheMesh) {
+TEST_F(MeshTriangles, MatchTheMesh) {
   const std::string obj =
       "v 0 0 0\nv 1 0 -0.0\nv 1 1 0.1\nf 1 2 3\nv 0 1 0\nv -0.5 0.5 1e-300\nf 1 2 3 4 5\nf -1 -2 "
       "-3\n";
@@ -144,7 +144,7 @@ TEST_F(MeshTriangles, AreThoseOfTheMesh) {
 }
 
 // More vertices than are kept in memory, referenced in random order.
-TEST_F(MeshTriangles, NameVerticesAnywhereInALargeFile) {
+TEST_F(MeshTriangles, ReferToVerticesAnywhereInALargeFile) {
   std::mt19937_64 random(77);
   constexpr std::uint32_t kVertices = 750'001, kTriangles = 20'000;
   std::vector<Point3> vertices(kVertices);
@@ -168,9 +168,9 @@ TEST_F(MeshTriangles, NameVerticesAnywhereInALargeFile) {
   EXPECT_TRUE(same_bits(triangles_of({file}, 10000), expected));
 }
 
-TEST_F(MeshTriangles, WhereThereAreNoneIsNamed) {
+TEST_F(MeshTriangles, ErrorsNameFilesWithoutTriangles) {
   EXPECT_NE(message({put("a.obj", "v 0 0 0\nv 1 1 1\n")}).find("no faces"), std::string::npos);
-  EXPECT_NE(message({put("a.xyz", "0 0 0\n1 1 1\n")}).find("is xyz, which has no triangles"),
+  EXPECT_NE(message({put("a.xyz", "0 0 0\n1 1 1\n")}).find("xyz has no triangles"),
             std::string::npos);
   EXPECT_NE(message({put("b.obj", "v 0 0 0\nf 1 2 3\n")}).find("line 2"), std::string::npos);
   EXPECT_NE(

@@ -27,7 +27,7 @@ std::vector<std::uint8_t> decode(const std::string& path, std::uint32_t format, 
   return pixels;
 }
 
-TEST(Png, GivesBackEveryPixel) {
+TEST(Png, RoundTripsEveryPixel) {
   const TempFolder folder;
   std::mt19937_64 random(1);
   const std::uint32_t formats[] = {PNG_FORMAT_GRAY, PNG_FORMAT_GA, PNG_FORMAT_RGB, PNG_FORMAT_RGBA};
@@ -52,7 +52,7 @@ TEST(Png, SixteenBitsAreBigEndianInTheFile) {
   const std::string path = (folder.path() / "g.png").string();
   const std::vector<std::uint16_t> samples{0, 1, 255, 256, 0x1234, 65535};
   write_png_grey16(path, 3, 2, samples);
-  // Read with libpng's low-level interface, which gives the bytes as they are in the file.
+  // libpng's low-level interface gives the bytes as they are in the file.
   FILE* file = std::fopen(path.c_str(), "rb");
   ASSERT_NE(file, nullptr);
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
@@ -70,7 +70,7 @@ TEST(Png, SixteenBitsAreBigEndianInTheFile) {
   std::fclose(file);
 }
 
-TEST(Png, RefusesAndLeavesNothing) {
+TEST(Png, ErrorsLeaveNoFiles) {
   const TempFolder folder;
   const auto path = folder.path() / "i.png";
   EXPECT_NE(error_of([&] { write_png(path, 0, 5, 3, {}); }), "");

@@ -76,7 +76,7 @@ std::string error_of(Act&& act) {
   return {};
 }
 
-/// Equal bit for bit: distinguishes 0 from -0.
+/// True if equal bit for bit, which distinguishes 0 from -0.
 inline bool same_bits(std::span<const Point3> a, std::span<const Point3> b) {
   return a.size() == b.size() &&
          (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
@@ -109,7 +109,7 @@ void append_values(std::vector<std::byte>& payload, const T&... values) {
   (append(values), ...);
 }
 
-/// Appends a value of that type with any bits, but finite for a double or a float.
+/// Appends a random value of that type: any bits, but finite for floats and doubles.
 inline void append_any(std::vector<std::byte>& payload, ScalarType type, std::mt19937_64& random) {
   if (type == ScalarType::f64) return append_values(payload, any_double(random));
   if (type == ScalarType::f32) {

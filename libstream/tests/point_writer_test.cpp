@@ -32,8 +32,8 @@ std::vector<PointBlock> random_blocks(std::size_t count) {
   return blocks;
 }
 
-// Formats that take their lattice from the first points too.
-TEST(PointWriter, TheFileIsTheSameIfThreadsEncode) {
+// Includes formats that take their lattice from the first points.
+TEST(PointWriter, ThreadsDoNotChangeTheFile) {
   const TempFolder folder;
   const std::vector<PointBlock> blocks = random_blocks(40);
   for (const std::string ending : {"xyz", "csv", "ply", "las", "laz", "copc.laz"}) {
@@ -46,7 +46,7 @@ TEST(PointWriter, TheFileIsTheSameIfThreadsEncode) {
 
     const auto writer = open_point_writer(many, kHeader);
     std::vector<PointWriter::EncodedPtr> encoded(blocks.size());
-    for (std::size_t done = 0; done < blocks.size(); done += 10) {  // also while some are appended
+    for (std::size_t done = 0; done < blocks.size(); done += 10) {  // encode while others append
       std::vector<std::jthread> threads;
       for (std::size_t first = done; first < done + 2; ++first) {
         threads.emplace_back([&, first] {
@@ -67,7 +67,7 @@ TEST(PointWriter, TheFileIsTheSameIfThreadsEncode) {
   }
 }
 
-TEST(PointWriter, APointThatDoesNotFitIsToldByItsNumberInTheFile) {
+TEST(PointWriter, ReportsTheNumberOfAPointThatDoesNotFit) {
   const TempFolder folder;
   const PointHeader header{.lattice = Lattice{.scale = {0.01, 0.01, 0.01}, .offset = {}}};
   for (const std::string ending : {"las", "laz", "copc.laz"}) {

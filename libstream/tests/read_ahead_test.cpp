@@ -70,7 +70,7 @@ TEST(ReadAhead, DeliversTheSameStream) {
   }
 }
 
-TEST(ReadAhead, AnErrorComesInItsPlace) {
+TEST(ReadAhead, ErrorsFollowTheBlocksBeforeThem) {
   const auto source = read_ahead(std::make_unique<Counting>(5, true), 3);
   PointBlock block;
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(source->next(block));
@@ -78,7 +78,7 @@ TEST(ReadAhead, AnErrorComesInItsPlace) {
   EXPECT_THROW(source->next(block), Error);
 }
 
-TEST(ReadAhead, ReadsNoFurtherThanAskedAndStopsAtOnce) {
+TEST(ReadAhead, ReadsNoFurtherThanRequestedAndStopsImmediately) {
   std::atomic<int> made = 0;
   {
     const auto source = read_ahead(std::make_unique<Counting>(1 << 30, false, &made), 4);
@@ -88,7 +88,7 @@ TEST(ReadAhead, ReadsNoFurtherThanAskedAndStopsAtOnce) {
   EXPECT_LE(made, 1 + 4 + 1);
 }
 
-/// A block, then a wait that only a stop ends.
+/// Delivers a block, then waits until it is stopped.
 class Waiting final : public PointSource {
  public:
   explicit Waiting(std::stop_token stop) : stop_(std::move(stop)) {}
@@ -113,13 +113,13 @@ class Waiting final : public PointSource {
   bool delivered_ = false;
 };
 
-TEST(ReadAhead, ItsEndAndTheCallersStopEndTheReading) {
+TEST(ReadAhead, DestructionAndTheCallersStopEndReading) {
   PointBlock block;
   {
     const std::stop_source reading;
     const auto source = read_ahead(std::make_unique<Waiting>(reading.get_token()), 4, reading);
     ASSERT_TRUE(source->next(block));
-    // The thread waits, or is about to: the destructor ends it.
+    // The thread waits or is about to wait; the destructor ends it.
   }
   std::stop_source caller;
   const std::stop_source reading;
@@ -141,7 +141,7 @@ class NamedPipe {
   std::string path_;
 };
 
-TEST(ReadAhead, AStopEndsOpeningAPipeWithoutAWriter) {
+TEST(ReadAhead, StopsOpeningAPipeWithoutAWriter) {
   const NamedPipe pipe;
   const std::array<std::string, 1> files{pipe.path()};
   std::stop_source stop;
@@ -149,10 +149,10 @@ TEST(ReadAhead, AStopEndsOpeningAPipeWithoutAWriter) {
   EXPECT_THROW((void)open_source(files, {.stop = stop.get_token()}), Stopped);
 }
 
-TEST(ReadAhead, ASourceEndsWhileItsPipeIdles) {
+TEST(ReadAhead, CanBeDestroyedWhileItsPipeIsIdle) {
   const NamedPipe pipe;
   const std::array<std::string, 1> files{pipe.path()};
-  // Opened for reading too, so that it opens at once and has a reader.
+  // Also open for reading, so that opening returns immediately and the pipe has a reader.
   const int writer = ::open(pipe.path().c_str(), O_RDWR | O_CLOEXEC);
   std::string lines;
   while (lines.size() < 8192) lines += "1 2 3\n";

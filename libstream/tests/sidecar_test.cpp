@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Files next to a raster: world files and FILE.aux.xml. What GDAL takes from them is the oracle.
+// SPDX-License-Identifier: Apache-2.0 Files next to a raster: world files and FILE.aux.xml,
+// compared with GDAL.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -30,7 +30,7 @@ class Sidecars : public ::testing::Test {
   std::string put(const std::string& name, const std::string& text) const {
     return write_text(path(name), text);
   }
-  /// Heights 1 to 9 in 3 x 3 cells, without a place, nodata value or CRS.
+  /// Heights 1 to 9 in 3 x 3 cells, without georeferencing, nodata value or CRS.
   void put_plain() const {
     write_tiff(path("a.tif"), small(), samples());
     put("b.hdr", "ncols 3\nnrows 3\nnbits 16\npixeltype unsignedint\nbyteorder I\n");
@@ -42,7 +42,7 @@ class Sidecars : public ::testing::Test {
         "ncols 3\nnrows 3\nxllcorner 1\nyllcorner 2\ncellsize 2\nNODATA_value 4\n"
         "1 2 3 4 5 6 7 8 9\n");
   }
-  /// The same with all of them, of other values.
+  /// The same with georeferencing, nodata value and CRS that differ from the sidecar's.
   void put_full() const {
     const auto place = placed_at(100, 200, 10);
     TiffSpec spec = small();
@@ -90,7 +90,7 @@ class Sidecars : public ::testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(Sidecars, WorldFilesPlaceWhatHasNoPlace) {
+TEST_F(Sidecars, WorldFilesGeoreferenceRastersThatAreNot) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   put_plain();
   ASSERT_EQ(std::system(("cd '" + path("") +
@@ -117,7 +117,7 @@ TEST_F(Sidecars, WorldFilesPlaceWhatHasNoPlace) {
   }
 }
 
-TEST_F(Sidecars, AnInternalPlaceOverridesAWorldFile) {
+TEST_F(Sidecars, InternalGeoreferencingOverridesAWorldFile) {
   put_full();
   const std::array<double, 6> own{10, 0, 105, 0, -10, 195};
   put("f.tfw", "10\n0\n0\n-10\n105.0001\n195\n");
@@ -126,12 +126,12 @@ TEST_F(Sidecars, AnInternalPlaceOverridesAWorldFile) {
   put("f.tfw", "10\n0\n0\n-10\n115\n195\n");
   EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);
   EXPECT_NE(read_file(path("f.tif")).info.note.find("f.tfw places"), std::string::npos);
-  // One that does not count may be damaged.
+  // One that is ignored may be damaged.
   put("f.tfw", "10\n");
   EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);
 }
 
-TEST_F(Sidecars, AWorldFileThatCountsMustBeWhole) {
+TEST_F(Sidecars, RejectsADamagedWorldFileThatIsNeeded) {
   put_plain();
   for (const char* const text :
        {"", "1\n0\n0\n-1\n5\n", "1\n0\n0\n-1\n5\nx\n", "1\n0\n0\n-1\nnan\n5\n",
@@ -143,7 +143,7 @@ TEST_F(Sidecars, AWorldFileThatCountsMustBeWhole) {
   EXPECT_EQ(read_file(path("a.tif")).info.world.xy[0], 1.5);
 }
 
-TEST_F(Sidecars, AWorldFilePlacesWhatHasControlPointsAlone) {
+TEST_F(Sidecars, AWorldFileGeoreferencesARasterWithControlPoints) {
   TiffSpec spec = small();
   spec.more = [](TIFF* tiff) {
     const std::array<double, 12> ties{0, 0, 0, 1, 1, 0, 3, 3, 0, 5, 9, 0};
@@ -160,7 +160,7 @@ constexpr char kPam[] =
     "<PAMRasterBand band=\"1\"><NoDataValue>5</NoDataValue><UnitType>ft</UnitType>"
     "<Offset>7</Offset><Scale>3</Scale></PAMRasterBand></PAMDataset>";
 
-TEST_F(Sidecars, AuxXmlCountsAsInGdal) {
+TEST_F(Sidecars, AuxXmlAppliesAsInGdal) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   put_plain();
   put_full();
@@ -177,7 +177,7 @@ TEST_F(Sidecars, AuxXmlCountsAsInGdal) {
   EXPECT_EQ(read_file(path("b.bil")).info.crs.epsg, 32633);
 }
 
-TEST_F(Sidecars, TheNodataValueOfAuxXmlReplacesThatOfAGeoTiff) {
+TEST_F(Sidecars, NodataOfAuxXmlOverridesThatOfAGeoTiff) {
   put_full();
   EXPECT_EQ(read_file(path("f.tif")).points.size(), 8U);
   put("f.tif.aux.xml", kPam);
@@ -186,9 +186,9 @@ TEST_F(Sidecars, TheNodataValueOfAuxXmlReplacesThatOfAGeoTiff) {
   for (const Point3& p : all.points.positions) heights.push_back(p[2]);
   std::sort(heights.begin(), heights.end());
   EXPECT_EQ(heights, (std::vector<double>{1, 2, 3, 4, 6, 7, 8, 9}));
-  // A note names all that differs.
-  for (const char* const words : {"its nodata value overrides", "its place overrides",
-                                  "its CRS overrides", "its scale does not count"}) {
+  // Notes name all differences.
+  for (const char* const words : {"its nodata value overrides", "its georeferencing overrides",
+                                  "its CRS overrides", "its scale is ignored"}) {
     EXPECT_NE(all.info.note.find(words), std::string::npos) << words << ": " << all.info.note;
   }
   put("f.tif.aux.xml",
@@ -199,22 +199,21 @@ TEST_F(Sidecars, TheNodataValueOfAuxXmlReplacesThatOfAGeoTiff) {
   EXPECT_EQ(read_file(path("f.tif")).points.size(), 8U);
 }
 
-TEST_F(Sidecars, OtherFormatsKeepWhatTheySay) {
+TEST_F(Sidecars, OtherFormatsOverrideAuxXml) {
   put_plain();
   put("h.asc.aux.xml", kPam);
   const AllPoints all = read_file(path("h.asc"));
   EXPECT_EQ(all.points.size(), 8U);
   EXPECT_EQ(all.info.nodata, 4);
-  EXPECT_NE(all.info.note.find("its nodata value does not count"), std::string::npos)
-      << all.info.note;
+  EXPECT_NE(all.info.note.find("its nodata value is ignored"), std::string::npos) << all.info.note;
   EXPECT_NE(all.info.note.find("the file has its own"), std::string::npos) << all.info.note;
-  // What a file does not say is added, without a note.
+  // Values that the file lacks are added without a note.
   put("g.asc.aux.xml",
       "<PAMDataset><PAMRasterBand band='1'><NoDataValue>5</NoDataValue>"
       "</PAMRasterBand></PAMDataset>");
   EXPECT_EQ(read_file(path("g.asc")).points.size(), 8U);
   EXPECT_EQ(read_file(path("g.asc")).info.note, "");
-  // A virtual raster has no sidecar.
+  // A virtual raster's sidecar is ignored.
   put("v.vrt",
       "<VRTDataset rasterXSize='3' rasterYSize='3'><VRTRasterBand dataType='UInt16' band='1'>"
       "<SimpleSource><SourceFilename relativeToVRT='1'>a.tif</SourceFilename></SimpleSource>"

@@ -52,7 +52,7 @@ class Redirected {
   int standard_, saved_;
 };
 
-TEST_F(Source, TellsFormatsByContentBeforeEnding) {
+TEST_F(Source, RecognisesFormatsByContentBeforeEnding) {
   EXPECT_EQ(read_all({put("a.txt", kPly)}).info.format, "ply");
   EXPECT_EQ(read_all({put("a.ply", "1 2 3\n")}).info.format, "xyz");
   EXPECT_EQ(read_all({put("noending", "1;2;3\n")}).info.format, "xyz");
@@ -60,7 +60,7 @@ TEST_F(Source, TellsFormatsByContentBeforeEnding) {
   EXPECT_NE(refusal({put("c.csv", "hello, world\n")}).find("no points"), std::string::npos);
 }
 
-TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
+TEST_F(Source, ExpandsFoldersListsAndPatterns) {
   namespace fs = std::filesystem;
   fs::create_directories(folder_.path() / "survey" / "b");
   const std::string one = put("survey/1.xyz", "1 0 0\n"), two = put("survey/b/2.csv", "2 0 0\n"),
@@ -97,11 +97,11 @@ TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
   EXPECT_EQ(heads({survey}, {.format = "ply"}), "7");
 
   for (const auto& [name, words] : std::vector<std::pair<std::string, std::string>>{
-           {survey + "/*.las", "no file has such a name"},
+           {survey + "/*.las", "no file matches"},
            {(folder_.path() / "survey" / "none.xyz").string(), "none.xyz"},
            {"@" + put("empty.lst", "# nothing\n"), "names no file"},
            {"@" + put("wrong.lst", "survey\nsurvey/none.xyz\n"), "line 2"},
-           {"@" + put("nested.lst", "@other.lst\n"), "lists do not name lists"},
+           {"@" + put("nested.lst", "@other.lst\n"), "a list cannot contain lists"},
            {"@" + (folder_.path() / "none.lst").string(), "none.lst"}}) {
     EXPECT_NE(refusal({name}).find(words), std::string::npos) << refusal({name});
   }
@@ -113,7 +113,7 @@ TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
             std::string::npos);
 }
 
-TEST_F(Source, RefusesWhatItDoesNotKnow) {
+TEST_F(Source, RejectsUnknownFormats) {
   const std::string prose = put("readme", "This is a text of 3 lines\nwith 1 2 3\nin it\n");
   EXPECT_NE(refusal({prose}).find("neither content nor name"), std::string::npos);
   EXPECT_NE(refusal({put("x.gtx", std::string(50, '\1'))}).find("gdal_translate"),
@@ -126,7 +126,7 @@ TEST_F(Source, RefusesWhatItDoesNotKnow) {
   EXPECT_NE(refusal({folder_.path().string()}).find("e.csv: the file is empty"), std::string::npos);
 }
 
-TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
+TEST_F(Source, NamesUnsupportedFormatsAndARemedy) {
   using std::string_literals::operator""s;
   std::string tar(512, '\0');
   tar.replace(257, 5, "ustar");
@@ -152,7 +152,7 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
       {tar, "tar archive", "tar xf"},
       {"version https://git-lfs.github.com/spec/v1\n", "Git LFS", "git lfs pull"}};
   for (const auto& [content, name, remedy] : by_content) {
-    // Whatever its name.
+    // With any name.
     for (const char* file : {"a.tif", "b.xyz", "noending"}) {
       const std::string text = refusal({put(file, content)});
       EXPECT_NE(text.find(name), std::string::npos) << text;
@@ -169,7 +169,7 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
     const std::string text = refusal({put(file, binary)});
     EXPECT_NE(text.find(name), std::string::npos) << text;
   }
-  // A readable file is read, whatever its name says.
+  // A readable file is read whatever its name.
   EXPECT_EQ(read_all({put("h.laz", "1 2 3\n")}).info.format, "xyz");
 }
 
@@ -197,7 +197,7 @@ TEST_F(Source, ChainedFilesMustAgree) {
   EXPECT_NE(refusal({"-", "-"}, {.format = "xyz"}).find("named twice"), std::string::npos);
 }
 
-TEST_F(Source, ChainedFilesNeedToAgreeInWhatIsKeptOnly) {
+TEST_F(Source, ChainedFilesMustAgreeOnlyInKeptAttributes) {
   const std::vector<std::string> files{put("a.csv", "x,y,z,a,b\n1,2,3,4,5\n"),
                                        put("b.csv", "x,y,z,c,a\n6,7,8,9,10\n"),
                                        put("c.csv", "x,y,z,b,a\n1,1,1,2,20\n")};
@@ -285,7 +285,7 @@ TEST_F(Source, TextGoesToStandardOutput) {
             std::string::npos);
 }
 
-TEST_F(Source, PromisesInAPipeAreNotBelieved) {
+TEST_F(Source, DoesNotTrustCountsInAPipe) {
   // Nothing is known about the bytes to come, so no memory may be allocated for them.
   const std::string text =
       "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000000000\n"
@@ -302,7 +302,7 @@ TEST_F(Source, PromisesInAPipeAreNotBelieved) {
   EXPECT_NE(error.find("ends in item 2 of element 'vertex'"), std::string::npos) << error;
 }
 
-TEST_F(Source, CrsOfTheCallerReplacesTheFiles) {
+TEST_F(Source, TheCallersCrsOverridesThatOfTheFiles) {
   Crs crs;
   crs.epsg = 32632;
   const AllPoints all = read_all({put("g.csv", "lon,lat,height\n1,2,3\n")}, {.crs = crs});
@@ -328,7 +328,7 @@ TEST(ToWorld, LeavesPointsWithoutTransformBitForBit) {
   EXPECT_TRUE(same_bits(block.positions, before));
 }
 
-TEST(OpenSource, RefusesNoNamesAndBlocksOfNoPoints) {
+TEST(OpenSource, RejectsMissingNamesAndEmptyBlocks) {
   EXPECT_THROW((void)open_source({}), std::invalid_argument);
   SourceOptions options;
   options.block_points = 0;

@@ -574,7 +574,7 @@ class NameTest(ProcessTest):
 
     def test_standard_input_is_named_in_words(self):
         for text, cause in (('', 'the file is empty'),
-                            ('This is prose.\n', 'neither content nor name tell its format')):
+                            ('This is prose.\n', 'neither content nor name shows its format')):
             with self.subTest(text=text):
                 result = terrace('info', '-', input=text)
                 self.assertEqual(result.returncode, 1)

@@ -159,12 +159,12 @@ class SelectionTest(unittest.TestCase):
                                  [list(map(float, row)) for row in second[1:]])
         # A folder of several formats.
         self.run_ok('convert', self.file, '-o', os.path.join(folder, 'more', 'all.ply'))
-        self.assertIn('or select those of a folder by --input-format', self.terrace('info', folder).stderr)
+        self.assertIn('or select files of a folder by --input-format', self.terrace('info', folder).stderr)
         told = json.loads(self.run_ok('info', folder, '--input-format', 'ply', '--json'))
         self.assertEqual((told['points'], told['files'], told['format']), (20000, 1, 'ply'))
         result = self.terrace('build', folder + '/*.las', '-o', self.path('none.st'))
         self.assertEqual(result.returncode, 1)
-        self.assertIn('no file has such a name', result.stderr)
+        self.assertIn('no file matches', result.stderr)
 
     def test_names_with_commas_are_given_in_quotes(self):
         with open(self.path('names.csv'), 'w') as file:

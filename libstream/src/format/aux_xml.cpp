@@ -56,9 +56,9 @@ XmlElement read_pam(const std::string& file) {
   });
 }
 
-/// What a sidecar says of a band; nullptr for nothing.
+/// A sidecar's element for the band; nullptr if it has none.
 const XmlElement* band_of(const XmlElement& root, const RasterOptions& options) {
-  // The samples of colours are not those that the sidecar describes.
+  // The sidecar describes the colours, not the heights that are decoded from them.
   if (options.heights_of_colour != HeightsOfColour::none) return nullptr;
   const auto found =
       std::find_if(root.children.begin(), root.children.end(), [&](const XmlElement& band) {
@@ -67,14 +67,14 @@ const XmlElement* band_of(const XmlElement& root, const RasterOptions& options) 
   return found == root.children.end() ? nullptr : &*found;
 }
 
-/// As in GDAL, the sidecar of a GeoTIFF overrides the file in place, CRS, nodata value and unit.
-/// Those of other formats only add to their files.
+/// As in GDAL, the sidecar of a GeoTIFF overrides the file's georeferencing, CRS, nodata value and
+/// unit. Sidecars of other formats only add what their files lack.
 bool is_overridden(const RasterInfo& info) { return info.format == "geotiff"; }
 
 class WithAuxXml final : public Raster {
  public:
-  /// own_nodata: of the file alone, where `raster` was opened with that of the sidecar. band: of
-  /// the root, or null.
+  /// own_nodata: the file's own value, even if `raster` was opened with the sidecar's. band: the
+  /// element in `root`, or null.
   WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, const XmlElement& root,
              std::optional<double> own_nodata, const XmlElement* band)
       : raster_(std::move(raster)),
@@ -85,7 +85,7 @@ class WithAuxXml final : public Raster {
     if (const XmlElement* const place = root.child("GeoTransform")) read_place(place->text);
     if (band != nullptr) read_band(*band, own_nodata);
   }
-  /// With a comment alone.
+  /// Applies nothing and adds a comment.
   WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, std::string comment)
       : raster_(std::move(raster)), info_(raster_->info()), sidecar_(std::move(sidecar)) {
     info_.comments.push_back(std::move(comment));
@@ -108,7 +108,7 @@ class WithAuxXml final : public Raster {
       for (std::size_t r = 0; r < rows; ++r) {
         const std::size_t from = r * columns, to = (row + r) * out.stride;
         for (std::size_t first = 0, end = 0; first < columns; first = end + 1) {
-          // Runs of cells that the file has.
+          // One run of cells with data at a time.
           while (first < columns && valid_[from + first] == 0) ++first;
           end = first;
           while (end < columns && valid_[from + end] != 0) ++end;
@@ -127,14 +127,14 @@ class WithAuxXml final : public Raster {
  private:
   static constexpr std::uint64_t kStripRows = 256;
 
-  /// Whether the sidecar counts in something that the file may say as well. Notes the choice if the
-  /// two differ.
+  /// Returns whether to use the sidecar's value of something that the file may state as well. Adds
+  /// a note about the choice if the two differ.
   bool takes(bool file_says_it, bool differs, bool overrides, const std::string& what) {
     if (!file_says_it) return true;
     if (differs) {
       info_.notes.push_back(sidecar_ + ": its " + what +
                             (overrides ? " overrides that of the file, as in GDAL"
-                                       : " does not count, as in GDAL: the file has its own"));
+                                       : " is ignored, as in GDAL: the file has its own"));
     }
     return overrides;
   }
@@ -145,7 +145,7 @@ class WithAuxXml final : public Raster {
     const bool has_own = !lacks_crs(own);
     if (has_own && own.epsg == crs.epsg && own.wkt == crs.wkt) return;
     if (!takes(has_own, crs.epsg == 0 || crs.epsg != own.epsg, overrides_, "CRS")) return;
-    // The sidecar may say nothing of heights.
+    // The sidecar may not say anything about heights.
     if (crs.vertical_epsg == 0 && crs.wkt.find("VERT") == std::string::npos) {
       crs.vertical_epsg = own.vertical_epsg;
     }
@@ -163,17 +163,17 @@ class WithAuxXml final : public Raster {
     }
     const double area = g[1] * g[5] - g[2] * g[4];
     if (!std::isfinite(area) || area == 0) return;
-    constexpr std::array<double, 6> kNoPlace{0, 1, 0, 0, 0, 1};  // as of a file without a place
+    constexpr std::array<double, 6> kNoPlace{0, 1, 0, 0, 0, 1};  // GDAL's for "not georeferenced"
     if (g == kNoPlace) return;
     // From the corner of the first cell to its middle.
     const WorldTransform world{
         {g[1], g[2], g[0] + 0.5 * (g[1] + g[2]), g[4], g[5], g[3] + 0.5 * (g[4] + g[5])}};
-    if (!takes(info_.world != kPlainWorld, !is_near(world), overrides_, "place")) return;
+    if (!takes(info_.world != kPlainWorld, !is_near(world), overrides_, "georeferencing")) return;
     info_.world = world;
     std::erase(info_.comments, kNoGeoreferencing);
   }
 
-  /// Within rounding of its numbers.
+  /// True if `world` equals the file's within rounding.
   [[nodiscard]] bool is_near(const WorldTransform& world) const {
     const auto &a = info_.world.xy, &b = world.xy;
     const double cell = std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[3]), std::abs(a[4])});
@@ -214,11 +214,11 @@ class WithAuxXml final : public Raster {
     if (!rule.value) return;
     const bool same = own == rule.value || (own && std::isnan(*own) && std::isnan(*rule.value));
     const bool taken = takes(own.has_value(), !same, overrides_, "nodata value");
-    // One that overrides the file's has been applied in opening it.
+    // A value that overrides the file's was already applied when the file was opened.
     if (!taken || overrides_) return;
     nodata_ = rule;
     info_.nodata = nodata_->value;
-    constexpr std::uint64_t kWindowColumns = 4096;  // of most windows
+    constexpr std::uint64_t kWindowColumns = 4096;  // most windows are not wider
     info_.held_bytes +=
         std::min(info_.columns, kWindowColumns) * kStripRows * (size_of(info_.sample.type) + 1);
   }
@@ -227,7 +227,7 @@ class WithAuxXml final : public Raster {
   RasterInfo info_;
   std::string sidecar_;
   bool overrides_ = false;            ///< see is_overridden()
-  std::optional<NodataRule> nodata_;  ///< of the sidecar, applied to the file's samples
+  std::optional<NodataRule> nodata_;  ///< the sidecar's, applied to the file's samples
   std::vector<std::byte> samples_;
   std::vector<std::uint8_t> valid_;
 };
@@ -239,7 +239,7 @@ std::unique_ptr<Raster> open_with_aux_xml(const OpenRaster& open, const std::str
   const std::string sidecar = file + ".aux.xml";
   std::error_code ignored;
   std::unique_ptr<Raster> raster = open(file, options);
-  // GDAL has no sidecars of virtual rasters.
+  // GDAL ignores sidecars of virtual rasters.
   if (raster->info().format == "vrt" || !std::filesystem::is_regular_file(sidecar, ignored)) {
     return raster;
   }
@@ -248,7 +248,7 @@ std::unique_ptr<Raster> open_with_aux_xml(const OpenRaster& open, const std::str
     root = read_pam(sidecar);
   } catch (const Error& error) {
     return std::make_unique<WithAuxXml>(std::move(raster), sidecar,
-                                        std::string("left aside: ") + error.what());
+                                        std::string("ignored: ") + error.what());
   }
   if (root.name != "PAMDataset") return raster;
   const std::optional<double> own = raster->info().nodata;

@@ -18,7 +18,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Those of `channels` that are not among `others`.
+/// Lists the channels that are not among `others`, for messages.
 std::string list_of(const std::vector<Channel>& channels, const std::vector<Channel>& others) {
   std::string out;
   for (const Channel& channel : channels) {
@@ -30,7 +30,7 @@ std::string list_of(const std::vector<Channel>& channels, const std::vector<Chan
   return out;
 }
 
-/// How the attributes of `other` differ from those of `first`.
+/// Describes how the attributes of `other` differ from those of `first`.
 std::string difference(const SourceInfo& first, const SourceInfo& other) {
   const std::string& name = first.files.front();
   const std::string more = list_of(other.attributes, first.attributes);
@@ -42,7 +42,7 @@ std::string difference(const SourceInfo& first, const SourceInfo& other) {
 
 void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreement& crs) {
   const auto refuse = [&](std::string cause,
-                          std::string remedy = "convert one of them, or read them on their own") {
+                          std::string remedy = "convert one of them, or read them separately") {
     throw Error({.file = other.files.front(),
                  .where = {},
                  .cause = std::move(cause),
@@ -50,16 +50,17 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreem
   };
   if (first.coordinates != other.coordinates) {
     refuse("its coordinates are " + std::string(name_of(other.coordinates[0].type)) +
-           ", those of " + first.files.front() + " are " +
+           ", but those of " + first.files.front() + " are " +
            std::string(name_of(first.coordinates[0].type)) + ", or their units differ");
   }
   if (first.attributes != other.attributes) {
-    refuse(difference(first, other), "`keep` what all files have, or read them on their own");
+    refuse(difference(first, other),
+           "`keep` only what all files have, or read the files separately");
   }
   if (!crs.agrees(other.crs)) {
-    refuse("its coordinate reference system is not that of " + first.files.front(),
-           "name the one that both have (`crs` of build), convert one of them, or read them on "
-           "their own");
+    refuse("its coordinate reference system differs from that of " + first.files.front(),
+           "if both mean the same system, name it (`crs` of build); otherwise convert one of the "
+           "files, or read them separately");
   }
 }
 
@@ -181,7 +182,7 @@ class Chain final : public PointSource {
 
   /// The source with only the attributes that the selection needs, in the order of the first file.
   [[nodiscard]] std::unique_ptr<PointSource> narrowed(std::unique_ptr<PointSource> source) const {
-    // Selected while it still has the marks of withheld points, so that those are counted.
+    // Select before the flags of withheld points are dropped, so that those points are counted.
     SourceOptions selecting = options_;
     selecting.selection.keep.reset();
     selecting.selection.drop.clear();

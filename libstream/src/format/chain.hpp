@@ -14,9 +14,10 @@ namespace terrace::stream {
 using OpenOne =
     std::function<std::unique_ptr<PointSource>(const std::string& file, const SourceOptions&)>;
 
-/// Several files, one after the other, as one source; a single one unchanged. Checks the head of
-/// each immediately and (re)opens it when its turn comes; pipes are opened only once. Throws: Error
-/// if one cannot be opened or differs from the first in channels or CRS.
+/// Opens several files as one source that reads them in order; a single file is opened as it is.
+/// Checks each file's header immediately and reopens the file when its turn comes; pipes are opened
+/// only once. Throws: Error if a file cannot be opened or differs from the first in channels or
+/// CRS.
 std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
                                           const SourceOptions& options, const OpenOne& open_one);
 

@@ -15,15 +15,15 @@
 namespace terrace::stream {
 namespace {
 
-/// Relative error of a quotient of scales: less than a ten-thousandth of a step over 32 bits.
+/// Relative tolerance of a ratio of scales: less than a ten-thousandth of a step over 32 bits.
 constexpr double kSameRatio = 1e-14;
 constexpr double kSameStep = 1e-4;
-/// A step is cut into this many at most.
+/// Upper limit of the parts that a step is divided into.
 constexpr std::uint64_t kMostParts = 10'000;
 
 bool is_whole(double steps) { return std::abs(steps - std::round(steps)) <= kSameStep; }
 
-/// The least number of parts of a step whose multiples are near `steps`; nullopt if it is large.
+/// The smallest number of parts for which near(steps * parts) holds; nullopt beyond kMostParts.
 template <class Near>
 std::optional<std::uint64_t> parts_of(double steps, const Near& near) {
   for (std::uint64_t parts = 1; parts <= kMostParts; ++parts) {
@@ -32,13 +32,13 @@ std::optional<std::uint64_t> parts_of(double steps, const Near& near) {
   return std::nullopt;
 }
 
-/// One axis of lattices: values k * scale + offset.
+/// One axis of a lattice: values k * scale + offset for integers k.
 struct Axis {
   double scale = 1, offset = 0;
 };
 
-/// The number of parts into which the first scale is to be cut for all values to be multiples of
-/// the result from the first offset on.
+/// The number of parts into which to divide the first scale so that the values of all axes are
+/// multiples of the result, counted from the first offset; nullopt if more than kMostParts.
 std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
   const Axis& first = axes.front();
   std::uint64_t parts = 1;
@@ -58,8 +58,8 @@ std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
   return parts;
 }
 
-/// The first axis with its scale cut into parts: as one of them has it, if one has, as quotients
-/// are rounded.
+/// The first axis with its scale divided into parts. The quotient is rounded, so an equal scale of
+/// another axis is used in its place.
 Axis cut(std::span<const Axis> axes, std::uint64_t parts) {
   Axis cut = axes.front();
   cut.scale /= static_cast<double>(parts);
@@ -69,8 +69,8 @@ Axis cut(std::span<const Axis> axes, std::uint64_t parts) {
   return cut;
 }
 
-/// Moves the offset by whole steps, if need be, for 32 bits to reach from `low` to `high`. False if
-/// they cannot.
+/// Moves the offset by whole steps, if necessary, so that 32 bits cover `low` to `high`. Returns
+/// false if they cannot.
 bool reach(double low, double high, Axis& axis) {
   constexpr double kMost = std::numeric_limits<std::int32_t>::max();
   const auto reaches = [&] {
@@ -91,7 +91,7 @@ std::optional<Lattice> common_lattice(std::span<const Lattice> lattices, const B
     if (!found) return std::nullopt;
     parts[i] = *found;
   }
-  // Steps of one size in x and y stay so: triangulations are Delaunay in steps.
+  // Equal steps in x and y stay equal, because triangulations are Delaunay in units of steps.
   if (lattices.front().scale[0] == lattices.front().scale[1]) {
     parts[0] = parts[1] = std::lcm(parts[0], parts[1]);
   }
@@ -105,7 +105,7 @@ std::optional<Lattice> common_lattice(std::span<const Lattice> lattices, const B
   return common;
 }
 
-/// The lattice of integers that can be moved; nullopt for others.
+/// The lattice of int32 coordinates, which can be moved; nullopt for other types.
 std::optional<Lattice> movable_lattice(const Placement& placement) {
   for (const Channel& coordinate : placement.coordinates) {
     if (coordinate.type != ScalarType::i32) return std::nullopt;

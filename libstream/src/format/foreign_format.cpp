@@ -9,7 +9,7 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// How a format shows in the first bytes.
+/// Bytes near the beginning of a file that identify a format.
 struct Mark {
   std::size_t at = 0;
   std::string_view bytes;
@@ -19,17 +19,17 @@ struct Mark {
 struct KnownFormat {
   ForeignFormat format;
   std::string_view endings;  ///< ".a .b"
-  Mark first, second{};      ///< both, if there are two; of the first with text, it may be indented
+  Mark first, second{};      ///< both must match, if there are two; `first` may be indented text
 };
 
 constexpr std::string_view kRaster = "convert it, e.g. 'gdal_translate FILE out.tif'";
 constexpr std::string_view kVector =
-    "convert its points, e.g. 'ogr2ogr -f CSV -lco GEOMETRY=AS_XYZ out.csv FILE', to text";
+    "convert its points to text, e.g. 'ogr2ogr -f CSV -lco GEOMETRY=AS_XYZ out.csv FILE'";
 
-// What tells more comes first.
+// More specific rows come first.
 constexpr KnownFormat kRows[] = {
     // Points.
-    {{"E57", "convert it, e.g. with CloudCompare or 'pdal translate FILE out.ply', to PLY"},
+    {{"E57", "convert it to PLY, e.g. with CloudCompare or 'pdal translate FILE out.ply'"},
      ".e57",
      {0, "ASTM-E57"}},
     {{"PCD (a cloud of the Point Cloud Library)",
@@ -38,14 +38,14 @@ constexpr KnownFormat kRows[] = {
      {0, "# .PCD"}},
     // Rasters.
     {{"an ESRI binary grid", kRaster}, ".adf", {0, "HDR1.2\0\0"sv}},
-    {{"the header of a binary grid", "name the .bil or .flt beside it"}, ".hdr", {}},
+    {{"the header of a binary grid", "name the .bil or .flt file next to it"}, ".hdr", {}},
     {{"HDF5 or NetCDF 4",
-      "convert a variable of it ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
+      "convert one of its variables ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
       "NETCDF:FILE:VARIABLE out.tif'"},
      ".h5 .hdf5 .he5",
      {0, "\x89HDF\r\n\x1a\n"sv}},
     {{"NetCDF",
-      "convert a variable of it ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
+      "convert one of its variables ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
       "NETCDF:FILE:VARIABLE out.tif'"},
      ".nc .nc4 .cdf",
      {0, "CDF"}},
@@ -74,18 +74,18 @@ constexpr KnownFormat kRows[] = {
      {0, "SQLite format 3"},
      {68, "GPKG"}},
     {{"an SQLite database (MBTiles?)", kRaster}, ".mbtiles .sqlite", {0, "SQLite format 3"}},
-    {{"an HTML page", "a server may have sent it in place of the file: download that again"},
+    {{"an HTML page", "a server may have sent it instead of the file: download that again"},
      ".html .htm",
      {0, "<!doctype html", true}},
-    {{"an HTML page", "a server may have sent it in place of the file: download that again"},
+    {{"an HTML page", "a server may have sent it instead of the file: download that again"},
      "",
      {0, "<html", true}},
     {{"XML (GML, KML, LandXML?)", kVector}, ".kml .gml .xml", {}},
     // Meshes.
-    {{"glTF as text", "write it in its binary form, GLB"}, ".gltf", {}},
-    {{"JSON, and no GeoJSON", kVector}, ".json", {}},
-    {{"VTK", "convert it, e.g. with ParaView, to PLY"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
-    // What may hold any of them.
+    {{"glTF as text", "export it in the binary form, GLB"}, ".gltf", {}},
+    {{"JSON, but not GeoJSON", kVector}, ".json", {}},
+    {{"VTK", "convert it to PLY, e.g. with ParaView"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
+    // Containers of any of them.
     {{"compressed by bzip2", "unpack it: 'bzip2 -dk FILE'"}, ".bz2", {0, "BZh"}},
     {{"compressed by xz", "unpack it: 'xz -dk FILE'"},
      ".xz",
@@ -97,7 +97,7 @@ constexpr KnownFormat kRows[] = {
     {{"a 7z archive", "unpack it: '7z x FILE'"}, ".7z", {0, "7z\xbc\xaf\x27\x1c"sv}},
     {{"a RAR archive", "unpack it: 'unrar x FILE'"}, ".rar", {0, "Rar!\x1a\x07"sv}},
     {{"a tar archive", "unpack it: 'tar xf FILE'"}, ".tar .tgz", {257, "ustar"}},
-    {{"a pointer of Git LFS, not the file", "fetch the file: 'git lfs pull'"},
+    {{"a Git LFS pointer, not the file", "fetch the file: 'git lfs pull'"},
      "",
      {0, "version https://git-lfs"}},
 };
@@ -122,7 +122,7 @@ bool has_word(std::string_view words, std::string_view word) {
 }  // namespace
 
 const ForeignFormat* foreign_format_of_content(std::string_view head) {
-  // Text may be indented, and begin with the mark of UTF-8.
+  // Text may begin with the byte order mark of UTF-8 and may be indented.
   std::string_view text = head;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));

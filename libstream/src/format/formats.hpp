@@ -5,7 +5,7 @@
 
 #include "terrace/stream/source.hpp"
 
-/// The registry's entries, each from the file of its format.
+/// The registry's entries, each defined in the source file of its format.
 
 namespace terrace::stream {
 
@@ -27,13 +27,13 @@ const Format& off_format();
 const Format& stl_format();
 /// GeoJSON, also newline-delimited: the positions of its geometries, or its lines.
 const Format& geojson_format();
-/// Tiles of SRTM without a header, also in .zip and .gz.
+/// SRTM tiles without a header, also in .zip and .gz.
 const Format& hgt_format();
-/// ESRI's ASCII grids.
+/// Esri ASCII grids.
 const Format& ascii_grid_format();
-/// ESRI's binary grids with a header file: .flt, .bil, .bip, .bsq.
+/// Esri binary grids with a header file: .flt, .bil, .bip, .bsq.
 const Format& binary_grid_format();
-/// Digital elevation models of the USGS, in ASCII.
+/// USGS digital elevation models in ASCII.
 const Format& usgs_dem_format();
 /// PNG: grey height maps, and colours that encode heights.
 const Format& png_format();

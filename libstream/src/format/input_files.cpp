@@ -36,7 +36,7 @@ bool exists(const std::string& name) {
   return fs::exists(fs::symlink_status(name, ignored));
 }
 
-/// All files below whose names tell a format, in the order of their paths.
+/// Appends all files below the folder whose names show a known format, sorted by path.
 void add_folder(const std::string& folder, const std::string& format,
                 std::vector<std::string>& files) {
   const std::size_t before = files.size();
@@ -44,15 +44,15 @@ void add_folder(const std::string& folder, const std::string& format,
   fs::recursive_directory_iterator at(folder, error);
   for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
     std::error_code ignored;
-    // One input, whose own files are no others.
+    // An EPT folder is one input; the files in it are not inputs themselves.
     if (at->is_directory(ignored) && fs::exists(at->path() / kEptName, ignored)) {
       at.disable_recursion_pending();
       if (format.empty() || format == "ept") files.push_back((at->path() / kEptName).string());
       continue;
     }
-    const Format* const told = format_of_name(at->path().string());
+    const Format* const known = format_of_name(at->path().string());
     const bool hidden = at->path().filename().string().front() == '.';
-    if (hidden || told == nullptr || (!format.empty() && told->name != format) ||
+    if (hidden || known == nullptr || (!format.empty() && known->name != format) ||
         !at->is_regular_file(ignored)) {
       continue;
     }
@@ -62,10 +62,10 @@ void add_folder(const std::string& folder, const std::string& format,
   if (files.size() == before) {
     if (exists((fs::path(folder) / kManifestName).string())) {
       fail(folder, {}, "is a store, not a file of points",
-           "write its points to a file first, as 'terrace points' does");
+           "write its points to a file first, with 'terrace points'");
     }
     fail(folder, {}, "is a folder without a file that can be read",
-         "name one with files that end in .las, .tif and the like");
+         "name a folder with files that end in .las, .tif or similar");
   }
   std::sort(files.begin() + static_cast<std::ptrdiff_t>(before), files.end());
 }
@@ -74,7 +74,7 @@ void add_folder(const std::string& folder, const std::string& format,
   fail(pattern, {}, "the folders of the pattern cannot be listed", {});
 }
 
-/// What matches a pattern without "**".
+/// The paths that match a pattern without "**".
 std::vector<std::string> matches_of(const std::string& pattern) {
   std::vector<std::string> names;
   ::glob_t found{};
@@ -85,7 +85,7 @@ std::vector<std::string> matches_of(const std::string& pattern) {
   return names;
 }
 
-/// Where a part "**" of the path begins; npos if there is none.
+/// The position of a path component "**"; npos if there is none.
 std::size_t find_stars(const std::string& pattern) {
   for (std::size_t at = pattern.find("**"); at != pattern.npos; at = pattern.find("**", at + 1)) {
     const std::size_t end = at + 2;
@@ -96,7 +96,7 @@ std::size_t find_stars(const std::string& pattern) {
   return pattern.npos;
 }
 
-/// The name as a pattern that only it matches.
+/// Escapes a name: returns a pattern that only this name matches.
 std::string literal(const std::string& name) {
   std::string pattern;
   for (const char c : name) {
@@ -106,7 +106,8 @@ std::string literal(const std::string& name) {
   return pattern;
 }
 
-/// What matches in a folder and all below it. folder: ends with '/', or is empty for the current.
+/// The paths that match in a folder and in the folders below it, except in hidden ones. folder:
+/// ends with '/', or is empty for the current folder.
 std::vector<std::string> matches_below(const std::string& folder, const std::string& pattern) {
   std::vector<std::string> names = matches_of(literal(folder) + pattern);
   std::error_code error;
@@ -126,22 +127,22 @@ std::vector<std::string> matches_below(const std::string& folder, const std::str
   return names;
 }
 
-/// What the shell would make of a pattern that it has been kept from; "**" stands for any number of
-/// folders, none included, but for hidden ones.
+/// Expands a quoted pattern as the shell would. "**" stands for any number of folders, including
+/// zero, but not for hidden ones.
 void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
   std::vector<std::string> names;
   const std::size_t stars = find_stars(pattern);
   if (stars == pattern.npos) {
     names = matches_of(pattern);
   } else {
-    const std::string behind = pattern.substr(std::min(stars + 3, pattern.size()));
-    if (find_stars(behind) != behind.npos) {
-      fail(pattern, {}, "has ** twice", "once is enough to reach all folders below");
+    const std::string rest = pattern.substr(std::min(stars + 3, pattern.size()));
+    if (find_stars(rest) != rest.npos) {
+      fail(pattern, {}, "has ** twice", "use it once: it reaches all folders below");
     }
     std::vector<std::string> folders{""};
     if (stars > 0) folders = matches_of(pattern.substr(0, stars));
     for (const std::string& folder : folders) {
-      const std::vector<std::string> more = matches_below(folder, behind.empty() ? "*" : behind);
+      const std::vector<std::string> more = matches_below(folder, rest.empty() ? "*" : rest);
       names.insert(names.end(), more.begin(), more.end());
     }
     std::erase_if(names, [](const std::string& name) {
@@ -150,7 +151,7 @@ void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
     });
     std::sort(names.begin(), names.end());
   }
-  if (names.empty()) fail(pattern, {}, "no file has such a name", "check the pattern");
+  if (names.empty()) fail(pattern, {}, "no file matches", "check the pattern");
   files.insert(files.end(), names.begin(), names.end());
 }
 
@@ -176,12 +177,12 @@ class Names {
     } else if (name.find_first_of("*?[") != name.npos) {
       add_pattern(name, files_);
     } else {
-      files_.push_back(name);  // whoever opens it says best what is wrong
+      files_.push_back(name);  // opening it gives the best error
     }
   }
 
  private:
-  /// A name a line, from the list's folder on.
+  /// Adds the files of a list: one name per line, relative to the list's folder.
   void add_list(const std::string& list) {
     Input input(list);
     LineReader lines(input);
@@ -191,7 +192,7 @@ class Names {
       if (name.empty() || name.front() == '#') continue;
       const std::string file = (fs::path(list).parent_path() / name).string();
       if (name.front() == '@') {
-        fail(list, "line " + std::to_string(lines.number()), "lists do not name lists",
+        fail(list, "line " + std::to_string(lines.number()), "a list cannot contain lists",
              "name them on the command line");
       }
       if (file.find_first_of("*?[") == file.npos && !exists(file)) {
@@ -200,7 +201,7 @@ class Names {
       }
       add(file);
     }
-    if (files_.size() == before) fail(list, {}, "names no file", "write a name on each line");
+    if (files_.size() == before) fail(list, {}, "names no file", "write one name on each line");
   }
 
   const std::string& format_;

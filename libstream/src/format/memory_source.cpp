@@ -28,7 +28,7 @@ class ColumnSource final : public PointSource {
       : points_(std::move(points)), block_points_(std::max<std::size_t>(options.block_points, 1)) {
     if (points_.attributes.size() != points_.info.attributes.size()) {
       throw std::invalid_argument("there are " + counted(points_.attributes.size(), "column") +
-                                  " of " + counted(points_.info.attributes.size(), "attribute"));
+                                  " for " + counted(points_.info.attributes.size(), "attribute"));
     }
     points_.info.points = points_.count;
     if (options.crs) points_.info.crs = *options.crs;
@@ -70,7 +70,7 @@ class ColumnSource final : public PointSource {
     if (missing) nodata_ += leave_out_missing(block, record);
   }
 
-  /// Returns whether a coordinate is NaN.
+  /// Copies one coordinate of all points of the block; returns whether one of them is NaN.
   bool fill_axis(std::size_t axis, PointBlock& block) const {
     bool missing = false;
     with_type(points_.info.coordinates[axis].type, [&]<class T>(T number) {

@@ -9,8 +9,8 @@
 
 namespace terrace::stream {
 
-/// True if a coordinate is NaN, which is how scanners and photogrammetry write "no return": points
-/// and meshes, of files or arrays, are read without such points, which count as nodata.
+/// True if a coordinate is NaN, which is how scanners and photogrammetry write "no return". Readers
+/// of points and meshes, in files or arrays, drop such points and count them as nodata.
 inline bool is_missing(const Point3& point) {
   return std::isnan(point[0]) || std::isnan(point[1]) || std::isnan(point[2]);
 }
@@ -19,7 +19,8 @@ inline bool is_infinite(const Point3& point) {
   return std::isinf(point[0]) || std::isinf(point[1]) || std::isinf(point[2]);
 }
 
-/// Leaves out such points and their records of so many bytes. Returns how many.
+/// Removes the missing points and their payload records of `record` bytes each. Returns how many
+/// were removed.
 inline std::size_t leave_out_missing(PointBlock& block, std::size_t record) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < block.size(); ++i) {

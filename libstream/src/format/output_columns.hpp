@@ -26,9 +26,9 @@ class OutputColumns {
   void check(const PointBlock& block) const;
   /// Appends the values of point `i` as text, `separator` before each.
   void append_text(std::string& out, const PointBlock& block, std::size_t i, char separator) const;
-  /// The bytes that put_bytes() puts.
+  /// The number of bytes that put_bytes() writes.
   [[nodiscard]] std::size_t written_bytes() const { return written_bytes_; }
-  /// Puts the values of point `i` at `at` as little-endian bytes; returns their end.
+  /// Writes the values of point `i` to `at` as little-endian bytes; returns their end.
   char* put_bytes(char* at, const PointBlock& block, std::size_t i) const;
 
  private:

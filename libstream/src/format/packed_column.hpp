@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// A scalar column in rows of `stride` bytes: value i lies at rows + i * stride.
+/// A scalar column in rows of `stride` bytes: value i is at rows + i * stride.
 struct PackedColumn {
   const char* rows = nullptr;
   std::size_t stride = 0;

@@ -16,7 +16,7 @@
 namespace terrace::stream {
 namespace {
 
-/// What an image is to libpng. `swap`: the samples have two bytes in this machine's order, which is
+/// An image as libpng needs it. swap: the samples have two bytes in this machine's order, which is
 /// not PNG's.
 struct Image {
   const unsigned char* pixels;
@@ -25,8 +25,8 @@ struct Image {
   bool swap;
 };
 
-/// libpng is C and leaves by longjmp: exceptions must not pass through it. A failed write is kept
-/// here and thrown when libpng has returned.
+/// libpng is C and reports errors by longjmp, so exceptions must not pass through it. The exception
+/// of a failed write is kept here and rethrown after libpng has returned.
 struct Output {
   Sink* file;
   std::exception_ptr error;
@@ -56,7 +56,7 @@ void on_flush(png_structp) {}
 
 void on_warning(png_structp, png_const_charp) {}
 
-/// False if libpng failed. Has no objects with destructors: it may be left by longjmp.
+/// Returns false if libpng failed. Must not have objects with destructors: longjmp skips them.
 bool write_image(const Image& image, Output& output) {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &output, &on_error, &on_warning);
   png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
@@ -68,7 +68,7 @@ bool write_image(const Image& image, Output& output) {
   png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
                static_cast<png_uint_32>(image.height), image.bit_depth, image.color_type,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  // Names the writer, so that a file can be told from others before it is replaced.
+  // Names the writer: only files that we wrote may be replaced.
   static char key[] = "Software", value[] = "terrace";
   png_text mark{};
   mark.compression = PNG_TEXT_COMPRESSION_NONE;
@@ -92,7 +92,8 @@ void write_file(const std::filesystem::path& path, const Image& image, const Nam
   };
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
   if (image.width == 0 || image.height == 0) refuse("a PNG image cannot be empty");
-  if (image.width > kMost || image.height > kMost) refuse("a PNG side is at most 2147483647 long");
+  if (image.width > kMost || image.height > kMost)
+    refuse("a PNG side has at most 2147483647 pixels");
   Sink file(path.string(), replace, stop);
   Output output{.file = &file, .error = nullptr, .message = ""};
   if (!write_image(image, output)) {

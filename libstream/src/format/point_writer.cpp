@@ -5,7 +5,7 @@ namespace terrace::stream {
 
 void to_world(const Placement& placement, PointBlock& block) {
   const std::array<double, 6>& m = placement.world.xy;
-  // Points that are stored as they are stay bit for bit what they are (1 * -0.0 + 0 would not).
+  // Without a transform, coordinates must keep every bit (1 * -0.0 + 0 would not).
   if (placement.world != WorldTransform{}) {
     for (Point3& p : block.positions) {
       const double x = p[0] * m[0] + p[1] * m[1] + m[2];

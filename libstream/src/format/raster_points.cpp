@@ -16,7 +16,7 @@
 namespace terrace::stream {
 namespace {
 
-/// A raster without georeferencing, with cells of another size.
+/// A raster without georeferencing, with the cell size set by the caller.
 class WithCells final : public Raster {
  public:
   WithCells(std::unique_ptr<Raster> raster, double cell) : raster_(std::move(raster)) {
@@ -24,7 +24,7 @@ class WithCells final : public Raster {
     if (info_.world != kPlainWorld) {
       throw Error({.file = info_.files.front(),
                    .where = {},
-                   .cause = "says itself how large its cells are",
+                   .cause = "is georeferenced, which sets its cell size",
                    .remedy = "leave `cell` out"});
     }
     std::erase(info_.comments, kNoGeoreferencing);
@@ -53,14 +53,14 @@ std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> fil
   const std::uint64_t window = window_bytes(options.memory_bytes);
   raster.cache_bytes = window / 6;
   const auto open_one = [open, cell = options.cell](const std::string& file,
-                                                    const RasterOptions& how) {
-    std::unique_ptr<Raster> found = open_with_aux_xml(open, file, how);
+                                                    const RasterOptions& one) {
+    std::unique_ptr<Raster> found = open_with_aux_xml(open, file, one);
     if (cell > 0) found = std::make_unique<WithCells>(std::move(found), cell);
     return found;
   };
   if (files.size() == 1) return points_of(open_one(files.front(), raster), options);
   constexpr std::size_t kOpenAtOnce = 32;
-  raster.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
+  raster.cache_bytes /= kOpenAtOnce / 4;  // few of them overlap one window
   const RasterOpener opener = [raster, open_one](const std::string& file) {
     return open_one(file, raster);
   };

@@ -14,7 +14,8 @@ namespace terrace::stream {
 using OpenRaster =
     std::function<std::unique_ptr<Raster>(const std::string& file, const RasterOptions& options)>;
 
-/// Format::open for rasters: the cells of one file, or of several as a mosaic, as points.
+/// Implements Format::open for rasters: the cells of one file, or of a mosaic of several, as
+/// points.
 std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> files,
                                                 const SourceOptions& options,
                                                 const OpenRaster& open);

@@ -61,8 +61,8 @@ class ReadAhead final : public PointSource {
       return false;
     }
     progress_ = ready_.front().progress;
-    // The caller's buffers go back to the reading thread as they are: nothing is allocated, nor set
-    // to zero, in the long run.
+    // The reading thread reuses the caller's buffers, so that in the long run nothing is allocated
+    // or set to zero.
     if (spare_.size() < most_) {
       spare_.push_back(std::exchange(block, std::move(ready_.front().block)));
     } else {
@@ -74,7 +74,7 @@ class ReadAhead final : public PointSource {
     return true;
   }
 
-  /// As of the block last delivered.
+  /// As of the last block delivered.
   [[nodiscard]] Progress progress() const override { return progress_; }
 
  private:
@@ -83,7 +83,7 @@ class ReadAhead final : public PointSource {
     Progress progress;
   };
 
-  /// To one stop goes what another was asked for.
+  /// Forwards a stop request.
   struct Forward {
     std::stop_source to;
     void operator()() { to.request_stop(); }
@@ -94,7 +94,7 @@ class ReadAhead final : public PointSource {
     try {
       thread_ = std::thread([this] { run(); });
     } catch (const std::system_error&) {
-      // The system grants no more threads: next() reads.
+      // The system has no more threads: next() reads.
     }
   }
 
@@ -135,12 +135,12 @@ class ReadAhead final : public PointSource {
     return true;
   }
 
-  const std::unique_ptr<PointSource> source_;  // the thread's alone once it runs
+  const std::unique_ptr<PointSource> source_;  // used only by the thread once it runs
   const std::size_t most_;
   const SourceInfo info_;
   std::stop_source reading_;
   std::stop_callback<Forward> on_stop_;
-  Progress progress_;  // the caller's alone
+  Progress progress_;  // used only by the caller
   bool started_ = false;
 
   std::mutex mutex_;

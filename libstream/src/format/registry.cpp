@@ -42,7 +42,7 @@ std::string ending_of(const std::filesystem::path& file) {
   return lower_case(file.extension().string());
 }
 
-/// The format that an ending tells; nullptr if none.
+/// The format with that file ending; nullptr if there is none.
 const Format* format_of_ending(const std::string& ending) {
   for (const Format& format : formats()) {
     const auto& known = format.endings;
@@ -51,7 +51,7 @@ const Format* format_of_ending(const std::string& ending) {
   return nullptr;
 }
 
-/// The format that reads packed files itself and whose name this has: ".hgt.zip".
+/// The format that unpacks files itself and has this file's double ending, such as ".hgt.zip".
 const Format* packed_format_of(const std::string& file) {
   const std::string ending = ending_of(file);
   if (ending != ".zip" && ending != ".gz") return nullptr;
@@ -69,9 +69,10 @@ bool is_ept_name(const std::string& file) {
                .remedy = std::string(format.remedy)});
 }
 
-/// By name, else by content, else by ending. A file whose ending is known but whose content is not
-/// goes to the ending's reader, which can say best what is wrong with it. Formats that are known
-/// and not read are refused before the last of formats(), text, is asked, as some look like it.
+/// Determines the format by options.format, else by content, else by ending. A file with a known
+/// ending but unknown content goes to that ending's reader, which can best report what is wrong.
+/// Known formats that cannot be read are refused before text, the last of formats(), is tried,
+/// because some of them look like text.
 const Format& format_of(const std::string& file, const SourceOptions& options) {
   if (!options.format.empty()) {
     for (const Format& format : formats()) {
@@ -82,8 +83,8 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   }
   const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
   const auto bytes = std::as_bytes(std::span(head));
-  const std::span<const Format> telling = formats().first(formats().size() - 1);
-  for (const Format& format : telling) {
+  const std::span<const Format> distinctive = formats().first(formats().size() - 1);
+  for (const Format& format : distinctive) {
     if (format.recognise(bytes)) return format;
   }
   if (is_ept_name(file)) return ept_format();
@@ -98,14 +99,14 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   throw Error(
       {.file = shown_name(file),
        .where = {},
-       .cause = head.empty() ? "the file is empty" : "neither content nor name tell its format",
-       .remedy = head.empty() ? "fetch or write the file again"
+       .cause = head.empty() ? "the file is empty" : "neither content nor name shows its format",
+       .remedy = head.empty() ? "download or export the file again"
                               : "convert a raster (gdal_translate FILE out.tif), or name the "
                                 "format: " +
                                     known_formats()});
 }
 
-/// Lets go of pipes that were looked at but not opened.
+/// Releases pipes that were peeked at but not opened.
 struct HeadScope {
   HeadScope() = default;
   ~HeadScope() { drop_heads(); }
@@ -113,7 +114,7 @@ struct HeadScope {
   HeadScope& operator=(const HeadScope&) = delete;
 };
 
-/// What open_source() does but for reading ahead.
+/// open_source() without reading ahead.
 std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                                        const SourceOptions& options) {
   const HeadScope scope;
@@ -126,14 +127,14 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                    .where = {},
                    .cause = "is " + other.name + ", but " + shown_name(files.front()) + " is " +
                             format.name,
-                   .remedy = "name files of one format, or select those of a folder by `format`"});
+                   .remedy = "name files of one format, or select files of a folder by `format`"});
     }
     if (is_seekable(file) || packed_format_of(file) == &format) continue;
     if (!format.streams && !format.self_contained) {
       throw Error({.file = shown_name(file),
                    .where = {},
-                   .cause = format.name + " cannot be read from a pipe or out of gzip",
-                   .remedy = "name a file, unpacked"});
+                   .cause = format.name + " cannot be read from a pipe or from gzip",
+                   .remedy = "name an unpacked file"});
     }
     spooled = spooled || !format.streams;
   }
@@ -141,42 +142,41 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
     throw Error({.file = "standard input",
                  .where = {},
                  .cause = "is named twice",
-                 .remedy = "it can be read only once"});
+                 .remedy = "name it once: it can be read only once"});
   }
   if (options.heights_of_colour != HeightsOfColour::none && format.name != png_format().name) {
     throw Error({.file = shown_name(files.front()),
                  .where = {},
-                 .cause = "is " + format.name + ", whose heights are no colours",
+                 .cause = format.name + " does not encode heights as colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
   if (options.selection.resolution > 0 && format.name != las_format().name &&
       format.name != ept_format().name) {
     throw Error({.file = shown_name(files.front()),
                  .where = {},
-                 .cause = "is " + format.name + ", which has no octree to read to a resolution",
+                 .cause = format.name + " has no octree, so `resolution` does not apply",
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
   const bool triangles = options.entities == Entities::triangles;
   if (options.entities != Entities::points && !(triangles ? format.triangles : format.lines)) {
-    throw Error(
-        {.file = shown_name(files.front()),
-         .where = {},
-         .cause = "is " + format.name + ", which has no " + (triangles ? "triangles" : "lines"),
-         .remedy =
-             std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)" : "name GeoJSON") +
-             ", or leave `entities` out"});
+    throw Error({.file = shown_name(files.front()),
+                 .where = {},
+                 .cause = format.name + " has no " + (triangles ? "triangles" : "lines"),
+                 .remedy = std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)"
+                                                 : "name GeoJSON") +
+                           ", or leave `entities` out"});
   }
   auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
     throw Error({.file = shown_name(files.front()),
                  .where = {},
-                 .cause = "is " + format.name + ", whose points are no cells",
+                 .cause = format.name + " is not a raster format",
                  .remedy = "leave `cell` out"});
   }
   if (options.band != 1 && !source->info().grid) {
     throw Error({.file = shown_name(files.front()),
                  .where = {},
-                 .cause = "is " + format.name + ", whose points have no bands",
+                 .cause = format.name + " has no bands",
                  .remedy = "leave `band` out"});
   }
   return selection_of(std::move(source), options);
@@ -195,7 +195,7 @@ std::optional<Entities> entities_named(std::string_view name) {
 }
 
 std::span<const Format> formats() {
-  // The most telling content first: text is whatever looks like a table of numbers.
+  // The most distinctive content first. Text comes last: anything like a table of numbers counts.
   static const std::array<Format, 16> all{
       geotiff_format(),  vrt_format(), las_format(),         ept_format(),
       ply_format(),      glb_format(), hgt_format(),         ascii_grid_format(),
@@ -208,7 +208,7 @@ const Format* format_of_name(const std::string& file) {
   if (is_ept_name(file)) return &ept_format();
   if (const Format* const packed = packed_format_of(file)) return packed;
   const std::string ending = ending_of(file);
-  // Of GTOPO30 and SRTM30; those of the USGS have no header beside them.
+  // GTOPO30 and SRTM30 also end in .dem; unlike USGS DEMs, they have a header file next to them.
   if (ending == ".dem" && !binary_header_of(file).empty()) return &binary_grid_format();
   return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
 }
@@ -216,10 +216,10 @@ const Format* format_of_name(const std::string& file) {
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options) {
   if (names.empty()) throw std::invalid_argument("there is no file to open");
-  if (options.block_points == 0) throw std::invalid_argument("block_points must be above 0");
+  if (options.block_points == 0) throw std::invalid_argument("block_points must be positive");
   const std::vector<std::string> files = input_files(names, options.format);
   if (options.blocks_ahead == 0) return open_here(files, options);
-  // The reading ends with the source too, not by the caller's stop alone.
+  // Reading ends when the source is destroyed, not only when the caller requests a stop.
   std::stop_source reading;
   SourceOptions inner = options;
   inner.stop = reading.get_token();

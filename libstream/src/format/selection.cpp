@@ -74,7 +74,7 @@ class SelectedSource final : public PointSource {
 
   bool next(PointBlock& block) override {
     block.clear();
-    // What was left over last time.
+    // Begin with the points left over from the last call.
     std::swap(block, rest_);
     rest_.clear();
     while (block.size() < block_points_ && source_->next(read_)) {
@@ -108,7 +108,7 @@ class SelectedSource final : public PointSource {
     std::size_t from = 0, bytes = 0;
   };
 
-  /// Appends what counts of the block that was read last.
+  /// Appends the selected points of the block in read_.
   void append(PointBlock& block) {
     const std::size_t from_bytes = source_->info().payload_size(), to_bytes = info_.payload_size();
     matches_.assign(read_.size(), 1);
@@ -198,7 +198,7 @@ void check_attributes(const std::vector<std::string>& names, const std::vector<C
     throw Error({.file = file,
                  .where = {},
                  .cause = "its points have no attribute " + in_quotes(name),
-                 .remedy = list.empty() ? "they have none" : "known are " + list});
+                 .remedy = list.empty() ? "they have no attributes" : "known are " + list});
   }
 }
 
@@ -208,7 +208,7 @@ std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
   if (wanted.where.empty() && !wanted.keep && wanted.drop.empty() && !wanted.region) return source;
   const SourceInfo& all = source->info();
   const std::string file = all.files.empty() ? std::string() : all.files.front();
-  // Files that follow one another are without what is left out, and have checked it.
+  // A chain of files has already checked and dropped these attributes.
   if (all.files.size() <= 1 || all.grid) check_attributes(wanted.drop, all.attributes, file);
   if (wanted.keep) check_attributes(*wanted.keep, all.attributes, file);
   std::vector<std::size_t> kept;

@@ -10,18 +10,18 @@
 
 namespace terrace::stream {
 
-/// The part of a source selected by options.selection; the source itself if everything is selected.
-/// Blocks of points are refilled, those of a raster remain its tiles. Throws: Error for an invalid
-/// condition and for unknown names.
+/// Returns the part of a source selected by options.selection; the source itself if everything is
+/// selected. Blocks of points are filled up again, blocks of a raster remain its tiles. Throws:
+/// Error for an invalid condition and for unknown names.
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options);
 
-/// The source with only those of its attributes that are among `names`, in the order of `names`.
+/// The source with only the attributes among `names`, in the order of `names`.
 std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
                                              const std::vector<std::string>& names,
                                              std::size_t block_points);
 
-/// The attributes that are kept or that the condition names: no others need to be read.
+/// The attributes that are kept or named by the condition: no others need to be read.
 /// Throws: Error for an invalid condition.
 std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted);
 

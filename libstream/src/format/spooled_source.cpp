@@ -42,7 +42,7 @@ class SpooledSource final : public PointSource {
   std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
 
  private:
-  /// Returns the name by which the copy can be opened.
+  /// Copies a file to a temporary one; returns the name by which that can be opened.
   std::string set_aside(const std::string& file, const std::stop_token& stop) {
     Input input(file, stop);
     auto spool = std::make_unique<Spool>(input.name());
@@ -74,7 +74,7 @@ class SpooledSource final : public PointSource {
 
   std::vector<std::string> names_, copies_;
   std::vector<std::unique_ptr<Spool>> spools_;
-  std::unique_ptr<PointSource> source_;  // goes before what it reads
+  std::unique_ptr<PointSource> source_;  // destroyed before the copies that it reads
   SourceInfo info_;
 };
 

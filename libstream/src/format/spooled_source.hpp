@@ -9,9 +9,8 @@
 
 namespace terrace::stream {
 
-/// The result of `format.open` for the files, after reading those without random access (pipes,
-/// gzip) to their end into unnamed temporary files. Messages have the names of `files`. Throws:
-/// Error, Stopped.
+/// Opens the files with `format.open`, after copying those without random access (pipes, gzip) to
+/// unnamed temporary files. Messages name the original files. Throws: Error, Stopped.
 std::unique_ptr<PointSource> open_spooled(const Format& format, std::span<const std::string> files,
                                           const SourceOptions& options);
 

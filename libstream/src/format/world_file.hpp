@@ -8,8 +8,7 @@
 
 namespace terrace::stream {
 
-/// A world file next to a raster: six numbers that lead from column and row to the centre of a
-/// cell.
+/// A world file next to a raster: six numbers that map column and row to the centre of a cell.
 struct WorldFile {
   std::string name;
   WorldTransform world;
@@ -19,8 +18,8 @@ struct WorldFile {
 /// for NAME.tif, in lower or upper case. nullopt if there is none. Throws: Error if it is damaged.
 std::optional<WorldFile> world_file_of(const std::string& file);
 
-/// Places a raster that has no place of its own (see kNoGeoreferencing) by its world file, if it
-/// has one. Throws: as world_file_of().
+/// Georeferences a raster that is not georeferenced itself (see kNoGeoreferencing) by its world
+/// file, if it has one. Throws: as world_file_of().
 void place_by_world_file(const std::string& file, RasterInfo& info);
 
 }  // namespace terrace::stream

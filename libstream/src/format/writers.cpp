@@ -14,7 +14,7 @@
 namespace terrace::stream {
 namespace {
 
-// Endings that end as others do come before them.
+// Longer endings come first: ".copc.laz" also ends in ".laz".
 constexpr std::array<WriterFormat, 7> kPointFormats{{{"xyz", ".xyz", ".txt", true},
                                                      {"csv", ".csv", "", true},
                                                      {"ply", ".ply", "", false},
@@ -45,7 +45,7 @@ std::string known(std::span<const WriterFormat> table) {
   return out;
 }
 
-/// Whether a file's name, in lower case, has that ending and more.
+/// True if a file's name, in lower case, has the ending and something before it.
 bool has_ending(const std::string& name, std::string_view ending) {
   return !ending.empty() && name.size() > ending.size() && name.ends_with(ending);
 }
@@ -79,7 +79,7 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
   }
   throw Error({.file = path,
                .where = {},
-               .cause = "its ending names no format that can be written",
+               .cause = "no output format has its ending",
                .remedy = "known are " + known(table)});
 }
 
@@ -103,8 +103,8 @@ MeshRounding::MeshRounding(const std::string& path, const Box3& bounds,
   origin_ = glb_origin(bounds);
   if (frame) metres_ = frame->metres;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // Half a unit in the last of 24 bits, and what doubles lose when the origin is taken off and
-    // added again, and between units.
+    // Half a unit in the last of 24 bits, and the rounding of doubles when the origin is subtracted
+    // and added back and when units are converted.
     const double half =
         std::max(bounds.max[axis] - (*origin_)[axis], (*origin_)[axis] - bounds.min[axis]);
     const double doubles = metres_[axis] == 1.0 ? 0x1p-51 : 0x1p-50;

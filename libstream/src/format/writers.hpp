@@ -19,11 +19,11 @@ struct WriterFormat {
   std::string_view name;
   std::string_view ending;  ///< empty: by name only
   std::string_view second_ending;
-  bool streams;  ///< fit for standard output
+  bool streams;  ///< can be written to standard output
 };
 
-/// The row for `path`: by options.format, else by ending; for "-" the first that streams.
-/// Throws: Error that lists the formats of the table.
+/// Returns the number of the row for `path`: by options.format, else by ending; for "-" the first
+/// that streams. Throws: Error that lists the formats of the table.
 std::size_t choose_format(std::span<const WriterFormat> table, const std::string& path,
                           const WriterOptions& options);
 
@@ -40,7 +40,7 @@ std::unique_ptr<PointWriter> open_las_writer(const std::string& path, const Poin
                                              const WriterOptions& options);
 std::unique_ptr<PointWriter> open_copc_writer(const std::string& path, const PointHeader& header,
                                               const WriterOptions& options);
-/// The same with so many nodes in a page of the hierarchy: see write_copc_hierarchy().
+/// Like open_copc_writer(), with `page_nodes` nodes per page: see write_copc_hierarchy().
 std::unique_ptr<PointWriter> open_paged_copc_writer(const std::string& path,
                                                     const PointHeader& header,
                                                     const WriterOptions& options,
@@ -58,13 +58,14 @@ std::unique_ptr<MeshWriter> open_obj_writer(const std::string& path, const MeshH
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
                                             const WriterOptions& options);
 
-/// The local origin of a GLB file whose vertices lie in `bounds`.
+/// The local origin of a GLB file whose vertices are in `bounds`.
 Point3 glb_origin(const Box3& bounds);
-/// Returns what a GLB file stores for a coordinate whose unit is `metres` long. Not inline: where
-/// GCC 12 vectorises it and the result is widened again at once, it drops the rounding.
+/// Returns the value that a GLB file stores for a coordinate whose unit is `metres` long. Not
+/// inline: where GCC 12 vectorises it and widens the result again immediately, it drops the
+/// rounding.
 float glb_coordinate(double coordinate, double origin, double metres);
 
-/// Holds a mesh writer's caller to its promises.
+/// Asserts that a mesh writer's caller adds what its header promises.
 class MeshCounts {
  public:
   explicit MeshCounts(const MeshHeader& header)
@@ -82,7 +83,7 @@ class MeshCounts {
     assert(vertices_left() == 0 && triangles.size() <= triangles_ - triangles_seen_);
     triangles_seen_ += triangles.size();
   }
-  /// True if there are as many as promised.
+  /// True if all promised vertices and triangles have been added.
   [[nodiscard]] bool complete() const {
     return vertices_seen_ == vertices_ && triangles_seen_ == triangles_;
   }
