@@ -12,32 +12,34 @@
 
 namespace terrace::stream {
 
-/// Bytes with random access: a file, memory, or anything else.
+/// Bytes with random access, from a file, memory or elsewhere.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
 
-  /// The name in error messages; for a file the path.
+  /// The name for error messages; the path of a file.
   [[nodiscard]] virtual const std::string& name() const = 0;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
-  /// Fills `out` with the bytes from `offset` on. Requires offset + out.size() <= size(). Called by
-  /// several threads at once. Throws: Error if they cannot be read.
+  /// Fills `out` with the bytes from `offset` on. Requires offset + out.size() <= size(). May be
+  /// called by several threads at once. Throws: Error if the bytes cannot be read.
   virtual void read(std::uint64_t offset, std::span<std::byte> out) const = 0;
 };
 
-/// A regular file, read with pread(2). Throws: Error if it is not one or cannot be opened.
+/// Opens a regular file, to be read with pread(2). Throws: Error if it is not a regular file or
+/// cannot be opened.
 [[nodiscard]] std::unique_ptr<ByteSource> open_file(const std::filesystem::path& path);
 
-/// Bytes in memory.
+/// Serves bytes from memory.
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::string name,
                                                           std::vector<std::byte> bytes);
 
-/// `size` bytes read by the caller's function, under the contract of ByteSource::read().
+/// Serves `size` bytes through the caller's function, which follows the contract of
+/// ByteSource::read().
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_by_function(
     std::string name, std::uint64_t size,
     std::function<void(std::uint64_t offset, std::span<std::byte> out)> read);
 
-/// Opens a file of a folder, or of anything that acts as one, by its name ("manifest.json").
+/// Opens a file by its name ("manifest.json") in a folder, an archive, on a server or the like.
 /// Throws: Error if it does not exist.
 using OpenByName = std::function<std::unique_ptr<ByteSource>(const std::string& name)>;
 

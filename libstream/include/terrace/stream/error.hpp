@@ -15,7 +15,7 @@ class Error : public std::runtime_error {
     std::string where;     ///< "line 12", "byte 4096", "tile 3,4", "cluster 0/17"
     std::string cause;     ///< what is wrong
     std::string remedy;    ///< what the user can do
-    int error_number = 0;  ///< errno of the system call that failed; 0: none did
+    int error_number = 0;  ///< errno of the failed system call, if any; otherwise 0
   };
 
   explicit Error(Parts parts);
@@ -26,7 +26,7 @@ class Error : public std::runtime_error {
   Parts parts_;
 };
 
-/// Thrown if reading or writing ends because the caller's stop token requested it.
+/// Thrown when reading or writing ends early because a stop was requested by the caller's token.
 class Stopped : public std::runtime_error {
  public:
   Stopped() : std::runtime_error("stopped") {}
@@ -38,7 +38,8 @@ class ClosedPipe : public Error {
   ClosedPipe();
 };
 
-/// An Error for a failed system call: the cause ends with the text of `error_number` (errno).
+/// Returns the Error for a failed system call; its cause ends with the text of `error_number`
+/// (errno).
 Error system_error(std::string file, const std::string& action, int error_number,
                    std::string remedy = {});
 

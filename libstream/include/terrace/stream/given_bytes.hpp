@@ -21,7 +21,7 @@ struct ByteRange {
   friend bool operator==(const ByteRange&, const ByteRange&) = default;
 };
 
-/// Bytes that nobody has given yet. Not a fault: give them and do the same again.
+/// Thrown for bytes that have not been given yet. Not a fault: give them and try again.
 class MissingBytes : public std::runtime_error {
  public:
   explicit MissingBytes(std::vector<ByteRange> ranges);
@@ -31,34 +31,35 @@ class MissingBytes : public std::runtime_error {
   std::vector<ByteRange> ranges_;
 };
 
-/// Files of which only those parts are there that somebody has given, so that a store can be read
-/// by one who cannot wait: in a browser, whose requests come back when they will. What is read of
-/// such a file is copied if it is there; if not, the read throws MissingBytes, which names what to
-/// bring.
+/// Partial files in memory, of which callers give the parts. They let a store be read where reads
+/// cannot wait, as in a browser, whose requests are asynchronous. A read copies the bytes if all
+/// are held; otherwise it throws MissingBytes, which names the range of the read.
 ///
-/// One thread at a time. The sources that open() gives share what was given and stay valid.
+/// Not thread-safe. The sources that open() returns share the given bytes and stay valid.
 class GivenBytes {
  public:
-  /// max_bytes: beyond it the parts that were read or given longest ago are dropped (and missing
-  /// again when they are read). One part, however large, is always kept.
+  /// max_bytes: the limit of the bytes held. Beyond it, the least recently read or given parts are
+  /// dropped, and are missing again when they are read. The last part is always kept, however
+  /// large.
   explicit GivenBytes(std::uint64_t max_bytes = std::uint64_t{64} << 20);
   ~GivenBytes();
   GivenBytes(GivenBytes&&) noexcept;
   GivenBytes& operator=(GivenBytes&&) noexcept;
 
-  /// A file of this size is there; to be told before it is opened. Throws: Error if it was told
-  /// with another size.
+  /// Declares a file and its size; must be called before the file is opened. Throws: Error if it
+  /// was declared with another size.
   void add_file(const std::string& name, std::uint64_t size);
-  /// Bytes that are already there are kept as they are. Throws: Error if the file is not there or
-  /// is smaller.
+  /// Gives a part of a file. Bytes that were given before keep their values. Throws: Error if the
+  /// file is not declared or is smaller.
   void give(const std::string& name, std::uint64_t offset, std::span<const std::byte> bytes);
-  /// Forgets what was given of a file, as after bytes that turned out to be damaged.
+  /// Forgets the given bytes of a file, for example because they turned out to be damaged.
   void forget(const std::string& name);
 
-  /// For Store::open(). Throws: Error for files that are not there.
+  /// Returns the function for Store::open(), which throws Error for files that are not declared.
   [[nodiscard]] OpenByName open() const;
-  /// Whether all these bytes are there. O(log n).
+  /// Whether all these bytes are held. O(log n).
   [[nodiscard]] bool has(const ByteRange& range) const;
+  /// Bytes held now.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:

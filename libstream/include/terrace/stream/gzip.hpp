@@ -11,16 +11,16 @@
 
 namespace terrace::stream {
 
-/// True if `bytes` begin like gzip.
+/// True if `bytes` begin with the signature of gzip.
 bool is_gzip(std::span<const std::byte> bytes);
 
-/// Compresses, without time and name, so that equal bytes give equal bytes. level: 1 (fast) to 12
-/// (small).
+/// Compresses. Stores neither time nor name, so equal input gives equal output. level: 1 (fast) to
+/// 12 (small).
 std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level = 6);
 
-/// Decompresses. most: the limit of the size; data that claims more is refused before it is
-/// decompressed. name: for messages. Throws: Error if `bytes` are damaged or not gzip, or hold more
-/// than `most`.
+/// Decompresses. most: the maximum size; data that claims more is refused before it is
+/// decompressed. name: for messages. Throws: Error if `bytes` are damaged, not gzip, or decompress
+/// to more than `most` bytes.
 std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t most,
                               const std::string& name);
 

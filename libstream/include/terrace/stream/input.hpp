@@ -12,7 +12,7 @@
 
 namespace terrace::stream {
 
-/// The name for standard input, and for standard output in writers.
+/// The name of standard input, and for writers of standard output.
 inline constexpr std::string_view kStandardStream = "-";
 
 /// Whether `file` is standard input or a pipe: bytes that can be read only once, by one reader.
@@ -21,18 +21,19 @@ inline constexpr std::string_view kStandardStream = "-";
 class GzipStream;
 
 /// The bytes of a file, a pipe or standard input ("-") from first to last, through a window that
-/// moves forward. Holds the window, never the whole file. Input that begins as gzip is decompressed
-/// on the way, unless it is `as_it_is`: windows and offsets refer to the decompressed bytes.
+/// moves forward. Holds the window, never the whole file. Input that begins with the signature of
+/// gzip is decompressed, unless Packed::as_it_is is passed; windows and offsets then refer to the
+/// decompressed bytes.
 ///
-/// Any wait for a pipe (for its first writer, or for more bytes) ends with Stopped as soon as
-/// `stop` is requested, on any thread.
+/// Any wait for a pipe (for its first writer, or for more bytes) ends with Stopped as soon as a
+/// stop is requested, from any thread.
 class Input {
  public:
-  /// as_it_is: for bytes that may begin like gzip by chance.
+  /// Whether gzip input is decompressed. as_it_is: for bytes that may begin like gzip by chance.
   enum class Packed : std::uint8_t { unpacked, as_it_is };
 
-  /// at_once: bytes requested at a time. Does not wait for the first writer of a pipe. Throws:
-  /// Error if the file cannot be opened.
+  /// at_once: bytes per read. Does not wait for the first writer of a pipe. Throws: Error if the
+  /// file cannot be opened.
   explicit Input(const std::string& file, const std::stop_token& stop = {},
                  std::size_t at_once = std::size_t{256} << 10, Packed packed = Packed::unpacked);
   ~Input();
@@ -54,14 +55,14 @@ class Input {
   [[nodiscard]] std::uint64_t offset() const { return offset_; }
   /// Size of a regular file; nullopt for pipes and gzip.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
-  /// As the caller named it, "standard input" for "-".
+  /// The name as the caller gave it; "standard input" for "-".
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
   class Descriptor;
 
   Input& operator=(Input&&) noexcept;
-  /// One read into the free end of the buffer; false at the end of the input.
+  /// Reads once into the free end of the buffer; false at the end of the input.
   bool read_more();
 
   std::string name_;

@@ -10,14 +10,14 @@
 #include <string_view>
 #include <vector>
 
-/// The LAZ codec: encodes LAS point records, packed as in LAS, as LASzip chunks and decodes them,
-/// bit for bit. It handles bytes only; headers and files are up to the reader and the writer.
+/// The LAZ codec: encodes LAS point records as LASzip chunks and decodes them, bit for bit. It
+/// handles bytes only; the readers and writers of files handle headers.
 ///
 /// A LAZ file (point format byte + 128) has a LASzip VLR among its VLRs. Where the records of a LAS
-/// file would begin there are (except with Compressor::pointwise) 8 bytes with the chunk table's
-/// position in the file (int64), then the chunks without gaps, then the table. A position of -1
-/// means that it is in the last 8 bytes of the file instead; the field's own position means that
-/// the writer stopped before writing a table.
+/// file would begin, it has 8 bytes with the chunk table's position in the file (int64), then the
+/// chunks without gaps, then the table; with Compressor::pointwise it has the chunk only. A
+/// position of -1 means that the table's position is in the last 8 bytes of the file instead. The
+/// field's own position means that the writer stopped before it wrote the table.
 ///
 /// Source: M. Isenburg, LASzip: lossless compression of LiDAR data, PE&RS 79(2), 2013; A. Said,
 /// Introduction to arithmetic coding, HPL-2004-76.
@@ -30,7 +30,7 @@ class Corrupt : public std::runtime_error {
   Corrupt(const std::string& cause, std::uint64_t offset)
       : std::runtime_error(cause), offset_(offset) {}
 
-  /// The position in the given bytes (a chunk, a table, a VLR's payload) where this was noticed.
+  /// Offset in the given bytes (a chunk, a table, a VLR's payload) at which the fault was found.
   [[nodiscard]] std::uint64_t offset() const noexcept { return offset_; }
 
  private:
@@ -66,13 +66,13 @@ struct Item {
   friend bool operator==(const Item&, const Item&) = default;
 };
 
-/// The LASzip VLR: how the points of a file are coded.
+/// The LASzip VLR, which says how the points of a file are coded.
 struct Vlr {
   static constexpr std::string_view kUserId = "laszip encoded";
   static constexpr std::uint16_t kRecordId = 22204;
-  /// As chunk_size: the table has the number of points of each chunk.
+  /// A chunk_size that means that the chunk table has the number of points of each chunk.
   static constexpr std::uint32_t kVariable = 0xffffffff;
-  /// In options: formats 6 to 10 stored as formats 1 to 5 with extra bytes.
+  /// A bit of `options`: formats 6 to 10 are stored as formats 1 to 5 with extra bytes.
   static constexpr std::uint32_t kCompatibility = 1;
 
   Compressor compressor = Compressor::layered;
@@ -80,54 +80,55 @@ struct Vlr {
   std::uint32_t chunk_size = 50'000;  ///< points per chunk, except the last one
   std::vector<Item> items;            ///< in the order of the record
 
-  /// LASzip's default coding of a point format. Throws: std::invalid_argument unless point_format
-  /// <= 10 and record_length is between the format's and 65,535 (more than the format's: extra
-  /// bytes).
+  /// Returns LASzip's default coding of a point format. Throws: std::invalid_argument unless
+  /// point_format <= 10 and record_length is between the format's and 65,535 (more than the
+  /// format's: extra bytes).
   static Vlr of(unsigned point_format, std::size_t record_length,
                 std::uint32_t chunk_size = 50'000);
   /// Reads a VLR's payload (the bytes after its header of 54 bytes). Throws: Corrupt unless this
-  /// codec knows it and its items match the LAS header's point format (0 to 10, with bits 6 and 7
-  /// removed) and record length.
+  /// codec supports the VLR and its items match the LAS header's point format (0 to 10, with bits 6
+  /// and 7 removed) and record length.
   static Vlr parse(std::span<const std::byte> payload, unsigned point_format,
                    std::size_t record_length);
 
-  /// The payload.
+  /// Returns the payload.
   [[nodiscard]] std::vector<std::byte> serialise() const;
   [[nodiscard]] std::size_t record_length() const;
 };
 
-/// A run of points that is coded independently of others.
+/// A run of points that is coded independently of the others.
 struct Chunk {
-  std::uint64_t offset = 0;  ///< position of its first byte relative to the first chunk's
+  std::uint64_t offset = 0;  ///< of its first byte, counted from the first chunk's
   std::uint64_t bytes = 0;
   std::uint64_t points = 0;
 
   friend bool operator==(const Chunk&, const Chunk&) = default;
 };
 
-/// Reads a chunk table from the bytes at its position (more may follow). points: the number in the
-/// LAS header; bytes: the number between the first chunk and the table. Entries without points,
-/// which some writers append, are dropped. Memory: 24 bytes per chunk.
-/// Throws: Corrupt, also unless the chunks add up to exactly these points and bytes.
+/// Reads a chunk table from the bytes at its position; other bytes may follow it. points: the
+/// number in the LAS header; bytes: the number from the first chunk to the table. Drops entries
+/// without points, which some writers append. Memory: 24 bytes per chunk.
+/// Throws: Corrupt for a damaged table, and unless its chunks add up to exactly these points and
+/// bytes.
 std::vector<Chunk> read_chunk_table(std::span<const std::byte> table, const Vlr& vlr,
                                     std::uint64_t points, std::uint64_t bytes);
 
-/// The bytes of a chunk table. If vlr.chunk_size is not kVariable all chunks but the last must have
-/// that many points. Throws: std::invalid_argument if they do not, or for more than 2^32 - 1
-/// chunks, or points or bytes in one.
+/// Returns the bytes of a chunk table. Unless vlr.chunk_size is kVariable, all chunks except the
+/// last must have that many points. Throws: std::invalid_argument if they do not, and for more than
+/// 2^32 - 1 chunks, or points or bytes in a chunk.
 std::vector<std::byte> write_chunk_table(std::span<const Chunk> chunks, const Vlr& vlr);
 
-/// The number of leading bytes that layered_chunk() needs. Layered chunks contain their own size,
-/// so they can be read without a table.
+/// Returns the number of leading bytes that layered_chunk() needs. Layered chunks contain their
+/// size, so they can be read without a table.
 std::size_t layered_head_size(const Vlr& vlr);
 
-/// The points and bytes of the layered chunk that begins with `head`; its offset is 0. The numbers
-/// are not validated. Throws: Corrupt if `head` is too short.
+/// Returns the points and bytes of the layered chunk that begins with `head`, with offset 0. Does
+/// not validate the numbers. Throws: Corrupt if `head` is too short.
 Chunk layered_chunk(const Vlr& vlr, std::span<const std::byte> head);
 
 /// Attributes of layered chunks, as bits of a mask. X, Y, the returns and the scanner channel are
-/// always decoded; an omitted attribute has the value of the chunk's first point in all records.
-/// Other chunks are decoded completely.
+/// always decoded; in an attribute that is not, all records have the value of the chunk's first
+/// point. Other kinds of chunks are decoded completely.
 enum Attributes : std::uint32_t {
   kZ = 1u << 0,
   kClassification = 1u << 1,
@@ -140,7 +141,7 @@ enum Attributes : std::uint32_t {
   kRgb = 1u << 8,
   kNir = 1u << 9,
   kWavePacket = 1u << 10,
-  kExtraByte0 = 1u << 16,  ///< shifted left by i: extra byte i; the last bit for all from 15 on
+  kExtraByte0 = 1u << 16,  ///< shifted left by i for extra byte i; the highest bit: all from 15 on
   kAllAttributes = 0xffffffff,
 };
 
@@ -154,23 +155,23 @@ class Decoder {
   Decoder(Decoder&&) noexcept;
   Decoder& operator=(Decoder&&) noexcept;
 
-  /// Decodes a complete chunk of records.size() / record_length points. Throws: Corrupt, also
-  /// unless the chunk's last byte is consumed by its last point; `records` are then unspecified.
+  /// Decodes a complete chunk of records.size() / record_length points. Throws: Corrupt for damage,
+  /// and if the last point does not end at the chunk's last byte; `records` are then unspecified.
   void decode_chunk(std::span<const std::byte> chunk, std::span<std::byte> records);
 
   /// The progress of a step.
   struct Step {
-    std::size_t bytes = 0;   ///< consumed, not to be passed again
+    std::size_t bytes = 0;   ///< consumed; must not be passed again
     std::size_t points = 0;  ///< decoded
   };
-  /// Begins a chunk of this many points, to be decoded by step(): a chunk of which not all points
-  /// are wanted at once, or whose end is unknown, as when it comes from a pipe.
+  /// Begins a chunk of this many points, to be decoded by step(). For a chunk that is decoded in
+  /// pieces, or whose end is unknown because it comes from a pipe.
   void start(std::uint64_t points);
-  /// Decodes as many of the chunk's remaining points as `records` has room for and `bytes` suffice
-  /// for. bytes: those after the bytes consumed before; for a layered chunk all of it, at the same
-  /// address as in the first step, until its last point consumes it. `last`: there are no more;
-  /// otherwise pointwise chunks leave a point to the next step if fewer than 512 bytes + 4 per
-  /// extra byte are left. Throws: Corrupt, with the offset in the chunk.
+  /// Decodes the chunk's next points, until `records` is full or `bytes` run out. bytes: those
+  /// after the bytes consumed before. A layered chunk must be passed completely, at the same
+  /// address in each step; its last point consumes it. last: no more bytes follow. If they do, a
+  /// point of a pointwise chunk is left to the next step when fewer than 512 bytes + 4 per extra
+  /// byte remain. Throws: Corrupt, with the offset in the chunk.
   Step step(std::span<const std::byte> bytes, bool last, std::span<std::byte> records);
 
  private:
@@ -182,15 +183,15 @@ class Decoder {
 /// bytes of a layered chunk.
 class Encoder {
  public:
-  /// Throws: std::invalid_argument as Decoder does.
+  /// Throws: std::invalid_argument under the same conditions as Decoder.
   explicit Encoder(const Vlr& vlr);
   ~Encoder();
   Encoder(Encoder&&) noexcept;
   Encoder& operator=(Encoder&&) noexcept;
 
-  /// Appends the chunk of `records`, at least one point, to `out`. The bytes are identical to
-  /// LASzip's. Throws: std::invalid_argument if the bytes of records are not a multiple of the
-  /// record length, are 0, or are more than 2^32 - 1 points.
+  /// Encodes `records`, at least one point, and appends the chunk to `out`. Its bytes are identical
+  /// to LASzip's. Throws: std::invalid_argument if records.size() is 0, is not a multiple of the
+  /// record length, or is more than 2^32 - 1 points.
   void encode_chunk(std::span<const std::byte> records, std::vector<std::byte>& out);
 
  private:

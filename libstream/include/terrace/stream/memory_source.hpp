@@ -10,21 +10,21 @@
 #include "terrace/stream/raster.hpp"
 #include "terrace/stream/source.hpp"
 
-/// Sources whose points or samples are already in memory: the arrays of a program. Nothing is
-/// copied but the block that is being delivered; the arrays must outlive the source.
+/// Sources that read points or samples from a program's arrays. Only the block that is being
+/// delivered is copied; the arrays must outlive the source.
 
 namespace terrace::stream {
 
-/// Numbers at equal distances in memory, native and possibly unaligned. Either direction.
+/// Equally spaced numbers in memory, in native byte order and possibly unaligned.
 struct MemoryColumn {
   const std::byte* first = nullptr;
-  std::ptrdiff_t stride = 0;  ///< bytes from one number to the next
+  std::ptrdiff_t stride = 0;  ///< bytes from one number to the next; may be negative
 };
 
 /// Points in columns.
 struct MemoryPoints {
   /// Types, scales and names of coordinates and attributes, the CRS, and in `files` a name for
-  /// messages. `points` is set here.
+  /// messages. open_memory() sets `points`.
   SourceInfo info;
   std::uint64_t count = 0;
   std::array<MemoryColumn, 3> coordinates;  ///< of the types in info.coordinates
@@ -39,14 +39,14 @@ struct MemoryRaster {
   std::ptrdiff_t column_stride = 0, row_stride = 0;  ///< bytes
 };
 
-/// The points in their order. options: block_points, crs, selection and reading ahead count.
-/// Those of which a coordinate is NaN are left out and counted as nodata.
-/// Throws: Error for a selection that does not suit; in next() for an infinite coordinate, naming
-/// the point; std::invalid_argument unless each attribute has a column.
+/// Opens the points, in their order. Of the options, only block_points, crs, selection and those of
+/// reading ahead have an effect. Points with a NaN coordinate are left out and counted as nodata.
+/// Throws: Error for a selection that does not apply; std::invalid_argument unless each attribute
+/// has a column. next() throws Error for an infinite coordinate, naming the point.
 std::unique_ptr<PointSource> open_memory(MemoryPoints points, const SourceOptions& options = {});
 
-/// The samples as points, as from points_of(). Samples without data are those that equal
-/// info.nodata, NaN and the infinities.
+/// Opens the samples as points, as points_of() does. Samples that equal info.nodata, NaN and the
+/// infinities have no data.
 std::unique_ptr<PointSource> open_memory(const MemoryRaster& raster,
                                          const SourceOptions& options = {});
 

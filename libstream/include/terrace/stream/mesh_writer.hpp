@@ -14,16 +14,16 @@
 
 namespace terrace::stream {
 
-/// How coordinates become the metres of a format that has no other unit (GLB).
+/// How coordinates are converted to metres for a format whose unit is the metre (GLB).
 struct MeshFrame {
-  Point3 metres{1, 1, 1};  ///< in a unit of x, y and z; positive
-  /// x and y become metres from the middle of the bounds, for longitudes and latitudes have no
-  /// place in metres. Otherwise the file keeps the place: x, y and z, in metres.
+  Point3 metres{1, 1, 1};  ///< metres per unit of x, y and z; positive
+  /// True: x and y become metres from the middle of the bounds; for longitudes and latitudes, which
+  /// cannot be absolute positions in metres. False: positions stay absolute, in metres.
   bool local = false;
-  std::string crs{};  ///< of the coordinates: named in the file
+  std::string crs{};  ///< name of the coordinates' CRS, written to the file
 };
 
-/// The header of a mesh file. The counts must be kept.
+/// The header of a mesh file. The mesh must have exactly the declared counts.
 struct MeshHeader {
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
@@ -32,33 +32,33 @@ struct MeshHeader {
   /// Bounding box of all vertices, if known: GLB puts its local origin at the centre. Otherwise the
   /// first vertex is the origin.
   std::optional<Box3> bounds{};
-  /// Without one GLB has the coordinates as they are. The other formats do not use it.
+  /// GLB only; without a frame it has the coordinates unchanged.
   std::optional<MeshFrame> frame{};
 };
 
-/// Vertex indices of a triangle, counter-clockwise seen from outside (terrain: from above).
+/// Vertex indices of a triangle, counter-clockwise seen from outside (for terrain, from above).
 using TriangleIndices = std::array<std::uint32_t, 3>;
 
 /// Writes a triangle mesh to a file, which appears under its name, complete and synced, with
-/// finish(); a writer destroyed before that leaves nothing. First all vertices, then all triangles,
-/// each in pieces of any size. Bounded memory; the same mesh gives the same bytes.
+/// finish(); a writer destroyed before that leaves nothing. All vertices must be added before the
+/// triangles, both in pieces of any size. Memory is bounded; the same mesh gives the same bytes.
 ///
 /// PLY: double coordinates, float attributes, binary little-endian or ASCII; exact.
 /// OBJ: coordinates as the shortest decimals that read back as the same double; attributes cannot
 /// be represented and are dropped.
 /// GLB (binary glTF 2.0): positions are float32 relative to a local origin, which the node's
-/// translation holds in double precision; so a vertex is off by at most 2^-24 of its distance from
-/// the origin per axis. glTF's y axis points up: (x, y, z) with z up is stored as (x, z, -y).
-/// With a frame coordinates become metres on the way, and asset.extras says how they are got back:
-/// of a vertex at X, Y, Z in the scene x = origin[0] + X / metres_per_unit[0],
-/// y = origin[1] - Z / metres_per_unit[1] and z = Y / metres_per_unit[2].
-/// Attributes become vertex attributes, "level" as "_LEVEL". At most 4 GiB. Without triangles it is
-/// a point cloud, without vertices an empty scene.
+/// translation holds in double precision, so each coordinate is off by at most 2^-24 of its
+/// distance from the origin. glTF's y axis points up: (x, y, z) with z up is stored as (x, z, -y).
+/// With a frame, coordinates are converted to metres, and asset.extras has what is needed to
+/// convert a vertex X, Y, Z of the scene back: x = origin[0] + X / metres_per_unit[0], y =
+/// origin[1] - Z / metres_per_unit[1], z = Y / metres_per_unit[2].
+/// Attributes become vertex attributes, "level" as "_LEVEL". Maximum size: 4 GiB. A mesh without
+/// triangles is written as a point cloud, one without vertices as an empty scene.
 class MeshWriter {
  public:
   virtual ~MeshWriter() = default;
 
-  /// Appends vertices: finite coordinates, and header.attributes.size() values per vertex.
+  /// Appends vertices with finite coordinates, and header.attributes.size() values per vertex.
   virtual void add_vertices(std::span<const Point3> positions,
                             std::span<const float> attributes = {}) = 0;
   /// Appends triangles, after all vertices.
@@ -67,32 +67,32 @@ class MeshWriter {
   virtual void finish() = 0;
 };
 
-/// A writer for `path`, by WriterOptions::format, otherwise by ending (.ply, .obj, .glb). "-" is
-/// standard output, for "obj" (also if no format is given) and "ply-ascii". Throws:
-/// std::invalid_argument if the format is unknown (names the known ones); Error if it cannot hold
-/// such a large mesh, or if the file cannot be created.
+/// Opens a writer for `path`. The format is WriterOptions::format, or follows from the ending
+/// (.ply, .obj, .glb). "-" is standard output, for "obj" (the default there) and "ply-ascii".
+/// Throws: std::invalid_argument for an unknown format, naming the known ones; Error if the format
+/// cannot hold a mesh of this size, or if the file cannot be created.
 std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const MeshHeader& header,
                                              const WriterOptions& options = {});
 
-/// The name of the format that open_mesh_writer() would write: "ply", "glb". Throws as it does.
+/// Returns the name of the format that open_mesh_writer() would write: "ply", "glb". Throws as
+/// open_mesh_writer() does.
 std::string mesh_format(const std::string& path, const WriterOptions& options = {});
 
 /// The rounding of positions by a mesh file.
 class MeshRounding {
  public:
-  /// For the file that open_mesh_writer() writes with the same path and options, and `bounds` and
-  /// `frame` in its header. Throws: std::invalid_argument for an unknown format, as
-  /// open_mesh_writer() does.
+  /// For the file that open_mesh_writer() writes with this path and these options, and `bounds` and
+  /// `frame` in its header. Throws: std::invalid_argument for an unknown format.
   MeshRounding(const std::string& path, const Box3& bounds, const WriterOptions& options = {},
                const std::optional<MeshFrame>& frame = {});
 
-  /// The position that a reader of the file gets back for `p`, in the coordinates of `p`.
+  /// Returns the position that a reader of the file gets for `p`, in the coordinates of `p`.
   [[nodiscard]] Point3 operator()(const Point3& p) const;
   /// The maximum change of a coordinate of a point in `bounds`, per axis: 0 if the format is exact.
   [[nodiscard]] const Point3& largest() const { return largest_; }
 
  private:
-  std::optional<Point3> origin_;  ///< float32 relative to it; nullopt: exact
+  std::optional<Point3> origin_;  ///< positions are float32 relative to it; nullopt: exact
   Point3 metres_{1, 1, 1};
   Point3 largest_{};
 };

@@ -12,9 +12,9 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/store.hpp"
 
-/// The overlay: a file next to a store with other values for some of its points, such as smoothed
-/// heights. The store is never changed. A point is identified by the cluster of which it is a
-/// member and its index there; the store by its checksum. FORMAT.md describes the bytes.
+/// An overlay is a file next to a store with other values for some of its points, such as smoothed
+/// heights. The store is never changed. A point is identified by its cluster and its index among
+/// the cluster's members, the store by its checksum. FORMAT.md describes the bytes.
 
 namespace terrace::stream {
 
@@ -27,11 +27,11 @@ struct OverlayValue {
 };
 
 /// Writes an overlay. It appears under its name, complete and synced, when finish() returns.
-/// Memory: about 4096 values plus those of one cluster, and 20 bytes per 4096 values written.
+/// Memory: about 4096 values, the values of one cluster, and 20 bytes per 4096 values written.
 class OverlayWriter {
  public:
   /// `channel` names the quantity; values are in real units, with scale and offset applied. The
-  /// store must outlive the writer. Throws: Error if `path` exists and `replace` is false, or
+  /// store must outlive the writer. Throws: Error if `path` exists and may not be replaced, or
   /// cannot be written; std::invalid_argument for a name of more than 65,535 bytes.
   OverlayWriter(const std::filesystem::path& path, const Store& store, const std::string& channel,
                 Naming replace = {});
@@ -39,14 +39,15 @@ class OverlayWriter {
   OverlayWriter(OverlayWriter&&) noexcept;
   OverlayWriter& operator=(OverlayWriter&&) noexcept;
 
-  /// In ascending order of cluster ids, and of indices within a cluster. Throws:
-  /// std::invalid_argument if out of order, for a value that is not finite, and for a point that
-  /// the store does not have; Error if the file cannot be written or the store is damaged.
+  /// Adds a value. Values must come in ascending order of cluster ids, and of indices within a
+  /// cluster. Throws: std::invalid_argument if out of order, for a value that is not finite, and
+  /// for a point that the store does not have; Error if the file cannot be written or the store is
+  /// damaged.
   void add(ClusterId cluster, std::uint32_t index, double value);
   /// Values added so far.
   [[nodiscard]] std::uint64_t values() const;
 
-  /// Publishes the file and returns its size in bytes. Afterwards only values() may be called.
+  /// Publishes the file. Returns its size in bytes. Afterwards only values() may be called.
   std::uint64_t finish();
 
  private:
@@ -54,25 +55,26 @@ class OverlayWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// An overlay opened for reading. One thread at a time; several threads may each open their own.
-/// Memory: the directory, 24 bytes per page, and the page last used.
+/// An overlay opened for reading. Not thread-safe; each thread may open its own. Memory: the
+/// directory, 24 bytes per page, and the last page used.
 class Overlay {
  public:
-  /// Throws: Error if there is no overlay, for a newer version, a damaged header or directory, or
-  /// if it was made for another store (both checksums are named).
+  /// Throws: Error if the file is not an overlay, has a newer version or a damaged header or
+  /// directory, or was made for another store (naming both checksums).
   static Overlay open(const std::filesystem::path& path, const Store& store);
   ~Overlay();
   Overlay(Overlay&&) noexcept;
   Overlay& operator=(Overlay&&) noexcept;
 
   [[nodiscard]] const std::filesystem::path& path() const;
-  /// The quantity of the values.
+  /// The name of the quantity, as passed to the writer.
   [[nodiscard]] const std::string& channel() const;
   [[nodiscard]] std::uint64_t values() const;
 
-  /// The values of a cluster in ascending order of indices, empty if it has none; valid until the
-  /// next call. A binary search over the pages, which reads one unless it is that of the previous
-  /// call: clusters in ascending order read every page once. Throws: Error for damage.
+  /// Returns the values of a cluster in ascending order of indices, empty if it has none; valid
+  /// until the next call. Cost: a binary search over the pages, and reading one page unless it is
+  /// the last page used, so visiting clusters in ascending order reads every page once. Throws:
+  /// Error for damage.
   [[nodiscard]] std::span<const OverlayValue> find(ClusterId cluster);
   /// Visits all clusters that have values, in ascending order. Throws: Error for damage.
   void for_each(const std::function<void(ClusterId, std::span<const OverlayValue>)>& visit);

@@ -13,15 +13,15 @@ namespace terrace::stream {
 
 /// Writes a PNG image of 8 bits per channel, rows from top to bottom, without padding.
 ///
-/// channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; pixels: width * height * channels values. The
-/// file appears complete and synced, or not at all; an existing one is replaced only with
+/// channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA. pixels: width * height * channels values. The
+/// file appears complete and synced, or not at all; an existing file is replaced only with
 /// `replace`. "-" is standard output; `stop` ends a wait for its reader.
 /// Throws: Error if the image is empty or larger than 2^31 - 1 on a side, or cannot be written.
 void write_png(const std::filesystem::path& path, std::size_t width, std::size_t height,
                int channels, std::span<const std::uint8_t> pixels, const Naming& replace = {},
                const std::stop_token& stop = {});
 
-/// The same for one channel of 16 bits: `samples` are width * height values.
+/// Writes a PNG image of one grey channel of 16 bits, likewise. samples: width * height values.
 void write_png_grey16(const std::filesystem::path& path, std::size_t width, std::size_t height,
                       std::span<const std::uint16_t> samples, const Naming& replace = {},
                       const std::stop_token& stop = {});

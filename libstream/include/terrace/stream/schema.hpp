@@ -15,25 +15,25 @@
 
 #include "terrace/stream/point.hpp"
 
-/// The meaning of a point's numbers: its coordinates, their place in a coordinate reference system,
-/// and the packed record of its attributes. Shared by sources, stores and writers.
+/// The meaning of a point's numbers: its coordinates, how they relate to a coordinate reference
+/// system, and the packed record of its attributes. Shared by sources, stores and writers.
 
 namespace terrace::stream {
 
 /// The types of a column. Multi-byte values are little-endian on disk, native in memory.
 enum class ScalarType : std::uint8_t { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
 
-/// Bytes of one value.
+/// Returns the bytes of one value.
 std::size_t size_of(ScalarType type);
-/// "int8", "uint8", ..., "float32", "float64": the names in manifests and PLY headers.
+/// Returns "int8", "uint8", ..., "float32", "float64", the names in manifests and PLY headers.
 std::string_view name_of(ScalarType type);
-/// The type of that name (also PLY's "char", "uchar", "short", ...); nullopt for other names.
+/// Returns the type of that name (also PLY's "char", "uchar", "short", ...); nullopt for other
+/// names.
 std::optional<ScalarType> scalar_type_of(std::string_view name);
-/// The value of that type at `bytes`, which need not be aligned, rounded to a double.
+/// Returns the value of that type at `bytes`, which need not be aligned, rounded to a double.
 double to_double(ScalarType type, const std::byte* bytes);
 
-/// A column of the points with the meaning of its stored values: real value = stored * scale +
-/// offset.
+/// A column of the points. Its real values are stored value * scale + offset.
 struct Channel {
   std::string name;
   ScalarType type = ScalarType::f64;
@@ -53,12 +53,12 @@ struct GeoKey {
   friend bool operator==(const GeoKey&, const GeoKey&) = default;
 };
 
-/// A coordinate reference system as the file names it. Not interpreted here.
+/// A coordinate reference system as the file describes it, not interpreted.
 struct Crs {
   int epsg = 0;                 ///< EPSG code of the horizontal CRS; 0 if none is given
   int vertical_epsg = 0;        ///< EPSG code of the vertical CRS; 0 if none is given
-  std::string name;             ///< citation or name
-  std::string wkt;              ///< WKT if the file has one
+  std::string name;             ///< name or citation
+  std::string wkt;              ///< WKT, if the file has it
   bool geographic = false;      ///< x, y are longitude and latitude
   std::string horizontal_unit;  ///< "metre", "foot", "US survey foot", "degree"; empty if unknown
   std::string vertical_unit;    ///< likewise for heights
@@ -94,8 +94,8 @@ struct Lattice {
 
   friend bool operator==(const Lattice&, const Lattice&) = default;
 };
-/// The lattice of stored integers of up to 32 bits; nullopt for other types and for a rotated
-/// transform.
+/// Returns the lattice of stored integers of up to 32 bits; nullopt for other types and for a
+/// rotated transform.
 [[nodiscard]] std::optional<Lattice> lattice_of(const Placement& placement);
 
 /// Converts a point in stored coordinates to coordinates of the CRS.
@@ -105,10 +105,11 @@ struct Lattice {
           stored[0] * xy[3] + stored[1] * xy[4] + xy[5],
           stored[2] * placement.coordinates[2].scale + placement.coordinates[2].offset};
 }
-/// The axis-aligned box in the CRS around a box in stored coordinates; empty stays empty. Around a
-/// rotated raster it is larger than the rotated box.
+/// Returns the axis-aligned box in the CRS around a box in stored coordinates; empty for an empty
+/// box. For a rotated raster it is larger than the rotated box.
 [[nodiscard]] Box3 world_box(const Placement& placement, const Box3& stored);
-/// Stored x, y (column and row of a raster) of a place in the CRS: the inverse of world_point().
+/// Returns the stored x, y (column and row of a raster) of a place in the CRS, the inverse of
+/// world_point().
 [[nodiscard]] std::array<double, 2> stored_place(const Placement& placement,
                                                  const std::array<double, 2>& world);
 
@@ -116,7 +117,7 @@ struct Lattice {
 struct ValueRange {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool nan = true;  ///< some may be NaN
+  bool nan = true;  ///< whether some may be NaN
 };
 
 /// One attribute of packed records, read as values of type T.
@@ -144,8 +145,8 @@ class AttributeView {
   std::size_t stride_, size_;
 };
 
-/// The components of a point. The values of its attributes are packed into one record without gaps,
-/// in the order of `attributes` and in native byte order; records of many points are contiguous.
+/// The components of a point. Its attribute values are packed into one record without gaps, in the
+/// order of `attributes` and in native byte order; records of many points are contiguous.
 struct Schema : Placement {
   bool grid = false;                    ///< coordinates are integer column, row and a raw sample
   std::vector<Channel> attributes;      ///< further columns, in order
@@ -155,7 +156,7 @@ struct Schema : Placement {
   [[nodiscard]] std::size_t payload_size() const { return attribute_offset(attributes.size()); }
   /// Offset of an attribute in a record.
   [[nodiscard]] std::size_t attribute_offset(std::size_t attribute) const;
-  /// An attribute of packed records; T is its type.
+  /// A view of one attribute of packed records; T is its type.
   template <class T>
   [[nodiscard]] AttributeView<T> view(std::span<const std::byte> records,
                                       std::size_t attribute) const {
@@ -164,8 +165,9 @@ struct Schema : Placement {
   }
 };
 
-/// How much wider on each side along x and y a region of a raster is taken: a millionth of a cell,
-/// since the places of rows and columns that a border names are rounded. Points have none.
+/// Returns how far a region is widened on each side along x and y, in units of the CRS: for a
+/// raster a millionth of a cell, because the computed positions of its columns and rows are
+/// rounded; for points 0.
 [[nodiscard]] std::array<double, 2> border_tolerance(const Schema& schema);
 
 }  // namespace terrace::stream

@@ -16,26 +16,26 @@ namespace terrace::stream {
 
 class StopWaiter;
 
-/// The destination of a writer's bytes: a file that appears when it is complete, or, for "-",
-/// standard output.
+/// The destination of a writer's bytes: a file that appears when it is complete, or standard output
+/// for "-".
 class Sink {
  public:
-  /// replace: an existing file. stop: ends writing, and a wait for the reader of standard output.
-  /// Throws: as AtomicFile.
+  /// replace: whether an existing file is replaced. stop: ends writing, and a wait for the reader
+  /// of standard output. Throws: as AtomicFile does.
   Sink(const std::string& path, const Naming& replace, const std::stop_token& stop = {});
   ~Sink();
   Sink(const Sink&) = delete;
   Sink& operator=(const Sink&) = delete;
 
-  /// Throws: Error if writing fails, Stopped, and for standard output ClosedPipe; each here or in
-  /// commit().
+  /// Appends bytes. Throws: Error if writing fails, Stopped, and for standard output ClosedPipe;
+  /// some failures are found only by commit().
   void write(std::string_view text);
   void write(std::span<const std::byte> bytes) {
     write(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   }
-  /// Replaces bytes written before; for files only.
+  /// Overwrites bytes written before; for files only.
   void write_at(std::uint64_t offset, std::string_view text);
-  /// Bytes so far.
+  /// Bytes written so far.
   [[nodiscard]] std::uint64_t size() const { return size_; }
   /// Publishes the file, or flushes standard output.
   void commit();

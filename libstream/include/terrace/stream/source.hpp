@@ -18,10 +18,10 @@
 
 namespace terrace::stream {
 
-/// The octree of the points (COPC, EPT): its nodes down to a depth are a thinned cloud.
+/// The octree of the points (COPC, EPT). Its nodes down to a depth are a thinned cloud.
 struct OctreeInfo {
   double spacing = 0.0;     ///< spacing of the root's points, in the CRS; halves with each depth
-  unsigned depths = 0;      ///< depths with points among the nodes to read; the root's is 0
+  unsigned depths = 0;      ///< number of depths with points to read; the root has depth 0
   std::uint64_t nodes = 0;  ///< nodes with points to read
 };
 
@@ -29,23 +29,24 @@ struct OctreeInfo {
 struct SourceInfo : Schema {
   std::string format;              ///< "geotiff", "xyz", "ply", ...
   std::vector<std::string> files;  ///< as the caller named them
-  /// Bounds of the points in stored coordinates, as the files state them. They may be wrong:
-  /// nothing may be left out because of them.
+  /// Bounds of the points in stored coordinates, as the files state them. They may be wrong, so
+  /// points must not be left out because of them.
   std::optional<Box3> stated_bounds;
-  /// The number of points if known; an upper bound for what has nodata: rasters, PLY, meshes.
+  /// The number of points if known; an upper bound for formats with nodata: rasters, PLY, meshes.
   std::optional<std::uint64_t> points;
   std::optional<double> nodata;      ///< of the (first) raster, in raw units
   std::optional<OctreeInfo> octree;  ///< of a single input organised as an octree
   std::vector<std::string> comments;
-  std::string note;  ///< for people: how several files were brought together; empty if as they are
-  /// Bytes in temporary files that hold input from pipes or gzip for random access.
+  /// For users: how several files were brought together; empty if they were used as they are.
+  std::string note;
+  /// Size in bytes of temporary files that hold input from pipes or gzip for random access.
   std::uint64_t spooled_bytes = 0;
 };
 
 /// A block of points in *stored coordinates* (see WorldTransform). Every coordinate type except
-/// 64-bit integers is exact in a double; a raster of 64-bit integers has its samples also as the
-/// attribute "sample", which is the authoritative value.
-/// Points of a block are close together: consumers cluster a block as a whole.
+/// 64-bit integers is exact in a double; a raster of 64-bit integers also has the attribute
+/// "sample", which holds the exact value.
+/// Points of a block are close together, because consumers cluster a block as a whole.
 struct PointBlock {
   std::vector<Point3> positions;
   std::vector<std::byte> payload;  ///< Schema::payload_size() bytes per point: packed attributes
@@ -58,41 +59,43 @@ struct PointBlock {
   }
 };
 
-/// The progress of a source. Bytes refer to the input files, if the source knows them.
+/// The progress of a source.
 struct Progress {
   std::uint64_t points = 0;
-  /// Left out: cells without data; of XYZ, CSV, PLY, meshes and arrays points (entities) of which a
-  /// coordinate is NaN (in text also an empty field or NA). Infinite coordinates are errors.
+  /// Left out for lack of data: cells without data, and points (entities) of XYZ, CSV, PLY, meshes
+  /// and arrays with a coordinate that is NaN (in text also an empty field or NA). Infinite
+  /// coordinates are errors.
   std::uint64_t nodata = 0;
-  /// Attributes of the points that their text leaves empty or NA: they are NaN.
+  /// Attribute values that are empty or NA in a text file; they are NaN.
   std::uint64_t empty_values = 0;
-  /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
+  /// Points that their file marks as withheld (LAS). They are delivered, and counted in `points`.
   std::uint64_t withheld = 0;
-  /// Points left out by Selection::where, region and resolution, whether they were read or not; of
-  /// rasters cells that were not read, whatever they hold.
+  /// Points left out by Selection::where, region and resolution, whether they were read or not. Of
+  /// rasters also cells that were not read, whatever they hold.
   std::uint64_t excluded = 0;
-  std::uint64_t lost = 0;  ///< points of damaged parts, left out (see SourceOptions::on_damage)
-  double fraction = 0.0;   ///< share of the work, 0 to 1; 0 if unknown
+  /// Points of damaged parts that were left out (see SourceOptions::on_damage).
+  std::uint64_t lost = 0;
+  double fraction = 0.0;  ///< share of the work, 0 to 1; 0 if unknown
 };
 
-/// A stream of points, pulled block by block. Bounded memory; never seeks back to what it has
-/// delivered. Not thread-safe; `read_ahead` moves the work to a separate thread.
+/// A stream of points, pulled block by block. Memory is bounded; a source never goes back to points
+/// that it has delivered. Not thread-safe; `read_ahead` moves the work to a separate thread.
 class PointSource {
  public:
   virtual ~PointSource() = default;
 
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
-  /// Fills `block` (cleared first; its capacity is reused). False at the end, with an empty block.
-  /// A block never has more than SourceOptions::block_points points. Throws: Error for bad data,
-  /// naming file, place, cause and remedy; Stopped.
+  /// Replaces `block` by the next points and returns true; false at the end, with an empty block.
+  /// Reuses the capacity of `block`. A block has at most SourceOptions::block_points points.
+  /// Throws: Error for bad data, naming file, place, cause and remedy; Stopped.
   virtual bool next(PointBlock& block) = 0;
   [[nodiscard]] virtual Progress progress() const = 0;
-  /// Sets what a caller of a raster knows only after info(): the height / width of a cell on the
-  /// ground, so that tiles are square there (until then the transform counts), and
-  /// SourceOptions::memory_bytes again. To be called before the first next(). Without effect on
-  /// other sources.
+  /// For rasters: sets two properties that callers can only determine after info(), the height /
+  /// width of a cell on the ground, so that tiles are square there (the default is that of the
+  /// transform), and SourceOptions::memory_bytes. Must be called before the first next(). Other
+  /// sources ignore it.
   virtual void refine(double /*cell_aspect*/, std::uint64_t /*memory_bytes*/) {}
-  /// Minimum memory of reading in bytes: for a raster, the window and what its file holds, which
+  /// Minimum memory of reading in bytes: for a raster, the window and its open file, whose need
   /// depends on its layout. 0 if only the blocks count.
   [[nodiscard]] virtual std::uint64_t reading_bytes() const { return 0; }
 };
@@ -101,54 +104,55 @@ class PointSource {
 struct Selection {
   /// Points that do not meet this condition (see Where) are left out; empty: all points are kept.
   std::string where{};
-  /// Names of the attributes to keep, in the order of the file; nullopt: all. Conditions see all of
-  /// them.
+  /// Names of the attributes to keep; nullopt: all. They keep the order of the file. Conditions may
+  /// use all attributes.
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
-  /// Points outside of this box, in the source's CRS, are left out; without heights its z are
-  /// infinite. Of rasters also those within a millionth of a cell are inside. Rasters, COPC and EPT
-  /// are read only as far as needed; a raster's columns and rows count from its first cell near the
-  /// box.
+  /// Points outside this box, in the source's CRS, are left out; its z are infinite if heights do
+  /// not matter. Cells of rasters within a millionth of a cell of the box are inside. Of rasters,
+  /// COPC and EPT only the necessary parts are read; a raster's columns and rows then count from
+  /// its first cell near the box.
   std::optional<Box3> region{};
-  /// Points in `region` at whose x, y this is false are left out too; empty: no others are.
-  /// Called by the thread that reads.
+  /// If set, points in `region` are left out too if this returns false for their x, y. Called by
+  /// the thread that reads.
   std::function<bool(const std::array<double, 2>& place)> covers{};
-  /// Above 0: points of an octree's nodes down to the first depth whose spacing is at most this, in
-  /// units of the CRS. Formats without an octree are refused.
+  /// If positive, only nodes of an octree down to the first depth whose spacing is at most this, in
+  /// units of the CRS, are read. Formats without an octree are refused.
   double resolution = 0.0;
 };
 
-/// How the colours of a PNG encode heights in metres, with R, G, B from 0 to 255:
-/// mapbox -10000 + (R * 65536 + G * 256 + B) / 10, terrarium R * 256 + G + B / 256 - 32768.
+/// How the colours of a PNG encode heights in metres, with R, G, B from 0 to 255: mapbox as -10000
+/// + (R * 65536 + G * 256 + B) / 10, terrarium as R * 256 + G + B / 256 - 32768.
 enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 
-/// Called for a damaged part of a LAS, LAZ, COPC or EPT that is left out (a chunk, a node, the
+/// Called for each damaged part of a LAS, LAZ, COPC or EPT that is left out (a chunk, a node, the
 /// missing end of a truncated file), with the number of points it should have had; 0 if it holds no
-/// points. Called by the reading thread. Damage on which all points depend is still thrown.
+/// points. Called by the thread that reads. Damage that affects all points is still thrown.
 using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
-/// What a source delivers from a file. Entities of several corners are points too: the position is
-/// that of the first corner, the attributes are the other corners, of the coordinates' type, bit
-/// for bit. Other attributes are left out.
+/// What a source delivers from a file. Entities of several corners are delivered as points: the
+/// position is the first corner, the attributes are the other corners, of the coordinates' type,
+/// bit for bit. Other attributes are left out.
 enum class Entities : std::uint8_t {
-  points,  ///< of meshes and GeoJSON: the vertices
+  points,  ///< the points; of meshes and GeoJSON the vertices
   /// The triangles of a mesh (GLB, OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
   /// file: "x2", "y2", "z2", "x3", "y3", "z3".
   triangles,
   /// The segments of lines (GeoJSON, including rings of polygons), in the order of the file: "x2",
-  /// "y2", "z2"; then "line", numbered from 0 over all files, "part", the segment's number in its
-  /// line, "vertices", which is 2, and "dimensions", 3 if the line has heights, otherwise 2. Points
-  /// are left out and counted as excluded.
+  /// "y2", "z2"; then "line", the line's number, counted from 0 over all files; "part", the
+  /// segment's number in its line; "vertices", which is 2; and "dimensions", 3 if the line has
+  /// heights, otherwise 2. Points are left out and counted as excluded.
   segments,
-  /// Lines in pieces of at most kPolylineVertices vertices, where the last of each piece is the
-  /// first of the next: "x2" to "z4" and the columns of segments. Missing corners of a piece are 0.
+  /// Lines in pieces of at most kPolylineVertices vertices, where the last vertex of each piece is
+  /// the first of the next: "x2" to "z4" and the other columns of segments. Missing corners of a
+  /// piece are 0.
   polylines,
 };
 /// Maximum number of vertices of an entity of Entities::polylines.
 inline constexpr std::size_t kPolylineVertices = 4;
-/// "points", "triangles", "segments", "polylines".
+/// Returns "points", "triangles", "segments" or "polylines".
 std::string_view name_of(Entities entities);
-/// The entities of that name; nullopt for other names.
+/// Returns the entities of that name; nullopt for other names.
 std::optional<Entities> entities_named(std::string_view name);
 
 /// Whether two descriptions mean the same CRS, however they are written.
@@ -156,60 +160,68 @@ using SameCrs = std::function<bool(const Crs&, const Crs&)>;
 
 /// Options of any source.
 struct SourceOptions {
-  std::string format{};  ///< name of a registered format; empty: by content, then ending
+  std::string format{};  ///< name of a format; empty: determined by content, then ending
   Entities entities = Entities::points;
   std::size_t block_points = 10000;        ///< maximum number of points per block
   std::uint64_t memory_bytes = 64u << 20;  ///< approximate memory limit of the source
   int band = 1;                            ///< of rasters, counted from 1
   HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< of PNG images in colour
-  double cell = 0.0;         ///< above 0: side of the cells of rasters without georeferencing
-  std::optional<Crs> crs{};  ///< replaces what the file says
-  /// Asked where the descriptions of several files differ; empty: then they do not agree.
+  double cell = 0.0;         ///< if positive, side of the cells of rasters without georeferencing
+  std::optional<Crs> crs{};  ///< overrides the files' CRS
+  /// Called if the descriptions of several files differ; empty: different descriptions do not
+  /// agree.
   SameCrs same_crs{};
-  /// Ends any wait for a pipe, in opening the source and in next(), with Stopped.
+  /// Makes any wait for a pipe, in open_source() and in next(), throw Stopped.
   std::stop_token stop{};
-  /// Above 0: blocks are read on a separate thread, at most this many ahead (see read_ahead()). The
-  /// source's destructor does not wait for a pipe.
+  /// If positive, blocks are read on a separate thread, at most this many ahead (see read_ahead()).
+  /// The source's destructor does not wait for a pipe.
   std::size_t blocks_ahead = 0;
   unsigned threads = 1;  ///< decoding threads, for formats with independent parts (LAZ, EPT)
   OnDamage on_damage{};  ///< empty: damage is thrown
   Selection selection{};
 };
 
-/// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;
-/// where they overlap the valid sample last named wins), other formats follow one another and must
-/// agree in CRS and in the attributes that the selection keeps or its condition names. "-" is
-/// standard input (streaming formats only). A folder stands for all files in it, recursively, whose
-/// names have an ending of a format (SourceOptions::format, if given), in the order of their paths;
-/// a folder with an ept.json for that dataset. "@LIST" stands for the names on the lines of LIST,
-/// relative to its folder, without blank lines and those that begin with #; a name with *, ? or
-/// [...] that is not an existing file for the files that match the pattern, in which a part ** of
-/// the path stands for any number of folders. Throws: Error, Stopped;
-/// std::invalid_argument for a format that is not known, without a name, or for blocks of 0 points.
+/// Opens one file, or several as one source. Rasters form a mosaic (see open_mosaic()). Files of
+/// other formats are read one after another, and must agree in CRS and in the attributes that the
+/// selection keeps or its condition names.
+///
+/// A name may be:
+/// - a file, or "-" for standard input (streaming formats only);
+/// - a folder with an ept.json, which is that dataset;
+/// - another folder: all files in it, recursively, whose names have an ending of a format (of
+///   SourceOptions::format, if given), in the order of their paths;
+/// - "@LIST": the names on the lines of the file LIST, relative to its folder; blank lines and
+///   lines that begin with # are ignored;
+/// - a pattern with *, ? or [...], if no file has that name: the files that match it. A component
+///   ** of the path matches any number of folders.
+///
+/// Throws: Error, Stopped; std::invalid_argument for an unknown format, without names, and for
+/// blocks of 0 points.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 
-/// NAME.prj beside NAME.tif and the like, where ESRI's formats have their CRS; empty if there is
-/// none.
+/// Returns the path of NAME.prj next to NAME.tif and the like, where ESRI's formats have their CRS;
+/// empty if it does not exist.
 [[nodiscard]] std::string prj_beside(const std::string& file);
 
-/// The same stream, read on a separate thread, at most `blocks` blocks ahead. An Error thrown there
-/// is rethrown by the `next` that would have delivered the block. The thread starts at once, that
-/// of a raster with the first `next`, as refine() comes before it; if none can be started the
-/// caller's thread reads. reading: the stop source of `source`; a stop is requested by `stop` and
-/// when the object is destroyed, so that its destructor does not wait for a pipe.
+/// Returns a source that reads `source` on a separate thread, at most `blocks` blocks ahead. An
+/// Error thrown there is rethrown by the next() that would have delivered the block. The thread
+/// starts at once; for a raster with the first next(), because refine() must come before it. If no
+/// thread can be started, the caller's thread reads. reading: the stop source of `source`. A stop
+/// is requested from it when one is requested from `stop`, and when the returned source is
+/// destroyed, so that its destructor does not wait for a pipe.
 std::unique_ptr<PointSource> read_ahead(
     std::unique_ptr<PointSource> source, std::size_t blocks = 8,
     const std::stop_source& reading = std::stop_source(std::nostopstate),
     const std::stop_token& stop = {});
 
-/// A format in the registry. `recognise` sees the first bytes of a file, up to 4096.
+/// A format in the registry. `recognise` gets the first bytes of a file, up to 4096.
 struct Format {
   std::string name;
-  std::vector<std::string> endings;  ///< lower case, with the dot: ".tif"
+  std::vector<std::string> endings;  ///< in lower case, with the dot: ".tif"
   bool streams = false;              ///< can be read from a pipe, front to back
-  /// A format that does not stream can be read from a copy: neither its name nor files next to it
-  /// matter.
+  /// A format that does not stream can be read from a copy of the file, because neither the file's
+  /// name nor files next to it matter.
   bool self_contained = false;
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
@@ -218,7 +230,7 @@ struct Format {
   bool lines = false;      ///< can be opened as Entities::segments and polylines too
 };
 
-/// All readable formats; a new one is one more entry.
+/// Returns all readable formats.
 std::span<const Format> formats();
 
 }  // namespace terrace::stream

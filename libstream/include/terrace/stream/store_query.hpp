@@ -15,8 +15,8 @@
 
 namespace terrace::stream {
 
-/// A linear map, row-major. As a metric the length of a vector v is |map v|: the rows of a scale to
-/// metres measure on the ground, a row of zeros ignores a coordinate.
+/// A linear map, row-major. As a metric, the length of a vector v is |map v|: a scale to metres
+/// measures distances on the ground, a row of zeros ignores a coordinate.
 using LinearMap = std::array<double, 9>;
 
 inline constexpr LinearMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -30,41 +30,41 @@ struct FoundPoint {
   double distance = 0.0;  ///< from the query's place, in the metric; 0 for a box
 };
 
-/// Queries by place: range, radius, nearest points, count; and the traversals of the hierarchy on
-/// which they and others are built. All boxes and places are in stored coordinates.
+/// Spatial queries (range, radius, nearest points, count), and the traversals of the hierarchy on
+/// which they are built. All boxes and places are in stored coordinates.
 ///
-/// A query reads the clusters whose boxes may matter, about 25 ns per point, and the index entries
-/// on the way. The root and 6 MiB of the decoded clusters above level 0 are cached, so nearby
-/// queries cost a tenth of that. In a view (Store::where()) only points that meet its condition are
-/// found and counted, and clusters of level 0 in which none can are not read.
+/// A query reads the clusters whose boxes may matter, about 25 ns per point, and their index
+/// entries. The root and 6 MiB of decoded clusters above level 0 are cached, so nearby queries cost
+/// a tenth of that. In a view (see Store::where()) only points that meet its condition are found
+/// and counted, and clusters of level 0 without such points are not read if the index shows it.
 ///
-/// One object per thread; any number of them share a Store, which must outlive them. All functions
-/// throw Error for a damaged store and Stopped if the store is stopped.
+/// Not thread-safe, but any number of objects may share a Store, which must outlive them. All
+/// functions throw Error for a damaged store, and Stopped if the store is stopped.
 class StoreQuery {
  public:
-  /// A cluster headed by a point, as described by the index: everything below is in its box.
+  /// A cluster headed by a point, as described by the index. All its descendants are in its box.
   struct Branch {
     Box3 box;
     std::uint64_t ordinal = 0;
-    /// Points of level 0 below, including the representative; 0 if the index has not been read for
-    /// this one yet, and the box is Store::coarse_box() or page_box().
+    /// Number of level-0 points below, including the representative; 0 if its index entry has not
+    /// been read yet. The box is then Store::coarse_box() or page_box().
     std::uint64_t descendants = 0;
   };
-  /// A decoded cluster and the clusters that its members head. Those of a view that do not meet the
-  /// condition have no position, but they are heads all the same, behind the others.
+  /// A decoded cluster and the clusters that its members head. In a view, members that do not meet
+  /// the condition have no position, but are still heads, numbered after the others.
   class Node {
    public:
     ClusterId id{};
-    std::vector<Point3> positions;  ///< of the members, of a view of those that meet the condition
+    std::vector<Point3> positions;  ///< of the members; in a view, of those that meet the condition
     std::uint64_t bytes = 0;
 
     [[nodiscard]] unsigned level() const { return level_of(id); }
-    /// The member that position i is of.
+    /// The number of the member at position i.
     [[nodiscard]] std::uint32_t member(std::size_t i) const {
       return members_.empty() ? static_cast<std::uint32_t>(i) : members_[i];
     }
-    /// The number of heads: the members, or 0 on level 0. Head i is the point of position i, if
-    /// there are so many.
+    /// The number of heads: the members, or 0 on level 0. Head i is the point at positions[i], if i
+    /// is less than positions.size().
     [[nodiscard]] std::size_t heads() const {
       return level() == 0 ? 0 : branches_.size() / level();
     }
@@ -74,8 +74,7 @@ class StoreQuery {
       if (branch.descendants == 0) look_up(branch, below);
       return branch;
     }
-    /// The same, but its box may be that of its page of the index, which is not read. Throws:
-    /// Error.
+    /// Like branch(), but does not read the index entry; the box may be its page's. Throws: Error.
     [[nodiscard]] const Branch& near_branch(std::size_t head, unsigned below) const {
       Branch& branch = branches_[head * level() + below];
       if (branch.descendants == 0) {
@@ -83,7 +82,7 @@ class StoreQuery {
       }
       return branch;
     }
-    /// The same as far as it is known without reading.
+    /// Like branch(), but reads nothing; the box may be Store::coarse_box().
     [[nodiscard]] const Branch& known_branch(std::size_t head, unsigned below) const {
       return branches_[head * level() + below];
     }
@@ -93,70 +92,71 @@ class StoreQuery {
     void look_up(Branch& branch, unsigned below) const;
 
     const Store* store_ = nullptr;
-    std::vector<std::uint32_t> members_;    ///< of a view: the number of each head
+    std::vector<std::uint32_t> members_;    ///< in a view, the member number of each head
     mutable std::vector<Branch> branches_;  ///< level() per head, level 0 first
   };
 
-  /// leaf_bytes: cache for decoded clusters of level 0 (LRU), for callers that query nearby places
-  /// repeatedly. Without it, ranges that do not overlap are read fastest.
+  /// leaf_bytes: size of an LRU cache of decoded clusters of level 0, for callers that query nearby
+  /// places repeatedly. Ranges that do not overlap are read fastest without it.
   explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0);
   StoreQuery(const StoreQuery&) = delete;
   StoreQuery& operator=(const StoreQuery&) = delete;
 
   [[nodiscard]] const Store& store() const { return store_; }
 
-  /// The points of `level` and above in the box: higher levels first, within a level by id.
+  /// Returns the points of `level` and above in the box, higher levels first, within a level by id.
   [[nodiscard]] std::vector<FoundPoint> in_box(const Box3& box, unsigned level = 0);
-  /// The points of `level` and above whose distance is at most `radius`, the nearest first; on ties
-  /// those with smaller coordinates first. Requires finite arguments.
+  /// Returns the points of `level` and above whose distance is at most `radius`, nearest first;
+  /// ties are in ascending order of coordinates. Requires finite arguments.
   [[nodiscard]] std::vector<FoundPoint> within(const Point3& place, double radius,
                                                const LinearMap& metric = kIdentityMap,
                                                unsigned level = 0);
-  /// The `count` nearest points of `level` and above, all if there are fewer, in the order of
-  /// within(). Distances are those of double arithmetic. O((count + points read) log).
+  /// Returns the `count` nearest points of `level` and above, or all if there are fewer, in the
+  /// order of within(). Distances are computed in doubles. Cost: O(n log n) for n = count + points
+  /// read.
   [[nodiscard]] std::vector<FoundPoint> nearest(const Point3& place, std::size_t count,
                                                 const LinearMap& metric = kIdentityMap,
                                                 unsigned level = 0);
-  /// The attributes of found points, in their order: Schema::payload_size() bytes each. Reads each
-  /// of their clusters once.
+  /// Returns the attributes of found points, in their order, Schema::payload_size() bytes each.
+  /// Reads each of their clusters once.
   [[nodiscard]] std::vector<std::byte> attributes(std::span<const FoundPoint> found) const;
-  /// The number of points of `level` and above in the box. For level 0, but of a view, only
-  /// clusters that cross its border are read.
+  /// Returns the number of points of `level` and above in the box. For level 0, except in a view,
+  /// reads only clusters that cross the border of the box.
   [[nodiscard]] std::uint64_t count(const Box3& box, unsigned level = 0);
-  /// An estimate of count(), of a view without its condition, from the index alone: of clusters
-  /// that cross the border, the share of their boxes inside counts. Ends early with any number
-  /// above `limit` if there are more.
+  /// Returns an estimate of count() from the index alone, ignoring the condition of a view. A
+  /// cluster that crosses the border counts by the share of its box that is inside. Stops early and
+  /// returns any number above `limit` once it is exceeded.
   [[nodiscard]] double estimate(const Box3& box,
                                 double limit = std::numeric_limits<double>::infinity());
 
-  /// One cluster, for custom traversals. Valid until the next call of any member.
+  /// Returns one cluster, for custom traversals. Valid until the next call of any member.
   const Node& node(ClusterId id);
 
   /// Visits the root and then, level by level down to `level` and within a level by id, each
-  /// cluster for which wants(level, branch) is true. A branch is tested only if that of the same
-  /// point on the level above was wanted, since it lies within that; and with larger boxes first,
-  /// for which wants() must be true too where it is for the branch's.
+  /// cluster for which wants(level, branch) is true. A branch is tested only if the same point's
+  /// branch on the level above was wanted, because it is inside that one. wants() is called with
+  /// larger boxes first, so it must be true for a box if it is true for one inside it.
   template <class Wants, class Visit>
   void descend(unsigned level, const Wants& wants, const Visit& visit);
 
   /// Visits the root and then clusters of `level` and above in ascending order of least(box), as
-  /// long as that does not exceed what the last visit(node) returned. least: a lower bound for any
-  /// point in the box; infinite: the box is skipped.
+  /// long as it does not exceed the last result of visit(node). least: returns a lower bound for
+  /// any point in the box, or infinity to skip it.
   template <class Least, class Visit>
   void best_first(unsigned level, const Least& least, const Visit& visit);
 
-  /// Cuts the hierarchy below the root at the border of a box: take(head, branch) is called for
-  /// clusters that lie completely inside and for those of level 0 on the border, until it returns
-  /// false; head is null if that does not meet the condition of a view. Before a cluster on the
-  /// border is opened, opens(branch) is asked. In a store of one block every point is such a
-  /// branch, without other descendants.
+  /// Cuts the hierarchy below the root at the border of a box. Calls take(head, branch) for
+  /// clusters that are completely inside and for those of level 0 on the border, until it returns
+  /// false; head is null if the point does not meet the condition of a view. Opens a cluster on the
+  /// border only if opens(branch) is true. In a store of one block, every point is a branch without
+  /// other descendants.
   template <class Take, class Opens>
   void cut(const Box3& box, const Take& take, const Opens& opens);
 
  private:
   using Nodes = std::list<Node>;
 
-  /// Nodes up to a number of bytes, most recently used first.
+  /// Nodes up to a total size, most recently used first.
   struct Cache {
     std::uint64_t most_bytes = 0, held_bytes = 0;
     Nodes nodes{};
@@ -171,17 +171,17 @@ class StoreQuery {
   };
 
   void fill(Node& node, ClusterId id);
-  /// Each cluster has one head, so no traversal opens more clusters than exist; in a damaged store
-  /// it could otherwise run nearly for ever. Throws: Error.
+  /// Throws Error if a traversal has opened more clusters than exist. Each cluster has one head, so
+  /// that only happens in a damaged store, where the traversal could otherwise run almost forever.
   void check_looked(std::uint64_t clusters) const;
 
   const Store& store_;
-  std::uint64_t clusters_ = 0;  ///< of all levels
-  Node root_, passing_;         ///< passing: the node that is not cached
+  std::uint64_t clusters_ = 0;  ///< number of clusters on all levels
+  Node root_, passing_;         ///< passing_: the last node that is not cached
   Cache leaves_, inner_;
   ClusterPoints points_;
   std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
-  std::vector<Open> open_;                          ///< a heap, the least on top
+  std::vector<Open> open_;                          ///< a heap with the smallest on top
   std::vector<ClusterId> crossing_;
 };
 
@@ -208,9 +208,9 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
   if (level > store_.top()) return;
   deliver(root_);
   for (unsigned at = store_.top(); at-- > level;) {
-    // In order of ordinals, which is the order of the bytes in the file.
+    // By ordinal, which is the order of the bytes in the file.
     std::sort(wanted_[at].begin(), wanted_[at].end());
-    // There are no duplicates unless the store is damaged.
+    // Duplicates exist only in a damaged store.
     wanted_[at].erase(std::unique(wanted_[at].begin(), wanted_[at].end()), wanted_[at].end());
     for (const std::uint64_t ordinal : wanted_[at]) deliver(node(cluster_id(at, ordinal)));
   }
@@ -266,7 +266,7 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
     const Node& at = node(crossing_.back());
     crossing_.pop_back();
     for (std::size_t i = 0; i < at.heads(); ++i) {
-      // What a point heads on a level lies within what it heads on the level above.
+      // The cluster that a point heads on a level is inside the one on the level above.
       for (unsigned below = at.level(); below-- > 0;) {
         if (!box.intersects(at.known_branch(i, below).box)) break;
         if (!box.intersects(at.near_branch(i, below).box)) break;

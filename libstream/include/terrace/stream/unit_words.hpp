@@ -6,13 +6,13 @@
 
 namespace terrace::stream {
 
-/// The one name that Channel::unit and Crs have for a unit of length, by any usual word for it:
-/// "ft", "Feet", "foot_intl" are "foot", "us-ft", "ftUS", "US survey feet" are "US survey foot".
-/// Words as GDAL, VRT and .aux.xml files, GeoTIFF citations, WKT, EPSG and PROJ have them, in any
-/// case. The text itself, without blanks around it, if it is not such a word.
+/// Returns the name that Channel::unit and Crs use for a unit of length, given any usual word for
+/// it: "foot" for "ft", "Feet" and "foot_intl"; "US survey foot" for "us-ft", "ftUS" and "US survey
+/// feet". Knows the words of GDAL, VRT and .aux.xml files, GeoTIFF citations, WKT, EPSG and PROJ,
+/// and ignores case. Returns other text unchanged, but trimmed.
 std::string canonical_unit(std::string_view text);
 
-/// A noun in messages after its number: "point" after 1, else "points"; "vertices", "entries".
+/// The form of a noun after its number in messages: "point" if `one`, else "points"; "vertices".
 inline std::string noun_for(bool one, std::string_view noun) {
   if (one) return std::string(noun);
   if (noun == "vertex") return "vertices";
@@ -21,7 +21,7 @@ inline std::string noun_for(bool one, std::string_view noun) {
   return std::string(noun) + 's';
 }
 
-/// Whether it is one of the names that canonical_unit() gives.
+/// True for the names of units that canonical_unit() returns.
 bool is_length_unit(std::string_view name);
 
 }  // namespace terrace::stream

@@ -13,19 +13,19 @@ namespace terrace::stream {
 
 /// A condition on points, such as `classification == 2 && return_number == last`.
 ///
-/// Operands are numbers, attributes by name (in double quotes if the name is not a plain word), x,
+/// Operands are numbers, names of attributes (in double quotes if the name is not a plain word), x,
 /// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). Operators, from
-/// tightest to loosest: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||; with
-/// parentheses as usual, and `not`, `and`, `or` as words. Everything is computed in doubles, or,
-/// where integers of 64 bits are named, in extended precision, which holds them all; attributes
-/// with their scale and offset. Comparisons give 1 or 0, and a point meets the condition if its
-/// value is a number other than 0.
+/// tightest to loosest: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||. Parentheses
+/// are allowed, and `not`, `and`, `or` as words. Scale and offset of attributes are applied. Values
+/// are computed as doubles, or in extended precision if the condition names 64-bit integers, which
+/// are then exact. Comparisons give 1 or 0; a point meets the condition if its value is a number
+/// other than 0.
 ///
-/// Const members may be called by several threads at once.
+/// Several threads may call const members at once.
 class Where {
  public:
-  /// text: up to 4096 characters. Throws: Error that names the character if it is not a condition
-  /// on points of this schema.
+  /// text: at most 4096 characters. Throws: Error that names the character if `text` is not a
+  /// condition on points of this schema.
   Where(const std::string& text, const Schema& schema);
 
   [[nodiscard]] const std::string& text() const { return text_; }
@@ -33,12 +33,12 @@ class Where {
   [[nodiscard]] bool uses(std::size_t attribute) const;
 
   /// Sets matches[i] to 1 for points that meet the condition, otherwise to 0. positions: in stored
-  /// coordinates; records: packed, one per point. About 1 ns per operand and point.
+  /// coordinates; records: packed, one per point. Cost: about 1 ns per operand and point.
   void test(std::span<const Point3> positions, std::span<const std::byte> records,
             std::span<std::uint8_t> matches) const;
 
-  /// Whether points in `box` (in the CRS) with attributes in these ranges may meet the condition;
-  /// false means that none does. attributes: one per attribute, or empty if unknown.
+  /// False if no point in `box` (in the CRS) with attributes in these ranges can meet the
+  /// condition. attributes: one range per attribute, or empty if unknown.
   [[nodiscard]] bool possible(const Box3& box, std::span<const ValueRange> attributes) const;
 
  private:
@@ -56,8 +56,8 @@ class Where {
   std::string text_;
   Schema schema_;
   std::vector<Step> steps_;  ///< in postfix order
-  std::size_t depth_ = 0;    ///< maximum number of operands at a time
-  bool extended_ = false;    ///< doubles do not hold all values
+  std::size_t depth_ = 0;    ///< maximum number of operands on the stack
+  bool extended_ = false;    ///< whether to compute in extended precision
 };
 
 }  // namespace terrace::stream
