@@ -32,7 +32,7 @@ std::ptrdiff_t entries(const fs::path& folder) {
   return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
 }
 
-TEST(AtomicFile, AppearsWithCommitOnly) {
+TEST(AtomicFile, AppearsOnlyWithCommit) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   AtomicFile file(target);
@@ -55,7 +55,7 @@ TEST(AtomicFile, LeavesNothingWithoutCommit) {
   EXPECT_EQ(entries(folder.path()), 0);
 }
 
-TEST(AtomicFile, RefusesAnExistingTargetUnlessItReplaces) {
+TEST(AtomicFile, ReplacesAnExistingTargetOnlyIfAsked) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   std::ofstream(target) << "old";
@@ -84,7 +84,7 @@ TEST(AtomicFile, KeepsATargetThatAppearedMeanwhile) {
   EXPECT_EQ(entries(folder.path()), 1);
 }
 
-TEST(AtomicFile, WritesAndReadsAnywhere) {
+TEST(AtomicFile, WritesAndReadsAtAnyOffset) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   AtomicFile file(target);
@@ -101,7 +101,7 @@ TEST(AtomicFile, WritesAndReadsAnywhere) {
   EXPECT_EQ(content(target), std::string("012ab56789\0\0abend", 17));
 }
 
-TEST(AtomicFile, TwoWritersOfOneTargetDoNotMeet) {
+TEST(AtomicFile, TwoWritersOfOneTargetAreIndependent) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   AtomicFile first(target), second(target);
@@ -112,7 +112,7 @@ TEST(AtomicFile, TwoWritersOfOneTargetDoNotMeet) {
   EXPECT_EQ(content(target), "first");
 }
 
-TEST(AtomicFile, RemovesWhatADeadWriterLeft) {
+TEST(AtomicFile, RemovesFilesOfADeadWriter) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   const pid_t child = fork();
@@ -132,7 +132,7 @@ TEST(AtomicFile, RemovesWhatADeadWriterLeft) {
   EXPECT_EQ(content(target), "whole");
 }
 
-TEST(AtomicFile, LinksAreFollowed) {
+TEST(AtomicFile, FollowsLinks) {
   const TempFolder folder;
   fs::create_directory(folder.path() / "elsewhere");
   const fs::path link = folder.path() / "link", real = folder.path() / "elsewhere" / "out.bin";
@@ -152,7 +152,7 @@ TEST(AtomicFile, LinksAreFollowed) {
   EXPECT_THROW(AtomicFile(folder.path() / "dangling", true), Error);
 }
 
-TEST(AtomicFile, AFileSizeLimitIsAnErrorAndLeavesNothing) {
+TEST(AtomicFile, ReportsAFileSizeLimitAndLeavesNothing) {
   const TempFolder folder;
   const pid_t child = fork();
   ASSERT_GE(child, 0);
@@ -176,7 +176,7 @@ TEST(AtomicFile, AFileSizeLimitIsAnErrorAndLeavesNothing) {
   EXPECT_EQ(entries(folder.path()), 0);
 }
 
-TEST(AtomicFile, AFileMayHaveTheLongestName) {
+TEST(AtomicFile, AcceptsTheLongestFileName) {
   const TempFolder folder;
   const std::filesystem::path path = folder.path() / std::string(255, 'f');
   AtomicFile file(path);
@@ -187,14 +187,14 @@ TEST(AtomicFile, AFileMayHaveTheLongestName) {
 
 TEST(AtomicFile, RefusesADevice) { EXPECT_THROW(AtomicFile("/dev/null", true), Error); }
 
-/// Only files and folders that say "ours".
+/// Replaces only files and folders that begin with "ours".
 Naming if_ours() {
   return {[](const fs::path& there) {
     return content(fs::is_directory(there) ? there / "mark" : there).starts_with("ours");
   }};
 }
 
-TEST(AtomicFile, LooksAgainAtWhatItReplaces) {
+TEST(AtomicFile, ChecksAgainWhatItReplaces) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.bin";
   std::ofstream(target) << "ours, old";
@@ -220,7 +220,7 @@ TEST(AtomicFile, LooksAgainAtWhatItReplaces) {
   EXPECT_EQ(entries(folder.path()), 1);
 }
 
-TEST(OutputGroup, GivesAllNamesOrNone) {
+TEST(OutputGroup, PublishesAllFilesOrNone) {
   const TempFolder folder;
   const fs::path a = folder.path() / "a", b = folder.path() / "b", c = folder.path() / "c";
   const auto write = [&](bool stranger) {
@@ -247,7 +247,7 @@ TEST(OutputGroup, GivesAllNamesOrNone) {
   EXPECT_EQ(entries(folder.path()), 3);
 }
 
-TEST(OutputGroup, ThatIsNotCommittedLeavesNothing) {
+TEST(OutputGroup, LeavesNothingWithoutCommit) {
   const TempFolder folder;
   {
     OutputGroup group;
@@ -261,7 +261,7 @@ TEST(OutputGroup, ThatIsNotCommittedLeavesNothing) {
   EXPECT_EQ(entries(folder.path()), 0);
 }
 
-TEST(AtomicFolder, KeepsAFolderOfOursWithAStrangersFile) {
+TEST(AtomicFolder, KeepsFoldersThatContainForeignFiles) {
   const TempFolder scratch;
   const fs::path target = scratch.path() / "out";
   const Naming naming([](const fs::path& there) {
@@ -291,7 +291,7 @@ TEST(AtomicFolder, KeepsAFolderOfOursWithAStrangersFile) {
   EXPECT_EQ(entries(scratch.path()), 1);
 }
 
-TEST(AtomicFile, KnowsWhetherItsOutputHasBeenChanged) {
+TEST(AtomicFile, DetectsChangesToItsOutput) {
   const TempFolder folder;
   const fs::path target = folder.path() / "out.txt";
   const auto write = [&] {
@@ -312,7 +312,7 @@ TEST(AtomicFile, KnowsWhetherItsOutputHasBeenChanged) {
   EXPECT_FALSE(is_unchanged_output(target));
   write();
   EXPECT_TRUE(is_unchanged_output(target));
-  // The same bytes again, an hour ago.
+  // The same bytes, but an hour older.
   std::ofstream(target) << "1 2 3\n";
   fs::last_write_time(target, fs::last_write_time(target) - std::chrono::hours(1));
   EXPECT_FALSE(is_unchanged_output(target));
@@ -322,7 +322,7 @@ TEST(AtomicFile, KnowsWhetherItsOutputHasBeenChanged) {
   EXPECT_FALSE(is_unchanged_output(folder.path()));
 }
 
-TEST(AtomicFolder, AppearsWholeAndReplacesOnlyWhatIsOurs) {
+TEST(AtomicFolder, AppearsCompleteAndReplacesOnlyOurFolders) {
   const TempFolder parent;
   const fs::path target = parent.path() / "site";
   const auto write = [&](const std::string& text) {

@@ -24,8 +24,9 @@ std::vector<std::byte> random_bytes(std::size_t size, std::mt19937_64& random) {
   return bytes;
 }
 
-// Against a map of single bytes: what was given is read, in whatever pieces, and nothing else.
-TEST(GivenBytes, ReadsWhatWasGivenInWhateverPieces) {
+// Compares with a map of single bytes: the given bytes are read, whatever the pieces, and no
+// others.
+TEST(GivenBytes, ReadsGivenBytesInAnyPieces) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
@@ -61,7 +62,7 @@ TEST(GivenBytes, ReadsWhatWasGivenInWhateverPieces) {
   }
 }
 
-TEST(GivenBytes, KeepsToItsBudgetAndDropsWhatWasUnusedLongest) {
+TEST(GivenBytes, KeepsItsLimitAndDropsTheLeastRecentlyUsed) {
   GivenBytes given(30);
   given.add_file("a", 100);
   const std::vector<std::byte> ten(10);
@@ -80,7 +81,7 @@ TEST(GivenBytes, KeepsToItsBudgetAndDropsWhatWasUnusedLongest) {
   EXPECT_THROW(source->read(60, out), MissingBytes);
 }
 
-TEST(GivenBytes, RefusesWhatCannotBe) {
+TEST(GivenBytes, RefusesImpossibleParts) {
   GivenBytes given;
   given.add_file("a", 10);
   EXPECT_NO_THROW(given.add_file("a", 10));
@@ -92,8 +93,8 @@ TEST(GivenBytes, RefusesWhatCannotBe) {
   EXPECT_THROW(given.open()("b"), Error);
 }
 
-// A store opens and reads whatever order its bytes come in, each asked for once.
-TEST(GivenBytes, AStoreIsReadByWhatItLacks) {
+// A store can be opened and read whatever the order of its bytes, and requests each byte once.
+TEST(GivenBytes, ReadsAStoreFromItsMissingBytes) {
   const std::string folder = std::string(TERRACE_TEST_DATA) + "/stores/grid/";
   const Store whole = Store::open(folder);
   GivenBytes given;
@@ -121,7 +122,7 @@ TEST(GivenBytes, AStoreIsReadByWhatItLacks) {
       } catch (const MissingBytes& missing) {
         for (const ByteRange& range : missing.ranges()) {
           EXPECT_TRUE(asked.emplace(range.file, range.offset).second)
-              << range.file << " asked for twice";
+              << range.file << " requested twice";
           given.give(range.file, range.offset,
                      std::span(files[range.file])
                          .subspan(static_cast<std::size_t>(range.offset),
@@ -129,7 +130,7 @@ TEST(GivenBytes, AStoreIsReadByWhatItLacks) {
         }
       }
     }
-    throw std::runtime_error("never done");
+    throw std::runtime_error("does not end");
   };
   const Store store = brought([&] { return Store::open("given", given.open()); });
   EXPECT_EQ(store.checksum(), whole.checksum());

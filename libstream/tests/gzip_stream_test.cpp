@@ -20,7 +20,7 @@
 #include "terrace/stream/gzip.hpp"
 #include "terrace/stream/input.hpp"
 
-/// gzip decompressed as a stream, compared with libdeflate.
+/// Decompression of gzip as a stream, compared with libdeflate.
 
 namespace terrace::stream {
 namespace {
@@ -39,7 +39,8 @@ std::string some_text(std::size_t size, std::mt19937_64& random) {
   return text;
 }
 
-// `bytes` in pieces of random lengths up to most_in, requested in pieces of up to most_out.
+// Decompresses `bytes`, given in pieces of random lengths up to most_in and requested in pieces of
+// up to most_out.
 std::string unpacked(const std::string& bytes, std::size_t most_in, std::size_t most_out,
                      std::mt19937_64& random) {
   std::size_t given = std::min<std::size_t>(bytes.size(), random() % 30);
@@ -59,7 +60,7 @@ std::string unpacked(const std::string& bytes, std::size_t most_in, std::size_t 
   }
 }
 
-TEST(GzipStream, UnpacksWhateverThePiecesAre) {
+TEST(GzipStream, DecompressesInAnyPieces) {
   const std::uint64_t seed = 20;
   std::mt19937_64 random(seed);
   for (int round = 0; round < 200 / TERRACE_TEST_SHARE; ++round) {
@@ -77,16 +78,16 @@ TEST(GzipStream, UnpacksWhateverThePiecesAre) {
   }
 }
 
-TEST(GzipStream, EveryCutIsNoticed) {
+TEST(GzipStream, DetectsEveryTruncation) {
   std::mt19937_64 random(21);
   const std::string one = packed(some_text(700, random));
   const std::string bytes = one + packed(some_text(300, random));
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    if (size == one.size()) continue;  // a complete member
+    if (size == one.size()) continue;  // complete members
     const std::string cut = bytes.substr(0, size);
     try {
       unpacked(cut, 100, 100, random);
-      ADD_FAILURE() << size << " bytes of " << bytes.size() << " were taken for all";
+      ADD_FAILURE() << size << " bytes of " << bytes.size() << " were taken for the complete data";
     } catch (const Error& error) {
       EXPECT_EQ(error.parts().file, "x.gz");
       EXPECT_NE(error.parts().where.find("byte " + std::to_string(size)), std::string::npos)
@@ -95,8 +96,8 @@ TEST(GzipStream, EveryCutIsNoticed) {
   }
 }
 
-// Every changed byte is noticed, except in the header, which is not used.
-TEST(GzipStream, DamageIsNoticed) {
+// Every changed byte is detected, except in the header, which is not used.
+TEST(GzipStream, DetectsDamage) {
   std::mt19937_64 random(22);
   const std::string text = some_text(500, random);
   const std::string bytes = packed(text);
@@ -123,7 +124,7 @@ class GzipInput : public ::testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(GzipInput, IsReadLikeWhatIsInIt) {
+TEST_F(GzipInput, GivesThePointsOfTheText) {
   std::mt19937_64 random(23);
   const std::string text = some_text(900'000, random);
   const std::string file = put("text.gz", packed(text));
@@ -143,7 +144,7 @@ TEST_F(GzipInput, IsReadLikeWhatIsInIt) {
   EXPECT_EQ(std::string(head.begin(), head.end()), text.substr(0, 100));
 }
 
-TEST_F(GzipInput, ComesThroughPipes) {
+TEST_F(GzipInput, IsReadFromPipes) {
   std::mt19937_64 random(24);
   for (const std::string& text :
        {some_text(300'000, random), std::string("a"), std::string("\x1f"), std::string()}) {

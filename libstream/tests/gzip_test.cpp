@@ -20,7 +20,7 @@ std::vector<std::byte> some_bytes(std::size_t size, unsigned seed) {
   return bytes;
 }
 
-TEST(Gzip, UnpacksToTheSameBytes) {
+TEST(Gzip, RoundTrips) {
   for (const std::size_t size : {0U, 1U, 2U, 1000U, 100000U}) {
     for (const int level : {1, 6, 12}) {
       const auto bytes = some_bytes(size, static_cast<unsigned>(size));
@@ -39,7 +39,7 @@ TEST(Gzip, RefusesDamage) {
   for (std::size_t size = 0; size < packed.size(); ++size) {
     EXPECT_THROW(gunzip(std::span(packed).first(size), 1 << 20, "test"), Error) << size;
   }
-  // After the header, whose time and system are arbitrary, every changed byte is noticed.
+  // Every changed byte is detected after the header, whose time and system are arbitrary.
   for (std::size_t at = 10; at < packed.size(); ++at) {
     auto damaged = packed;
     damaged[at] ^= std::byte{0x10};
@@ -50,7 +50,7 @@ TEST(Gzip, RefusesDamage) {
   EXPECT_THROW(gunzip(longer, 1 << 20, "test"), Error);
 }
 
-TEST(Gzip, AnotherProgramReadsIt) {
+TEST(Gzip, IsReadByAnotherProgram) {
   if (std::system("command -v gzip >/dev/null") != 0) GTEST_SKIP() << "no gzip installed";
   const TempFolder folder;
   const auto packed = gzip(some_bytes(100000, 2));

@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// A new folder for one test, removed with its contents at the end of the scope.
+/// A new folder for one test, which is removed with its contents at the end of the scope.
 class TempFolder {
  public:
   TempFolder() {

@@ -44,7 +44,7 @@ struct AtomicFile::Impl {
   fs::path place;   ///< after following symbolic links
   fs::path temporary;
   Naming naming;
-  OutputPlacement placement;  ///< once complete
+  OutputPlacement placement;  ///< set by complete()
   int descriptor = -1;
   std::uint64_t flushed = 0;  // bytes in the file; the buffer continues there
   std::vector<std::byte> buffer;
@@ -79,7 +79,7 @@ struct AtomicFile::Impl {
   }
 
   /// Creates and locks the temporary file. Between the two steps another writer may take it for
-  /// abandoned: then that writer holds the lock, or held it and has removed the name.
+  /// abandoned: it then holds the lock, or has already removed the file.
   void create() {
     sweep_temporaries(place);
     for (int attempt = 0;; ++attempt) {
@@ -89,7 +89,7 @@ struct AtomicFile::Impl {
         if (errno == EEXIST && attempt < 1000) continue;
         fail("cannot be created", errno);
       }
-      // On file systems without locks (some network disks) work continues.
+      // Work continues on file systems without locks (some network disks).
       const bool taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
       struct stat status {};
       if (!taken && ::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
@@ -129,8 +129,8 @@ struct AtomicFile::Impl {
     placement = OutputPlacement(shown, place, temporary, naming);
   }
 
-  /// After put_together(): the temporary name is gone or that of what has been replaced. The
-  /// descriptor is closed last, so that the lock outlives the name.
+  /// Called after put_together(), when the temporary name is gone or is that of the replaced file.
+  /// The descriptor is closed last, so that the lock outlives the name.
   void finish() {
     const fs::path old = placement.replaced();
     if (!old.empty()) ::unlink(old.c_str());
@@ -145,8 +145,8 @@ AtomicFile::AtomicFile(const fs::path& target, Naming naming) : impl_(std::make_
   if (!target.has_filename()) {
     throw Error({.file = target.string(),
                  .where = {},
-                 .cause = "names no file",
-                 .remedy = "give a file name"});
+                 .cause = "is not a file name",
+                 .remedy = "add a file name"});
   }
   impl_->check_target();
   impl_->place = follow_links(target);

@@ -19,24 +19,24 @@ namespace terrace::stream {
 namespace fs = std::filesystem;
 
 struct AtomicFolder::Impl {
-  fs::path target, folder;  ///< `folder` is empty once it has its name and the old one is removed
+  fs::path target, folder;  ///< `folder` is empty once published and the old one is removed
   std::string mark;
   Naming naming;
   FileLock lock;
-  int spare = -1;  ///< lets the folder be listed, and so removed, when descriptors have run out
+  int spare = -1;  ///< keeps a descriptor for listing and removing the folder if none are left
 
   void remove(const fs::path& path) {
     if (spare >= 0) ::close(std::exchange(spare, -1));
     remove_marked_folder(path, mark);
   }
   ~Impl() {
-    if (!folder.empty()) remove(folder);  // before the lock goes
+    if (!folder.empty()) remove(folder);  // before the lock is released
     if (spare >= 0) ::close(spare);
   }
 
   void create() {
     const fs::path parent = folder_of(target);
-    // One process may write the same folder twice at a time; the first to finish wins.
+    // One process may have two writers of the same folder; the first to finish wins.
     for (int attempt = 0;; ++attempt) {
       const fs::path wanted = parent / temporary_name(target, attempt);
       lock = FileLock(fs::path(wanted).concat(kLockEnding));
@@ -76,7 +76,7 @@ AtomicFolder::AtomicFolder(fs::path target, std::string mark, Naming naming)
     throw Error({.file = impl.target.string(),
                  .where = {},
                  .cause = "the folder " + parent.string() + " does not exist",
-                 .remedy = "make it first"});
+                 .remedy = "create it first"});
   }
   sweep_temporaries(impl.target, impl.mark);
   impl.create();

@@ -4,7 +4,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Counts what a text has, without keeping it.
+/// Counts the values and the depth of a text without keeping them.
 class LimitChecker final : public nlohmann::json_sax<nlohmann::json> {
  public:
   LimitChecker(const JsonLimits& limits, const std::function<void(const char* cause)>& refuse)
@@ -22,7 +22,7 @@ class LimitChecker final : public nlohmann::json_sax<nlohmann::json> {
   bool start_array(std::size_t) override { return open(); }
   bool end_object() override { return close(); }
   bool end_array() override { return close(); }
-  /// The parser that follows says what is wrong.
+  /// parse() reports the error afterwards.
   bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
     return false;
   }

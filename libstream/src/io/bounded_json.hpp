@@ -10,14 +10,14 @@
 
 namespace terrace::stream {
 
-/// What JSON from a file may have.
+/// Limits of JSON from a file.
 struct JsonLimits {
-  int depth = 16;                             ///< of lists and objects in one another
+  int depth = 16;                             ///< of nested lists and objects
   std::size_t values = std::size_t{1} << 20;  ///< values, names and brackets
 };
 
-/// The text in memory, in time linear in its bytes. (nlohmann's parser with a callback walks a
-/// whole list at the end of each of its objects.) refuse: called with what exceeds the limits; must
+/// Parses JSON in time linear in its bytes. (nlohmann's parser with a callback walks a whole list
+/// at the end of each of its objects.) refuse: called with the cause if a limit is exceeded; must
 /// throw. Throws: nlohmann::json::parse_error, and out_of_range for a number too large for a
 /// double.
 nlohmann::json parse_bounded_json(std::string_view text, const JsonLimits& limits,

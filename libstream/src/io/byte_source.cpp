@@ -50,7 +50,7 @@ class FileSource final : public ByteSource {
         throw Error({.file = name_,
                      .where = "byte " + std::to_string(offset + done),
                      .cause = "the file ends too early",
-                     .remedy = "it was truncated while it was read: restore it"});
+                     .remedy = "it was truncated while being read: restore it"});
       }
       done += static_cast<std::size_t>(got);
     }

@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// Puts the bytes of a number at `at` in little-endian order on every machine; returns their end.
+/// Stores a number at `at` in little-endian order on every machine; returns the position after it.
 template <class T>
 char* store_little_endian(char* at, T value) {
   std::memcpy(at, &value, sizeof(T));

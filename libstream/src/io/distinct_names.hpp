@@ -7,11 +7,11 @@
 
 namespace terrace::stream {
 
-/// Makes names distinct: of equal ones the second gets "_2". Time for a name does not grow with the
-/// number of equal ones.
+/// Makes names distinct: a second "name" becomes "name_2". The time for a name does not grow with
+/// the number of equal names.
 class DistinctNames {
  public:
-  /// The name, or one made of it that has not been added yet.
+  /// Returns the name, or the name with a number if it has been added before.
   std::string add(const std::string& name) {
     std::string distinct = name;
     std::size_t number = 2;
@@ -27,7 +27,7 @@ class DistinctNames {
   }
 
  private:
-  std::map<std::string, std::size_t> next_;  ///< of each name, the number for its next equal
+  std::map<std::string, std::size_t> next_;  ///< number for the next name equal to this one
 };
 
 }  // namespace terrace::stream

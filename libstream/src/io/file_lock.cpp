@@ -41,8 +41,8 @@ FileLock::FileLock(const std::filesystem::path& path) : path_(path) {
       ::close(std::exchange(descriptor_, -1));
       return;
     }
-    // A holder may have removed the name between our open and our lock: then our lock is on a file
-    // that others will not find.
+    // A holder may have removed the name between our open() and flock(). Our lock would then be on
+    // a file that others do not find.
     if (has_name()) return;
     ::close(std::exchange(descriptor_, -1));
   }
@@ -74,8 +74,9 @@ bool FileLock::has_name() const {
 
 void FileLock::release() noexcept {
   if (descriptor_ < 0) return;
-  // The name is removed first: anyone who opens it from now on creates a new file. Without working
-  // locks the file may belong to another process.
+  // The name is removed first, so that other processes that open it from now on create a new file.
+  // Without working locks the file may belong to another process, so it is removed only if created
+  // here.
   if (exclusive_ || made_) ::unlink(path_.c_str());
   ::close(std::exchange(descriptor_, -1));
 }

@@ -45,7 +45,7 @@ struct GivenBytes::Impl {
   };
 
   std::map<std::string, File> files;
-  Uses uses;  // the longest unused first
+  Uses uses;  // least recently used first
   std::uint64_t max_bytes = 0, bytes = 0;
 
   void drop(Uses::iterator part) {
@@ -53,7 +53,7 @@ struct GivenBytes::Impl {
     part->file->parts.erase(part->offset);
     uses.erase(part);
   }
-  /// The part with this byte, or the next one, or the end.
+  /// Returns the part that contains this byte, or the next part, or the end.
   static auto from(File& file, std::uint64_t offset) {
     auto at = file.parts.upper_bound(offset);
     if (at != file.parts.begin() && std::prev(at)->second->end() > offset) --at;
@@ -81,7 +81,8 @@ struct GivenBytes::Impl {
     for (std::size_t done = 0; done < out.size();) {
       const std::uint64_t next = offset + done;
       const auto at = from(file, next);
-      // All of it is asked for again: where a little is there, it may be gone when the rest comes.
+      // Requests all of the range: parts of it that are held may be dropped before the rest
+      // arrives.
       if (at == file.parts.end() || at->first > next) {
         throw MissingBytes({{name, offset, out.size()}});
       }
@@ -107,8 +108,8 @@ void GivenBytes::add_file(const std::string& name, std::uint64_t size) {
   if (added) {
     at->second.size = size;
   } else if (at->second.size != size) {
-    throw impossible(name, "was said to have " + counted(at->second.size, "byte") +
-                               " and now has " + std::to_string(size));
+    throw impossible(name, "was added with " + counted(at->second.size, "byte") + " and now has " +
+                               std::to_string(size));
   }
 }
 
@@ -117,7 +118,7 @@ void GivenBytes::give(const std::string& name, std::uint64_t offset,
   const auto at = impl_->files.find(name);
   if (at == impl_->files.end()) throw impossible(name, "there is no such file");
   if (offset > at->second.size || bytes.size() > at->second.size - offset) {
-    throw impossible(name, "bytes behind its end were given");
+    throw impossible(name, "bytes beyond its end were given");
   }
   impl_->give(at->second, offset, bytes);
 }

@@ -22,7 +22,7 @@ struct Free {
   throw Error({.file = name, .where = "gzip", .cause = cause, .remedy = "recreate the file"});
 }
 
-// The size stated in the last four bytes, modulo 2^32.
+// Returns the size of the decompressed bytes modulo 2^32, which the last four bytes state.
 std::uint64_t stated_size(std::span<const std::byte> bytes) {
   std::uint64_t size = 0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -31,7 +31,7 @@ std::uint64_t stated_size(std::span<const std::byte> bytes) {
   return size;
 }
 
-// A header of 10 bytes and a trailer of 8.
+// The header has at least 10 bytes, the trailer 8.
 constexpr std::size_t kLeast = 18;
 
 }  // namespace
@@ -57,8 +57,8 @@ std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t mo
   if (!is_gzip(bytes) || bytes.size() < kLeast) refuse(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
   if (size > most) {
-    refuse(name, "states " + counted(size, "byte") + ", more than the " + std::to_string(most) +
-                     " that it may hold");
+    refuse(name,
+           "states " + counted(size, "byte") + ", more than the limit of " + std::to_string(most));
   }
   const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
       libdeflate_alloc_decompressor());

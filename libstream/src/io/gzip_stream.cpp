@@ -45,7 +45,7 @@ void GzipStream::fail(const std::string& cause) const {
   throw Error({.file = name_,
                .where = "byte " + std::to_string(used_) + " of the gzip data",
                .cause = cause,
-               .remedy = "the file is damaged or truncated: obtain it again"});
+               .remedy = "the file is damaged or truncated: download it again"});
 }
 
 bool GzipStream::refill(const Read& read) {

@@ -24,16 +24,16 @@ class GzipStream {
   GzipStream(const GzipStream&) = delete;
   GzipStream& operator=(const GzipStream&) = delete;
 
-  /// Decompressed bytes, at least one unless they have ended. Requires: most > 0. Throws: Error,
-  /// naming the position in the compressed bytes, if they are damaged, end within a member, or are
-  /// followed by something else than a member; whatever `read` throws.
+  /// Returns how many decompressed bytes it wrote to `to`: at least one, or 0 at the end. Requires
+  /// most > 0. Throws: Error, naming the position in the compressed bytes, if they are damaged, end
+  /// within a member, or are followed by anything but a member; whatever `read` throws.
   std::size_t read(char* to, std::size_t most, const Read& read);
 
  private:
   struct Inflater;
 
   [[noreturn]] void fail(const std::string& cause) const;
-  /// Reads more compressed bytes after those that are left; false at their end.
+  /// Reads more compressed bytes and appends them to those not yet used; false at their end.
   bool refill(const Read& read);
 
   std::string name_;

@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::size_t kLeastBuffer = 4096;
 
-/// Pipes whose first bytes have been read: they cannot be reopened without losing them.
+/// Pipes whose first bytes have been read; reopening them would lose these bytes.
 std::map<std::string, std::unique_ptr<Input>>& heads() {
   thread_local std::map<std::string, std::unique_ptr<Input>> kept;
   return kept;
@@ -34,7 +34,7 @@ std::map<std::string, std::unique_ptr<Input>>& heads() {
 
 int open_for_reading(const std::string& file) {
   if (file == kStandardStream) return STDIN_FILENO;
-  // Opening a pipe without O_NONBLOCK would wait for its writer without reacting to a stop. poll()
+  // Opening a pipe without O_NONBLOCK would wait for its writer and ignore a stop request. poll()
   // waits for the writer too.
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | (reads_once(file) ? O_NONBLOCK : 0));
   if (fd < 0) throw system_error(file, "cannot open", errno, "check the name and its permissions");
@@ -56,7 +56,7 @@ class Input::Descriptor {
       : fd_(open_for_reading(file)), owned_(file != kStandardStream) {
     struct stat status {};
     if (::fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) {
-      // Standard input from a file may already have been read in part: only the rest counts.
+      // A file on standard input may already have been read in part; only the rest counts.
       const off_t at = owned_ ? 0 : std::max<off_t>(0, ::lseek(fd_, 0, SEEK_CUR));
       size_ = static_cast<std::uint64_t>(std::max<off_t>(0, status.st_size - at));
       ::posix_fadvise(fd_, 0, 0, POSIX_FADV_SEQUENTIAL);
@@ -75,7 +75,8 @@ class Input::Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
 
-  /// Returns 0 at the end. Throws: Error with the name of the input, Stopped.
+  /// Returns the number of bytes read, 0 at the end. Throws: Error with the name of the input,
+  /// Stopped.
   [[nodiscard]] std::size_t read(char* to, std::size_t most, const std::string& name) const {
     for (;;) {
       if (waiter_) waiter_->wait(fd_, POLLIN);
@@ -91,13 +92,13 @@ class Input::Descriptor {
         throw Error({.file = name,
                      .where = {},
                      .cause = "is closed",
-                     .remedy = "name a file, or connect it to one"});
+                     .remedy = "give the name of a file, or redirect one to it"});
       }
-      // EAGAIN: another reader of the same pipe was faster.
+      // EAGAIN means that another reader of the same pipe was faster.
       if (errno != EINTR && errno != EAGAIN) throw system_error(name, "cannot read", errno);
     }
   }
-  /// For regular files only. Does not move the reading position.
+  /// For regular files only. Does not change the position.
   [[nodiscard]] bool begins_as_gzip() const {
     std::byte head[2];
     const off_t at = ::lseek(fd_, 0, SEEK_CUR);
@@ -106,14 +107,14 @@ class Input::Descriptor {
   [[nodiscard]] bool skip(std::uint64_t count) const {
     return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
   }
-  /// Known only for a regular file.
+  /// The size of a regular file; otherwise nullopt.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
 
  private:
   int fd_;
   bool owned_;
   std::optional<std::uint64_t> size_;
-  std::optional<StopWaiter> waiter_;  ///< for everything except regular files, which never block
+  std::optional<StopWaiter> waiter_;  ///< nullopt for regular files, which never block
 };
 
 Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once,
@@ -131,7 +132,7 @@ Input::Input(const std::string& file, const std::stop_token& stop, std::size_t a
   buffer_.resize(at_once);
   looked_at_ = packed == Packed::as_it_is;
   if (looked_at_ || !size_)
-    return;  // not checked before the first read: a pipe may have no writer yet
+    return;  // checked at the first read, because a pipe may have no writer yet
   looked_at_ = true;
   if (descriptor_->begins_as_gzip()) {
     size_.reset();
@@ -177,7 +178,7 @@ std::string_view Input::fill(std::size_t wanted) {
     begin_ = 0;
   }
   while (end_ - begin_ < wanted) {
-    // Grows as bytes come: most inputs are shorter than what may be asked for.
+    // Grows with the bytes read, because most inputs are shorter than callers may request.
     if (end_ == buffer_.size()) {
       buffer_.resize(std::min(begin_ + wanted, std::max(2 * end_, kLeastBuffer)));
     }

@@ -9,7 +9,7 @@
 namespace terrace::stream {
 namespace {
 
-/// True for the beginning of a text in UTF-16, with its mark or without.
+/// True if a text begins as UTF-16, with or without a byte order mark.
 bool is_utf16(std::string_view head) {
   if (head.starts_with("\xFF\xFE") || head.starts_with("\xFE\xFF")) return true;
   // Every other byte of ASCII characters is 0.
@@ -25,7 +25,7 @@ void refuse_utf16(Input& input) {
   if (!is_utf16(input.fill(4))) return;
   throw Error({.file = input.name(),
                .where = {},
-               .cause = "is text in UTF-16, which is not read",
+               .cause = "is text in UTF-16, which is not supported",
                .remedy = "save it as UTF-8, e.g. 'iconv -f UTF-16 -t UTF-8 FILE'"});
 }
 
@@ -54,7 +54,7 @@ bool LineReader::next(std::string_view& line) {
     throw Error({.file = input_->name(),
                  .where = "line " + std::to_string(number_ + 1),
                  .cause = "longer than " + counted(kMaxLine, "byte"),
-                 .remedy = "this is not a text of points, or its line ends are missing"});
+                 .remedy = "the file is not text, or its line ends are missing"});
   }
   pending_ = length + line_end;
   ++number_;

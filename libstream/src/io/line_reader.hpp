@@ -9,31 +9,33 @@
 
 namespace terrace::stream {
 
-/// Throws: Error, with the remedy, if the text that begins at the input's position is UTF-16, which
-/// would be read as text without numbers.
+/// Throws Error if the text at the input's position is UTF-16, which would be read as text without
+/// numbers.
 void refuse_utf16(Input& input);
 
-/// The lines of a text, in a window of bounded size. Lines end in LF or CR LF, or, if the beginning
-/// of the text has no LF, in CR; the last needs no end.
+/// Reads the lines of a text, in a window of bounded size. Lines end in LF or CR LF, or in CR if
+/// the beginning of the text has no LF. The last line needs no end.
 class LineReader {
  public:
-  /// Maximum length of a line in bytes; a longer one is an Error, as a line is held in memory.
+  /// Maximum length of a line in bytes. A longer line is an Error, because lines are held in
+  /// memory.
   static constexpr std::size_t kMaxLine = 64u << 10;
 
-  /// `input` must outlive the reader and not be moved by others between two lines.
+  /// `input` must outlive the reader, and others must not read from it between two lines.
   explicit LineReader(Input& input) : input_(&input) {}
 
-  /// The next line without its end; false if there is none. `line` is valid until the next call.
-  /// Throws: Error if the line is longer than kMaxLine or cannot be read, and for UTF-16.
+  /// Reads the next line, without its end; false at the end of the text. `line` is valid until the
+  /// next call. Throws: Error if the line is longer than kMaxLine or cannot be read, and for
+  /// UTF-16.
   bool next(std::string_view& line);
-  /// Makes the next call of next() return the last line again.
+  /// Makes next() return the last line again.
   void hold() {
     pending_ = 0;
     --number_;
   }
-  /// Skips one line of any length that is not blank; false if there is none.
+  /// Skips the next line that is not blank, of any length; false if the text has no more.
   bool skip();
-  /// Moves the input past the last line, which is then invalid.
+  /// Moves the input past the last line, whose view is then invalid.
   void release() {
     input_->consume(pending_);
     pending_ = 0;

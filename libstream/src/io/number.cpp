@@ -6,7 +6,7 @@
 namespace terrace::stream {
 
 bool is_underflow(std::string_view text) {
-  // The decimal exponent of the first nonzero digit; its sign decides.
+  // The decimal exponent of the first nonzero digit: negative if the number is too small.
   std::int64_t exponent = 0;
   bool point = false, digits = false;
   std::size_t i = 0;

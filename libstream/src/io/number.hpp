@@ -8,17 +8,18 @@
 
 namespace terrace::stream {
 
-/// Maximum number of characters that append_number() adds: the shortest form of a double has at
+/// Maximum number of characters that append_number() appends; the shortest form of a double has at
 /// most 24.
 inline constexpr std::size_t kMaxNumber = 32;
 
-/// True if the decimal number in `text`, known to be out of a floating type's range, is too small
-/// rather than too large.
+/// True if the decimal number in `text` is too small rather than too large. Requires that it is out
+/// of the range of its floating-point type.
 bool is_underflow(std::string_view text);
 
-/// Reads the number that starts at `at`, correctly rounded to T (float or double); a leading '+' is
-/// allowed. Returns the position after it, or null if there is no number or it is too large. Values
-/// that underflow become zero. Never reads at `end` or beyond; does not depend on the locale.
+/// Parses the number that starts at `at`, correctly rounded to T (float or double); a leading '+'
+/// is allowed. Returns the position after it, or null if the text is not a number or the number is
+/// too large. Values that underflow become zero. Never reads at `end` or beyond; independent of the
+/// locale.
 template <class T>
 const char* parse_real(const char* at, const char* end, T& value) {
   if (at != end && *at == '+') {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kPendingBytes = 64u << 10;
 
-/// True if a write may block on another program or a person.
+/// True if a write may block until another program or a person reads.
 bool may_wait(int descriptor) {
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) return false;

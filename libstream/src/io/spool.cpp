@@ -18,7 +18,8 @@
 namespace terrace::stream {
 namespace {
 
-/// A file without a name; if the file system does not support that, the name is removed at once.
+/// Opens a file without a name. If the file system does not support that, creates a named file and
+/// removes the name.
 int open_nameless(std::filesystem::path folder) {
   if (folder.empty()) {
     std::error_code error;

@@ -12,25 +12,25 @@
 
 namespace terrace::stream {
 
-/// A temporary file without a name: its space is freed when the object is destroyed or the process
-/// ends in any way. Holds data that can only be read front to back (compressed files, text, pipes)
-/// but is needed with random access.
+/// A temporary file without a name, whose space is freed when the object is destroyed or the
+/// process ends in any way. Holds data that can only be read front to back (compressed files, text,
+/// pipes) but needs random access.
 class Spool final : public ByteSource {
  public:
-  /// name: of the spooled input, for messages. folder: where; empty: $TMPDIR or /tmp. Throws: Error
-  /// if the file cannot be created.
+  /// name: of the spooled input, for messages. folder: where to create the file; empty: $TMPDIR or
+  /// /tmp. Throws: Error if the file cannot be created.
   explicit Spool(std::string name, const std::filesystem::path& folder = {});
   ~Spool() override;
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
 
-  /// Throws: Error, usually because the disk is full.
+  /// Appends bytes. Throws: Error, usually because the disk is full.
   void append(std::span<const std::byte> bytes) { write(size_, bytes); }
   /// Writes at any position; gaps read as zero. Different parts may be written at the same time.
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
-  /// A name by which this process can open the file, for interfaces that need a name.
+  /// Returns a path by which this process can open the file, for interfaces that need one.
   [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
   [[nodiscard]] std::uint64_t size() const override { return size_; }
   void read(std::uint64_t offset, std::span<std::byte> out) const override;

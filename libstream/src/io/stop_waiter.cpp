@@ -39,7 +39,7 @@ void StopWaiter::wait(int descriptor, short events) const {
     if (stop_.stop_requested()) throw Stopped();
     std::array<pollfd, 2> waiting{};
     waiting[0] = {.fd = descriptor, .events = events, .revents = 0};
-    waiting[1] = {.fd = read_end_, .events = POLLIN, .revents = 0};  // below 0: ignored
+    waiting[1] = {.fd = read_end_, .events = POLLIN, .revents = 0};  // ignored if negative
     const int ready = ::poll(waiting.data(), waiting.size(), -1);
     if (stop_.stop_requested()) throw Stopped();
     // If poll fails for a reason other than a signal, the following read reports the cause.

@@ -7,22 +7,22 @@
 
 namespace terrace::stream {
 
-/// Waits until a descriptor is ready, or for a stop.
+/// Waits for a descriptor to become ready, or for a stop request.
 class StopWaiter {
  public:
-  /// Throws: Error if there are too many open files.
+  /// Throws: Error if too many files are open.
   explicit StopWaiter(const std::stop_token& stop);
   ~StopWaiter();
   StopWaiter(const StopWaiter&) = delete;
   StopWaiter& operator=(const StopWaiter&) = delete;
 
-  /// Returns when `descriptor` is ready for `events` of poll(), or has ended or failed, which the
-  /// next read or write reports. Throws: Stopped.
+  /// Returns when `descriptor` is ready for `events` of poll(), or is at its end or has failed,
+  /// which the next read or write reports. Throws: Stopped.
   void wait(int descriptor, short events) const;
 
  private:
   std::stop_token stop_;
-  int read_end_ = -1, write_end_ = -1;  ///< of a pipe: readable from the stop on
+  int read_end_ = -1, write_end_ = -1;  ///< of a pipe that becomes readable with the stop request
   std::optional<std::stop_callback<std::function<void()>>> on_stop_;
 };
 

@@ -28,7 +28,7 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
       }
       std::size_t from = 0;
       if (line.starts_with('"')) {
-        // Where a quote is doubled, the quoted text goes on.
+        // A doubled quote does not end the quoted text.
         from = line.find('"', 1);
         while (from != line.npos && line.substr(from + 1).starts_with('"'))
           from = line.find('"', from + 2);

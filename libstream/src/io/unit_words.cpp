@@ -9,7 +9,7 @@
 namespace terrace::stream {
 namespace {
 
-/// A unit and all words for it but its own name, in lower case, separated by commas.
+/// A unit and all other words for it, in lower case, separated by commas.
 struct UnitWords {
   std::string_view name, words;
 };
@@ -40,7 +40,8 @@ constexpr std::array<UnitWords, 18> kUnitWords{{
     {"Clarke's foot", "clarkes foot,clarkes feet,foot clarke,ft cla"},
 }};
 
-/// In lower case; dots, apostrophes and brackets left out, other signs as single blanks.
+/// Returns the text in lower case, without dots, apostrophes and brackets, and with other runs of
+/// signs as single blanks.
 std::string plain_words(std::string_view text) {
   std::string plain;
   for (const char c : lower_case(std::string(text))) {
