@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t kBlock = 1000;
 
-/// Points on a surface, each with its number as an attribute.
+/// A source of points on a surface, each with its number as an attribute.
 class MadePoints final : public PointSource {
  public:
   using Place = std::function<Point3(std::uint64_t)>;
@@ -41,7 +41,7 @@ class MadePoints final : public PointSource {
     info_.points = points;
     info_.stated_bounds = bounds;
   }
-  /// As many points a block, with room for kBlock.
+  /// Sets the number of points per block; blocks have room for kBlock.
   void block_points(std::size_t points) { block_points_ = points; }
   const SourceInfo& info() const override { return info_; }
   Progress progress() const override { return {.points = next_}; }
@@ -66,23 +66,23 @@ class MadePoints final : public PointSource {
 
 Point3 on_surface(double x, double y) { return {x, y, std::floor(20 * std::sin(x / 90))}; }
 
-/// `count` places in rows of `width`.
+/// Returns places in rows of `width`.
 MadePoints::Place rows(std::uint64_t width) {
   return [width](std::uint64_t i) {
     return on_surface(static_cast<double>(i % width), static_cast<double>(i / width));
   };
 }
 
-/// A square of `side` squared places, visited repeatedly in random order.
+/// Returns the places of a square of `side` x `side`, visited repeatedly in random order.
 MadePoints::Place shuffled(std::uint64_t side) {
   return [side](std::uint64_t i) {
-    // Odd steps visit every place of a power of two.
+    // Steps by an odd number visit every place if their number is a power of two.
     const std::uint64_t place = (i * 0x9E3779B97F4A7C15u) % (side * side);
     return on_surface(static_cast<double>(place % side), static_cast<double>(place / side));
   };
 }
 
-/// Squares of `side` squared places one after another, along rows of squares.
+/// Returns the places of squares of `side` x `side` one after another, along rows of squares.
 MadePoints::Place squares(std::uint64_t side) {
   return [side](std::uint64_t i) {
     const std::uint64_t square = i / (side * side), in = i % (side * side);
@@ -95,7 +95,7 @@ struct Read {
   std::vector<PointBlock> blocks;
   OrderedSource::Report report;
 
-  /// Mean width of the blocks in the plane.
+  /// Returns the mean width of the blocks in the plane.
   [[nodiscard]] double width() const {
     double widths = 0;
     for (const PointBlock& block : blocks) {
@@ -123,7 +123,7 @@ Read read(std::uint64_t count, const MadePoints::Place& place, Order order,
   return read;
 }
 
-/// Every point was delivered once, at its place, with its record.
+/// Expects that every point was delivered once, at its place, with its record.
 void expect_all(const Read& read, std::uint64_t count, const MadePoints::Place& place) {
   std::vector<bool> met(count);
   std::uint64_t points = 0;
@@ -151,17 +151,17 @@ bool same(const Read& a, const Read& b) {
                     });
 }
 
-TEST(SpatialOrderTest, ShuffledPointsComeInCompactBlocks) {
+TEST(SpatialOrderTest, DeliversShuffledPointsInCompactBlocks) {
   constexpr std::uint64_t kSide = 1024, kCount = kSide * kSide;
   for (const ScalarType type : {ScalarType::f64, ScalarType::i32, ScalarType::i16}) {
     const Read ordered = read(kCount, shuffled(kSide), Order::automatic, type);
     expect_all(ordered, kCount, shuffled(kSide));
     EXPECT_TRUE(ordered.report.reordered);
     EXPECT_GT(ordered.report.spread, 10);
-    // As close to a square of this many places as the pieces of a k-d tree are.
+    // As compact as pieces of a k-d tree with this many places.
     EXPECT_LT(ordered.width(), 1.3 * 2 * std::sqrt(kBlock));
     const std::uint64_t record = 3 * size_of(type) + 9;
-    // Of `mark` and most of the number's bytes nothing is written.
+    // `mark` and most bytes of the number are not written.
     EXPECT_LE(ordered.report.temporary_bytes, kCount * (record - 5));
     EXPECT_GT(ordered.report.temporary_bytes, kCount * record / 8);
     if (type != ScalarType::i16) continue;
@@ -169,7 +169,7 @@ TEST(SpatialOrderTest, ShuffledPointsComeInCompactBlocks) {
   }
 }
 
-TEST(SpatialOrderTest, PointsThatFitInAWindowTakeNoDisk) {
+TEST(SpatialOrderTest, UsesNoDiskIfPointsFitInAWindow) {
   for (const std::uint64_t count : {0u, 1u, 999u, 1000u, 1001u, 100000u}) {
     const Read ordered = read(count, shuffled(1024), Order::spatial);
     expect_all(ordered, count, shuffled(1024));
@@ -178,7 +178,7 @@ TEST(SpatialOrderTest, PointsThatFitInAWindowTakeNoDisk) {
   }
 }
 
-TEST(SpatialOrderTest, CompactStreamsPassAsTheyAre) {
+TEST(SpatialOrderTest, KeepsCompactStreams) {
   constexpr std::uint64_t kCount = 1u << 20;
   for (const Order order : {Order::automatic, Order::stream}) {
     const Read passed = read(kCount, squares(32), order);
@@ -190,14 +190,14 @@ TEST(SpatialOrderTest, CompactStreamsPassAsTheyAre) {
   }
 }
 
-TEST(SpatialOrderTest, AStreamThatIsToPassIsNotJudged) {
+TEST(SpatialOrderTest, DoesNotJudgeAStreamThatKeepsItsOrder) {
   const Read passed = read(50000, shuffled(1024), Order::stream);
   expect_all(passed, 50000, shuffled(1024));
   EXPECT_FALSE(passed.report.reordered);
   EXPECT_EQ(passed.report.spread, 0);
 }
 
-TEST(SpatialOrderTest, WideScanLinesAreReordered) {
+TEST(SpatialOrderTest, ReordersWideScanLines) {
   constexpr std::uint64_t kCount = 1u << 20;
   const Read ordered = read(kCount, rows(4096), Order::automatic);
   expect_all(ordered, kCount, rows(4096));
@@ -205,9 +205,9 @@ TEST(SpatialOrderTest, WideScanLinesAreReordered) {
   EXPECT_LT(ordered.width(), 1.3 * 2 * std::sqrt(kBlock));
 }
 
-// The first planes are based only on the beginning of the stream: nearly everything after it goes
+// The first planes are based only on the beginning of the stream, so nearly all points after it go
 // to one bucket.
-TEST(SpatialOrderTest, BucketsThatGrewLargeAreDivided) {
+TEST(SpatialOrderTest, DividesLargeBuckets) {
   constexpr std::uint64_t kCount = 2u << 20;
   const auto place = [](std::uint64_t i) {
     Point3 p = rows(1 << 14)(i);
@@ -220,7 +220,7 @@ TEST(SpatialOrderTest, BucketsThatGrewLargeAreDivided) {
   EXPECT_LE(ordered.report.temporary_bytes, records + records / 5);
 }
 
-TEST(SpatialOrderTest, AStreamThatLosesItsOrderIsPutInOrderFromThere) {
+TEST(SpatialOrderTest, ReordersAStreamFromWhereItLosesItsOrder) {
   constexpr std::uint64_t kOrdered = 1u << 20, kCount = 2u << 20;
   const auto place = [](std::uint64_t i) {
     return i < kOrdered ? squares(32)(i) : shuffled(1024)(i);
@@ -232,8 +232,8 @@ TEST(SpatialOrderTest, AStreamThatLosesItsOrderIsPutInOrderFromThere) {
   EXPECT_LT(ordered.report.temporary_bytes, kOrdered * (3 * 8 + 9));
 }
 
-TEST(SpatialOrderTest, PlacesThatNoPlaneParts) {
-  constexpr std::uint64_t kCount = 300000;  // more than a window
+TEST(SpatialOrderTest, DeliversManyPointsAtOnePlace) {
+  constexpr std::uint64_t kCount = 300000;  // more than one window
   const auto duplicates = [](std::uint64_t) { return Point3{1, 2, 3}; };
   expect_all(read(kCount, duplicates, Order::spatial), kCount, duplicates);
   const auto mostly = [](std::uint64_t i) {
@@ -244,7 +244,7 @@ TEST(SpatialOrderTest, PlacesThatNoPlaneParts) {
   expect_all(read(kCount, line, Order::spatial), kCount, line);
 }
 
-TEST(SpatialOrderTest, HeightsInMetresDoNotHideDegrees) {
+TEST(SpatialOrderTest, MeasuresDegreesAndMetresOnTheGround) {
   constexpr std::uint64_t kCount = 1u << 19;
   const auto place = [](std::uint64_t i) {
     Point3 p = shuffled(1024)(i);
@@ -260,8 +260,8 @@ TEST(SpatialOrderTest, HeightsInMetresDoNotHideDegrees) {
   EXPECT_LT(ordered.width(), 0.01 * 20);
 }
 
-/// Thousands of files of one point each take the room of their points, not that of a block each.
-TEST(SpatialOrderTest, SmallBlocksAreHeldTogether) {
+/// Thousands of files of one point each take the memory of their points, not that of a block each.
+TEST(SpatialOrderTest, HoldsSmallBlocksTogether) {
   constexpr std::uint64_t kCount = 300'000;
   for (const auto& [place, order] :
        {std::pair{squares(100), Order::automatic}, std::pair{shuffled(1024), Order::automatic},
@@ -275,7 +275,7 @@ TEST(SpatialOrderTest, SmallBlocksAreHeldTogether) {
       std::uint64_t points = 0, room = 0;
       for (PointBlock block; source->next(block); block = {}) {
         points += block.size();
-        // Only the first window counts, which is held until its order is judged.
+        // Only the first window counts, because it is held until its order is judged.
         if (points <= 1u << 18) room += block.positions.capacity();
         EXPECT_LE(block.size(), kBlock);
         found.blocks.push_back(block);
@@ -300,15 +300,16 @@ TEST(SpatialOrderTest, ThreadsDoNotChangeTheOrder) {
       Read found;
       for (PointBlock block; source->next(block);) found.blocks.push_back(block);
       EXPECT_TRUE(same(found, expected)) << threads << " threads, " << ahead << " ahead";
-      // Chunks of buckets are written in another order, and the last one may be a shorter one.
+      // Chunks of buckets are written in another order, so another chunk may be the last, shorter
+      // one.
       EXPECT_NEAR(static_cast<double>(source->report().temporary_bytes),
                   static_cast<double>(expected.report.temporary_bytes), 32 << 10);
     }
   }
 }
 
-TEST(SpatialOrderTest, AStatedBoxSparesDividingTheOutermostBuckets) {
-  // The first window is one corner of the square: without a box nearly all points are beyond.
+TEST(SpatialOrderTest, AStatedBoxAvoidsDividingTheOutermostBuckets) {
+  // The first window is one corner of the square. Without a box nearly all points are outside it.
   constexpr std::uint64_t kCount = 3'000'000;
   const auto place = squares(512);
   Box3 box;
@@ -328,7 +329,7 @@ TEST(SpatialOrderTest, AStatedBoxSparesDividingTheOutermostBuckets) {
   EXPECT_LT(told.width(), 1.05 * blind.width());
   EXPECT_GT(blind.report.written_twice, kCount / 2);
   EXPECT_LT(told.report.written_twice, kCount / 10);
-  // One that is wrong, or not a box, does no harm.
+  // A wrong or invalid box does no harm.
   Box3 far;
   far.include(Point3{1e9, 1e9, 1e9});
   far.include(Point3{2e9, 2e9, 2e9});
@@ -340,7 +341,7 @@ TEST(SpatialOrderTest, AStatedBoxSparesDividingTheOutermostBuckets) {
   EXPECT_TRUE(same(ordered(Box3{}), blind));
 }
 
-TEST(SpatialOrderTest, AStopEndsTheReading) {
+TEST(SpatialOrderTest, EndsWithAStopRequest) {
   std::stop_source stop;
   const auto source = in_spatial_order(
       std::make_unique<MadePoints>(1u << 20, shuffled(1024)),
@@ -351,7 +352,7 @@ TEST(SpatialOrderTest, AStopEndsTheReading) {
   EXPECT_THROW(source->next(block), Stopped);
 }
 
-TEST(SpatialOrderTest, AFolderThatIsNotThereIsNamed) {
+TEST(SpatialOrderTest, NamesAFolderThatDoesNotExist) {
   const TempFolder folder;
   const auto source = in_spatial_order(std::make_unique<MadePoints>(1u << 20, shuffled(1024)),
                                        {.block_points = kBlock, .folder = folder.path() / "none"});
@@ -364,13 +365,13 @@ TEST(SpatialOrderTest, AFolderThatIsNotThereIsNamed) {
   }
 }
 
-TEST(KdCutTest, IntegersAreCutAsDoublesAre) {
+TEST(KdCutTest, CutsIntegersLikeDoubles) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
   const std::array<double, 3> lengths{1, 1, 0.5};
   for (int round = 0; round < 300; ++round) {
-    // From a single place, over many that are the same, to the ends of the type.
+    // From a single place, over many equal ones, to the limits of the type.
     const auto bits = static_cast<unsigned>(random() % 33);
     std::vector<NumberedIntegers> integers(1 + random() % 3000);
     std::vector<NumberedPoint> doubles;
@@ -402,7 +403,7 @@ TEST(KdCutTest, IntegersAreCutAsDoublesAre) {
   }
 }
 
-TEST(RecordPackerTest, RecordsComeBackFromBytesThatDiffer) {
+TEST(RecordPackerTest, RoundTripsRecords) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -421,7 +422,7 @@ TEST(RecordPackerTest, RecordsComeBackFromBytesThatDiffer) {
     }
     RecordPacker packer(bytes);
     const std::span<const std::byte> view = packer.pack(records);
-    // Buffers of their very sizes: no byte beyond them is touched.
+    // Buffers of the exact sizes, so that a sanitizer detects access beyond them.
     const std::vector<std::byte> packed(view.begin(), view.end());
     ASSERT_LE(packed.size(), (2 + count) * bytes);
     if (often == 0) {

@@ -9,7 +9,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Parts of a box in which coordinates are counted to find one of a given rank.
+/// Bins in which coordinates are counted to find the one of a given rank.
 constexpr std::size_t kRankBins = 1024;
 
 template <class Coordinate>
@@ -34,7 +34,7 @@ struct Extent {
   }
 };
 
-/// Parts of an axis, in ascending order.
+/// Divides an axis into bins, in ascending order.
 template <class Coordinate>
 class RankBins {
  public:
@@ -42,7 +42,7 @@ class RankBins {
     if (extent.width(axis) > 0) bins_per_unit_ = kRankBins / extent.width(axis);
   }
 
-  /// Not a number, which infinities make, is in the last.
+  /// Returns the bin of a value: the last one for a NaN, which results from infinities.
   [[nodiscard]] std::size_t of(Coordinate value) const {
     const double bin = (value - low_) * bins_per_unit_;
     return bin < kRankBins ? static_cast<std::size_t>(bin) : kRankBins - 1;
@@ -69,7 +69,8 @@ class RankBins<std::int32_t> {
   std::uint64_t bins_per_unit_;  ///< times 2^32
 };
 
-/// By words: parts that are stored one by one would be waited for when they are loaded as a whole.
+/// Exchanges values by words. Loading a value as a whole would stall on members that were just
+/// stored one by one.
 template <class Value>
 void exchange(Value& a, Value& b) {
   using Words = std::array<std::uint64_t, sizeof(Value) / sizeof(std::uint64_t)>;
@@ -81,18 +82,18 @@ void exchange(Value& a, Value& b) {
   std::memcpy(&b, &of_a, sizeof b);
 }
 
-/// By the coordinate, then by number.
+/// Compares by the coordinate, then by number.
 template <class Point>
 bool comes_before(const Point& a, const Point& b, std::size_t axis) {
   return a.place[axis] != b.place[axis] ? a.place[axis] < b.place[axis] : a.number < b.number;
 }
 
-/// Puts the points for which `is_before` holds before the others; returns how many they are.
+/// Moves the points for which `is_before` holds before the others; returns their number.
 template <class Point, class IsBefore>
 std::size_t part(std::span<Point> points, const IsBefore& is_before) {
   std::size_t before = 0;
   for (Point& point : points) {
-    // Exchanged always: a branch would be a coin toss.
+    // Always exchanged, because a branch would be unpredictable.
     const bool first = is_before(point, before);
     exchange(point, points[before]);
     before += first ? 1 : 0;
@@ -100,8 +101,8 @@ std::size_t part(std::span<Point> points, const IsBefore& is_before) {
   return before;
 }
 
-/// Puts the `first` points that come first along the widest axis before the others, which begin at
-/// the plane returned. Requires first < points.size(), unless there are no points.
+/// Moves the `first` lowest points along the widest axis before the others, and returns the plane
+/// at which the others begin. Requires first < points.size(), unless there are no points.
 template <class Coordinate>
 KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
                const std::array<double, 3>& lengths) {
@@ -122,7 +123,7 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
   for (const Point& point : points) ++counts[bins.of(point.place[axis])];
   std::size_t middle = 0, begin = 0;
   for (; begin + counts[middle] <= first; ++middle) begin += counts[middle];
-  // Only points in this bin are compared with one another.
+  // Only the points in bin `middle` are compared with one another.
   const auto order = [axis](const Point& a, const Point& b) { return comes_before(a, b, axis); };
   const auto select = [&](std::span<Point> in_middle) {
     const auto found = in_middle.begin() + static_cast<std::ptrdiff_t>(first - begin);
@@ -130,7 +131,8 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
     return *found;
   };
   if constexpr (std::is_same_v<Coordinate, double>) {
-    // The order on both sides counts where a window is thinned, so it depends on the ranks alone.
+    // The order on both sides matters when a window is thinned, so it must depend only on the
+    // ranks.
     std::vector<Point> in_middle;
     in_middle.reserve(counts[middle]);
     for (const Point& point : points) {
@@ -140,7 +142,8 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
     part(points, [&](const Point& point, std::size_t) { return order(point, at_plane); });
     return {axis, at_plane.place[axis]};
   } else {
-    // One pass less: all up to the bin go before the others, then those in it to their end.
+    // Saves a pass: first moves all points up to the bin before the others, then those in the bin
+    // to the end of these.
     std::vector<std::size_t> in_middle(counts[middle] + 1);
     std::size_t found = 0;
     std::size_t end = part(points, [&](const Point& point, std::size_t at) {

@@ -12,7 +12,7 @@
 
 namespace terrace::stream {
 
-/// A place and its index in the input. Integers take half the room of doubles.
+/// A place and its index in the input. Integers take half the memory of doubles.
 template <class Coordinate>
 struct Numbered {
   std::array<Coordinate, 3> place;
@@ -21,7 +21,7 @@ struct Numbered {
 using NumberedPoint = Numbered<double>;
 using NumberedIntegers = Numbered<std::int32_t>;
 
-/// A plane across one of the axes. Points below the value are on the first side.
+/// A plane perpendicular to one of the axes. Points below `value` are on the first side.
 struct KdPlane {
   std::size_t axis = 0;
   double value = 0;
@@ -30,24 +30,25 @@ struct KdPlane {
 };
 
 /// Cuts points into `pieces` of sizes that differ by at most one, always across the axis of
-/// greatest extent, with units of the axes as long as `lengths`. Ties in a coordinate are broken by
-/// the points' numbers: the same pieces on every machine. Returns where the pieces begin and, last,
-/// the number of points. Coordinates are doubles or 32-bit integers: they make no difference.
+/// greatest extent. lengths: of the axes' units. Ties in a coordinate are broken by the points'
+/// numbers, so pieces are the same on every machine. Returns the beginnings of the pieces followed
+/// by the number of points. Double and 32-bit integer coordinates give the same pieces.
 template <class Coordinate>
 std::vector<std::size_t> cut_in_pieces(std::span<Numbered<Coordinate>> points, std::size_t pieces,
                                        const std::array<double, 3>& lengths);
 
-/// The planes of a complete k-d tree over points, which are reordered accordingly: the root first,
-/// the children of node i at 2i + 1 and 2i + 2.
+/// Returns the planes of a complete k-d tree over points: the root first, the children of node i at
+/// 2i + 1 and 2i + 2. Reorders the points by the tree.
 std::vector<KdPlane> kd_planes(std::span<NumberedPoint> points, unsigned depth,
                                const std::array<double, 3>& lengths);
 
-/// The leaves, counted from the left, of a complete tree of planes in which places lie: `place_of`
-/// gives those from 0 on, and `take` is given the number of each and its leaf.
+/// Finds the leaves of a complete tree of planes that contain places. Calls take(i, leaf) for each
+/// i below `count` with the leaf of place_of(i), counted from the left.
 template <class PlaceOf, class Take>
 void kd_leaves(std::span<const KdPlane> planes, std::size_t count, const PlaceOf& place_of,
                const Take& take) {
-  // Several places go down the tree side by side: each step waits for the one before.
+  // Several places go down the tree in parallel, because each step of one place waits for the step
+  // before it.
   constexpr std::size_t kSideBySide = 8;
   const auto walk = [&](std::size_t first, auto places) {
     std::array<std::size_t, places> nodes{};

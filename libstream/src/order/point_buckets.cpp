@@ -14,7 +14,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Copies a few bytes, by words: inlined, unlike a call for a size that is not known.
+/// Copies a few bytes by words. Inlined, unlike memcpy() with a variable size.
 inline void copy_short(const std::byte* from, std::byte* to, std::size_t bytes) {
   using Word = std::uint64_t;
   if (bytes < sizeof(Word)) {
@@ -132,7 +132,7 @@ template void PackedPoints::unpack(std::span<const std::byte>, std::vector<Numbe
 template void PackedPoints::unpack(std::span<const std::byte>,
                                    std::vector<NumberedIntegers>&) const;
 
-/// Records that are fetched while others before them are unpacked.
+/// How many records ahead of the one being unpacked are prefetched.
 constexpr std::size_t kRecordsAhead = 24;
 
 void PackedPoints::unpack(std::span<const std::byte> records,
@@ -206,7 +206,7 @@ void BucketFile::append(Bucket& bucket, std::span<const std::byte> records, Reco
   }
 }
 
-/// Moves the records in memory to the file.
+/// Moves the bucket's records in memory to the file.
 void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
   std::span<const std::byte> bytes = packer.pack(bucket.tail);
   if (bytes.size() >= chunk_bytes_) bytes = bucket.tail;
@@ -237,7 +237,7 @@ void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
   bucket.tail.clear();
 }
 
-/// The smallest place that is free and large enough, or one at the end of the file.
+/// Returns the smallest free position that is large enough, or one at the end of the file.
 Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
   const auto pages = static_cast<std::uint32_t>((bytes + kPageBytes - 1) / kPageBytes);
   Bucket::Chunk chunk{.page = pages_, .pages = pages, .bytes = static_cast<std::uint32_t>(bytes)};
@@ -246,8 +246,8 @@ Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
     if (pages > UINT32_MAX - pages_) {
       throw Error({.file = file_.name(),
                    .where = {},
-                   .cause = "its points take more than 4 TiB of temporary disk",
-                   .remedy = "build from parts of them"});
+                   .cause = "its points need more than 4 TiB of temporary disk space",
+                   .remedy = "split the input"});
     }
     pages_ += pages;
     return chunk;
@@ -278,7 +278,7 @@ std::uint64_t BucketFile::records(const Bucket& bucket) const {
 void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
   const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
   const std::size_t chunks = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
-  // All that might ever come: `out` is used again.
+  // Reserves the maximum, because `out` is reused.
   out.reserve(at_once * chunk_bytes_ + bucket.tail.size());
   out.resize(chunks * chunk_bytes_);
   for (std::size_t i = 0; i < chunks; ++i) {

@@ -13,12 +13,13 @@
 namespace terrace::stream {
 namespace {
 
-/// Fewer bytes that are the same are written with those around them.
+/// Shorter runs of equal bytes are written with the bytes around them.
 constexpr std::size_t kLeastGap = 3;
-/// Records that are walked through once per run: they stay in the nearest cache.
+/// Records that are processed together, once per run; few enough to stay in the first-level cache.
 constexpr std::size_t kRecordsAtOnce = 256;
 
-/// Copies bytes of records, or of one if `from_stride` is 0. The compiler knows how many.
+/// Copies bytes of records, or of one record if `from_stride` is 0. Their number is a compile-time
+/// constant.
 template <std::size_t kBytes>
 void copy_run(const std::byte* from, std::size_t from_stride, std::byte* to, std::size_t to_stride,
               std::size_t count) {
@@ -30,15 +31,15 @@ constexpr auto copies_of_runs(std::index_sequence<kBytes...>) {
   return std::array{&copy_run<kBytes + 1>...};
 }
 constexpr std::size_t kMostInRun = 16;
-/// By the number of bytes less 1.
+/// The functions copy_run<n>, at index n - 1.
 constexpr auto kCopyRun = copies_of_runs(std::make_index_sequence<kMostInRun>{});
 
 }  // namespace
 
-/// Returns how many bytes are written of each record.
+/// Finds the runs. Returns the number of bytes written for each record.
 std::size_t RecordPacker::find_runs(std::span<const std::byte> differing) {
   runs_.clear();
-  // Short gaps are written: fewer runs are faster.
+  // Short gaps are written too, because fewer runs are faster.
   const auto same_at = [&](std::size_t at) {
     std::size_t end = at;
     while (end < record_bytes_ && differing[end] == std::byte{0}) ++end;

@@ -7,20 +7,20 @@
 
 namespace terrace::stream {
 
-/// Records written without the bytes that are the same in all of them: flags that are not used, the
+/// Packs records without the bytes that are the same in all of them, such as unused flags and the
 /// upper bytes of coordinates and numbers.
 class RecordPacker {
  public:
   explicit RecordPacker(std::size_t record_bytes) : record_bytes_(record_bytes) {}
 
-  /// Packs complete records, at least one. The view is valid until the next call. Packed records
-  /// are longer by at most two records.
+  /// Packs one or more complete records. The result is valid until the next call, and is longer
+  /// than `records` by at most two records.
   std::span<const std::byte> pack(std::span<const std::byte> records);
-  /// Undoes pack(). Requires `records` to be as long as those that were packed to `packed`.
+  /// Undoes pack(). Requires that `records` has the size of the records that were packed.
   void unpack(std::span<const std::byte> packed, std::span<std::byte> records);
 
  private:
-  /// Bytes of a record, at most 16, that are the same in all records or written for each.
+  /// At most 16 bytes of a record that are either the same in all records or written for each.
   struct Run {
     std::size_t in_record, written, bytes;
     bool same;

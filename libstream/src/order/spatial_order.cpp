@@ -23,23 +23,25 @@
 namespace terrace::stream {
 namespace {
 
-/// Points that are looked at together.
+/// Points of a window, which are judged together.
 constexpr std::size_t kWindowPoints = 1u << 18;
-/// A window is judged by every fourth of its points, and in an ordered stream every fourth is.
+/// A window is judged by every fourth of its points. In a stream that is in order, every fourth
+/// window is judged.
 constexpr std::size_t kJudgedPoints = 4;
 constexpr std::size_t kJudgedWindows = 4;
-/// Blocks so many times wider than those of a k-d tree are not compact.
+/// Blocks are not compact if they are wider than a k-d tree's by more than this factor.
 constexpr double kWidest = 2.0;
 /// Buckets are the leaves of a k-d tree of this depth.
 constexpr unsigned kDepth = 8;
-/// More points than these are not put in order at once.
+/// Maximum number of points that are put in order at once.
 constexpr std::uint64_t kMostAtOnce = 1u << 18;
 
 std::size_t blocks_of(std::size_t points, std::size_t block_points) {
   return (points + block_points - 1) / block_points;
 }
 
-/// The widths of the blocks that `begins` tells, over all axes, as `lengths` counts them.
+/// Returns the sum of the widths over all axes of the blocks that start at `begins`. lengths: of
+/// the axes' units.
 double widths_of(std::span<const NumberedPoint> points, std::span<const std::size_t> begins,
                  const std::array<double, 3>& lengths) {
   double widths = 0;
@@ -53,15 +55,17 @@ double widths_of(std::span<const NumberedPoint> points, std::span<const std::siz
   return widths;
 }
 
-/// A window whose box has a greater share of the source's shows what all of it is like.
+/// A window whose box has a greater share of the source's box represents all of it.
 constexpr double kWindowShowsAll = 0.25;
-/// Points that go to the buckets together, in about so many shares where they come from one.
+/// Points that go to the buckets together, in about kSharesOfBucket shares if they come from one
+/// bucket.
 constexpr std::size_t kSharedPoints = 1u << 16;
 constexpr std::size_t kSharesOfBucket = 16;
-/// Buckets that a thread fills before it looks for others.
+/// Number of buckets that a thread fills at a time.
 constexpr std::size_t kBucketsATime = 4;
 
-/// What points take that are held back to be judged or come next, and the ends of all buckets.
+/// Returns the memory in bytes of the points that are held to be judged or to be delivered next,
+/// and of the ends of all buckets.
 std::uint64_t bytes_to_order(const SourceInfo& info, unsigned parts_ahead) {
   static_assert(kWindowPoints <= kMostAtOnce);
   const std::uint64_t point = sizeof(Point3) + info.payload_size() + sizeof(NumberedPoint);
@@ -116,7 +120,7 @@ class SpatialSource final : public OrderedSource {
  private:
   enum class State : std::uint8_t { opening, passing, judging, gathering, delivering };
 
-  /// The next block of the source.
+  /// Reads the next block of the source.
   bool next_block(PointBlock& block) {
     if (following_.empty()) return source_->next(block);
     std::swap(block, following_);
@@ -124,8 +128,8 @@ class SpatialSource final : public OrderedSource {
     return true;
   }
 
-  /// The next blocks of the source as one, as many as fit: thousands of files may have one point
-  /// each, and what is held must not grow with the number of blocks.
+  /// Reads as many blocks of the source as fit into one. Thousands of files may have one point
+  /// each, and memory must not grow with the number of blocks.
   bool next_full_block(PointBlock& block) {
     block.clear();
     for (; !ended_; following_.clear()) {
@@ -145,7 +149,7 @@ class SpatialSource final : public OrderedSource {
     return !block.empty();
   }
 
-  /// Reads the first window, which is held back until it has been judged.
+  /// Reads the first window, which is held until it has been judged.
   void open() {
     state_ = State::judging;
     bool more = true;
@@ -153,7 +157,7 @@ class SpatialSource final : public OrderedSource {
       PointBlock block;
       more = next_full_block(block);
       look_at(block);
-      // A source may leave room for more points than there are.
+      // A source may reserve room for more points than it delivers.
       if (block.positions.capacity() > block.size() + block.size() / 4) {
         block.positions.shrink_to_fit();
         block.payload.shrink_to_fit();
@@ -169,7 +173,7 @@ class SpatialSource final : public OrderedSource {
     }
   }
 
-  /// Looks at blocks on their way: what follows a window that is not compact is put in order.
+  /// Judges blocks that are delivered. Points after a window that is not compact are put in order.
   void judge(const PointBlock& block) {
     if (unjudged_ > 0) {
       unjudged_ -= std::min<std::uint64_t>(unjudged_, block.size());
@@ -185,7 +189,7 @@ class SpatialSource final : public OrderedSource {
     }
   }
 
-  /// Adds points of a block to those by which its window is judged.
+  /// Adds points of a block to those that represent its window.
   void look_at(const PointBlock& block) {
     places_.reserve(kWindowPoints / kJudgedPoints + block.size());
     for (const Point3& p : block.positions) {
@@ -199,7 +203,7 @@ class SpatialSource final : public OrderedSource {
     unjudged_ = (kJudgedWindows - 1) * kWindowPoints;
   }
 
-  /// The spread of the window of which `places_` are a part, which is reordered.
+  /// Returns the spread of the window represented by `places_`, which it reorders.
   double spread() {
     const std::size_t blocks =
         blocks_of(places_.size(), std::max<std::size_t>(options_.block_points / kJudgedPoints, 1));
@@ -235,7 +239,7 @@ class SpatialSource final : public OrderedSource {
     state_ = State::delivering;
   }
 
-  /// Puts what is held back and all that follows into buckets.
+  /// Puts the window, if it is held, and all points that follow into buckets.
   void gather() {
     if (!window_.empty()) places_.clear();
     for (const PointBlock& block : window_) {
@@ -260,14 +264,16 @@ class SpatialSource final : public OrderedSource {
     for (bool more = true; more;) {
       if (options_.stop.stop_requested()) throw Stopped();
       std::size_t count = 0, points = 0;
-      // Who reads a block sorts it, while it is in a near cache and another reads the next.
-      // Done before more is read: a full disk is told even if the input's producer idles.
+      // The thread that reads a block also sorts it while it is cached, and another reads the next
+      // block.
+      // Written before more is read, so that a full disk is reported even if the input's producer
+      // idles.
       team_.run(team_.threads(), [&](std::size_t, std::size_t) {
         std::unique_lock lock(reading);
         while (more && points < kSharedPoints) {
           if (count == shares.size()) shares.emplace_back();
           Share& share = shares[count];
-          more = false;  // should this fail, no other is to read
+          more = false;  // no other thread may read if this fails
           if (!next_of_all(share.block)) return;
           more = true;
           ++count;
@@ -288,10 +294,10 @@ class SpatialSource final : public OrderedSource {
     state_ = State::delivering;
   }
 
-  /// A window often shows one corner of the whole, of a survey its first swath. Where the source
-  /// knows more, most of the window's points give way to places spread evenly over its box, in
-  /// proportion to the points that are to come: else nearly all of them would end in the outermost
-  /// buckets, to be divided later.
+  /// A window often covers only a corner of the whole, such as the first swath of a survey. If the
+  /// source states a larger box, replaces most of the window's points by places spread evenly over
+  /// that box, in proportion to the points still to come. Otherwise nearly all of these would go to
+  /// the outermost buckets, which would have to be divided later.
   void expect_elsewhere() {
     const std::optional<Box3>& bounds = info().stated_bounds;
     const std::uint64_t points = info().points.value_or(0);
@@ -305,7 +311,7 @@ class SpatialSource final : public OrderedSource {
       lengths[axis] = length * lengths_[axis];
       parts[axis] = length > 0 ? (window.max[axis] - window.min[axis]) / length : 1;
     }
-    // The shortest does not count: on land that of the heights, which one point may stretch.
+    // The shortest axis does not count: on land it is the height, which one outlier may stretch.
     parts[static_cast<std::size_t>(std::ranges::min_element(lengths) - lengths.begin())] = 1;
     const double seen = std::min(parts[0], 1.0) * std::min(parts[1], 1.0) * std::min(parts[2], 1.0);
     if (seen > kWindowShowsAll) return;
@@ -314,7 +320,7 @@ class SpatialSource final : public OrderedSource {
     const auto kept = static_cast<std::size_t>(static_cast<double>(count) * share);
     for (std::size_t i = 0; i < kept; ++i) places_[i] = places_[i * count / kept];
     for (std::size_t i = kept; i < count; ++i) {
-      // The additive sequence of least discrepancy in space: powers of 1 / 1.2207...
+      // The additive sequence of low discrepancy in three dimensions: powers of 1 / 1.2207...
       constexpr std::array<double, 3> kSteps{0.8191725133961645, 0.6710436067037893,
                                              0.5497004779019703};
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -326,11 +332,11 @@ class SpatialSource final : public OrderedSource {
     for (std::size_t i = 0; i < count; ++i) places_[i].number = i;
   }
 
-  /// Points on their way to the buckets.
+  /// A share of the points that go to the buckets.
   struct Share {
-    PointBlock block;                   ///< from the source
-    std::vector<std::byte> records;     ///< from another bucket
-    std::vector<NumberedPoint> places;  ///< of these
+    PointBlock block;                   ///< if from the source
+    std::vector<std::byte> records;     ///< if from another bucket
+    std::vector<NumberedPoint> places;  ///< of these records
     std::vector<std::uint16_t> leaves;  ///< by record
     std::vector<std::byte> by_leaf;     ///< the records
     std::vector<std::size_t> begins;    ///< of each leaf's, and the end
@@ -344,7 +350,7 @@ class SpatialSource final : public OrderedSource {
     });
   }
 
-  /// Adds the records of the first `count` shares to the buckets, in order.
+  /// Appends the records of the first `count` shares to the buckets, in order.
   void distribute(const std::deque<Share>& shares, std::size_t count,
                   std::vector<Bucket>& buckets) {
     while (packers_.size() < team_.threads()) packers_.emplace_back(packed_->record_bytes());
@@ -362,19 +368,20 @@ class SpatialSource final : public OrderedSource {
     });
   }
 
-  /// Makes the buckets the next ones, such as are small together as one. Planes do not divide those
-  /// of more than `divisible` records: they hold one place, more or less.
+  /// Makes these buckets the next to be delivered, joining small ones. A bucket of more than
+  /// `divisible` records is not divided further: planes did not divide it, so most of its points
+  /// are at one place.
   void push(std::vector<Bucket> buckets, std::uint64_t divisible) {
     std::vector<Bucket> joined;
     join(buckets, joined);
-    // The first is to be the last in the list.
+    // The first must be last in the list.
     for (; !joined.empty(); joined.pop_back()) {
       const bool small = file_->records(joined.back()) <= divisible;
       pending_.push_back({std::move(joined.back()), small});
     }
   }
 
-  /// The buckets of a subtree of the k-d tree that fit together are one region.
+  /// Joins the buckets of a subtree of the k-d tree if they fit into one region.
   void join(std::span<Bucket> buckets, std::vector<Bucket>& joined) {
     std::uint64_t records = 0;
     for (const Bucket& bucket : buckets) records += file_->records(bucket);
@@ -389,7 +396,7 @@ class SpatialSource final : public OrderedSource {
     joined.push_back(std::move(all));
   }
 
-  /// Fills the block with the next points; it is empty once there are no more.
+  /// Fills the block with the next points; leaves it empty at the end.
   void deliver(PointBlock& block) {
     while (next_piece_ + 1 >= region_.pieces.size()) {
       if (!region_.records.empty()) spare_.push_back(std::exchange(region_, {}));
@@ -409,12 +416,12 @@ class SpatialSource final : public OrderedSource {
                     block);
   }
 
-  /// Points that are delivered together, piece by piece.
+  /// Points that are prepared together and delivered piece by piece.
   struct Region {
     std::vector<std::byte> records;
-    std::vector<std::size_t> pieces;      ///< where each begins, and the end
-    std::vector<std::uint32_t> in_order;  ///< records of the pieces
-    // Needed only while it is being prepared, the places in one form:
+    std::vector<std::size_t> pieces;      ///< beginning of each, and the end
+    std::vector<std::uint32_t> in_order;  ///< numbers of the records, by piece
+    // Needed only during preparation; either `places` or `integers` is used.
     std::vector<NumberedPoint> places;
     std::vector<NumberedIntegers> integers;
     std::vector<std::uint32_t> piece_of;  ///< by record
@@ -434,7 +441,7 @@ class SpatialSource final : public OrderedSource {
       }
       file_->take(next.bucket, kMostAtOnce, region.records);
       if (file_->records(next.bucket) == 0) pending_.pop_back();
-      // Where the system grants no more threads, it is cut once it is needed.
+      // If the system grants no more threads, the region is cut when it is needed.
       const std::launch when = options_.parts_ahead > 0 ? std::launch::async | std::launch::deferred
                                                         : std::launch::deferred;
       coming_.push_back(std::async(
@@ -456,7 +463,7 @@ class SpatialSource final : public OrderedSource {
     packed_->unpack(region.records, places);
     region.pieces =
         cut_in_pieces(std::span(places), blocks_of(places.size(), options_.block_points), lengths_);
-    // Within a piece in the order of the source: neighbours in it are often alike.
+    // A piece keeps the order of the source, in which neighbours are often alike.
     region.piece_of.resize(places.size());
     for (std::uint32_t piece = 0; piece + 1 < region.pieces.size(); ++piece) {
       for (std::size_t i = region.pieces[piece]; i < region.pieces[piece + 1]; ++i) {
@@ -470,7 +477,7 @@ class SpatialSource final : public OrderedSource {
     }
   }
 
-  /// Puts smaller buckets in place of the next one.
+  /// Replaces the next bucket by smaller ones.
   void divide() {
     Bucket bucket = std::move(pending_.back().bucket);
     pending_.pop_back();
@@ -511,28 +518,28 @@ class SpatialSource final : public OrderedSource {
   SpatialOrderOptions options_;
   State state_;
   std::uint64_t ordering_bytes_;
-  PointBlock following_;               ///< read, but did not fit the last full block
-  bool ended_ = false;                 ///< the source has no more blocks
-  std::deque<PointBlock> window_;      ///< what was held back to be judged
-  std::vector<NumberedPoint> places_;  ///< of a window
-  std::uint64_t unjudged_ = 0;         ///< points that pass before the next window
-  std::uint64_t seen_ = 0;             ///< points of the window that is judged
+  PointBlock following_;               ///< read, but did not fit into the last full block
+  bool ended_ = false;                 ///< whether the source has no more blocks
+  std::deque<PointBlock> window_;      ///< held until it is judged
+  std::vector<NumberedPoint> places_;  ///< represent a window
+  std::uint64_t unjudged_ = 0;         ///< points to deliver before the next window to judge
+  std::uint64_t seen_ = 0;             ///< points of the window being judged
   std::array<double, 3> lengths_{1, 1, 1};
 
   std::optional<PackedPoints> packed_;
-  std::vector<KdPlane> planes_;  ///< between the buckets
+  std::vector<KdPlane> planes_;  ///< that divide the buckets
   std::optional<BucketFile> file_;
-  std::vector<Pending> pending_;  ///< the next one is the last
+  std::vector<Pending> pending_;  ///< the next is at the end
 
   base::ThreadTeam team_;
   std::vector<RecordPacker> packers_;  ///< by thread of the team
-  Region region_;                      ///< that is delivered
+  Region region_;                      ///< being delivered
   std::size_t next_piece_ = 0;
   std::vector<Region> spare_;
 
   std::uint64_t delivered_ = 0, total_ = 0;
   Report report_;
-  std::deque<std::future<Region>> coming_;  ///< goes first: it needs the others
+  std::deque<std::future<Region>> coming_;  ///< destroyed first, because it uses the others
 };
 
 }  // namespace
