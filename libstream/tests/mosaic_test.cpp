@@ -27,7 +27,7 @@ RasterOpener plain_opener() {
   return [](const std::string& file) { return open_geotiff(file); };
 }
 
-/// Several rasters of the same grid in one folder.
+/// Rasters of the same grid in one folder.
 class Files {
  public:
   std::string add(const TiffSpec& spec, const std::vector<std::byte>& samples) {
@@ -44,7 +44,7 @@ class Files {
   std::vector<std::string> names_;
 };
 
-/// Random rasters with holes and random overlaps, compared with a map from place to last sample.
+/// Random rasters with holes and overlaps, compared with a map from place to last sample.
 TEST(Mosaic, TheLastValidSampleWinsAndEachCellIsOnePoint) {
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -62,7 +62,8 @@ TEST(Mosaic, TheLastValidSampleWinsAndEachCellIsOnePoint) {
       const auto row = static_cast<std::int64_t>(random() % 100);
       if (random() % 2 == 0) spec.tile_columns = spec.tile_rows = 16;
       if (random() % 2 == 0) spec.compression = COMPRESSION_ADOBE_DEFLATE;
-      const auto hole = static_cast<std::int16_t>(random() % 3);  // each file its own nodata
+      const auto hole =
+          static_cast<std::int16_t>(random() % 3);  // each file has its own nodata value
       const auto place = placed_at(7 + static_cast<double>(column) * cell,
                                    50 - static_cast<double>(row) * cell, cell);
       spec.more = [&](TIFF* tiff) {
@@ -117,7 +118,7 @@ TiffSpec at(double x, double y, double cell = 10) {
   return spec;
 }
 
-/// The error must name both files.
+/// Expects an error that names both files.
 void expect_misfit(const Files& files, const std::optional<Crs>& crs = std::nullopt) {
   try {
     open_mosaic(files.names(), plain_opener(), crs);
@@ -129,7 +130,7 @@ void expect_misfit(const Files& files, const std::optional<Crs>& crs = std::null
   }
 }
 
-/// A raster of 8 x 8 zeros that counts how many of its kind are open.
+/// A raster of 8 x 8 zeros that counts the open rasters of its class.
 class CountedRaster final : public Raster {
  public:
   CountedRaster(const std::string& name, std::size_t& open) : open_(open) {
@@ -149,7 +150,7 @@ class CountedRaster final : public Raster {
   RasterInfo info_;
 };
 
-TEST(Mosaic, KeepsOpenWhatFitsIntoItsMemory) {
+TEST(Mosaic, KeepsFilesOpenWithinItsMemory) {
   for (const std::size_t room : {0u, 1u, 2u, 5u, 40u}) {
     SCOPED_TRACE(room);
     std::size_t open = 0, most = 0;
@@ -171,7 +172,7 @@ TEST(Mosaic, KeepsOpenWhatFitsIntoItsMemory) {
   }
 }
 
-TEST(Mosaic, RefusesWhatDoesNotFit) {
+TEST(Mosaic, RefusesRastersThatDoNotMatch) {
   const std::vector<std::byte> samples(8 * 8 * 8);
   {
     Files files;  // shifted by a tenth of a cell
@@ -212,7 +213,7 @@ TEST(Mosaic, RefusesWhatDoesNotFit) {
   }
 }
 
-TEST(Mosaic, AMillimetreOfACellDoesNotMatter) {
+TEST(Mosaic, IgnoresShiftsOfAThousandthOfACell) {
   const std::vector<std::byte> samples(8 * 8 * 2);
   Files files;
   files.add(at(0, 0), samples);
@@ -222,7 +223,7 @@ TEST(Mosaic, AMillimetreOfACellDoesNotMatter) {
   EXPECT_TRUE(mosaic->info().notes.empty());
 }
 
-TEST(Mosaic, AFewHundredthsOfACellAreNoted) {
+TEST(Mosaic, NotesShiftsOfAFewHundredthsOfACell) {
   const std::vector<std::byte> samples(8 * 8 * 2);
   Files files;
   files.add(at(0, 0), samples);
@@ -233,7 +234,7 @@ TEST(Mosaic, AFewHundredthsOfACellAreNoted) {
   EXPECT_NE(info.notes[0].find("0.04 of a cell"), std::string::npos) << info.notes[0];
 }
 
-TEST(Mosaic, TheCrsMustAgreeUnlessTheCallerKnowsIt) {
+TEST(Mosaic, CrsMustAgreeUnlessTheCallerGivesIt) {
   const std::vector<std::byte> samples(8 * 8 * 2);
   Files files;
   for (const int epsg : {32632, 32633}) {
@@ -255,7 +256,7 @@ TEST(Mosaic, TheCrsMustAgreeUnlessTheCallerKnowsIt) {
   EXPECT_EQ(geotiff_format().open(files.names(), options)->info().crs.epsg, 32632);
 }
 
-TEST(Mosaic, FilesOnBothSidesOfTheAntimeridianAreJoinedThere) {
+TEST(Mosaic, JoinsFilesOnBothSidesOfTheAntimeridian) {
   std::list<Files> kept;
   const auto joined = [&kept](const std::vector<double>& wests, bool degrees) {
     Files& files = kept.emplace_back();
@@ -281,16 +282,16 @@ TEST(Mosaic, FilesOnBothSidesOfTheAntimeridianAreJoinedThere) {
     EXPECT_EQ(read.value(7), 179);
     EXPECT_EQ(read.value(8), -180);
   }
-  // Longitudes from 0 to 360 are cut at Greenwich instead, and joined there.
+  // Longitudes from 0 to 360 are cut at Greenwich instead, so files are joined there.
   EXPECT_EQ(joined({0, 359}, true)->info().world.xy[2], -0.9375);
   EXPECT_EQ(joined({-179, 100, 170}, true)->info().columns, 82u * 8);
-  // All around the earth, or not of the earth: as the files say.
+  // Files all around the Earth, and files that are not in degrees, stay where they are.
   EXPECT_EQ(joined({-180, -90, 0, 90, 179}, true)->info().columns, 360u * 8);
   EXPECT_EQ(joined({-180, 179}, false)->info().columns, 360u * 8);
 }
 
-/// Two real tiles of one survey; both hold the row they share.
-TEST(Mosaic, OneRealFileTwiceIsThatFile) {
+/// One real file given twice gives the same points as once.
+TEST(Mosaic, OneRealFileTwiceEqualsThatFile) {
   const auto folder = real_data();
   if (!folder) GTEST_SKIP() << "needs TERRACE_DATA";
   const std::string file = (*folder / "dem/N46E008_alps_point.tif").string();

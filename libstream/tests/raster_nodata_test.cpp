@@ -29,7 +29,7 @@ bool is_nodata(const std::string& text, ScalarType type, T sample) {
   return valid == 0;
 }
 
-TEST(Nodata, IntegersByTheirValueHoweverItIsWritten) {
+TEST(Nodata, MatchesIntegersHoweverTheValueIsWritten) {
   for (const char* text : {"-32768", " -32768 ", "-32768.0", "-3.2768e4", "-32768\n"}) {
     EXPECT_TRUE(is_nodata<std::int16_t>(text, ScalarType::i16, -32768)) << text;
     EXPECT_FALSE(is_nodata<std::int16_t>(text, ScalarType::i16, -32767)) << text;
@@ -38,7 +38,7 @@ TEST(Nodata, IntegersByTheirValueHoweverItIsWritten) {
   EXPECT_TRUE(is_nodata<std::uint32_t>("4294967295", ScalarType::u32, 4294967295u));
 }
 
-TEST(Nodata, WhatATypeCannotHoldMatchesNothing) {
+TEST(Nodata, MatchesNothingIfTheTypeCannotHoldTheValue) {
   for (const char* text : {"-9999", "256", "0.5", "nan", "inf", "1e300", "-1"}) {
     const NodataRule rule = NodataRule::parse(text, ScalarType::u8);
     EXPECT_TRUE(rule.value.has_value()) << text;
@@ -60,7 +60,7 @@ TEST(Nodata, LargeIntegersAreExact) {
   EXPECT_FALSE(is_nodata<std::uint64_t>("-1", ScalarType::u64, UINT64_MAX));
 }
 
-TEST(Nodata, FloatsWithinTheirPrecision) {
+TEST(Nodata, MatchesFloatsWithinTheirPrecision) {
   EXPECT_TRUE(is_nodata("-3.4028234663852886e+38", ScalarType::f32, -3.4028234663852886e+38f));
   EXPECT_TRUE(is_nodata("-3.40282306073710965e+38", ScalarType::f32, -3.4028234663852886e+38f));
   EXPECT_TRUE(is_nodata("-3.4e+38", ScalarType::f32, -3.4e+38f));
@@ -77,7 +77,7 @@ TEST(Nodata, FloatsWithinTheirPrecision) {
   EXPECT_FALSE(is_nodata("-9999", ScalarType::f64, -9999.0001));
 }
 
-TEST(Nodata, WhatIsNotFiniteIsNoDataWithoutARule) {
+TEST(Nodata, NaNAndInfinitiesAreNodataWithAnyValue) {
   for (const char* text :
        {"", "nan", "NaN", "-nan", "inf", "-Inf", "1.#QNAN", "-1.#IND", "-9999"}) {
     SCOPED_TRACE(text);
@@ -91,15 +91,15 @@ TEST(Nodata, WhatIsNotFiniteIsNoDataWithoutARule) {
   }
 }
 
-TEST(Nodata, RubbishIsNoRule) {
+TEST(Nodata, IgnoresUnreadableText) {
   for (const char* text : {"", "  ", "none", "x", "-", "\xff\xfe"}) {
     EXPECT_FALSE(NodataRule::parse(text, ScalarType::i16).value.has_value()) << text;
   }
 }
 
-/// The kernels compared with the rule cell by cell, over all steps and lengths around the chunk
+/// Compares the loops with the rule cell by cell, for all steps and for lengths around the chunk
 /// size.
-TEST(Overlay, LaysValidCellsOverOthers) {
+TEST(Overlay, CopiesValidCellsOverOthers) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 3000; ++round) {
     SCOPED_TRACE(round);

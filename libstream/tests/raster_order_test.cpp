@@ -12,7 +12,7 @@
 namespace terrace::stream {
 namespace {
 
-TEST(RasterOrder, HilbertVisitsEveryFieldOnceGoingToNeighbours) {
+TEST(RasterOrder, HilbertVisitsEveryFieldOnceByNeighbours) {
   for (std::uint32_t columns = 1; columns <= 24; ++columns) {
     for (std::uint32_t rows = 1; rows <= 24; ++rows) {
       SCOPED_TRACE(std::to_string(columns) + " x " + std::to_string(rows));
@@ -33,7 +33,7 @@ TEST(RasterOrder, HilbertVisitsEveryFieldOnceGoingToNeighbours) {
   }
 }
 
-TEST(RasterOrder, TilesAreFewSquareAndNotTooLarge) {
+TEST(RasterOrder, TilesAreNearlySquareAndFull) {
   std::mt19937_64 random(5);
   for (int i = 0; i < 20000; ++i) {
     const GridSize window{1 + random() % (1u << (1 + random() % 20)),
@@ -60,7 +60,7 @@ TEST(RasterOrder, TilesAreFewSquareAndNotTooLarge) {
   }
 }
 
-TEST(RasterOrder, WindowsFitMemoryAndAreWholeBlocksWherePossible) {
+TEST(RasterOrder, WindowsFitMemoryAndHaveCompleteBlocksIfPossible) {
   std::mt19937_64 random(6);
   for (int i = 0; i < 20000; ++i) {
     RasterInfo info;
@@ -84,7 +84,7 @@ TEST(RasterOrder, WindowsFitMemoryAndAreWholeBlocksWherePossible) {
       ASSERT_TRUE(window.columns % info.block_columns == 0 || window.columns == info.columns);
       ASSERT_TRUE(window.rows % info.block_rows == 0 || window.rows == info.rows);
     }
-    // Strips are not cut as long as a row of them fits.
+    // Strips are not cut if a row of one fits.
     if (info.block_columns == info.columns && info.columns <= cells) {
       ASSERT_EQ(window.columns, info.columns);
     }

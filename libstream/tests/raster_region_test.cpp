@@ -29,20 +29,21 @@
 #include "terrace/stream/source.hpp"
 #include "tiff_writing.hpp"
 
-/// Selection::region of rasters: the cells inside, and no others are read.
+/// Tests Selection::region of rasters: only blocks with cells inside are read.
 
 namespace terrace::stream {
 namespace {
 
 constexpr std::uint64_t kBlockSide = 16;
 
-/// What was read of a raster.
+/// Records which blocks of a raster were read.
 struct Reading {
   std::uint64_t cells = 0;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> blocks;  ///< of each window, with repeats
+  std::vector<std::pair<std::uint64_t, std::uint64_t>>
+      blocks;  ///< the blocks of each window, with repeats
 };
 
-/// Samples that are a function of their place, one in eleven void.
+/// A raster whose samples are a function of their place; one in eleven is void.
 class MadeRaster final : public Raster {
  public:
   MadeRaster(std::uint64_t columns, std::uint64_t rows, const WorldTransform& world,
@@ -94,7 +95,7 @@ std::vector<Point3> points_in_order(PointSource& source) {
   return points;
 }
 
-/// In the CRS, sorted.
+/// Returns the points in the CRS, sorted.
 std::vector<Point3> world_points(PointSource& source) {
   std::vector<Point3> points = points_in_order(source);
   for (Point3& p : points) p = world_point(source.info(), p);
@@ -112,11 +113,11 @@ Box3 flat_box(double left, double bottom, double right, double top) {
   return {{left, bottom, -kInfinity}, {right, top, kInfinity}};
 }
 
-TEST(RasterRegion, HasTheCellsInsideAndReadsEachBlockThereOnce) {
+TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
   constexpr std::uint64_t kSeed = 41;
   std::cout << "seed " << kSeed << '\n';
   std::mt19937_64 random(kSeed);
-  // Powers of two, so that places are exact; the last is rotated.
+  // Cell sizes are powers of two, so that places are exact; the last raster is rotated.
   const std::array<WorldTransform, 3> worlds{
       {{}, {.xy = {0.5, 0, -20, 0, -0.25, 70}}, {.xy = {0.5, -0.25, 5, 0.25, 0.5, -3}}}};
   std::size_t in_all = 0, without = 0;
@@ -159,7 +160,7 @@ TEST(RasterRegion, HasTheCellsInsideAndReadsEachBlockThereOnce) {
     std::sort(reading.blocks.begin(), reading.blocks.end());
     EXPECT_EQ(std::adjacent_find(reading.blocks.begin(), reading.blocks.end()),
               reading.blocks.end());
-    if (round % 3 == 2) continue;  // around a box of a rotated raster lies more
+    if (round % 3 == 2) continue;  // a box around a part of a rotated raster contains more
     const double across = std::abs(world.xy[0]), down = std::abs(world.xy[4]);
     const Box3 around = flat_box(region.min[0] - 2 * across, region.min[1] - 2 * down,
                                  region.max[0] + 2 * across, region.max[1] + 2 * down);
@@ -169,8 +170,8 @@ TEST(RasterRegion, HasTheCellsInsideAndReadsEachBlockThereOnce) {
   EXPECT_GT(without, 2u);
 }
 
-/// Overwrites the tiles of a GeoTIFF but for those that `kept` names, so that reading them fails.
-/// Returns how many tiles are left.
+/// Overwrites the tiles of a GeoTIFF except those for which `kept` is true, so that reading them
+/// fails. Returns the number of tiles left.
 std::size_t damage_tiles(const std::filesystem::path& file,
                          const std::function<bool(std::uint32_t, std::uint32_t)>& kept) {
   struct Place {
@@ -178,7 +179,7 @@ std::size_t damage_tiles(const std::filesystem::path& file,
   };
   std::vector<Place> damaged;
   std::size_t left = 0;
-  TIFFSetWarningHandler(nullptr);  // of tags that libtiff does not know
+  TIFFSetWarningHandler(nullptr);  // libtiff warns of tags that it does not know
   TIFF* const tiff = TIFFOpen(file.c_str(), "r");
   EXPECT_NE(tiff, nullptr);
   std::uint32_t columns = 0, side = 0;
@@ -230,7 +231,7 @@ class RegionOfFiles : public testing::Test {
   TempFolder folder_;
 };
 
-TEST_F(RegionOfFiles, OfATiledGeoTiffNoOtherTilesAreRead) {
+TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAGeoTiff) {
   const std::string file = write("a.tif", 0);
   const Box3 region = flat_box(130, 400, 250, 500);  // columns 130 to 249, rows 140 to 239
   const std::vector<Point3> wanted = inside(read({file}), region);
@@ -243,7 +244,7 @@ TEST_F(RegionOfFiles, OfATiledGeoTiffNoOtherTilesAreRead) {
   EXPECT_EQ(read({file}, region), wanted);
 }
 
-TEST_F(RegionOfFiles, OfAMosaicNoOtherTilesAreRead) {
+TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAMosaic) {
   const std::vector<std::string> files{write("a.tif", 0), write("b.tif", kSide),
                                        write("c.tif", 2 * kSide)};
   const Box3 region = flat_box(kSide - 10, 600, kSide + 10, 620);
@@ -258,7 +259,7 @@ TEST_F(RegionOfFiles, OfAMosaicNoOtherTilesAreRead) {
   EXPECT_EQ(read(files, region), wanted);
 }
 
-TEST_F(RegionOfFiles, OfAVrtAndOfACogNoOtherTilesAreRead) {
+TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAVrtAndACog) {
   if (!has_gdal()) GTEST_SKIP() << "gdal-bin is not installed";
   const std::string a = write("a.tif", 0), b = write("b.tif", kSide);
   const std::string vrt = (folder_.path() / "ab.vrt").string();
@@ -287,7 +288,7 @@ TEST_F(RegionOfFiles, OfAVrtAndOfACogNoOtherTilesAreRead) {
   EXPECT_EQ(read({vrt}, region), wanted);
 }
 
-TEST(RasterRegion, FilesGiveThePointsInside) {
+TEST(RasterRegion, AsciiGridGivesThePointsInside) {
   const TempFolder folder;
   const std::string file = (folder.path() / "a.asc").string();
   {
@@ -312,7 +313,7 @@ TEST(RasterRegion, FilesGiveThePointsInside) {
   EXPECT_EQ(progress.points + progress.nodata + progress.excluded, 97u * 83);
 }
 
-/// All void; calls back for every window.
+/// A raster without data that calls a function for every window.
 class VoidRaster final : public Raster {
  public:
   VoidRaster(std::uint64_t columns, std::uint64_t rows, std::function<void()> on_window)
@@ -333,7 +334,7 @@ class VoidRaster final : public Raster {
   RasterInfo info_;
 };
 
-TEST(RasterPoints, AStopEndsTheSearchForCellsWithData) {
+TEST(RasterPoints, AStopRequestEndsTheSearchForCellsWithData) {
   std::stop_source stop;
   int windows = 0;
   const auto source = points_of(std::make_unique<VoidRaster>(1u << 24, 1u << 24,
@@ -347,7 +348,7 @@ TEST(RasterPoints, AStopEndsTheSearchForCellsWithData) {
   EXPECT_EQ(windows, 3);
 }
 
-TEST(RasterPoints, MoreCellsThanCanBeReadAreRefused) {
+TEST(RasterPoints, RefusesMoreCellsThanAStoreCanHold) {
   const auto open = [](std::uint64_t columns, const std::optional<Box3>& region) {
     SourceOptions options;
     options.selection.region = region;
@@ -356,7 +357,7 @@ TEST(RasterPoints, MoreCellsThanCanBeReadAreRefused) {
   EXPECT_NO_THROW(open(1u << 18, std::nullopt));
   try {
     open((1u << 18) + 1, std::nullopt);
-    ADD_FAILURE() << "more than 2^48 cells";
+    ADD_FAILURE() << "accepted more than 2^48 cells";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("262145 x 1073741823 cells"), std::string::npos)
         << error.what();

@@ -27,7 +27,7 @@ struct WholeRaster {
     std::memcpy(&value, samples.data() + cell * sizeof(T), sizeof(T));
     return value;
   }
-  /// A sample of any type as a double.
+  /// Returns a sample of any type as a double.
   [[nodiscard]] double value(std::size_t cell) const {
     switch (info.sample.type) {
       case ScalarType::i8:
@@ -66,7 +66,7 @@ inline WholeRaster read_whole(Raster& raster) {
   return whole;
 }
 
-/// The folder of real files, if the environment names one.
+/// Returns the folder of real files, if the environment names one.
 inline std::optional<std::filesystem::path> real_data() {
   const char* folder = std::getenv("TERRACE_DATA");
   if (folder == nullptr || *folder == '\0') return std::nullopt;

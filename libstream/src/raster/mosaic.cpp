@@ -41,7 +41,7 @@ std::string all_digits(double value) {
                .remedy = remedy});
 }
 
-/// Where the raster's first cell lies in the cells of `frame`.
+/// Returns the column and row of `frame` at x, y.
 std::array<double, 2> cell_of(const WorldTransform& frame, double x, double y) {
   const auto& m = frame.xy;
   const double determinant = m[0] * m[4] - m[1] * m[3];
@@ -51,13 +51,14 @@ std::array<double, 2> cell_of(const WorldTransform& frame, double x, double y) {
 
 struct Member {
   std::string file;
-  std::int64_t column = 0, row = 0;  // of its first cell, first in the frame of the first file
+  std::int64_t column = 0, row = 0;  // of its first cell; until unite(), from the first file's
   std::uint64_t columns = 0, rows = 0;
   std::uint64_t held_bytes = 0;
 };
 
-/// All four corners must be on cells of the first raster, to kNearestCell, so cell sizes and
-/// rotation agree too. off: the largest distance of a corner from its cell, in cells.
+/// Places a raster in the cells of the first one. All four corners must be on cells, to
+/// kNearestCell, so that cell sizes and rotation agree too. off: raised to the largest distance of
+/// a corner from its cell, in cells.
 Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
   const std::string &a = first.files.front(), &b = other.files.front();
   const auto& m = other.world.xy;
@@ -76,7 +77,7 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
     off = std::max({off, std::abs(at[0] - column - c), std::abs(at[1] - row - r)});
     if (!(stretch <= kNearestCell)) {
       differ(a, b,
-             "cells of " + all_digits(m[0]) + " x " + all_digits(m[4]) + " where the other has " +
+             "its cells are " + all_digits(m[0]) + " x " + all_digits(m[4]) + ", not " +
                  all_digits(first.world.xy[0]) + " x " + all_digits(first.world.xy[4]),
              align);
     }
@@ -90,7 +91,7 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
            align);
   }
   if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
-    differ(a, b, "it lies 2^31 cells away or more", "read them separately");
+    differ(a, b, "it is 2^31 or more cells away", "read them separately");
   }
   return {.file = b,
           .column = static_cast<std::int64_t>(column),
@@ -108,20 +109,20 @@ void check_samples(const RasterInfo& first, const RasterInfo& other) {
   const std::string &a = first.files.front(), &b = other.files.front();
   if (first.sample.type != other.sample.type) {
     differ(a, b,
-           "samples are " + std::string(name_of(other.sample.type)) + ", there " +
+           "its samples are " + std::string(name_of(other.sample.type)) + ", not " +
                std::string(name_of(first.sample.type)),
            "convert one: gdal_translate -ot");
   }
   if (first.sample.scale != other.sample.scale || first.sample.offset != other.sample.offset) {
     differ(a, b,
-           "scale and offset are " + all_digits(other.sample.scale) + ", " +
-               all_digits(other.sample.offset) + ", there " + all_digits(first.sample.scale) +
-               ", " + all_digits(first.sample.offset),
+           "its scale and offset are " + all_digits(other.sample.scale) + ", " +
+               all_digits(other.sample.offset) + ", not " + all_digits(first.sample.scale) + ", " +
+               all_digits(first.sample.offset),
            "make them agree: gdal_translate -unscale");
   }
   if (first.sample.unit != other.sample.unit) {
     differ(a, b,
-           "heights are in " + named(other.sample.unit) + ", there in " + named(first.sample.unit),
+           "its heights are in " + named(other.sample.unit) + ", not " + named(first.sample.unit),
            "give both the same unit (gdal_edit.py -units), or convert one (gdal_calc.py)");
   }
 }
@@ -132,7 +133,7 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
     if (crs.epsg != 0) {
       text << "EPSG:" << crs.epsg;
     } else {
-      // The name is the first thing that WKT puts in quotes.
+      // The first quoted text of WKT is the name.
       const std::size_t quote = crs.name.empty() ? crs.wkt.find('"') : crs.wkt.npos;
       const std::string name =
           quote == crs.wkt.npos
@@ -151,15 +152,16 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
     return;
   }
   differ(first.files.front(), other.files.front(),
-         "its CRS is " + described(b) + ", there " + described(a),
-         "reproject one (gdalwarp -t_srs), or name the CRS of all");
+         "its CRS is " + described(b) + ", not " + described(a),
+         "reproject one (gdalwarp -t_srs), or give the CRS of all");
 }
 
-/// The columns that lead once around the earth; 0 if that is not a whole number, or not known.
+/// Returns the number of columns around the Earth; 0 if it is not an integer or is unknown.
 std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
   const auto& m = world.xy;
   const bool degrees = crs.horizontal_unit.empty() || crs.horizontal_unit == "degree";
-  // Whoever reads WKT comes later; a degree in radians tells enough.
+  // WKT is only interpreted later, but the size of a degree in radians shows that the unit is
+  // degrees.
   const bool geographic =
       crs.geographic || (crs.wkt.starts_with("GEOG") && crs.wkt.find("0.01745329") != crs.wkt.npos);
   if (!geographic || !degrees || m[1] != 0 || m[3] != 0 || !(m[0] > 0)) return 0;
@@ -170,14 +172,15 @@ std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
 
 std::int64_t modulo(std::int64_t value, std::int64_t turn) { return (value % turn + turn) % turn; }
 
-/// Moves members by whole turns if they are wider than half a turn and then are not: terrain that
-/// files in longitudes of -180 to 180 cut at the antimeridian. Returns whether it did.
+/// Joins members across the antimeridian, where files in longitudes of -180 to 180 are cut. If the
+/// members together are wider than half a turn, but would be at most half a turn wide after moving
+/// some by complete turns, moves these. Returns whether it did.
 bool join_around(std::vector<Member>& members, const WorldTransform& world, std::int64_t turn) {
   const auto end_of = [](std::int64_t column, const Member& member) {
     return column + static_cast<std::int64_t>(member.columns);
   };
   std::int64_t left = INT64_MAX, right = INT64_MIN;
-  std::vector<std::array<std::int64_t, 2>> spans;  // from a column of the first turn
+  std::vector<std::array<std::int64_t, 2>> spans;  // columns, each beginning in the first turn
   for (const Member& member : members) {
     left = std::min(left, member.column);
     right = std::max(right, end_of(member.column, member));
@@ -186,8 +189,9 @@ bool join_around(std::vector<Member>& members, const WorldTransform& world, std:
   }
   if (2 * (right - left) <= turn) return false;
   std::sort(spans.begin(), spans.end());
-  // Begun at each span, the way around ends where the spans before it end one turn later.
-  std::vector<std::int64_t> ends(spans.size());  // the last of the spans from each on
+  // A range that begins at one span and goes around ends where the spans before that end one turn
+  // later.
+  std::vector<std::int64_t> ends(spans.size());  // the maximum end of this span and those after it
   for (std::size_t i = spans.size(); i-- > 0;) {
     ends[i] = i + 1 < spans.size() ? std::max(spans[i][1], ends[i + 1]) : spans[i][1];
   }
@@ -219,7 +223,7 @@ class Mosaic final : public Raster {
     std::optional<CrsAgreement> agreement;
     for (const std::string& file : files) {
       const std::unique_ptr<Raster> raster = opener_(file);
-      // A member may be a part of its file.
+      // A member may be only a part of a file.
       RasterInfo info = raster->info();
       for (std::string& name : info.files) {
         if (files_.empty() || files_.back() != name) files_.push_back(std::move(name));
@@ -249,7 +253,7 @@ class Mosaic final : public Raster {
     if (farthest > kSameCell) {
       notes_.push_back("the cells of " + farthest_file + " are up to " + shown(farthest) +
                        " of a cell off those of " + files.front() +
-                       ", and are placed on the nearest ones");
+                       ", and are placed on the nearest cells");
     }
     unite(*first, crs.value_or(first->crs));
     info_.notes = std::move(notes_);
@@ -296,7 +300,7 @@ class Mosaic final : public Raster {
     if (info_.comments.size() < kMostComments) info_.comments.push_back(std::move(comment));
   }
 
-  /// The union's size and place; members then count from its corner.
+  /// Determines the union's size and placement; afterwards members count from its corner.
   void unite(const RasterInfo& first, Crs crs) {
     if (crs.epsg == 0 && crs.wkt.empty() && !crs.geographic) {
       const std::string prj = prj_beside(first.files.front());
@@ -306,7 +310,7 @@ class Mosaic final : public Raster {
     }
     const std::int64_t turn = columns_around(first.world, crs);
     if (turn > 0 && join_around(members_, first.world, turn)) {
-      note("the files lie on both sides of the antimeridian: longitudes go on beyond 180 degrees");
+      note("the files are on both sides of the antimeridian: longitudes go beyond 180 degrees");
     }
     std::int64_t left = INT64_MAX, top = 0, right = INT64_MIN, bottom = 0;
     for (const Member& member : members_) {
@@ -338,7 +342,7 @@ class Mosaic final : public Raster {
     const auto c = static_cast<double>(left), r = static_cast<double>(top);
     m[2] = m[0] * c + m[1] * r + m[2];
     m[5] = m[3] * c + m[4] * r + m[5];
-    // Blocks of several files have no common grid.
+    // The blocks of several files are not aligned.
     if (members_.size() > 1) info_.block_columns = info_.block_rows = 1;
   }
 
@@ -361,7 +365,7 @@ class Mosaic final : public Raster {
         info.sample.type != info_.sample.type) {
       throw Error({.file = members_[member].file,
                    .where = {},
-                   .cause = "has changed while it was read",
+                   .cause = "changed while it was read",
                    .remedy = "start again"});
     }
     return *open_.front().raster;
@@ -371,9 +375,9 @@ class Mosaic final : public Raster {
   std::size_t open_at_once_;
   std::uint64_t open_bytes_, held_bytes_ = 0;
   RasterInfo info_;
-  std::vector<std::string> files_, notes_;  ///< of info_, until it is complete
+  std::vector<std::string> files_, notes_;  ///< for info_, until it is complete
   std::vector<Member> members_;
-  std::list<Open> open_;  // the latest used first
+  std::list<Open> open_;  // most recently used first
 };
 
 }  // namespace

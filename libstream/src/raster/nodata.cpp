@@ -20,8 +20,8 @@ std::optional<T> whole_number(std::string_view text) {
   return value;
 }
 
-/// The number at the start of `text`; from_chars also reads "nan" and "inf" in any case, the other
-/// spellings are what old C libraries of Windows print.
+/// Parses the number at the start of `text`. from_chars also reads "nan" and "inf" in any case; old
+/// C libraries of Windows print the other spellings.
 std::optional<double> leading_number(std::string_view text) {
   if (text.find(".#QNAN") != text.npos || text.find(".#SNAN") != text.npos ||
       text.find(".#IND") != text.npos) {
@@ -35,7 +35,7 @@ std::optional<double> leading_number(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc::invalid_argument) return std::nullopt;
   if (error == std::errc::result_out_of_range) {
-    // Beyond the doubles: as good as infinite, or as zero.
+    // Out of the range of doubles, so taken for infinite or zero.
     const bool tiny =
         text.find("e-") != std::string_view::npos || text.find("E-") != std::string_view::npos;
     value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
@@ -44,13 +44,14 @@ std::optional<double> leading_number(std::string_view text) {
   return value;
 }
 
-/// GDAL's notion of equal: |a - b| < epsilon |a + b| 2, solved for a.
+/// GDAL takes a and b for equal if |a - b| < 2 epsilon |a + b|; solved here for a.
 void set_float_range(NodataRule& rule, double value, double epsilon, double most) {
   const double k = 2 * epsilon;
   const double near = value * ((1 - k) / (1 + k)), far = value * ((1 + k) / (1 - k));
   rule.low = std::min({near, far, value});
   rule.high = std::max({near, far, value});
-  // The far side may be beyond all doubles; samples there are infinite and so without data anyhow.
+  // The far end may be out of the range of doubles; samples there are infinite and have no data
+  // anyway.
   rule.low = std::max(rule.low, -most);
   rule.high = std::min(rule.high, most);
   rule.unmatched = rule.low > rule.high;
@@ -90,7 +91,7 @@ NodataRule NodataRule::parse(const std::string& text, ScalarType type) {
       if (std::isfinite(value)) {
         set_float_range(rule, value, std::numeric_limits<float>::epsilon(),
                         std::numeric_limits<float>::max());
-        if (!rule.unmatched) {  // subnormal floats are coarser than that
+        if (!rule.unmatched) {  // subnormal floats have larger steps
           constexpr double kMost = std::numeric_limits<float>::max();
           const double rounded = static_cast<float>(std::clamp(value, -kMost, kMost));
           rule.low = std::min(rule.low, rounded);
@@ -105,7 +106,7 @@ NodataRule NodataRule::parse(const std::string& text, ScalarType type) {
       }
       return rule;
     case ScalarType::u64:
-      // A double cannot tell large integers apart, so the text decides where it is one.
+      // Doubles cannot represent all large integers, so an integer is parsed from the text.
       if (const auto exact = whole_number<std::uint64_t>(trimmed)) {
         rule.low_unsigned = rule.high_unsigned = *exact;
       } else if (value >= 0 && value < 0x1p64 && value == std::floor(value)) {

@@ -9,9 +9,9 @@
 
 namespace terrace::stream {
 
-/// The raw samples that count as "no data": those in the closed range [low, high], where low > high
-/// is the empty range, and for floats always NaN and the infinities. A range instead of one value,
-/// because the text of a float is often rounded to fewer digits than the float has.
+/// The raw samples that count as nodata: those in the closed range [low, high], which is empty if
+/// low > high, and for floats always NaN and the infinities. It is a range because the text of a
+/// float is often rounded to fewer digits than the float has.
 struct NodataRule {
   std::optional<double> value;                     ///< as in the file
   bool unmatched = false;                          ///< no sample of this type can have that value
@@ -19,9 +19,9 @@ struct NodataRule {
   std::int64_t low_integer = 1, high_integer = 0;  ///< integers except u64
   std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< u64
 
-  /// The meaning of a file's text (GDAL_NODATA) for samples of `type`, read as GDAL does: "nan",
-  /// "inf" and "-inf" in any case, decimals for integer samples ("-9999.0"), floats within two
-  /// units of their last place. An empty or unreadable text is no rule.
+  /// Parses a file's text (GDAL_NODATA) for samples of `type`, as GDAL does: accepts "nan", "inf"
+  /// and "-inf" in any case and decimals for integer samples ("-9999.0"); floats match within two
+  /// units in the last place. Returns an empty range for an empty or unreadable text.
   static NodataRule parse(const std::string& text, ScalarType type);
 };
 

@@ -17,7 +17,7 @@ std::uint64_t parts_of(std::uint64_t whole, std::uint64_t part) {
 
 int sign(int x) { return (x > 0) - (x < 0); }
 
-/// Half of x, rounded down (also below zero).
+/// Returns half of x, rounded down (also if negative).
 int half(int x) { return x >= 0 ? x / 2 : -((1 - x) / 2); }
 
 struct Step {
@@ -48,7 +48,7 @@ class Hilbert {
       return;
     }
     Step a2{half(a.x), half(a.y)}, b2{half(b.x), half(b.y)};
-    if (2 * w > 3 * h) {  // long: two halves, one after the other
+    if (2 * w > 3 * h) {  // if long, two halves, one after the other
       if (std::abs(a2.x + a2.y) % 2 != 0 && w > 2) a2 = {a2.x + da.x, a2.y + da.y};
       walk(at, a2, b);
       walk({at.x + a2.x, at.y + a2.y}, {a.x - a2.x, a.y - a2.y}, b);
@@ -70,12 +70,13 @@ class Hilbert {
   std::vector<std::uint32_t> order_;
 };
 
-/// `length` rounded up to whole blocks, but not beyond `whole`.
+/// Returns `length` rounded up to complete blocks, but at most `whole`.
 std::uint64_t in_blocks(std::uint64_t length, std::uint64_t block, std::uint64_t whole) {
   return std::min(parts_of(std::min(length, whole), block) * block, whole);
 }
 
-/// Parts of `whole` as even as blocks allow, none longer than `length` (whole blocks, or `whole`).
+/// Returns the length of parts of `whole` that are as even as blocks allow, and at most `length`
+/// (complete blocks, or `whole`).
 std::uint64_t evened(std::uint64_t length, std::uint64_t block, std::uint64_t whole) {
   return in_blocks(parts_of(whole, parts_of(whole, length)), block, whole);
 }
@@ -91,7 +92,8 @@ GridSize ground_square(std::uint64_t cells, double aspect) {
 
 GridSize tiles_of(GridSize window, std::uint64_t cells, double aspect) {
   const GridSize tile = ground_square(cells, aspect);
-  // Even division leaves tiles smaller than wanted in one direction: the other may take more.
+  // Even division makes tiles smaller than wanted in one direction, so they may be larger in the
+  // other.
   if (window.columns * tile.rows < window.rows * tile.columns) {
     const std::uint64_t across = parts_of(window.columns, tile.columns);
     const std::uint64_t rows = std::max<std::uint64_t>(cells / parts_of(window.columns, across), 1);
@@ -113,14 +115,14 @@ GridSize window_size(const RasterInfo& info, std::uint64_t cells, std::uint64_t 
       in_blocks(kTilesPerSide * tile.columns, info.block_columns, info.columns);
   const std::uint64_t wanted_rows =
       in_blocks(kTilesPerSide * tile.rows, info.block_rows, info.rows);
-  // As wide as fits, in whole blocks.
+  // As wide as memory allows, in complete blocks.
   if (const std::uint64_t most = cells / wanted_rows; most >= wanted_columns) {
     const std::uint64_t columns =
         most >= info.columns ? info.columns : most / info.block_columns * info.block_columns;
     return {evened(columns, info.block_columns, info.columns),
             evened(wanted_rows, info.block_rows, info.rows)};
   }
-  // Even the least width leaves too little for the rows.
+  // Even with the minimum width, memory is too small for the wanted rows.
   const std::uint64_t columns = std::min(wanted_columns, std::max<std::uint64_t>(cells, 1));
   const std::uint64_t most = std::max<std::uint64_t>(cells / columns, 1);
   if (most < info.block_rows) return {columns, most};

@@ -24,7 +24,7 @@ Range<T> range_of(const NodataRule& rule) {
   if constexpr (std::is_same_v<T, double>) {
     return {rule.low, rule.high};
   } else if constexpr (std::is_same_v<T, float>) {
-    // Rounded inward, so that the floats in the range are those the doubles name. The bounds are
+    // Rounded inward, so that the range has the same floats as the range of doubles. The bounds are
     // within float's range already.
     auto low = static_cast<float>(rule.low), high = static_cast<float>(rule.high);
     if (low < rule.low) low = std::nextafter(low, std::numeric_limits<float>::infinity());
@@ -50,19 +50,19 @@ bool has_data(T value, Range<T> nodata) {
   const bool outside = (value < nodata.low) | (value > nodata.high);
   if constexpr (std::is_floating_point_v<T>) {
     constexpr T most = std::numeric_limits<T>::max();
-    return outside & (value >= -most) & (value <= most);  // false for NaN, too
+    return outside & (value >= -most) & (value <= most);  // also false for NaN
   } else {
     return outside;
   }
 }
 
-/// A kernel with a step known at compile time where it is 1, so that it vectorises.
+/// The loop; its step is a compile-time constant if it is 1, so that it vectorises.
 template <class T, bool kPacked>
 bool overlay(const SampleRow& row, Range<T> nodata, std::byte* out, std::uint8_t* valid) {
   const std::size_t step = kPacked ? sizeof(T) : row.step * sizeof(T);
   const std::byte* const from = row.samples;
   std::size_t holes = 0;
-  constexpr std::size_t kChunk = 128;  // counted in bytes, which vectorise better
+  constexpr std::size_t kChunk = 128;  // small enough to count in bytes, which vectorises better
   for (std::size_t begin = 0; begin < row.cells; begin += kChunk) {
     const std::size_t end = std::min(begin + kChunk, row.cells);
     std::uint8_t count = 0;

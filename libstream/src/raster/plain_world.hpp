@@ -5,11 +5,11 @@
 
 #include "terrace/stream/schema.hpp"
 
-/// The placement of a raster without georeferencing.
+/// The georeference assumed for a raster without one.
 
 namespace terrace::stream {
 
-/// Cells of 1 x 1, y = -row.
+/// Cells of 1 x 1 with y = -row.
 inline constexpr WorldTransform kPlainWorld{{1, 0, 0, 0, -1, 0}};
 /// The corresponding comment.
 inline const std::string kNoGeoreferencing =

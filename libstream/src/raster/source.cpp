@@ -17,7 +17,7 @@
 namespace terrace::stream {
 namespace {
 
-/// More tiles than these in one window are not worth their list.
+/// Maximum number of tiles in a window, which bounds the memory of their list.
 constexpr std::uint64_t kMostTiles = 1u << 18;
 constexpr std::size_t kMostBlockPoints = std::size_t{1} << 40;
 
@@ -59,7 +59,8 @@ SourceInfo source_info(const RasterInfo& raster, const SourceOptions& options) {
   return info;
 }
 
-/// The cells that may lie in a region, some around its border included; all without a region.
+/// Returns the cells that may be in a region, with some around its border; all cells without a
+/// region.
 CellWindow cells_in(const SourceInfo& info, const std::optional<Box3>& region) {
   const CellWindow all{.column = 0, .row = 0, .columns = info.columns, .rows = info.rows};
   if (!region) return all;
@@ -75,7 +76,7 @@ CellWindow cells_in(const SourceInfo& info, const std::optional<Box3>& region) {
       }
     }
   }
-  // A cell more on each side: places are rounded.
+  // One more cell on each side, because places are rounded.
   const auto cell = [](double place, std::uint64_t count) {
     return static_cast<std::uint64_t>(std::clamp(place, 0.0, static_cast<double>(count)));
   };
@@ -89,8 +90,8 @@ CellWindow cells_in(const SourceInfo& info, const std::optional<Box3>& region) {
 
 std::uint64_t cells_of(const CellWindow& window) { return window.columns * window.rows; }
 
-/// How long a part from cell `from` of a crop on is that is to have `size` cells of it. It ends
-/// with a block of the file where it can, so that blocks are decoded once.
+/// Returns the length of the part of a crop that begins at cell `from`, at most `size` cells. The
+/// part ends with a block of the file if possible, so that blocks are decoded once.
 std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t whole,
                           std::uint64_t crop_begin, std::uint64_t block) {
   if (size >= whole - from) return whole - from;
@@ -99,15 +100,14 @@ std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t 
   return size < block || end <= begin ? size : end - begin;
 }
 
-/// Throws: Error if there are more cells than a store has room for: no reading would come to an
-/// end.
+/// Throws Error if the cells are more than a store can hold; reading them would never end.
 void check_count(const SourceInfo& info, const CellWindow& crop) {
   constexpr std::uint64_t kMostReadableCells = std::uint64_t{1} << 48;
   if (cells_of(crop) <= kMostReadableCells) return;
   throw Error({.file = info.files.front(),
                .where = {},
                .cause = "has " + std::to_string(crop.columns) + " x " + std::to_string(crop.rows) +
-                        " cells, more than the 2^48 that can be read",
+                        " cells, more than the limit of 2^48",
                .remedy = "select a part (`region`, gdal_translate -srcwin), or correct its size"});
 }
 
@@ -122,7 +122,7 @@ class RasterSource final : public PointSource {
     check_count(info_, crop_);
     progress_.excluded = *info_.points - cells_of(crop_);
     if (cells_of(crop_) == 0) {
-      row_ = info_.rows;  // there is nothing to read
+      row_ = info_.rows;  // nothing to read
     } else {
       std::array<double, 6>& m = info_.world.xy;
       const auto column = static_cast<double>(crop_.column), row = static_cast<double>(crop_.row);
@@ -169,7 +169,8 @@ class RasterSource final : public PointSource {
         window_size_.columns * window_size_.rows * cell_bytes + raster_->info().held_bytes;
   }
 
-  /// Reads the next window; false after the last. One without valid cells leaves no tiles.
+  /// Reads the next window and lists its tiles, none if the window has no valid cells; false after
+  /// the last window.
   bool next_window() {
     if (row_ >= info_.rows) return false;
     const RasterInfo& file = raster_->info();
@@ -257,7 +258,7 @@ class RasterSource final : public PointSource {
         }
         out += width;
       } else {
-        for (std::size_t i = 0; i < width; ++i) {  // writes every cell, keeps the valid ones
+        for (std::size_t i = 0; i < width; ++i) {  // writes every cell, but only valid ones advance
           *out = {first_column + static_cast<double>(i), row, static_cast<double>(samples[i])};
           out += valid[i];
         }
@@ -273,7 +274,7 @@ class RasterSource final : public PointSource {
   }
 
   std::unique_ptr<Raster> raster_;
-  SourceInfo info_;  ///< columns and rows count from the crop's first cell
+  SourceInfo info_;  ///< with columns and rows counted from the crop's first cell
   CellWindow crop_;  ///< of the file, around Selection::region
   std::stop_token stop_;
   std::size_t block_points_;
@@ -285,7 +286,7 @@ class RasterSource final : public PointSource {
   CellWindow window_;                   // of the crop
   std::vector<std::byte> samples_;      // of the window
   std::vector<std::uint8_t> valid_;
-  std::size_t dirty_cells_ = 0;  // so many at the front of valid_ may not be zero
+  std::size_t dirty_cells_ = 0;  // number of cells at the front of valid_ that may not be zero
   GridSize tiles_;
   std::vector<std::uint32_t> order_;  // of the window's tiles
   std::size_t next_tile_ = 0;
