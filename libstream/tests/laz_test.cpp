@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The LAZ codec: LASzip's bytes for given values, and round trips of records.
+// Tests of the LAZ codec: LASzip's bytes for given values, and round trips of records.
 #include "terrace/stream/laz.hpp"
 
 #include <algorithm>
@@ -41,7 +41,7 @@ ByteVector from_hex(const std::string& text) {
   return bytes;
 }
 
-/// Encodes with `code(coder)`, and runs it again with a decoder on the bytes.
+/// Encodes with code(coder), and calls it again with a decoder of the bytes.
 template <class Code>
 std::vector<std::uint8_t> coded_twice(const Code& code) {
   std::vector<std::uint8_t> bytes;
@@ -57,7 +57,7 @@ std::vector<std::uint8_t> coded_twice(const Code& code) {
   return bytes;
 }
 
-TEST(LazCoder, StreamsAreThoseOfLaszip) {
+TEST(LazCoder, StreamsEqualLaszips) {
   EXPECT_EQ(hex(coded_twice([](auto&) {})), "01000000");
   EXPECT_EQ(
       hex(coded_twice([](auto& coder) { EXPECT_EQ(coder.raw(32, 0x12345678), 0x12345678u); })),
@@ -71,7 +71,7 @@ TEST(LazCoder, StreamsAreThoseOfLaszip) {
             "d5fff7a19c17a10000");
 }
 
-TEST(LazCoder, ModelsAreThoseOfLaszip) {
+TEST(LazCoder, ModelsEqualLaszips) {
   SymbolModel<4> small{};
   EXPECT_EQ(hex(coded_twice([&](auto& coder) {
               unsigned at = 0;
@@ -121,7 +121,7 @@ TEST(LazCoder, ModelsAreThoseOfLaszip) {
   EXPECT_EQ(fnv1a(std::as_bytes(std::span(bytes))), 0x5f5c744f7ff7807bu);
 }
 
-TEST(LazCoder, IntegersAreThoseOfLaszip) {
+TEST(LazCoder, IntegersEqualLaszips) {
   const auto models = make_zeroed<IntegerModels<32, 1>>(1);
   const std::array<std::int32_t, 11> values{
       0, 1, -1, 2, -2, 100, -100, 1000, -100000, 2147483647, -2147483647 - 1};
@@ -151,7 +151,7 @@ TEST(LazCoder, IntegersAreThoseOfLaszip) {
             "0f7da742538141bb92000000");
 }
 
-TEST(LazCoder, MedianIsThatOfLaszip) {
+TEST(LazCoder, MedianEqualsLaszips) {
   Median5 median;
   median.begin();
   std::vector<std::int32_t> values;
@@ -162,7 +162,7 @@ TEST(LazCoder, MedianIsThatOfLaszip) {
   EXPECT_EQ(values, (std::vector<std::int32_t>{0, 0, 3, 3, 3, 5, 5, 5, 7, 10, 10}));
 }
 
-TEST(LazChunkTable, IsThatOfLaszip) {
+TEST(LazChunkTable, EqualsLaszips) {
   Vlr vlr = Vlr::of(0, 20, 50000);
   std::vector<Chunk> chunks{{0, 1000, 50000}, {1000, 999, 50000}, {1999, 70, 123}};
   const std::string head = "0000000003000000";
@@ -182,7 +182,7 @@ TEST(LazChunkTable, IsThatOfLaszip) {
   EXPECT_EQ(read_chunk_table(write_chunk_table(chunks, vlr), vlr, 100123, 2069).size(), 3u);
 }
 
-TEST(LazChunkTable, RefusesWhatDoesNotAddUp) {
+TEST(LazChunkTable, RefusesTablesThatDoNotAddUp) {
   const Vlr vlr = Vlr::of(0, 20, 50000);
   const std::vector<Chunk> chunks{{0, 1000, 50000}, {1000, 999, 50000}, {1999, 70, 123}};
   const ByteVector table = write_chunk_table(chunks, vlr);
@@ -223,7 +223,7 @@ TEST(LazVlr, IsReadAsWritten) {
   EXPECT_THROW(Vlr::of(11, 100), std::invalid_argument);
 }
 
-TEST(LazVlr, RefusesWhatItDoesNotKnow) {
+TEST(LazVlr, RefusesUnknownItems) {
   const ByteVector good = Vlr::of(3, 34).serialise();
   for (const std::size_t at : {0u, 2u, 32u, 34u, 36u, 38u}) {
     ByteVector bad = good;
@@ -267,7 +267,7 @@ Vlr with_version(Vlr vlr, std::uint16_t version) {
   return vlr;
 }
 
-TEST(LazChunk, PointsOfFormat0AreThoseOfLaszip) {
+TEST(LazChunk, PointsOfFormat0EqualLaszips) {
   const ByteVector records = from_hex(
       "a0860100400d03002c01000032000902fb000700ac860100360d0300360100003c000902fb000700"
       "b48601002d0d0300defeffff3c001101fc030800b48601002d0d0300defeffff0000120103030800");
@@ -276,7 +276,7 @@ TEST(LazChunk, PointsOfFormat0AreThoseOfLaszip) {
   expect_chunk(with_version(vlr, 1), records, "246b3774ec493cfcaeed4a1a2702097db51ea3d5b1d70000");
 }
 
-TEST(LazChunk, TimesAreThoseOfLaszip) {
+TEST(LazChunk, TimesEqualLaszips) {
   const std::array<double, 9> times{1000.0, 1000.001, 1000.002, 1000.003, 1000.003,
                                     -5.0,   1000.004, 1000.5,   1000.004};
   ByteVector records(times.size() * 28);
@@ -292,7 +292,7 @@ TEST(LazChunk, TimesAreThoseOfLaszip) {
       "1c5272fbd38ce8a04eec680068acc5ac000000000178000000");
 }
 
-/// Records of format 7 field by field.
+/// Appends a record of format 7.
 void put_point14(ByteVector& records, std::array<std::int32_t, 3> place, std::uint16_t intensity,
                  std::uint8_t returns, std::uint8_t flags, std::uint8_t classification,
                  std::int16_t angle, std::uint16_t source, double time,
@@ -313,7 +313,7 @@ void put_point14(ByteVector& records, std::array<std::int32_t, 3> place, std::ui
   put(rgb);
 }
 
-TEST(LazChunk, ChannelsAreThoseOfLaszip) {
+TEST(LazChunk, ChannelsEqualLaszips) {
   ByteVector records;
   put_point14(records, {1000, 2000, 30}, 10, 0x11, 0x40, 2, -300, 1, 100.0, {256, 512, 768});
   put_point14(records, {1010, 2005, 31}, 12, 0x22, 0x40, 2, -300, 1, 100.0, {300, 520, 700});
@@ -334,8 +334,8 @@ TEST(LazChunk, ChannelsAreThoseOfLaszip) {
                sizes("17") + layers + "ea592dd7ae7f58260a7d9ffea8a5ec054ebbfc01000000");
 }
 
-/// Records in which each byte probably equals that of the previous record, sometimes that of
-/// another one or any value: so all situations of a model occur soon.
+/// Returns records in which each byte mostly equals that of the previous record, sometimes that of
+/// another record or a random one, so that all cases of a model occur soon.
 ByteVector made_records(std::size_t length, std::size_t count, unsigned wildness,
                         std::mt19937& random) {
   ByteVector records(length * count);
@@ -349,7 +349,7 @@ ByteVector made_records(std::size_t length, std::size_t count, unsigned wildness
   return records;
 }
 
-/// All items in all versions, with extra bytes.
+/// Returns VLRs with all items in all versions, with extra bytes.
 std::vector<Vlr> all_codings() {
   std::vector<Vlr> all;
   for (unsigned format = 0; format <= 10; ++format) {
@@ -363,7 +363,7 @@ std::vector<Vlr> all_codings() {
   return all;
 }
 
-/// Decodes as from a pipe: `feed` more bytes at a time, `most` records at a time.
+/// Decodes as from a pipe, giving `feed` more bytes and requesting up to `most` records at a time.
 ByteVector decoded_in_steps(Decoder& decoder, std::span<const std::byte> chunk, std::size_t length,
                             std::size_t points, std::size_t feed, std::size_t most, bool layered) {
   ByteVector records(points * length);
@@ -378,7 +378,7 @@ ByteVector decoded_in_steps(Decoder& decoder, std::span<const std::byte> chunk, 
     done += step.points;
     if (step.points == 0) {
       if (known == chunk.size()) {
-        ADD_FAILURE() << "no point from all the bytes";
+        ADD_FAILURE() << "no point was decoded from all bytes";
         break;
       }
       known = std::min(known + feed, chunk.size());
@@ -391,7 +391,7 @@ ByteVector decoded_in_steps(Decoder& decoder, std::span<const std::byte> chunk, 
   return records;
 }
 
-TEST(LazChunk, AnyRecordsComeBack) {
+TEST(LazChunk, RoundTripsAnyRecords) {
   std::mt19937 random(20);
   for (const Vlr& vlr : all_codings()) {
     const std::size_t length = vlr.record_length();
@@ -421,7 +421,7 @@ TEST(LazChunk, AnyRecordsComeBack) {
   }
 }
 
-TEST(LazChunk, TimesOfAllKindsComeBack) {
+TEST(LazChunk, RoundTripsTimesOfAllKinds) {
   std::mt19937_64 random(30);
   for (std::uint16_t version = 1; version <= 3; ++version) {
     const bool layered = version == 3;
@@ -444,7 +444,7 @@ TEST(LazChunk, TimesOfAllKindsComeBack) {
   }
 }
 
-TEST(LazChunk, LayersThatAreNotWantedKeepTheFirstPointsValue) {
+TEST(LazChunk, OmittedLayersKeepTheFirstPointsValue) {
   struct Part {
     std::uint32_t attribute;
     std::size_t at, size;
@@ -487,7 +487,7 @@ TEST(LazChunk, LayersThatAreNotWantedKeepTheFirstPointsValue) {
   }
 }
 
-TEST(LazChunk, DamageIsAnErrorOrAWrongValueAndNothingElse) {
+TEST(LazChunk, DamageOnlyCausesErrorsOrWrongValues) {
   std::mt19937 random(50);
   for (const Vlr& vlr : all_codings()) {
     const std::size_t length = vlr.record_length(), count = 12;
@@ -498,7 +498,7 @@ TEST(LazChunk, DamageIsAnErrorOrAWrongValueAndNothingElse) {
     Encoder(vlr).encode_chunk(records, chunk);
     Decoder decoder(vlr);
     for (std::size_t size = 0; size < chunk.size(); ++size) {
-      // Not a part of a larger buffer, so that a sanitizer sees the end.
+      // A separate buffer, so that a sanitizer detects reads beyond the end.
       const ByteVector cut(chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(size));
       EXPECT_THROW(decoder.decode_chunk(cut, decoded), Corrupt) << size;
     }
@@ -514,13 +514,13 @@ TEST(LazChunk, DamageIsAnErrorOrAWrongValueAndNothingElse) {
     ByteVector more = chunk;
     more.push_back(std::byte{0});
     EXPECT_THROW(decoder.decode_chunk(more, decoded), Corrupt);
-    // A decoder's history makes no difference.
+    // A decoder's history does not make a difference.
     decoder.decode_chunk(chunk, decoded);
     EXPECT_TRUE(decoded == records);
   }
 }
 
-TEST(LazChunk, FilesOfChunksComeBack) {
+TEST(LazChunk, RoundTripsFilesOfChunks) {
   for (unsigned format = 0; format <= 10; ++format) {
     const std::size_t length = kRecordLengths[format];
     const ByteVector records = scanned_records(format, length, 2500);

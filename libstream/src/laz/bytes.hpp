@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <cstring>
 
-/// A coder that is not inlined keeps its registers in memory: half the speed.
+/// A coder that is not inlined keeps its registers in memory, which halves the speed.
 #if defined(__GNUC__) && !defined(TERRACE_LAZ_SANITIZED)
 #define TERRACE_LAZ_INLINE [[gnu::always_inline]] inline
 #define TERRACE_LAZ_INLINE_LAMBDA __attribute__((always_inline))

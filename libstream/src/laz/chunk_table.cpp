@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kTableHead = 8;  // version, number of chunks
 constexpr std::uint64_t kMost = 0xffffffff;
 
-/// Codes one number of a table after the one before. Context 0: points, 1: bytes.
+/// Codes a number of a table, given the previous one. Context 0: points, 1: bytes.
 template <class Coder>
 std::uint32_t code_entry(Coder& coder, IntegerModels<32, 2>& models, std::uint32_t before,
                          std::uint64_t value, unsigned context) {
@@ -31,11 +31,12 @@ std::vector<Chunk> read_chunk_table(std::span<const std::byte> table, const Vlr&
                                     std::uint64_t points, std::uint64_t bytes) {
   const auto* begin = reinterpret_cast<const std::uint8_t*>(table.data());
   if (table.size() < kTableHead) throw Corrupt("the chunk table is too short", table.size());
-  if (load<std::uint32_t>(begin) != 0) throw Corrupt("the chunk table's version is not known", 0);
+  if (load<std::uint32_t>(begin) != 0) throw Corrupt("the chunk table's version is unknown", 0);
   const std::uint32_t count = load<std::uint32_t>(begin + 4);
-  // A chunk has its first record and the beginning of a stream; one without points may follow.
+  // A chunk has at least its first record and the beginning of a stream; a chunk without points may
+  // follow the last.
   if (count > bytes / (vlr.record_length() + kStreamEnds) + 1) {
-    throw Corrupt("the chunk table has more chunks than their bytes could hold", 4);
+    throw Corrupt("the chunk table has more chunks than the file has room for", 4);
   }
   std::vector<Chunk> chunks;
   std::uint64_t points_so_far = 0, offset = 0;
@@ -87,7 +88,7 @@ std::vector<std::byte> write_chunk_table(std::span<const Chunk> chunks, const Vl
           (!variable &&
            (chunk.points > vlr.chunk_size || (!is_last && chunk.points != vlr.chunk_size)))) {
         throw std::invalid_argument(
-            "a chunk has more points or bytes than the chunk table can say");
+            "a chunk has more points or bytes than a chunk table can store");
       }
       if (variable) {
         code_entry(coder, models[0], static_cast<std::uint32_t>(before.points), chunk.points, 0);

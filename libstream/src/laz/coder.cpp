@@ -20,7 +20,7 @@ void SymbolDecoder::begin(CodedBytes& bytes, std::span<const std::uint8_t> strea
   length_ = kMostLength;
   value_ = 0;
   for (std::size_t i = 0; i < kStreamEnds; ++i) value_ = value_ << 8 | stream[i];
-  // Outside the interval.
+  // The value is outside the interval.
   if (value_ == kMostLength) throw Corrupt(kNotEncoded, origin);
   resume(bytes, stream, origin);
   next_ += kStreamEnds;
@@ -41,7 +41,7 @@ void SymbolDecoder::resume(CodedBytes& bytes, std::span<const std::uint8_t> stre
 
 SymbolDecoder::Window SymbolDecoder::to_tail(CodedBytes& bytes, const std::uint8_t* next) {
   if (bytes.at_tail) throw Corrupt(kTooShort, bytes.origin + bytes.stream.size());
-  // Since the call before no more than kReserve bytes were read.
+  // At most kReserve bytes have been read since the last call.
   return copy_tail(bytes, bytes.stream.subspan(offset(bytes, next)));
 }
 
@@ -83,7 +83,7 @@ SymbolEncoder::Window SymbolEncoder::grow(std::vector<std::uint8_t>& bytes,
 
 void SymbolEncoder::finish() {
   reserve();
-  // The shortest number in the interval, and zeros for the bytes that a decoder reads ahead.
+  // Writes the shortest number in the interval, and zeros for the bytes that a decoder reads ahead.
   const bool wide = length_ > 2 * kLeastLength;
   narrow(wide ? kLeastLength : kLeastLength >> 1, wide ? kLeastLength >> 1 : kLeastLength >> 9);
   for (int i = 0; i < (wide ? 3 : 2); ++i) *next_++ = 0;

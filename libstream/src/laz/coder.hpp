@@ -11,23 +11,23 @@
 #include "laz/models.hpp"
 
 /// The arithmetic coder: an interval of 32 bits that is narrowed symbol by symbol and emitted byte
-/// by byte. SymbolDecoder and SymbolEncoder have the same functions, so that each coding is written
-/// once: the encoder's functions return their argument, the decoder's the decoded value. Source: A.
-/// Said, Introduction to arithmetic coding, HPL-2004-76.
+/// by byte. SymbolDecoder and SymbolEncoder have the same functions, so one template codes in both
+/// directions: the encoder's functions return their argument, the decoder's the decoded value.
+/// Source: A. Said, Introduction to arithmetic coding, HPL-2004-76.
 
 namespace terrace::stream::laz {
 
 /// reserve() must be called at least once per this many coded bytes. A symbol or bit takes at most
 /// 2, raw bits at most 3 per 19.
 inline constexpr std::size_t kReserve = 64;
-/// Bytes added at the end of a stream, which are those that a decoder reads ahead.
+/// Bytes added at the end of a stream, as many as a decoder reads ahead.
 inline constexpr std::size_t kStreamEnds = 4;
 
 inline constexpr std::uint32_t kMostLength = 0xffffffff;
 inline constexpr std::uint32_t kLeastLength = 1u << 24;
 
-/// The bytes read by a decoder. Its inner loop does not check for their end: near it, reserve()
-/// switches to a copy of the last few followed by zeros.
+/// The bytes read by a decoder. Its inner loop does not check for their end. Near the end,
+/// reserve() switches to a copy of the last bytes followed by zeros.
 struct CodedBytes {
   std::span<const std::uint8_t> stream;
   std::uint64_t origin = 0;  ///< offset of the stream in the chunk, for errors
@@ -48,9 +48,9 @@ class SymbolDecoder {
              ChunkNumber chunk);
   /// Continues the stream in other memory, from offset() on.
   void resume(CodedBytes& bytes, std::span<const std::uint8_t> stream, std::uint64_t origin);
-  /// Number of consumed bytes of the current span; more than it has if they do not suffice.
+  /// Number of consumed bytes of the current span; more than its size if they did not suffice.
   [[nodiscard]] std::size_t offset() const { return offset(*bytes_, next_); }
-  /// Throws: Corrupt unless all bytes are consumed; with `open`, only if they do not suffice.
+  /// Throws Corrupt unless all bytes are consumed; with `open`, only if they did not suffice.
   void check_used(bool open) const;
   /// True if `size` bytes are left. Requires size >= kReserve.
   [[nodiscard]] bool has(std::size_t size) const {
@@ -68,8 +68,8 @@ class SymbolDecoder {
     if (model.born != chunk_) [[unlikely]]
       model.begin(chunk_, symbols);
     const std::uint32_t unit = length_ >> kSymbolBits;
-    // Many values hardly ever change: the likeliest symbol is tried first, without a division and
-    // with a branch that the processor predicts well.
+    // Many values hardly ever change, so the likeliest symbol is tried first, without a division
+    // and with a branch that the processor predicts well.
     unsigned symbol = model.likely;
     std::uint32_t begin = model.from[symbol] * unit;
     std::uint32_t end = symbol + 1 == symbols ? length_ : model.from[symbol + 1] * unit;
@@ -145,7 +145,7 @@ class SymbolDecoder {
   }
 
   const std::uint8_t* next_ = nullptr;
-  const std::uint8_t* limit_ = nullptr;  ///< from here on reserve() has work to do
+  const std::uint8_t* limit_ = nullptr;  ///< from here on reserve() must copy
   std::uint32_t value_ = 0, length_ = 0;
   ChunkNumber chunk_ = 0;
   CodedBytes* bytes_ = nullptr;

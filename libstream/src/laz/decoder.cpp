@@ -23,7 +23,7 @@ Bytes bytes_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
 }
 
-/// The attribute in a layer; the first one has what is always decoded.
+/// Returns the attribute in a layer; the first layer is always decoded.
 std::uint32_t attribute_of(std::size_t layer, const RecordLayout& layout) {
   constexpr std::uint32_t kOfPoint[kItemLayers] = {kAllAttributes, kZ,           kClassification,
                                                    kFlags,         kIntensity,   kScanAngle,
@@ -36,7 +36,7 @@ std::uint32_t attribute_of(std::size_t layer, const RecordLayout& layout) {
   return kExtraByte0 << std::min<std::size_t>(layer, 15);
 }
 
-/// What a layered chunk begins with: the first record, the number of points, the layers' sizes.
+/// Bytes before the layers of a chunk: the first record, the number of points, the layers' sizes.
 std::size_t head_size(const RecordLayout& layout) {
   return layout.length + sizeof(std::uint32_t) * (1 + layer_count(layout));
 }
@@ -77,7 +77,7 @@ struct Decoder::Impl {
   std::vector<CodedBytes> coded;  ///< of the layers, or of the one stream
   ChunkNumber chunk = 0;
   std::uint64_t points = 0, left = 0;  ///< of the chunk
-  std::uint64_t consumed = 0;          ///< bytes of it, in the steps before
+  std::uint64_t consumed = 0;          ///< bytes of it in earlier steps
   std::size_t chunk_bytes = 0;         ///< of a layered chunk
 
   Step step_pointwise(Bytes bytes, bool last, std::uint8_t* records, std::size_t room);
@@ -166,9 +166,9 @@ Decoder::Step Decoder::Impl::step_layered(Bytes bytes, bool last, std::uint8_t* 
       return {};
     }
     if (head.points != points) {
-      throw Corrupt("the chunk has " + std::to_string(head.points) + " points where " +
-                        std::to_string(points) + " should be",
-                    layout.length);
+      throw Corrupt(
+          "the chunk has " + std::to_string(head.points) + " points, not " + std::to_string(points),
+          layout.length);
     }
     begin_layers(bytes);
     std::memcpy(records, bytes.data(), layout.length);

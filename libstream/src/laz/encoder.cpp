@@ -42,7 +42,7 @@ void Encoder::encode_chunk(std::span<const std::byte> records, std::vector<std::
   Impl& impl = *impl_;
   const std::size_t length = impl.layout.length, count = records.size() / length;
   if (count == 0 || records.size() % length != 0 || count > 0xffffffff) {
-    throw std::invalid_argument("a chunk needs 1 to 2^32 - 1 whole records");
+    throw std::invalid_argument("a chunk needs 1 to 2^32 - 1 complete records");
   }
   const auto* first = reinterpret_cast<const std::uint8_t*>(records.data());
   const auto append = [&out](const void* bytes, std::size_t size) {

@@ -10,17 +10,19 @@
 namespace terrace::stream::laz {
 
 /// Models of integers of 8, 16 or 32 bits that are coded as corrections of a prediction, modulo
-/// 2^Bits. A correction's magnitude k is adaptive in the caller's context; its position within
-/// (2^(k-1), 2^k] or the mirror image [-2^k + 1, -2^(k-1)] is adaptive in its upper 8 bits.
+/// 2^Bits. A correction's magnitude k has an adaptive model per context of the caller. Its position
+/// within (2^(k-1), 2^k] or the mirror image [-2^k + 1, -2^(k-1)] has an adaptive model of its
+/// upper 8 bits.
 template <unsigned Bits, unsigned Contexts>
 struct IntegerModels {
   std::uint32_t magnitude;  ///< k of the last coded number
   BitModel zero_or_one;     ///< the correction if k is 0
   std::array<SymbolModel<Bits + 1>, Contexts> magnitudes;
-  /// By k - 1, 2^min(k, 8) symbols. 2^31 is followed by none.
+  /// At index k - 1, of 2^min(k, 8) symbols. A k of 32 needs none: the correction is 2^31.
   std::array<SymbolModel<256>, (Bits < 32 ? Bits : 31)> corrections;
 
-  /// Codes `value`, which decoding ignores, and returns it; for 8 and 16 bits as a number from 0.
+  /// Codes `value`, which decoding ignores, and returns it; for 8 and 16 bits as an unsigned
+  /// number.
   template <class Coder>
   TERRACE_LAZ_INLINE std::int32_t code(Coder& coder, std::int32_t predicted, std::int32_t value,
                                        unsigned context) {
@@ -35,7 +37,7 @@ struct IntegerModels {
     if constexpr (!Coder::kDecoding) {
       correction = static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(predicted);
       if constexpr (Bits < 32) {
-        // The representative within [-2^(Bits-1), 2^(Bits-1)).
+        // Reduced to [-2^(Bits-1), 2^(Bits-1)).
         correction = (correction + kHalf) % kRange - kHalf;
       }
       const bool positive = static_cast<std::int32_t>(correction) > 0;

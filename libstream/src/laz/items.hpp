@@ -10,13 +10,13 @@
 #include "laz/coder.hpp"
 #include "laz/integer_coder.hpp"
 
-/// The parts that pointwise and layered chunks code alike. Each function codes a part of a record
-/// with the models of its struct. Values to encode are parameters, which decoding ignores; both
-/// directions return the value.
+/// The items that pointwise and layered chunks code in the same way. Each function codes a part of
+/// a record with the models of its struct. Values to encode are parameters, which decoding ignores;
+/// both directions return the value.
 
 namespace terrace::stream::laz {
 
-/// A value of the record to encode; 0 in decoding.
+/// Loads a value of the record to encode; 0 in decoding.
 template <class Coder, class T>
 TERRACE_LAZ_INLINE T given(typename Coder::Record at) {
   if constexpr (Coder::kDecoding) {
@@ -36,8 +36,8 @@ TERRACE_LAZ_INLINE std::uint8_t low_byte(unsigned value) {
   return static_cast<std::uint8_t>(value);
 }
 
-/// LASzip's running median of differences: five sorted values; a new one replaces the highest and
-/// the lowest in turn.
+/// LASzip's running median of differences: five sorted values, of which a new value replaces the
+/// highest and the lowest in turn.
 struct Median5 {
   std::array<std::int32_t, 5> sorted;
   bool drop_highest;
@@ -56,7 +56,8 @@ struct Median5 {
   }
 };
 
-/// The contexts of a correction of Y by the magnitude k of that of X; of Z by the mean of both.
+/// Return the context of a correction: of Y, given the magnitude k of X's correction; of Z, given
+/// the mean of both magnitudes.
 TERRACE_LAZ_INLINE unsigned y_context(unsigned k, bool single) {
   return (single ? 1 : 0) + (k < 20 ? k & ~1u : 20);
 }
@@ -64,7 +65,7 @@ TERRACE_LAZ_INLINE unsigned z_context(unsigned k, bool single) {
   return (single ? 1 : 0) + (k < 18 ? k & ~1u : 18);
 }
 
-/// Codes a coordinate by the median of the previous steps.
+/// Codes a coordinate, predicted by the median of the previous steps.
 template <class Coder, class Models, class Median>
 TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, unsigned context,
                                   const std::uint8_t* last, typename Coder::Record now) {
@@ -76,15 +77,16 @@ TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, u
   steps.add(step);
 }
 
-/// GPS times, as the 64-bit patterns of the doubles: up to four alternating sequences, each of
-/// which continues by multiples of a difference. Layered chunks have no symbol for an unchanged
+/// Codes GPS times, as the 64-bit patterns of the doubles: up to four alternating sequences, each
+/// of which continues by multiples of a difference. Layered chunks have no symbol for an unchanged
 /// time.
 template <bool kLayered>
 struct GpsTime {
-  static constexpr unsigned kUnchanged = kLayered ? 0 : 1;  ///< number of symbols for that
+  static constexpr unsigned kUnchanged = kLayered ? 0 : 1;  ///< symbols for an unchanged time
   static constexpr int kMostMultiple = 500, kLeastMultiple = -10;
   static constexpr unsigned kMultiples = kMostMultiple - kLeastMultiple + 1;
-  /// After the multiples and "unchanged": a time in full, then the sequences 1 to 3 further on.
+  /// The symbols after the multiples and "unchanged": a complete time, then the sequences 1 to 3
+  /// places ahead.
   static constexpr unsigned kFull = kMultiples + kUnchanged;
 
   SymbolModel<5 + kUnchanged> first;  ///< if a sequence has no difference yet
@@ -104,7 +106,7 @@ struct GpsTime {
 
   template <class Coder>
   TERRACE_LAZ_INLINE std::uint64_t code(Coder& coder, std::uint64_t value) {
-    // How many sequences further on is the one continued by `value`; 4: none of them.
+    // How many places ahead the sequence is that `value` continues; 4: none of them.
     unsigned turns = 0;
     if constexpr (!Coder::kDecoding) {
       while (turns < 4 && !fits(value - time[(current + turns) & 3])) ++turns;
@@ -205,12 +207,12 @@ struct GpsTime {
   }
 };
 
-/// Colours, byte by byte: red relative to the previous point, green relative to red's change, blue
-/// to both.
+/// Codes colours, byte by byte: red relative to the previous point, green relative to red's change,
+/// blue relative to both.
 struct Rgb {
   using Value = std::array<std::uint16_t, 3>;
 
-  SymbolModel<128> changed;  ///< low and high bytes of red, green, blue; not grey
+  SymbolModel<128> changed;  ///< flags of low and high bytes of red, green, blue; not grey
   std::array<SymbolModel<256>, 6> changes;
 
   template <class Coder>
@@ -259,13 +261,13 @@ struct Rgb {
   }
 };
 
-/// Wave packets: index, position and size in the file of waveforms, and the position of the return
-/// in them.
+/// Codes wave packets: index, position and size in the file of waveforms, and the position of the
+/// return in the waveform.
 struct WavePacket {
   static constexpr std::size_t kSize = 29;
 
   SymbolModel<256> index;
-  std::array<SymbolModel<4>, 4> ways;  ///< by that of the previous point
+  std::array<SymbolModel<4>, 4> ways;  ///< by the previous point's
   IntegerModels<32, 1> offset_change, packet_size, return_place;
   IntegerModels<32, 3> direction;
   std::int32_t last_change;

@@ -16,13 +16,12 @@
 
 /// Layered chunks, point formats 6 to 10: each attribute has a separate stream, so that it can be
 /// skipped. The first layer holds everything on which the others depend: returns, scanner channel,
-/// and which of them change. Points pass in runs of a few hundred through one layer after the
-/// other.
+/// and which of them change. Points pass through one layer after another in runs of a few hundred.
 
 namespace terrace::stream::laz {
 
-/// Numbers for each number of returns n and return r, LASzip's tables: by the byte that holds them,
-/// n * 16 + r.
+/// LASzip's tables of contexts for each number of returns n and return r, indexed by the byte that
+/// holds them, n * 16 + r.
 struct Returns14 {
   std::array<std::uint8_t, 256> map, level;
 
@@ -56,7 +55,7 @@ enum Layer : std::size_t {
   kUserDataLayer,
   kSourceLayer,
   kTimeLayer,
-  kItemLayers,  ///< the layers of the items after the point start here
+  kItemLayers,  ///< first layer of the items after the point
 };
 
 inline std::size_t layer_count(const RecordLayout& layout) {
@@ -111,12 +110,12 @@ class Layered {
 
   struct LayerCoder {
     Coder coder;
-    /// Decoding: whether the layer exists and is wanted. Encoding: whether it must exist.
+    /// In decoding, whether the layer exists and is wanted; in encoding, whether it must exist.
     bool used = false;
   };
   std::vector<LayerCoder> coders;
 
-  /// Begins a chunk with its first record; the caller must begin the layers' coders.
+  /// Begins a chunk with its first record. The caller must begin the layers' coders.
   void begin(const std::uint8_t* first) {
     known_.fill(false);
     current_ = channel_of(first);
@@ -153,7 +152,7 @@ class Layered {
       records += run * layout_.length;
       count -= run;
     }
-    // The caller's records may not live until the next call.
+    // The caller's records may not exist until the next call.
     for (std::size_t i = 0; i < kChannels; ++i) {
       std::uint8_t* kept = last_.data() + i * layout_.length;
       if (known_[i] && predecessors_[i] != kept)
@@ -173,13 +172,13 @@ class Layered {
   struct Point {
     const std::uint8_t* last;  ///< the record from which it is predicted
     std::uint8_t channel;
-    bool new_channel;    ///< it begins with the values of `last`
-    std::uint8_t level;  ///< of Z
+    bool new_channel;    ///< whether the channel is new and begins with the values of `last`
+    std::uint8_t level;  ///< level context of Z
     std::uint8_t z_context;
     std::uint8_t place;  ///< 2 for a first return, + 1 for a last
     bool time_changed, angle_changed, source_changed;
-    /// The channels whose models and whose last value the items after the point use, and the one
-    /// from which the last value is first copied.
+    /// For the items after the point: the channels whose models and whose last value are used, and
+    /// the one from which the last value is first copied.
     std::uint8_t item_models, item_last, item_origin;
   };
 
@@ -188,7 +187,8 @@ class Layered {
     return last_extra_.data() + channel * layout_.extra_bytes;
   }
 
-  /// Begins the first layer's part of a new channel; the others begin theirs when they get there.
+  /// Begins the first layer's part of a new channel; the other layers begin theirs when they reach
+  /// it.
   void begin_channel(unsigned channel) {
     known_[channel] = true;
     Channel14& models = channels_[channel];
@@ -252,7 +252,7 @@ class Layered {
 
   void code_xy(Record records, std::size_t count) {
     enum : unsigned {
-      kReturnBits = 3,  // 1: next number, 2: the one before, 3: another
+      kReturnBits = 3,  // 1: next number, 2: previous, 3: another
       kReturnCountBit = 4,
       kScanAngleBit = 8,
       kTimeBit = 16,
@@ -360,9 +360,9 @@ class Layered {
     }
   }
 
-  /// Determines the channel whose models and last values the items after the point use. Version 3
-  /// has two errors of the original software: if the channel does not change it uses channel 0's
-  /// models, and if it changes it reads and replaces the last value of the previous channel.
+  /// Determines the channels whose models and last values the items after the point use. Version 3
+  /// keeps two errors of the original software: if the channel does not change, it uses channel 0's
+  /// models; if it changes, it reads and replaces the last value of the previous channel.
   void place_items(Point& point, bool channel_changed) {
     const bool mended = layout_.version >= 4;
     const auto wanted = static_cast<std::uint8_t>(mended || channel_changed ? current_ : 0);
@@ -402,7 +402,8 @@ class Layered {
              });
   }
   void code_flags(Record records, std::size_t count) {
-    // Classification flags, scan direction, edge of flight line, without the channel between them.
+    // Classification flags, scan direction, edge of flight line, without the scanner channel
+    // between them.
     const auto joined = [](unsigned byte) { return (byte & 15) | (byte >> 2 & 0x30); };
     for_each(
         records, count, kFlagsLayer,
@@ -548,7 +549,7 @@ class Layered {
   Zeroed<Channel14> channels_;
   Zeroed<SymbolModel<256>> extra_;        ///< by channel and byte
   std::vector<std::uint8_t> last_extra_;  ///< likewise
-  std::vector<std::uint8_t> last_;        ///< by channel: records kept between calls
+  std::vector<std::uint8_t> last_;        ///< the last record by channel, kept between calls
   std::array<const std::uint8_t*, kChannels> predecessors_{};  ///< the last record of each
   std::array<bool, kChannels> known_{}, item_known_{};
   unsigned current_ = 0, item_current_ = 0;

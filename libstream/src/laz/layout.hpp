@@ -7,10 +7,10 @@
 
 namespace terrace::stream::laz {
 
-/// The positions of the items in a record: offsets in bytes, 0 if absent.
+/// The offsets of the items in a record, in bytes; 0 if absent.
 struct RecordLayout {
   std::size_t length = 0;
-  std::size_t gps_time = 0;  ///< of formats 0 to 5; from 6 on it is part of the point
+  std::size_t gps_time = 0;  ///< of formats 0 to 5; in formats from 6 on it is part of the point
   std::size_t rgb = 0;
   std::size_t nir = 0;
   std::size_t wave_packet = 0;
@@ -18,7 +18,8 @@ struct RecordLayout {
   unsigned version = 0;  ///< of the items
 };
 
-/// Throws: std::invalid_argument for items that do not form a point format.
+/// Returns the layout of a VLR's records. Throws: std::invalid_argument for items that do not form
+/// a point format.
 RecordLayout layout_of(const Vlr& vlr);
 
 }  // namespace terrace::stream::laz

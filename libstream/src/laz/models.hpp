@@ -24,7 +24,7 @@
 namespace terrace::stream::laz {
 
 /// Models are in zeroed memory and are initialised when they are first used in a chunk, whose
-/// number (from 1 on) they store: most contexts never occur, so nothing is spent on their models.
+/// number (from 1 on) they store. Most contexts never occur, so their models cost nothing.
 using ChunkNumber = std::uint64_t;
 
 struct Free {
@@ -33,7 +33,7 @@ struct Free {
 template <class T>
 using Zeroed = std::unique_ptr<T[], Free>;
 
-/// `count` objects of zero bytes. Pages that are never touched take no memory.
+/// `count` zeroed objects. Pages that are never touched take no memory.
 template <class T>
 Zeroed<T> make_zeroed(std::size_t count) {
   static_assert(std::is_trivially_default_constructible_v<T>);
@@ -45,12 +45,12 @@ Zeroed<T> make_zeroed(std::size_t count) {
 /// Intervals of symbols are in units of 2^-kSymbolBits.
 inline constexpr unsigned kSymbolBits = 15;
 
-/// A model of at most `Capacity` symbols; the caller passes the actual number, `symbols`, each
-/// time.
+/// A model of at most `Capacity` symbols; the caller passes the actual number, `symbols`, to each
+/// call.
 template <unsigned Capacity>
 struct SymbolModel {
-  /// A decoder looks up the first candidate by the upper bits of the value, and compares eight
-  /// symbols at once from there on. Values can exceed 2^15 by 63, so there is one extra bucket.
+  /// A decoder looks up the first candidate by the upper bits of the value and compares eight
+  /// symbols at once from it on. Values can exceed 2^15 by 63, so there is one extra bucket.
   static constexpr unsigned kLanes = 8;
   static constexpr unsigned kBucketBits = Capacity <= kLanes ? 0 : std::bit_width(Capacity - 1) - 1;
   using Candidate = std::conditional_t<(Capacity > 256), std::uint16_t, std::uint8_t>;
@@ -59,19 +59,19 @@ struct SymbolModel {
   std::uint32_t until;  ///< symbols until the next update
   std::uint32_t cycle;
   std::uint32_t total;
-  std::uint32_t likely;                                  ///< a symbol with the greatest count
+  std::uint32_t likely;                                  ///< a symbol with the highest count
   std::array<Candidate, (1u << kBucketBits) + 1> first;  ///< candidates
   std::array<std::uint16_t, Capacity + kLanes> from;     ///< start of each symbol's interval
   std::array<std::uint16_t, Capacity> count;
 
   TERRACE_LAZ_APART void begin(ChunkNumber chunk, unsigned symbols);
 
-  /// A model before its first symbol.
+  /// Returns a model before its first symbol.
   static constexpr SymbolModel fresh(unsigned symbols) {
     SymbolModel model{};
     model.cycle = symbols;
     std::fill_n(model.count.begin(), symbols, std::uint16_t{1});
-    // Beyond all values.
+    // Greater than all values.
     std::fill_n(model.from.begin() + symbols, kLanes, std::uint16_t{0xffff});
     model.update(symbols);
     model.cycle = model.until = (symbols + 6) >> 1;
@@ -107,7 +107,7 @@ struct SymbolModel {
     until = cycle;
   }
 
-  /// The last symbol that begins at or before `value`.
+  /// Returns the last symbol whose interval begins at or before `value`.
   [[nodiscard]] TERRACE_LAZ_INLINE unsigned find(std::uint32_t value) const {
     unsigned symbol = kBucketBits == 0 ? 0 : first[value >> (kSymbolBits - kBucketBits)];
     for (;; symbol += kLanes) {
@@ -118,14 +118,14 @@ struct SymbolModel {
   }
 
  private:
-  /// How many of eight ascending numbers are at most `value`.
+  /// Returns how many of eight ascending numbers are at most `value`.
   [[nodiscard]] TERRACE_LAZ_INLINE static unsigned lanes_begun(const std::uint16_t* at,
                                                                std::uint32_t value) {
 #if defined(__SSE2__)
     const __m128i begins = _mm_loadu_si128(reinterpret_cast<const __m128i*>(at));
     const __m128i above = _mm_subs_epu16(begins, _mm_set1_epi16(static_cast<short>(value)));
     const int mask = _mm_movemask_epi8(_mm_cmpeq_epi16(above, _mm_setzero_si128()));
-    // The bit beyond the lanes is the last that can be clear.
+    // The bit after the lanes is always clear.
     return static_cast<unsigned>(std::countr_zero(~static_cast<std::uint32_t>(mask) | 0x10000)) / 2;
 #else
     unsigned begun = 0;
@@ -135,7 +135,7 @@ struct SymbolModel {
   }
 };
 
-/// Initialised models to copy: of all symbols, or of 2, 4, ..., 256.
+/// Initialised models to copy, of all symbols or of 2, 4, ..., 256.
 template <unsigned Capacity>
 inline constexpr std::array<SymbolModel<Capacity>, 1> kFresh{
     SymbolModel<Capacity>::fresh(Capacity)};

@@ -9,12 +9,12 @@
 #include "laz/layout.hpp"
 
 /// Pointwise chunks, point formats 0 to 5: the first record uncoded, then one stream with all items
-/// of all further points. This is version 2 of the items, which LASzip has written since 2011.
+/// of all further points. These are the items of version 2, which LASzip has written since 2011.
 
 namespace terrace::stream::laz {
 
-/// Numbers for each number of returns n and return r, LASzip's tables: by the lower 6 bits of the
-/// byte that holds them, n * 8 + r.
+/// LASzip's tables of contexts for each number of returns n and return r, indexed by the lower 6
+/// bits of the byte that holds them, n * 8 + r.
 struct Returns10 {
   std::array<std::uint8_t, 64> map, level;
 
@@ -42,7 +42,7 @@ struct Point10 {
                                kClassification = 15, kScanAngle = 16, kUserData = 17, kSource = 18;
 
   SymbolModel<64> changed;  ///< a bit for each part that can be omitted
-  /// By the byte of the previous point.
+  /// Indexed by the byte of the previous point.
   std::array<SymbolModel<256>, 256> returns, classification, user_data;
   IntegerModels<16, 1> source;
 
@@ -138,14 +138,14 @@ struct Point10V2 : Point10 {
   }
 };
 
-/// Models of a chunk in any of the formats; extra bytes have separate ones.
+/// Models of a chunk in any of the formats; those of extra bytes are separate.
 struct PointwiseV2 {
   Point10V2 point;
   GpsTime<false> gps_time;
   Rgb rgb;
   WavePacket wave_packet;
 
-  /// `first`: the chunk's first record.
+  /// Begins a chunk with its first record.
   void begin(const RecordLayout& layout, const std::uint8_t* first) {
     point.begin();
     if (layout.gps_time != 0) gps_time.begin(load<std::uint64_t>(first + layout.gps_time));

@@ -34,15 +34,15 @@ class Pointwise {
   /// Maximum coded bytes per record.
   [[nodiscard]] std::size_t most_bytes() const { return 512 + 4 * layout_.extra_bytes; }
 
-  /// Begins a chunk with its first record; the caller must begin the coder.
+  /// Begins a chunk with its first record. The caller must begin the coder.
   void begin(const std::uint8_t* first) {
     std::memcpy(last_.data(), first, last_.size());
     if (v1_ != nullptr) v1_[0].begin(layout_, first);
     if (v2_ != nullptr) v2_[0].begin(layout_, first);
   }
 
-  /// Codes the next `count` records; if `open`, only while there are most_bytes() to decode from.
-  /// Returns the number coded.
+  /// Codes the next `count` records; if `open`, only as long as most_bytes() bytes are left to
+  /// decode. Returns the number coded.
   std::size_t code(Record records, std::size_t count, bool open) {
     return v2_ != nullptr ? code(v2_[0], extra_v2_.get(), records, count, open)
                           : code(v1_[0], extra_v1_.get(), records, count, open);
@@ -63,7 +63,7 @@ class Pointwise {
       last = records;
       records += layout.length;
     }
-    // The caller's records may not live until the next call.
+    // The caller's records may not exist until the next call.
     if (done > 0) std::memcpy(last_.data(), last, last_.size());
     coder = local;
     return done;

@@ -55,7 +55,7 @@ struct Point10V1 : Point10 {
       kReturnsBit = 16,
       kIntensityBit = 32
     };
-    constexpr unsigned kLast = 19;  // of the contexts of y and z
+    constexpr unsigned kLast = 19;  // last context of y and z
     coder.reserve();
     code_step(coder, x, x_steps, 0, last + kX, now + kX);
     code_step(coder, y, y_steps, std::min(x.magnitude, kLast), last + kY, now + kY);
@@ -87,11 +87,11 @@ struct Point10V1 : Point10 {
   }
 };
 
-/// GPS times as one sequence of multiples of a difference.
+/// Codes GPS times as one sequence of multiples of a difference.
 struct GpsTimeV1 {
   static constexpr unsigned kMost = 509, kFull = 510, kSame = 511;
 
-  SymbolModel<3> first;  ///< if there is no difference yet: the same, a difference, a time in full
+  SymbolModel<3> first;  ///< before the first difference: same, difference, complete time
   SymbolModel<512> multiple;
   IntegerModels<32, 6> integers;
   std::uint64_t time;
@@ -160,10 +160,10 @@ struct GpsTimeV1 {
 struct PointwiseV1 {
   Point10V1 point;
   GpsTimeV1 gps_time;
-  SymbolModel<64> rgb_changed;  ///< low and high bytes of red, green, blue
+  SymbolModel<64> rgb_changed;  ///< flags of low and high bytes of red, green, blue
   IntegerModels<8, 6> rgb;
   WavePacket wave_packet;
-  IntegerModels<8, 1> extra_bytes;  ///< except the magnitudes, which are separate for each byte
+  IntegerModels<8, 1> extra_bytes;  ///< without the magnitudes, which are separate for each byte
 
   void begin(const RecordLayout& layout, const std::uint8_t* first) {
     point.begin();

@@ -11,12 +11,12 @@
 namespace terrace::stream::laz {
 namespace {
 
-// The payload's fields: bytes from its beginning.
+// Offsets of the payload's fields in bytes.
 constexpr std::size_t kCompressorAt = 0, kCoderAt = 2, kVersionAt = 4, kOptionsAt = 8,
                       kChunkSizeAt = 12, kSpecialAt = 16, kItemCountAt = 32, kItemsAt = 34;
 constexpr std::size_t kItemSize = 6;
 
-/// The items of a point format without extra bytes, in their usual version.
+/// Returns the items of a point format without extra bytes, in their usual version.
 std::vector<Item> standard_items(unsigned point_format) {
   using enum ItemType;
   constexpr Item kPoint10{point10, 20, 2}, kTime{gps_time11, 8, 2}, kRgb12{rgb12, 6, 2},
@@ -46,11 +46,11 @@ std::vector<Item> standard_items(unsigned point_format) {
     case 10:
       return {kPoint14, kRgbNir14, kWave14};
     default:
-      throw std::invalid_argument("there is no point format " + std::to_string(point_format));
+      throw std::invalid_argument("unknown point format " + std::to_string(point_format));
   }
 }
 
-/// Whether these are the items of a point format, extra bytes or not; versions aside.
+/// Whether these are the items of a point format, with or without extra bytes, in any version.
 bool are_of(const std::vector<Item>& items, unsigned point_format) {
   const std::vector<Item> standard = standard_items(point_format);
   const std::size_t count = standard.size();
@@ -96,7 +96,7 @@ Vlr Vlr::parse(std::span<const std::byte> payload, unsigned point_format,
   Vlr vlr;
   const auto compressor = load<std::uint16_t>(bytes + kCompressorAt);
   if (compressor > 3) {
-    throw Corrupt("LASzip's compressor " + std::to_string(compressor) + " is not known",
+    throw Corrupt("LASzip's compressor " + std::to_string(compressor) + " is unknown",
                   kCompressorAt);
   }
   vlr.compressor = static_cast<Compressor>(compressor);
@@ -132,7 +132,7 @@ std::vector<std::byte> Vlr::serialise() const {
   std::vector<std::byte> payload(kItemsAt + items.size() * kItemSize);
   auto* bytes = reinterpret_cast<std::uint8_t*>(payload.data());
   store(bytes + kCompressorAt, compressor);
-  // The version of LASzip that writes the same.
+  // The version of LASzip that writes the same bytes.
   bytes[kVersionAt] = 3;
   bytes[kVersionAt + 1] = 4;
   store(bytes + kOptionsAt, options);
@@ -182,9 +182,9 @@ RecordLayout layout_of(const Vlr& vlr) {
     }
     const unsigned version = version_of(item);
     require(layered ? version <= 4 : version == 1 || version == 2,
-            "a LASzip item has a version that is not known");
+            "a LASzip item has an unknown version");
     require(version == layout.version || item.type == wave_packet13,
-            "LASzip's items are of different versions");
+            "LASzip's items have different versions");
   }
   return layout;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // copc.mjs PACKAGES FILE.copc.laz...  reads files with npm's copc, node by node, and compares the
-// records with those of FILE.las in any order. Exits with 1 if they differ or lie in other nodes.
+// records with those of FILE.las in any order. Exits with 1 if they differ or are outside their node.
 
 import {readFileSync} from 'node:fs';
 import {createRequire} from 'node:module';
@@ -18,7 +18,7 @@ function recordsOfLas(name) {
   return Array.from({length: count}, (_, i) => file.toString('latin1', offset + i * length, offset + (i + 1) * length));
 }
 
-/** Whether a point lies in the cube of a node, to a step of the lattice. */
+/** Whether a point is in the cube of a node, to within a step of the lattice. */
 function isInside(record, key, {info, header}) {
   const [depth, ...place] = key.split('-').map(Number);
   return place.every((at, axis) => {
@@ -33,7 +33,7 @@ let faults = 0;
 for (const name of files) {
   const copc = await Copc.create(name);
   const nodes = {}, pages = [copc.info.rootHierarchyPage];
-  for (const page of pages) {  // grows
+  for (const page of pages) {  // the list grows
     const read = await Copc.loadHierarchyPage(name, page);
     Object.assign(nodes, read.nodes);
     pages.push(...Object.values(read.pages));
@@ -62,6 +62,6 @@ for (const name of files) {
     first === 1e8 && last === 1e8 + 0.001 * (found.length - 1) && Math.abs(spacing * 128 - (cube[3] - cube[0])) < 1e-6;
   if (!good) ++faults;
   console.log(`${name}: ${found.length} points, ${Object.keys(nodes).length} nodes, ${depths} depths, ${pages.length} pages` +
-    (good ? '' : `, ${same ? 'the' : 'other'} records, ${outside} outside of their nodes`));
+    (good ? '' : `, ${same ? 'the' : 'other'} records, ${outside} outside their nodes`));
 }
 process.exit(files.length > 0 && faults === 0 ? 0 : 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// laz_perf.mjs PACKAGES FILE.laz...  decodes files with npm's laz-perf and says how fast; compares
-// the records with FILE.records where there is one. Exits with 1 if they differ.
+// laz_perf.mjs PACKAGES FILE.laz...  decodes files with npm's laz-perf and prints the speed. Compares
+// the records with FILE.records if it exists. Exits with 1 if they differ.
 
 import {existsSync, readFileSync} from 'node:fs';
 import {createRequire} from 'node:module';

@@ -1,12 +1,12 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# laz_perf_test.sh BUILD WRITE_FILES [FILE.laz...]: npm's laz-perf decodes what this library encodes, and
-# npm's copc reads what it writes as COPC. They are installed below BUILD, unless they are there; exits
-# with 77 where they cannot be had. With files: how fast laz-perf decodes these.
+# laz_perf_test.sh BUILD WRITE_FILES [FILE.laz...] checks that npm's laz-perf decodes the LAZ files, and
+# npm's copc reads the COPC files, that this library writes. Installs both below BUILD if necessary; exits
+# with 77 if they are not available. With files, prints how fast laz-perf decodes these instead.
 set -eu
 source=$(cd "${0%/*}" && pwd)
 skip() {
-  echo "laz-perf is not asked: $*"
+  echo "skipped: $*"
   exit 77
 }
 for program in node npm; do
@@ -20,7 +20,7 @@ if ! cmp -s "$source/package-lock.json" "$packages/node_modules/.installed"; the
   cp "$source/package.json" "$source/package-lock.json" "$packages"
   npm ci --prefix "$packages" --ignore-scripts --no-audit --no-fund --prefer-offline \
     --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-timeout=30000 > "$packages/npm.log" 2>&1 ||
-    skip "the packages of npm cannot be installed here: $packages/npm.log"
+    skip "the npm packages cannot be installed: see $packages/npm.log"
   cp "$source/package-lock.json" "$packages/node_modules/.installed"
 fi
 if [ $# -eq 0 ]; then

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_files FOLDER OCTREES: LAZ files of made scans, NAME.laz, and their records, NAME.records;
-// in the other folder COPC, NAME.copc.laz, and the same points as NAME.las.
+// write_files FOLDER OCTREES writes to FOLDER LAZ files of synthetic scans, NAME.laz, and their
+// records, NAME.records, and to OCTREES COPC, NAME.copc.laz, and the same points as NAME.las.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -18,8 +18,8 @@
 
 namespace {
 
-/// A wavy surface with the attributes of a point format, to a file of whatever its ending says; or
-/// to COPC with so many nodes in a page.
+/// Writes a wavy surface with the attributes of a point format to a file, whose ending determines
+/// the format; or to COPC with a given number of nodes per page.
 void write_scan(const std::filesystem::path& file, unsigned format, std::size_t points,
                 std::size_t page_nodes = 0) {
   using namespace terrace::stream;
@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
     write_scan(path + ".copc.laz", format, 100'000);
     write_scan(path + ".las", format, 100'000);
   }
-  // Each of its few nodes has a page of its own.
+  // Each of its few nodes has a separate page.
   write_scan(argv[2] + std::string("/pages.copc.laz"), 6, 100'000, 4);
   write_scan(argv[2] + std::string("/pages.las"), 6, 100'000);
   const std::filesystem::path folder(argv[1]);
