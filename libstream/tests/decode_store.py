@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Reads stores and overlays. Written from FORMAT.md alone, and to be kept so: if it and the library
+"""Reads stores and overlays. Written from FORMAT.md alone, and must stay so: if it and the library
 differ, one of the three is wrong.
+
 
     decode_store.py STORE            every point: its cluster's level and ordinal, coordinates, attributes
     decode_store.py STORE OVERLAY    every value of the overlay: level, ordinal, index, value
@@ -58,7 +59,7 @@ def crc16(data):
 
 
 def real(form, k):
-    """The double represented by integer `k` in a number form."""
+    """Returns the double represented by integer `k` in a number form."""
     if form < 20:
         value = float(k) / 10 ** (form % 10)
         return value if form < 10 else struct.unpack("<f", struct.pack("<f", value))[0]
@@ -68,7 +69,7 @@ def real(form, k):
 
 
 class Bytes:
-    """Numbers of a byte string whose last four bytes are the CRC-32 of the rest."""
+    """Reads numbers of a byte string whose last four bytes are the CRC-32 of the rest."""
 
     def __init__(self, data, what):
         require(len(data) >= 4 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0], what)
@@ -145,7 +146,7 @@ class Tables:
 
 
 class Symbols:
-    """The two ends of a cluster's bytes."""
+    """Reads symbols and raw bits from the two ends of a cluster's bytes."""
 
     def __init__(self, data, tables):
         require(len(data) >= (4 if tables.version < 5 else 1), "too few bytes")
@@ -171,7 +172,7 @@ class Symbols:
         return self.raw(8) if symbol == ESCAPE else symbol
 
     def number(self, context):
-        """A number and its class."""
+        """Returns a number and its class."""
         c = self.symbol(context)
         require(c < ESCAPE, "class")
         if c < 16:
@@ -202,7 +203,7 @@ def magnitude(number_class):
 
 
 def rows(source, size, points):
-    """Cells (column, row) of the box, row by row, then their heights."""
+    """Returns the cells (column, row) of the box, row by row, then their heights."""
     cells, above = [], 0
     begin = end = None
     steps = [0, 0]
@@ -303,7 +304,7 @@ def attribute(source, context, count, kind):
 
 
 class Recent:
-    """Differences that are often one of the last ones."""
+    """Reads differences that are often one of the most recent ones."""
 
     def __init__(self, source, context, count):
         self.source, self.context, self.count = source, context, count
@@ -321,7 +322,7 @@ class Recent:
 
 
 def head(source, c, floating):
-    """Number form (None except for floats), whether there are several values, the first, its class, the divisor."""
+    """Returns the number form (None except for floats), whether there are several values, the first, its class, the divisor."""
     symbol = source.symbol(c)
     form = symbol % 22 if floating else None
     symbol = symbol // 22 if floating else symbol
@@ -336,7 +337,7 @@ ALONG, SAME, BEGINS = range(3)
 
 
 def guide(source, number, count, floating):
-    """The number form and the integers of the guide, and how each point follows the one before it."""
+    """Returns the number form and the integers of the guide, and the step to each point from the previous one."""
     c = 148 + source.tables.per_column * number
     form, several, value, last, divisor = head(source, c, floating)
     values, steps = [value], [BEGINS]
@@ -360,7 +361,7 @@ def guide(source, number, count, floating):
 
 
 def column(source, number, count, floating, before, steps=None):
-    """The number form (None except for floats) and the integers of a column from version 2 on. `steps`: of the guide."""
+    """Returns the number form (None except for floats) and the integers of a column from version 2 on. steps: of the guide."""
     c, kind = 148 + source.tables.per_column * number, source.tables.kinds[number]
     form, several, value, last, divisor = head(source, c, floating)
     values, recent = [value], Recent(source, c, 3)
@@ -417,7 +418,7 @@ def ordinals(source, nearest, count):
 
 
 def key(kind, value):
-    """The order of an attribute's values as unsigned numbers."""
+    """Returns an unsigned number for an attribute's value, in the order of the values."""
     if kind.startswith("float"):
         bits = int.from_bytes(struct.pack("<d", value), "little")
         return bits + (1 << 63) if bits >> 63 == 0 else bits ^ (WORD - 1)
@@ -425,8 +426,8 @@ def key(kind, value):
 
 
 class Cluster:
-    """`points` (three doubles), `attributes` (a column each), `children` (per level below, from the next), the position of
-    the representative (None in the root)."""
+    """A decoded cluster: `points` (three doubles), `attributes` (a column each), `children` (per level below, from the
+next), and the position of the representative (None in the root)."""
 
     def __init__(self, data, entry, tables, schema, level, root, grid):
         small = grid and level == 0 and tables.version > 4
@@ -531,7 +532,7 @@ class Level:
 
     @staticmethod
     def chapters(index, directory, pages, bounds):
-        """The offsets of pages; the boxes of each, and of its chapter; where the tables begin."""
+        """Returns the offsets of the pages, the boxes of each page and of its chapter, and where the tables begin."""
         def box(source, size, outer):
             most = 256 ** size - 1
             ends = [source.number(size) for _ in range(6)]
@@ -564,7 +565,7 @@ class Level:
         rows = [None] * 11 + [[0] * count]
 
         def numbers(column, contexts=None):
-            """The numbers of a column, and their steps."""
+            """Returns the numbers of a column and their steps."""
             values, steps = [], [0]
             for k in range(count):
                 value, c = symbols.number(first + 8 * column + (contexts[k] if contexts else steps[-1]))
@@ -672,7 +673,7 @@ class Store:
         self.levels = [Level(folder, k, levels, self.manifest) for k in range(len(levels))]
 
     def points(self):
-        """For every point: level and ordinal of its cluster, coordinates, attributes."""
+        """Returns level and ordinal of its cluster, coordinates and attributes of every point."""
         for number, level in enumerate(self.levels):
             for ordinal, cluster in enumerate(level.clusters):
                 for k in cluster.members() if cluster else ():

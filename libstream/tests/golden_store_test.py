@@ -22,7 +22,7 @@ class GoldenStoreTest(unittest.TestCase):
     def check_points(self, name):
         self.assertEqual(lines(decode_store.Store(STORES / name).points()), text(name))
 
-    def test_a_raster_with_voids(self):
+    def test_raster_with_voids(self):
         self.check_points('grid')
 
     def test_signed_64_bit_samples(self):
@@ -31,7 +31,7 @@ class GoldenStoreTest(unittest.TestCase):
     def test_unsigned_64_bit_samples(self):
         self.check_points('uint64')
 
-    def test_a_cloud_with_attributes_of_every_type(self):
+    def test_cloud_with_attributes_of_every_type(self):
         self.check_points('cloud')
 
     def test_version_2(self):
@@ -44,10 +44,10 @@ class GoldenStoreTest(unittest.TestCase):
         self.check_points('island')
         self.check_points('swath')
 
-    def test_a_store_without_points(self):
+    def test_store_without_points(self):
         self.check_points('empty')
 
-    def test_an_overlay(self):
+    def test_overlay(self):
         store = decode_store.Store(STORES / 'grid')
         self.assertEqual(lines(decode_store.overlay(STORES / 'grid.overlay', store)), text('grid.overlay'))
 

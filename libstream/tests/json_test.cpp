@@ -17,7 +17,7 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Each value is the one that nlohmann-json reads.
+/// Checks that each value is the same as nlohmann-json's.
 void expect_same(const JsonValue& json, const nlohmann::json& expected) {
   if (expected.is_object()) {
     ASSERT_EQ(json.kind(), JsonValue::Kind::object);
@@ -60,7 +60,7 @@ std::vector<std::string> texts() {
   return texts;
 }
 
-TEST(StoreJson, TextsAndDamagedOnesAreReadAsByNlohmannJson) {
+TEST(StoreJson, AgreesWithNlohmannJsonOnTextsAndDamagedOnes) {
   constexpr std::uint64_t kSeed = 20;
   std::mt19937_64 random(kSeed);
   const std::vector<std::string> all = texts();
@@ -97,14 +97,14 @@ TEST(StoreJson, TextsAndDamagedOnesAreReadAsByNlohmannJson) {
       ++refused;
       EXPECT_THROW(JsonValue::parse(text), Damage);
     } catch (const nlohmann::json::out_of_range&) {
-      // A number beyond those of doubles; JsonValue refuses it once it is asked for.
+      // A number too large for a double, which JsonValue refuses only when it is read.
     }
   }
   EXPECT_GT(read, 20'000u / TERRACE_TEST_SHARE);
   EXPECT_GT(refused, 20'000u / TERRACE_TEST_SHARE);
 }
 
-TEST(StoreJson, TextsThatWouldTakeMuchMemoryAreRefused) {
+TEST(StoreJson, RefusesTextsThatWouldTakeMuchMemory) {
   const std::string deep(100'000, '['), closed = std::string(17, '[') + std::string(17, ']');
   EXPECT_THROW(JsonValue::parse(deep), Damage);
   EXPECT_THROW(JsonValue::parse(closed), Damage);
@@ -114,7 +114,7 @@ TEST(StoreJson, TextsThatWouldTakeMuchMemoryAreRefused) {
   EXPECT_THROW(JsonValue::parse(many + "]"), Damage);
 }
 
-TEST(StoreJson, ValuesOfOtherKindsAndNumbersThatAreTooLargeAreDamage) {
+TEST(StoreJson, RefusesOtherKindsAndNumbersThatAreTooLarge) {
   const JsonValue json = JsonValue::parse(R"([1e309, 1.5, -1, "1", {"a": 1}])");
   EXPECT_THROW(static_cast<void>(json.items()[0].number()), Damage);
   for (std::size_t i = 0; i < 5; ++i)

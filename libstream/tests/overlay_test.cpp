@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Overlays: the written values are read back, and nothing else is accepted as an overlay of the
-// store.
+// Tests of overlays: written values are read back, and nothing else is accepted as an overlay of
+// the store.
 #include "terrace/stream/overlay.hpp"
 
 #include <algorithm>
@@ -41,7 +41,7 @@ Store make_store(const fs::path& path, int side, std::uint64_t seed) {
   return Store::open(path);
 }
 
-/// Values for a random part of the points.
+/// Returns values for a random part of the points.
 Values some_values(const Store& store, double part, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   Values values;
@@ -77,7 +77,7 @@ Values values_of(Overlay& overlay) {
   return values;
 }
 
-/// The message of the Error that opening and reading throw; empty if there is none.
+/// Returns the message of the Error that opening and reading throw, or an empty string.
 std::string refusal(const fs::path& path, const Store& store) {
   try {
     Overlay overlay = Overlay::open(path, store);
@@ -95,7 +95,7 @@ std::string refusal(const fs::path& path, const Store& store) {
   return {};
 }
 
-TEST(StoreOverlay, ComesBack) {
+TEST(StoreOverlay, RoundTrips) {
   const TemporaryFolder folder;
   const Store store = make_store(folder.path() / "s", 110, 1);
   int number = 0;
@@ -110,7 +110,7 @@ TEST(StoreOverlay, ComesBack) {
     EXPECT_EQ(overlay.channel(), "height");
     EXPECT_EQ(overlay.values(), values.size());
     EXPECT_EQ(values_of(overlay), values);
-    // Cluster by cluster, including those without values, first ascending, then in any order.
+    // By cluster, including those without values, first in ascending order, then in random order.
     std::vector<ClusterId> clusters;
     for (unsigned level = 0; level <= store.top(); ++level) {
       for (std::uint64_t c = 0; c < store.levels()[level].clusters; ++c) {
@@ -135,7 +135,7 @@ TEST(StoreOverlay, ComesBack) {
   EXPECT_GT(store.points(), 2 * 4096u);
 }
 
-TEST(StoreOverlay, OfAnEmptyStoreIsEmpty) {
+TEST(StoreOverlay, IsEmptyForAnEmptyStore) {
   const TemporaryFolder folder;
   testing::write_store(folder.path() / "s", testing::cloud_schema(), {},
                        {.block_points = 400, .cluster_points = 10, .scale = {1, 1, 1}});
@@ -148,7 +148,7 @@ TEST(StoreOverlay, OfAnEmptyStoreIsEmpty) {
   EXPECT_THROW(writer.add(store.root(), 0, 1.0), std::invalid_argument);
 }
 
-TEST(StoreOverlay, TheWriterRefusesWhatDoesNotBelongAndGoesOn) {
+TEST(StoreOverlay, WriterRefusesInvalidValuesAndContinues) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 24, 1);
@@ -179,7 +179,7 @@ TEST(StoreOverlay, TheWriterRefusesWhatDoesNotBelongAndGoesOn) {
                std::invalid_argument);
 }
 
-TEST(StoreOverlay, AppearsWholeOrNotAtAll) {
+TEST(StoreOverlay, AppearsCompleteOrNotAtAll) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 24, 1);
@@ -194,7 +194,7 @@ TEST(StoreOverlay, AppearsWholeOrNotAtAll) {
   EXPECT_EQ(Overlay::open(path, store).channel(), "other");
 }
 
-TEST(StoreOverlay, OfAnotherStoreIsRefusedWithBothChecksums) {
+TEST(StoreOverlay, NamesBothChecksumsIfMadeForAnotherStore) {
   const TemporaryFolder folder;
   const Store one = make_store(folder.path() / "one", 24, 1);
   const Store two = make_store(folder.path() / "two", 24, 2);
@@ -212,14 +212,14 @@ TEST(StoreOverlay, OfAnotherStoreIsRefusedWithBothChecksums) {
   // Files that are not overlays.
   EXPECT_TRUE(contains(refusal(folder.path() / "none", one), "there is no overlay"));
   EXPECT_TRUE(contains(refusal(folder.path() / "one", one), "there is no overlay"));
-  EXPECT_TRUE(contains(refusal(one.path() / "manifest.json", one), "does not say"));
+  EXPECT_TRUE(contains(refusal(one.path() / "manifest.json", one), "the file is not an overlay"));
   std::string newer = bytes_of(folder.path() / "o");
   newer[16] = 2;
   write_bytes(folder.path() / "newer", newer);
   EXPECT_TRUE(contains(refusal(folder.path() / "newer", one), "newer terrace"));
 }
 
-TEST(StoreOverlay, FlipsInEveryByteAndEveryTruncationAreFound) {
+TEST(StoreOverlay, FindsFlippedBytesAndTruncations) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 24, 1);
@@ -252,7 +252,7 @@ void repair(std::string& bytes, std::size_t header, std::size_t directory,
   sign(directory, bytes.size() - 4);
 }
 
-TEST(StoreOverlay, LiesWithGoodChecksumsAreRefusedOrConsistent) {
+TEST(StoreOverlay, DamageWithGoodChecksumsIsRefusedOrConsistent) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 110, 1);

@@ -16,11 +16,11 @@
 #include "terrace/stream/store.hpp"
 #include "terrace/stream/store_query.hpp"
 
-/// How a store lies for those who read places of it.
+/// Counts the pieces in which parts of a store are read.
 
 namespace terrace::stream::testing {
 
-/// Random windows, all heights high, whose sides are a share of the bounds'.
+/// Returns random windows over all heights, whose sides are a share of the bounds' sides.
 inline std::vector<Box3> windows(const Box3& bounds, double share, std::size_t count,
                                  std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -40,8 +40,8 @@ struct Pieces {
   std::size_t clusters = 0, index = 0;
 };
 
-/// The contiguous pieces of the files of clusters and of the indices that each window by itself
-/// reads, added up.
+/// Returns the number of contiguous pieces of the cluster files and of the indices that are read,
+/// summed over the windows.
 inline Pieces pieces_read(const std::filesystem::path& path, std::span<const Box3> boxes) {
   std::map<std::string, std::map<std::uint64_t, std::uint64_t>> ends;  // by offset
   const OpenByName files = [&](const std::string& name) {

@@ -12,8 +12,8 @@
 #include "terrace/stream/store.hpp"
 #include "terrace/stream/store_query.hpp"
 
-/// reader_alone STORE: reads a store through functions, as from a server, with the reader's library
-/// and nothing else of libstream; exit status 0 if it is valid and a query finds all points.
+/// reader_alone STORE reads a store through functions, as from a server, linked only with the
+/// reader's library. Exit status 0 if the store is valid and a query finds all points.
 
 int main(int arguments, char** values) {
   using namespace terrace::stream;

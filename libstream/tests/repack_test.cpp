@@ -28,11 +28,11 @@ void append_bytes(std::string& text, const T& value) {
   text.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-/// A hash of everything below the root that does not depend on where clusters and members are:
-/// points with their attributes, what they head, errors and counts.
+/// Returns a hash of the contents of all clusters (points with their attributes, the clusters they
+/// head, errors and counts) that does not depend on the order of clusters and members.
 std::size_t content_of(const Store& store) {
   const std::size_t stride = store.schema().payload_size();
-  std::vector<std::vector<std::size_t>> contents;  // of clusters, level by level
+  std::vector<std::vector<std::size_t>> contents;  // of clusters, by level
   for (unsigned level = 0; level <= store.top(); ++level) {
     std::vector<std::size_t>& found = contents.emplace_back();
     store.for_each(level, [&](ClusterId, const ClusterRecord& record, const ClusterPoints& points) {
@@ -67,7 +67,7 @@ std::size_t content_of(const Store& store) {
   return contents.back().front();
 }
 
-/// Repacks, and compares with the store as it was.
+/// Repacks a store and compares the result with it.
 void check_repacked(const std::filesystem::path& folder) {
   const Store before = Store::open(folder / "s");
   const std::uint64_t bytes = repack(before, folder / "r", false, 3);
@@ -82,8 +82,8 @@ void check_repacked(const std::filesystem::path& folder) {
   EXPECT_EQ(after.schema().parameters, before.schema().parameters);
   repack(before, folder / "one", false, 1);
   EXPECT_TRUE(testing::read_files(folder / "one") == testing::read_files(folder / "r"))
-      << "threads matter";
-  // And what is in order already stays whole.
+      << "the bytes depend on threads";
+  // A store that is in order already keeps its contents.
   repack(after, folder / "again", false, 2);
   const Store again = Store::open(folder / "again");
   EXPECT_TRUE(again.verify(testing::expect_no_problem));
@@ -96,7 +96,7 @@ std::vector<Block> reordered(std::vector<Block> blocks, std::uint64_t seed) {
   return blocks;
 }
 
-TEST(Repack, KeepsAllThatRastersHave) {
+TEST(Repack, KeepsContentsOfRasters) {
   for (const ScalarType type : {ScalarType::i16, ScalarType::f32, ScalarType::u64}) {
     for (const auto relief : {testing::Relief::flat, testing::Relief::fractal,
                               testing::Relief::extreme, testing::Relief::decimal}) {
@@ -110,7 +110,7 @@ TEST(Repack, KeepsAllThatRastersHave) {
   }
 }
 
-TEST(Repack, KeepsAllThatCloudsHave) {
+TEST(Repack, KeepsContentsOfClouds) {
   std::mt19937_64 random(7);
   for (const auto numbers :
        {testing::Numbers::decimals, testing::Numbers::floats, testing::Numbers::doubles,
@@ -134,7 +134,7 @@ TEST(Repack, KeepsAllThatCloudsHave) {
   }
 }
 
-/// More than one segment, whose tables differ, and more than are encoded side by side.
+/// More than one segment, with different tables, and more blocks than are encoded in parallel.
 TEST(Repack, KeepsStoresOfManyBlocks) {
   const TemporaryFolder folder;
   testing::write_store(
@@ -154,7 +154,7 @@ TEST(Repack, KeepsStoresOfFewPoints) {
   }
 }
 
-TEST(Repack, DoesNotReplaceUnasked) {
+TEST(Repack, ReplacesOnlyIfAsked) {
   const TemporaryFolder folder;
   testing::write_store(folder.path() / "s", testing::cloud_schema(),
                        testing::cloud_blocks(testing::Numbers::decimals, 500, 100, 1),
@@ -166,8 +166,8 @@ TEST(Repack, DoesNotReplaceUnasked) {
   EXPECT_EQ(content_of(Store::open(folder.path() / "s")), content);
 }
 
-/// What lies together is read together, however the store was built.
-TEST(Repack, WindowsAreReadInFewerPieces) {
+/// Neighbouring clusters are read together, however the store was built.
+TEST(Repack, ReadsWindowsInFewerPieces) {
   const TemporaryFolder folder;
   const auto write = [&](const char* name, const StoreSchema& schema,
                          const std::vector<Block>& blocks) {
@@ -186,9 +186,9 @@ TEST(Repack, WindowsAreReadInFewerPieces) {
   const auto mixed = write("shuffled", testing::grid_schema(ScalarType::i16), reordered(grid, 9));
   EXPECT_LT(3 * in_order[1], 2 * in_order[0]);
   EXPECT_LT(2 * mixed[1], mixed[0]);
-  // How they lay before matters next to nothing then.
+  // The order before repacking hardly makes a difference.
   EXPECT_LT(10 * mixed[1], 11 * in_order[1]);
-  // A flat cloud; its heights, though they have the largest numbers, tear nothing apart.
+  // A flat cloud. Its heights have the largest numbers, but must not separate neighbours.
   std::mt19937_64 random(3);
   std::vector<Block> cloud;
   for (int tile = 0; tile < 400; ++tile) {

@@ -12,14 +12,15 @@
 
 namespace terrace::stream::testing {
 
-/// A stand-in for the hierarchy builder: clusters blocks by the nearest of evenly strided seeds and
-/// passes them on, level by level, the root last. The aim is a valid hierarchy, not good clusters.
+/// A stand-in for the hierarchy builder. Clusters blocks by the nearest of evenly strided seeds and
+/// passes them on, level by level, the root last. The hierarchy is valid, but the clusters are not
+/// good.
 class StandInHierarchy {
  public:
   struct Options {
     std::size_t block_points = 10000;
     std::size_t cluster_points = 142;
-    std::array<double, 3> scale{1, 1, 1};  ///< to ground units
+    std::array<double, 3> scale{1, 1, 1};  ///< ground units per unit of each coordinate
   };
 
   using Sink = std::function<void(const ClusteredBlock&)>;
@@ -37,7 +38,7 @@ class StandInHierarchy {
                            }
                          }) {}
 
-  /// One block of level 0.
+  /// Adds a block of level 0.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {}) {
     Points points;
     points.positions.assign(positions.begin(), positions.end());
@@ -46,7 +47,7 @@ class StandInHierarchy {
     add(0, std::move(points));
   }
 
-  /// Returns the bytes of the store, if it was one.
+  /// Ends the hierarchy. Returns the size of the store in bytes, if it wrote one.
   std::uint64_t finish() {
     if (levels_.empty()) levels_.resize(1), closed_.resize(1);
     // The top is the first level that was never closed.
@@ -124,7 +125,7 @@ class StandInHierarchy {
       seeds.push_back(points.positions[(2 * s + 1) * n / (2 * k)]);
     std::vector<std::uint32_t> assigned(n);
     for (int round = 0; round < 3; ++round) {
-      // Assign to the nearest seed; then move the seeds to the means.
+      // Assigns points to the nearest seed, then moves the seeds to the means.
       for (std::size_t i = 0; i < n; ++i) {
         double best = std::numeric_limits<double>::infinity();
         for (std::size_t s = 0; s < k; ++s) {

@@ -12,7 +12,7 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Bit by bit, by the definition of the polynomial.
+/// Computes the CRC bit by bit from the definition of the polynomial.
 std::uint16_t crc16_by_bits(ByteView bytes) {
   unsigned crc = 0xFFFF;
   for (const std::uint8_t byte : bytes) {
@@ -55,7 +55,7 @@ TEST(Crc8, HasThePublishedCheckValueAndEqualsTheDefinition) {
   }
 }
 
-TEST(Crc32, PortableEqualsTheLibrarysInOneAndInParts) {
+TEST(Crc32, PortableEqualsTheLibrarysAtOnceAndInParts) {
   std::mt19937_64 random(2);
   for (std::size_t size = 1; size < 300; ++size) {
     SCOPED_TRACE(size);

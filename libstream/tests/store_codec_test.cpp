@@ -32,13 +32,13 @@ namespace {
 
 using Random = std::mt19937_64;
 
-/// A number of up to so many bits, each number of bits as likely as any other.
+/// Returns a number of up to most_bits bits; every number of bits is equally likely.
 std::uint64_t any_number(Random& random, unsigned most_bits) {
   const auto bits = static_cast<unsigned>(random() % (most_bits + 1));
   return bits == 0 ? 0 : random() >> (64 - bits);
 }
 
-TEST(StoreCodec, NumbersLieInTheirClasses) {
+TEST(StoreCodec, ClassesContainTheirNumbers) {
   Random random(1);
   for (int i = 0; i < 100000; ++i) {
     const std::uint64_t number = any_number(random, 64);
@@ -50,7 +50,7 @@ TEST(StoreCodec, NumbersLieInTheirClasses) {
   }
 }
 
-/// Tables of contexts that know some symbols, from rare to nearly the only one.
+/// Returns tables of contexts with some symbols, from rare to nearly the only one.
 std::vector<Frequencies> some_frequencies(Random& random, std::size_t contexts) {
   std::vector<Frequencies> result;
   for (std::size_t c = 0; c < contexts; ++c) {
@@ -86,7 +86,7 @@ ByteView inside(const Bytes& bytes) {
   return ByteView(bytes).subspan(kPadding, bytes.size() - 2 * kPadding);
 }
 
-TEST(StoreCodec, SymbolsOfSeveralClustersComeBackTogetherAsAlone) {
+TEST(StoreCodec, RoundTripsSymbolsOfSeveralClustersTogetherAndAlone) {
   Random random(2);
   for (int round = 0; round < 200; ++round) {
     SCOPED_TRACE(round);
@@ -108,7 +108,7 @@ TEST(StoreCodec, SymbolsOfSeveralClustersComeBackTogetherAsAlone) {
       for (Item& item : items[k]) {
         item.context = static_cast<unsigned>(random() % tables.encode.contexts());
         item.symbol = static_cast<unsigned>(random() % kClasses);
-        // Without raw bits only symbols that need no escape.
+        // Without raw bits, only symbols that do not need the escape.
         while (!raw && tables.encode.entries()[item.context * kSymbols + item.symbol] == 0) {
           item.symbol = static_cast<unsigned>(random() % kClasses);
         }
@@ -141,8 +141,9 @@ TEST(StoreCodec, SymbolsOfSeveralClustersComeBackTogetherAsAlone) {
   }
 }
 
-/// Numbers that come many at once are those that come one by one, escapes and open bits included.
-TEST(StoreCodec, NumbersAtOnceAreNumbersOneByOne) {
+/// Encoding many numbers at once gives the same bytes as one by one, including escapes and raw
+/// bits.
+TEST(StoreCodec, NumbersAtOnceEqualNumbersOneByOne) {
   Random random(4);
   for (int round = 0; round < 500; ++round) {
     SCOPED_TRACE(round);
@@ -184,11 +185,11 @@ TEST(StoreCodec, NumbersAtOnceAreNumbersOneByOne) {
   }
 }
 
-TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
+TEST(StoreCodec, RoundTripsPointsInBoxesOfAllSizes) {
   Random random(3);
   for (int round = 0; round < 2000 / TERRACE_TEST_SHARE; ++round) {
     SCOPED_TRACE(round);
-    // Sizes of up to 2^16 are kept in another way than larger ones.
+    // Boxes up to 2^16 wide are coded by other code than larger ones.
     std::array<std::uint64_t, 3> size{};
     const unsigned most_bits = round % 3 == 0 ? 63 : round % 3 == 1 ? 16 : 4;
     for (std::uint64_t& side : size) {
@@ -200,7 +201,7 @@ TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
     for (std::uint32_t i = 0; i < n; ++i) {
       const bool twin = i > 0 && random() % 4 == 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        // Corners too.
+        // Includes corners.
         const std::uint64_t place = random() % 8 == 0 ? size[axis] - 1 : random() % size[axis];
         at[axis].push_back(twin ? at[axis][i - 1] : place);
       }
@@ -212,7 +213,7 @@ TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
     SplitEncoder().encode(
         coder, size, [&](std::size_t axis, std::uint32_t i) { return at[axis][i]; }, n,
         order.data());
-    coder.symbol(0, 0);  // there may have been none
+    coder.symbol(0, 0);  // there may be no points
     Bytes bytes;
     coder.finish(0, bytes);
     bytes = padded(bytes);
@@ -240,7 +241,7 @@ TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
   }
 }
 
-TEST(StoreCodec, FewSymbolsAreFewBytes) {
+TEST(StoreCodec, FewSymbolsTakeFewBytes) {
   std::array<std::uint32_t, kSymbols> counts{};
   counts[1] = 1000;
   counts[2] = 1;
@@ -267,9 +268,10 @@ TEST(StoreCodec, FewSymbolsAreFewBytes) {
   EXPECT_THROW(SymbolDecoder(tables.pointers, ByteView()), Damage);
 }
 
-/// Entries of every kind come back from a page, ranges perhaps wider; what is cut off or put behind
-/// is found, unless an escape happens to name a class with as many more bits.
-TEST(StoreCodec, IndexPagesComeBack) {
+/// Entries of every kind are read back from a page, with ranges possibly widened. Truncated and
+/// trailing bytes are detected, unless an escape happens to select a class with that many more
+/// bits.
+TEST(StoreCodec, RoundTripsIndexPages) {
   Random random(10);
   int accepted = 0;
   for (int round = 0; round < 300 / TERRACE_TEST_SHARE; ++round) {
@@ -344,7 +346,7 @@ TEST(StoreCodec, IndexPagesComeBack) {
   EXPECT_LT(accepted, 10);
 }
 
-/// A stored box holds what it is made for, whatever is around it, and little more.
+/// A stored box contains the original box, whatever the outer box, and is only a little larger.
 template <class Box>
 void check_stored_boxes() {
   Random random(11);
@@ -370,12 +372,12 @@ void check_stored_boxes() {
     }
   }
 }
-TEST(StoreCodec, BoxesOfChaptersHoldTheirPages) { check_stored_boxes<ChapterBox>(); }
-TEST(StoreCodec, BoxesOfPagesHoldTheirClusters) { check_stored_boxes<PageBox>(); }
+TEST(StoreCodec, BoxesOfChaptersContainTheirPages) { check_stored_boxes<ChapterBox>(); }
+TEST(StoreCodec, BoxesOfPagesContainTheirClusters) { check_stored_boxes<PageBox>(); }
 
-/// Columns along the lines of a guide come back in every kind, with differences that wrap, that are
-/// multiples of something, or none.
-TEST(StoreCodec, ColumnsAlongLinesComeBackInEveryKind) {
+/// Columns along the lines of a guide round-trip in every kind, with differences that wrap, that
+/// have a common divisor, or that are all 0.
+TEST(StoreCodec, RoundTripsColumnsAlongLinesInEveryKind) {
   Random random(9);
   const BothTables tables(some_frequencies(random, 2 * context::kPerAttribute));
   constexpr unsigned kOther = context::kPerAttribute;

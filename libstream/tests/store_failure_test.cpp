@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What must not happen: half-written stores that open, damage that goes unnoticed, other programs'
-// files removed.
+// Tests that half-written stores do not open, that damage is detected, and that other programs'
+// files are kept.
 #include <csignal>
 #include <fstream>
 #include <random>
@@ -32,7 +32,7 @@ using testing::StandInHierarchy;
 using testing::TemporaryFolder;
 using testing::write_bytes;
 
-/// One byte in place: rewriting complete files would wait for the disk each time.
+/// Overwrites one byte in place. Rewriting complete files would wait for the disk each time.
 void overwrite(const fs::path& file, std::size_t at, char byte) {
   std::fstream out(file, std::ios::binary | std::ios::in | std::ios::out);
   out.seekp(static_cast<std::streamoff>(at));
@@ -67,12 +67,12 @@ void write_small(const fs::path& path, std::uint64_t seed, bool replace = false)
   hierarchy.finish();
 }
 
-TEST(StoreDamage, EveryFlippedBitIsFound) {
+TEST(StoreDamage, FindsEveryFlippedBit) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 1);
   for (const auto& [name, bytes] : files_of(path)) {
-    // Every bit of the first and last part; one bit of every byte between.
+    // Every bit of the first and last part, and one bit of every byte between them.
     for (std::size_t at = 0; at < bytes.size(); at += TERRACE_TEST_SHARE) {
       const bool edge = at < 200 || at + 200 > bytes.size();
       for (unsigned bit = edge ? 0 : at % 8; bit < (edge ? 8 : at % 8 + 1); ++bit) {
@@ -100,7 +100,7 @@ TEST(StoreDamage, EveryFlippedBitIsFound) {
   EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
 }
 
-TEST(StoreDamage, ReadingDamagedClustersThrows) {
+TEST(StoreDamage, ThrowsWhenReadingDamagedClusters) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 2);
@@ -114,7 +114,7 @@ TEST(StoreDamage, ReadingDamagedClustersThrows) {
   }
 }
 
-TEST(StoreDamage, TruncatedAndMissingFilesAreNamed) {
+TEST(StoreDamage, NamesTruncatedAndMissingFiles) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 3);
@@ -129,7 +129,7 @@ TEST(StoreDamage, TruncatedAndMissingFilesAreNamed) {
   EXPECT_TRUE(contains(error_of([&] { Store::open(folder.path()); }), "no store"));
 }
 
-TEST(StoreDamage, NewerVersionAsksForAnUpdate) {
+TEST(StoreDamage, ReportsStoresOfANewerVersion) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 4);
@@ -142,7 +142,7 @@ TEST(StoreDamage, NewerVersionAsksForAnUpdate) {
   EXPECT_TRUE(contains(words, "update")) << words;
 }
 
-TEST(StoreDamage, WrongOrdinalsAndLevelsAreErrors) {
+TEST(StoreDamage, RefusesWrongOrdinalsAndLevels) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 5);
@@ -154,7 +154,7 @@ TEST(StoreDamage, WrongOrdinalsAndLevelsAreErrors) {
   EXPECT_FALSE(error_of([&] { store.read(cluster_id(store.top() + 1, 0), points); }).empty());
 }
 
-TEST(StoreWriting, ExistingOutputsAreRefused) {
+TEST(StoreWriting, RefusesExistingOutputs) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 6);
@@ -199,8 +199,8 @@ TEST(StoreWriting, AbandonedWritersLeaveNothing) {
   EXPECT_TRUE(names_in(folder.path()).empty());
 }
 
-/// Writes a store in a process that dies silently before block `last`, if there are that many.
-/// Returns whether it completed.
+/// Writes a store in a process that dies before block `last`, if there are that many. Returns
+/// whether the store was completed.
 bool writes_until(const fs::path& path, std::size_t last,
                   const std::vector<testing::Block>& blocks) {
   const pid_t child = ::fork();
@@ -226,7 +226,7 @@ bool writes_until(const fs::path& path, std::size_t last,
   return WEXITSTATUS(status) == 0;
 }
 
-// Dying within a block, a sync or a rename is tested with the command: tests/cli/crash_cli_test.py.
+// tests/cli/crash_cli_test.py tests processes that die within a block, a sync or a rename.
 TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
@@ -242,7 +242,7 @@ TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
   EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
   fs::remove_all(path);
-  // The next writer does not touch the files of a living one.
+  // The next writer does not touch the files of a live one.
   EXPECT_FALSE(writes_until(path, 1, blocks));
   const StoreWriter living(path, testing::cloud_schema());
   const auto with_living = names_in(folder.path());
@@ -251,7 +251,7 @@ TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
   EXPECT_EQ(names_in(folder.path()), with_living);
 }
 
-TEST(StoreWriting, LinksAreFollowed) {
+TEST(StoreWriting, FollowsLinks) {
   const TemporaryFolder folder;
   fs::create_directory(folder.path() / "elsewhere");
   fs::create_symlink("elsewhere/s", folder.path() / "link");
@@ -264,8 +264,8 @@ TEST(StoreWriting, LinksAreFollowed) {
   EXPECT_EQ(names_in(folder.path() / "elsewhere"), (std::vector<std::string>{"s"}));
 }
 
-/// Overlays belong to the store. Anything else stays, and the message names the first of it.
-TEST(StoreWriting, AStrangersFileInAStoreIsKept) {
+/// Overlays belong to the store. Any other file prevents replacement, and the message names it.
+TEST(StoreWriting, KeepsStoresThatContainForeignFiles) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 1);
@@ -291,8 +291,8 @@ TEST(StoreWriting, AStrangersFileInAStoreIsKept) {
   EXPECT_NE(files_of(path), before);
 }
 
-/// The files left by a writer that dies between the two renames of a replacement.
-TEST(StoreWriting, AStoreThatWasMovedAsideGetsItsNameBack) {
+/// A writer may die between the two renames of a replacement.
+TEST(StoreWriting, RestoresAStoreThatWasMovedAside) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   const auto aside = folder.path() / ".s.tmp-1-old";
@@ -300,7 +300,7 @@ TEST(StoreWriting, AStoreThatWasMovedAsideGetsItsNameBack) {
   const auto files = files_of(path);
   fs::rename(path, aside);
   {
-    // A living writer is about to finish by itself.
+    // A live writer is about to finish.
     const FileLock lock(folder.path() / ".s.tmp-1.lock");
     EXPECT_THROW(Store::open(path), Error);
     const StoreWriter writer(path, testing::cloud_schema());
@@ -308,12 +308,11 @@ TEST(StoreWriting, AStoreThatWasMovedAsideGetsItsNameBack) {
   }
   EXPECT_NO_THROW(Store::open(path));
   EXPECT_EQ(files_of(path), files);
-  // So does a writer, before it refuses to replace it.
+  // A writer also restores the store, before it refuses to replace it.
   fs::rename(path, aside);
   EXPECT_TRUE(contains(error_of([&] { write_small(path, 2); }), "exists"));
   EXPECT_EQ(files_of(path), files);
-  // Next to a complete store it is what the new one replaced, and without its manifest it is
-  // nothing.
+  // Next to a complete store it is the replaced one, and without a manifest it is not a store.
   fs::copy(path, aside);
   write_small(path, 2, /*replace=*/true);
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
@@ -342,7 +341,7 @@ TEST(StoreWriting, TrialsLeaveNothing) {
   EXPECT_FALSE(fs::exists(folder.path() / "s"));
 }
 
-TEST(StoreWriting, OtherNamesAreNotTouched) {
+TEST(StoreWriting, KeepsFilesOfOtherNames) {
   const TemporaryFolder folder;
   const auto name_of_a_dead_writer = [&](const char* store) {
     const StoreWriter writer(folder.path() / store, testing::cloud_schema());
@@ -356,14 +355,14 @@ TEST(StoreWriting, OtherNamesAreNotTouched) {
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{others, "s"}));
 }
 
-TEST(StoreWriting, AStoreMayHaveTheLongestName) {
+TEST(StoreWriting, AcceptsTheLongestName) {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / std::string(255, 's');
   write_small(path, 10);
   EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
 }
 
-/// Runs `write` in a process whose files may not grow beyond `limit`. Returns whether it threw an
+/// Writes a store in a process whose files may not grow beyond `limit`. Returns whether it threw an
 /// Error.
 bool throws_under_limit(rlim_t limit, const fs::path& path) {
   const pid_t child = ::fork();
@@ -387,7 +386,7 @@ bool throws_under_limit(rlim_t limit, const fs::path& path) {
   return WEXITSTATUS(status) == 1;
 }
 
-TEST(StoreWriting, FullDisksAreErrorsAndLeaveNothing) {
+TEST(StoreWriting, ReportsFullDisksAndLeavesNothing) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 11);
@@ -404,7 +403,7 @@ TEST(StoreWriting, FullDisksAreErrorsAndLeaveNothing) {
   EXPECT_TRUE(fs::exists(path));
 }
 
-TEST(StoreWriting, CoordinatesThatAreNotFiniteAreErrors) {
+TEST(StoreWriting, RefusesCoordinatesThatAreNotFinite) {
   const TemporaryFolder folder;
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -418,7 +417,8 @@ TEST(StoreWriting, CoordinatesThatAreNotFiniteAreErrors) {
   }
 }
 
-/// The files, encoded by one thread in order or by several ahead of their turn.
+/// Returns the files of a store whose blocks are encoded by one thread in order, or by several
+/// ahead of their turn.
 std::map<std::string, std::string> files_for_threads(const StoreSchema& schema,
                                                      const std::vector<testing::OwnedBlock>& blocks,
                                                      unsigned ahead) {
@@ -451,8 +451,8 @@ std::map<std::string, std::string> files_for_threads(const StoreSchema& schema,
 }
 
 TEST(StoreWriting, BytesDoNotDependOnWhenBlocksAreEncoded) {
-  // More blocks than a segment has, so that some are encoded with tables that become obsolete; with
-  // cells given twice, whose order must be preserved.
+  // More blocks than a segment has, so that some are encoded with tables that become obsolete, and
+  // with cells that occur twice, whose order must be preserved.
   std::mt19937_64 random(12);
   std::vector<std::vector<Point3>> blocks;
   for (int b = 0; b < 1200; ++b) {

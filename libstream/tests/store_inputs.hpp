@@ -13,7 +13,7 @@
 
 namespace terrace::stream::testing {
 
-/// A clustered block that owns its data.
+/// A clustered block with its data.
 struct OwnedBlock {
   unsigned level = 0;
   std::vector<Point3> positions;
@@ -36,7 +36,7 @@ struct OwnedBlock {
   }
 };
 
-/// The blocks that a hierarchy would write, root last; those of each level in order.
+/// Returns the blocks that a hierarchy would write, the root last, those of each level in order.
 inline std::vector<OwnedBlock> recorded_hierarchy(const std::vector<std::vector<Point3>>& blocks,
                                                   const StandInHierarchy::Options& options) {
   std::vector<OwnedBlock> recorded;
@@ -47,8 +47,8 @@ inline std::vector<OwnedBlock> recorded_hierarchy(const std::vector<std::vector<
   return recorded;
 }
 
-/// A raster of side x side heights by midpoint displacement (diamond-square), rounded to integers,
-/// with approximately `step` as the root mean square of the difference between neighbours.
+/// Returns a raster of side x side heights by midpoint displacement (diamond-square), rounded to
+/// integers. The root mean square of the difference between neighbours is approximately `step`.
 inline std::vector<double> fractal_heights(int side, double step, std::uint64_t seed) {
   int size = 1;
   while (size < side) size *= 2;
@@ -98,7 +98,7 @@ inline std::vector<double> fractal_heights(int side, double step, std::uint64_t 
   return result;
 }
 
-/// A tile of a raster as stored points: column, row, height.
+/// Returns a tile of a raster as stored points: column, row, height.
 inline std::vector<Point3> tile(const std::vector<double>& heights, int width, int height, int x0,
                                 int y0, int side) {
   std::vector<Point3> points;
@@ -112,8 +112,8 @@ inline std::vector<Point3> tile(const std::vector<double>& heights, int width, i
   return points;
 }
 
-/// A patch of a rolling surface, sampled at random, in integer centimetres: a scan without its
-/// order.
+/// Returns a patch of a rolling surface, sampled at random, in integer centimetres, as in a scan
+/// that has lost its order.
 inline std::vector<Point3> scan_patch(int number, std::size_t points) {
   std::mt19937_64 random(static_cast<std::uint64_t>(number) + 1);
   const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };

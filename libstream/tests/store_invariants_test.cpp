@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// FORMAT.md's statements one by one: stores that violate one of them, with good checksums, are
-// refused when they are opened or read, or reported by verify; never believed.
+// Checks the statements of FORMAT.md one by one: a store that violates one of them, with good
+// checksums, is refused when it is opened or read, or reported by verify.
 #include <functional>
 #include <limits>
 #include <random>
@@ -43,7 +43,7 @@ std::vector<testing::Block> small_blocks() {
   return testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, kColumns, kRows, 12, 1);
 }
 
-/// A raster's store with three levels, level 0 of several pages.
+/// Returns the store of a raster with three levels, and several pages on level 0.
 const StoreFiles& grid_files() {
   static const StoreFiles files = [] {
     const TemporaryFolder folder;
@@ -72,7 +72,7 @@ std::string opening(const std::filesystem::path& path) {
   return {};
 }
 
-/// The same, in the same order, whatever the threads.
+/// Checks that the problems are the same, in the same order, for any number of threads.
 std::string problems_of(const Store& store) {
   std::string problems, by_threads;
   store.verify([&](const Problem& problem) { problems += problem.what + "\n"; });
@@ -81,7 +81,8 @@ std::string problems_of(const Store& store) {
   return problems;
 }
 
-/// The store opens, and reading all of it throws `expected`; verify says the same.
+/// Expects that the store opens, that reading all of it throws `expected`, and that verify reports
+/// it too.
 void expect_unreadable(const StoreFiles& files, const std::string& expected) {
   const TemporaryFolder folder;
   testing::write_files(folder.path(), files);
@@ -111,7 +112,7 @@ void expect_refused(const StoreFiles& files, const std::string& expected) {
   EXPECT_NE(refused.find(expected), refused.npos) << refused << "\nexpected: " << expected;
 }
 
-TEST(StoreInvariants, MendedCopiesAreTheSame) {
+TEST(StoreInvariants, MendingASoundStoreChangesNothing) {
   for (StoreFiles files : {grid_files(), cloud_files()}) {
     const StoreFiles before = files;
     testing::mend(files);
@@ -129,16 +130,16 @@ struct ManifestCase {
   std::function<void(ordered_json&)> edit;
 };
 
-TEST(StoreInvariants, ManifestsWhoseCountsCannotBeAreRefused) {
+TEST(StoreInvariants, RefusesManifestsWithInvalidCounts) {
   const auto level = [](ordered_json& m, std::size_t l) -> ordered_json& { return m["levels"][l]; };
   const std::vector<ManifestCase> cases{
       {"the points of level 0", [](auto& m) { m["points"] = 1; }},
-      {"a count is not an integer", [](auto& m) { m["points"] = -1; }},
-      {"a count is not an integer", [](auto& m) { m["points"] = 2500.5; }},
-      {"a count is not an integer", [](auto& m) { m["nodata"] = 1e30; }},
-      {"more points than one can have", [](auto& m) { m["nodata"] = std::uint64_t{1} << 60; }},
+      {"a count is not an unsigned", [](auto& m) { m["points"] = -1; }},
+      {"a count is not an unsigned", [](auto& m) { m["points"] = 2500.5; }},
+      {"a count is not an unsigned", [](auto& m) { m["nodata"] = 1e30; }},
+      {"more points than possible", [](auto& m) { m["nodata"] = std::uint64_t{1} << 60; }},
       {"the number of levels", [](auto& m) { m["levels"] = ordered_json::array(); }},
-      {"the levels do not follow", [&](auto& m) { level(m, 1)["level"] = 2; }},
+      {"the levels are not numbered", [&](auto& m) { level(m, 1)["level"] = 2; }},
       {"the members of level 0", [&](auto& m) { level(m, 0)["members"] = 5; }},
       {"the members of level 0", [&](auto& m) { level(m, 1)["points"] = 100000; }},
       {"does not have the level's clusters", [&](auto& m) { level(m, 0)["clusters"] = 5; }},
@@ -149,8 +150,8 @@ TEST(StoreInvariants, ManifestsWhoseCountsCannotBeAreRefused) {
        }},
       {"does not have one segment",
        [&](auto& m) { level(m, 0)["segments"].push_back(level(m, 0)["segments"][0]); }},
-      // As many clusters as only their number's wrapping makes possible.
-      {"more points than one can have",
+      // A number of clusters that is only possible if products wrap.
+      {"more points than possible",
        [&](auto& m) {
          const std::uint64_t many = std::numeric_limits<std::uint64_t>::max();
          m["points"] = level(m, 0)["points"] = many;
@@ -192,11 +193,11 @@ TEST(StoreInvariants, ManifestsWhoseCountsCannotBeAreRefused) {
   }
 }
 
-TEST(StoreInvariants, ManifestsWhosePlacesCannotBeAreRefused) {
+TEST(StoreInvariants, RefusesManifestsWithInvalidPlaces) {
   const std::vector<ManifestCase> cases{
-      {"the bounds do not suit", [](auto& m) { m["bounds"] = nullptr; }},
-      {"the bounds do not suit", [](auto& m) { m["bounds"]["min"][2] = "nan"; }},
-      {"the bounds do not suit", [](auto& m) { m["bounds"]["min"][2] = 1e9; }},
+      {"the bounds do not fit", [](auto& m) { m["bounds"] = nullptr; }},
+      {"the bounds do not fit", [](auto& m) { m["bounds"]["min"][2] = "nan"; }},
+      {"the bounds do not fit", [](auto& m) { m["bounds"]["min"][2] = 1e9; }},
       {"the bounds are not finite", [](auto& m) { m["bounds"]["max"][2] = "inf"; }},
       {"not finite in the CRS", [](auto& m) { m["coordinates"][2]["scale"] = 1e308; }},
       {"on the raster's columns", [](auto& m) { m["columns"] = 20; }},
@@ -223,14 +224,14 @@ TEST(StoreInvariants, ManifestsWhosePlacesCannotBeAreRefused) {
   }
 }
 
-TEST(StoreInvariants, ManifestsWithUnknownWordsAreRefused) {
+TEST(StoreInvariants, RefusesManifestsWithUnknownWords) {
   const auto parameter = [](ordered_json& m, const char* value) {
     m["parameters"].push_back({{"name", "entities"}, {"value", value}});
   };
   const std::vector<ManifestCase> cases{
       {"the kind is unknown", [](auto& m) { m["kind"] = "<b>grid</b>"; }},
       {"unknown type", [](auto& m) { m["coordinates"][2]["type"] = "int24"; }},
-      {"what heights refer to", [](auto& m) { m["vertical"] = "<b>ellipsoidal</b>"; }},
+      {"the kind of heights", [](auto& m) { m["vertical"] = "<b>ellipsoidal</b>"; }},
       {"the entities are unknown", [&](auto& m) { parameter(m, "<img src=x onerror=alert(1)>"); }},
       {"the entities are unknown", [&](auto& m) { parameter(m, "triangle"); }},
       {"the entities are unknown", [&](auto& m) { parameter(m, ""); }},
@@ -252,8 +253,8 @@ TEST(StoreInvariants, ManifestsWithUnknownWordsAreRefused) {
   }
 }
 
-TEST(StoreInvariants, VerifyFindsManifestsThatAreNotAsWritten) {
-  const char* const order = "the keys of the format in their order";
+TEST(StoreInvariants, VerifyFindsManifestsWithWrongKeysOrSummaries) {
+  const char* const order = "keys or their order are wrong";
   const std::vector<ManifestCase> cases{
       {order,
        [](auto& m) {
@@ -268,7 +269,7 @@ TEST(StoreInvariants, VerifyFindsManifestsThatAreNotAsWritten) {
          other.update(m);
          m = other;
        }},
-      {order, [](auto& m) { m["coordinates"][0]["type"] = "int"; }},  // of PLY: int32 here
+      {order, [](auto& m) { m["coordinates"][0]["type"] = "int"; }},  // PLY's name of int32
       {"the bounds are not those of the points", [](auto& m) { m["bounds"]["min"][2] = -1e6; }},
       {"the mean height", [](auto& m) { m["mean_height"] = 0; }},
       {"the mean height", [](auto& m) { m["mean_height"] = "nan"; }},
@@ -278,7 +279,7 @@ TEST(StoreInvariants, VerifyFindsManifestsThatAreNotAsWritten) {
     testing::edit_manifest(files, c.edit);
     expect_problem(files, c.expected);
   }
-  // mend() writes these anew, so they are changed as text.
+  // mend() recomputes these, so they are changed as text.
   StoreFiles files = grid_files();
   std::string& text = files["manifest.json"];
   const std::size_t at = text.find("\"crc32\": \"") + 10;
@@ -293,22 +294,22 @@ TEST(StoreInvariants, VerifyFindsManifestsThatAreNotAsWritten) {
   expect_problem(files, order);
 }
 
-/// A store whose manifest says fewer columns than its points have is not read, by whatever way.
-TEST(StoreInvariants, PointsOutsideOfTheRasterAreNotRead) {
+/// A store whose manifest has fewer columns than its points is refused by every way of reading.
+TEST(StoreInvariants, RefusesPointsOutsideTheRaster) {
   for (const char* const side : {"columns", "rows"}) {
     StoreFiles files = grid_files();
     testing::edit_manifest(files, [&](ordered_json& m) {
       m[side] = 20;
       m["bounds"]["max"][side == std::string("columns") ? 0 : 1] = 19;
     });
-    expect_unreadable(files, "a point lies outside of the bounds of the store");
+    expect_unreadable(files, "a point is outside the bounds of the store");
   }
   StoreFiles files = cloud_files();
   testing::edit_manifest(files, [](ordered_json& m) { m["bounds"]["max"][2] = 1; });
-  expect_unreadable(files, "a point lies outside of the bounds of the store");
+  expect_unreadable(files, "a point is outside the bounds of the store");
 }
 
-TEST(StoreInvariants, LevelsWithOtherNumbersOfMembersAreNotRead) {
+TEST(StoreInvariants, RefusesLevelsWithWrongNumbersOfMembers) {
   for (const int more : {-1, 1}) {
     StoreFiles files = grid_files();
     testing::edit_manifest(files, [&](ordered_json& m) {
@@ -334,7 +335,7 @@ struct EntryCase {
   unsigned level = 0;
 };
 
-TEST(StoreInvariants, IndexEntriesThatCannotBeAreNotRead) {
+TEST(StoreInvariants, RefusesInvalidIndexEntries) {
   constexpr store::NumberForm kCents = 2;
   const std::vector<EntryCase> grid{
       {"an index entry has no points", [](Entry& e) { e.points = 0; }},
@@ -388,23 +389,23 @@ TEST(StoreInvariants, IndexEntriesThatCannotBeAreNotRead) {
   }
 }
 
-TEST(StoreInvariants, PagesThatDoNotFollowOneAnotherAreFound) {
+TEST(StoreInvariants, FindsClustersThatAreNotContiguous) {
   StoreFiles files = grid_files();
   testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { ++offset; });
-  expect_problem(files, "do not follow those before");
+  expect_problem(files, "its bytes are not contiguous");
   files = grid_files();
   testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { offset = UINT64_MAX - 9; });
   expect_unreadable(files, "an index entry is out of range");
   files = grid_files();
   testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { offset = 1u << 30; });
-  expect_unreadable(files, "behind the end of the file");
+  expect_unreadable(files, "beyond the end of the file");
   files = grid_files();
   files["level-0.0.clusters"] += "more";
   testing::mend(files);
   expect_problem(files, "the clusters do not end where the file does");
 }
 
-/// Calls edit(level 0) on a store of rasters, and mends.
+/// Returns the store of a raster after edit(level 0) and mending.
 StoreFiles with_edited_index(const std::function<void(testing::LevelBytes&)>& edit) {
   StoreFiles files = grid_files();
   auto manifest = ordered_json::parse(files["manifest.json"]);
@@ -419,7 +420,7 @@ StoreFiles with_edited_index(const std::function<void(testing::LevelBytes&)>& ed
   return files;
 }
 
-/// The same, calls edit(parts of the index).
+/// Returns the store of a raster after edit(parts of the index of level 0) and mending.
 StoreFiles with_edited_parts(const std::function<void(testing::IndexParts&)>& edit) {
   return with_edited_index([&](testing::LevelBytes& level) {
     testing::IndexParts parts(level);
@@ -428,12 +429,12 @@ StoreFiles with_edited_parts(const std::function<void(testing::IndexParts&)>& ed
   });
 }
 
-TEST(StoreInvariants, DirectoriesThatCannotBeAreRefused) {
+TEST(StoreInvariants, RefusesInvalidDirectories) {
   using Edit = std::function<void(testing::LevelBytes&)>;
-  // One chapter: bytes of its pages, bytes of its contents, its box, number of sets, the first
-  // one's ordinal and bytes.
+  // The fields for one chapter: bytes of its pages, bytes of its contents, its box, number of sets,
+  // the first set's ordinal and bytes.
   enum Field { kPages, kContents, kSets, kOrdinal };
-  /// Puts a byte in the place of a field's first.
+  /// Replaces the first byte of a field.
   const auto put = [](Field field, char byte) -> Edit {
     return [field, byte](testing::LevelBytes& level) {
       store::ByteReader in(level.bytes({level.directory(), level.index.size()}));
@@ -474,7 +475,7 @@ TEST(StoreInvariants, DirectoriesThatCannotBeAreRefused) {
   }
 }
 
-TEST(StoreInvariants, ContentsOfChaptersThatCannotBeAreNotRead) {
+TEST(StoreInvariants, RefusesInvalidContentsOfChapters) {
   for (const int more : {-1, 1}) {
     const StoreFiles files = with_edited_index([&](testing::LevelBytes& level) {
       char& size_of_first = level.index[level.contents[0].begin];
@@ -484,7 +485,7 @@ TEST(StoreInvariants, ContentsOfChaptersThatCannotBeAreNotRead) {
   }
 }
 
-/// A second set of tables, from cluster `first` on, is put behind that of level 0.
+/// Adds a second set of tables to level 0, used from cluster `first` on.
 StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
   return with_edited_parts([&](testing::IndexParts& index) {
     index.sets.emplace_back(first, index.sets.front().second);
@@ -492,7 +493,7 @@ StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
   });
 }
 
-TEST(StoreInvariants, SecondTablesServeClustersOfTheirOwn) {
+TEST(StoreInvariants, ReadsClustersWithTheirSetOfTables) {
   const TemporaryFolder folder;
   testing::write_files(folder.path(), with_second_tables(100, false));
   EXPECT_EQ(problems_of(Store::open(folder.path())), "");
@@ -501,24 +502,24 @@ TEST(StoreInvariants, SecondTablesServeClustersOfTheirOwn) {
   expect_unreadable(with_second_tables(100, true), "table");
 }
 
-TEST(StoreInvariants, BoxesOfPagesThatLeaveClustersOutAreFound) {
+TEST(StoreInvariants, FindsBoxesOfPagesThatExcludeClusters) {
   for (std::size_t place = 0; place < 6; ++place) {
-    // The second page's box: a low end upwards, a high end downwards.
+    // The second page's box, with a low end raised or a high end lowered.
     expect_problem(with_edited_parts([&](testing::IndexParts& index) {
                      char& end = index.pages[1].box[place];
                      end = static_cast<char>(end + (place % 2 == 0 ? 8 : -8));
                    }),
-                   "the box reaches out of its page's");
-    // That of its chapter.
+                   "the box exceeds its page's");
+    // The box of its chapter.
     expect_problem(with_edited_parts([&](testing::IndexParts& index) {
                      char& end = index.chapter_boxes[0][2 * place + 1];
                      end = static_cast<char>(end + (place % 2 == 0 ? 8 : -8));
                    }),
-                   "the box reaches out of its page's");
+                   "the box exceeds its page's");
   }
 }
 
-TEST(StoreInvariants, OldPagesWithBitsThatMeanNothingAreNotRead) {
+TEST(StoreInvariants, RefusesOldPagesWithNonzeroPadding) {
   bool tried = false;
   const std::filesystem::path golden = std::filesystem::path(TERRACE_TEST_DATA) / "stores";
   for (const char* name : {"grid", "cloud"}) {
@@ -529,10 +530,11 @@ TEST(StoreInvariants, OldPagesWithBitsThatMeanNothingAreNotRead) {
       bool first = true, padded = false;
       testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json&) {
         if (!std::exchange(first, false) || page >= level.pages()) return;
-        // The last bit of the last column's bytes.
+        // The last bit of the last column.
         char& last = level.index[level.page_parts[page].end - 5];
         last = static_cast<char>(last | 0x80);
-        padded = level.clusters_of(page) % 8 != 0;  // 16 bits each: else there is no padding
+        padded =
+            level.clusters_of(page) % 8 != 0;  // 16 bits each, so otherwise there is no padding
       });
       if (files == sound || !padded) continue;
       testing::mend(files);
@@ -545,7 +547,7 @@ TEST(StoreInvariants, OldPagesWithBitsThatMeanNothingAreNotRead) {
   EXPECT_TRUE(tried);
 }
 
-/// Tables in which every symbol has its bits, so that any cluster can be written.
+/// Returns tables in which every symbol can be coded, so that any cluster can be written.
 store::Tables even_tables(const store::Layout& layout, store::ColumnKind kind) {
   store::Tables tables;
   if (layout.version > 1) tables.kinds.assign(layout.columns(), kind);
@@ -555,7 +557,8 @@ store::Tables even_tables(const store::Layout& layout, store::ColumnKind kind) {
   return tables;
 }
 
-/// What the decoder says of a cluster of `points` points in the box (0, 0, 0) to (7, 7, 7).
+/// Decodes a cluster of `points` points in the box (0, 0, 0) to (7, 7, 7). Returns the error, or
+/// "read".
 std::string decoding(bool grid, std::uint32_t points, std::uint32_t last,
                      const std::function<void(store::SymbolEncoder&)>& write,
                      const std::function<void(store::Bytes&)>& change = {},
@@ -590,7 +593,7 @@ std::string decoding(bool grid, std::uint32_t points, std::uint32_t last,
   return "read";
 }
 
-TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
+TEST(StoreInvariants, RefusesClustersThatBreakTheRules) {
   using store::SymbolEncoder;
   namespace context = store::context;
   const auto number = [](SymbolEncoder& coder, unsigned where, std::uint64_t value) {
@@ -613,7 +616,7 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
     number(coder, context::kRunEnd + 5, length - 1);
     for (unsigned row = 1; row < 8; ++row) number(coder, context::kRunCount + (row == 1), 0);
   };
-  // What is right is read.
+  // A correct cluster is read.
   EXPECT_EQ(decoding(false, 1, 0, one_point), "read");
   EXPECT_EQ(decoding(false, 1, 0, [&](auto& coder) { own_box(coder, 3, 4); }), "read");
   const auto flat_run = [&](SymbolEncoder& coder) {
@@ -627,12 +630,12 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
   EXPECT_EQ(decoding(false, 1, 0, [](auto& coder) { coder.symbol(context::kForm, 4); }),
             "a cluster has an unknown form");
   EXPECT_EQ(decoding(false, 1, 0, [&](auto& coder) { own_box(coder, 4, 4); }),
-            "a cluster's own box is not inside of its index entry's");
-  EXPECT_EQ(decoding(false, 1, 0, flat_run, {}, 1), "a cluster's box does not suit its form");
+            "a cluster's own box is not inside its index entry's");
+  EXPECT_EQ(decoding(false, 1, 0, flat_run, {}, 1), "a cluster's box does not fit its form");
   EXPECT_EQ(decoding(true, 1, 0, [&](auto& coder) { run(coder, 8, 1); }),
-            "a run lies outside of its cluster");
+            "a run is outside its cluster");
   EXPECT_EQ(decoding(true, 1, 0, [&](auto& coder) { run(coder, 2, 2); }),
-            "a run lies outside of its cluster");
+            "a run is outside its cluster");
   EXPECT_EQ(decoding(true, 2, 0, [&](auto& coder) { run(coder, 2, 1); }),
             "a cluster has too few cells");
   EXPECT_EQ(decoding(true, 1, 0,
@@ -640,22 +643,22 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
                        run(coder, 2, 1);
                        number(coder, context::kHeight + 63, 10);
                      }),
-            "a height lies outside of its cluster's box");
+            "a height is outside its cluster's box");
   EXPECT_EQ(decoding(false, 2, 0,
                      [](auto& coder) {
                        coder.symbol(context::kForm, store::kSplitForm);
                        coder.symbol(context::kSplit, 3);
                      }),
             "a part of a cluster has more points than the whole");
-  // Nine raw bits: seven behind them mean nothing.
-  const char* const ends = "coded bytes do not end where their numbers do";
+  // Nine raw bits are followed by seven bits of padding.
+  const char* const ends = "coded bytes do not end with their numbers";
   EXPECT_EQ(
       decoding(false, 1, 0, one_point, [](store::Bytes& bytes) { bytes[bytes.size() - 2] ^= 1; }),
       ends);
   EXPECT_EQ(decoding(false, 1, 0, one_point,
                      [](store::Bytes& bytes) { bytes.insert(bytes.end() - 2, 1, 0); }),
             ends);
-  // 2^20 points at one place are a few bytes: more are too many.
+  // 2^20 points at one place take a few bytes; more are refused.
   const auto same_place = [&](SymbolEncoder& coder) {
     coder.symbol(context::kForm, store::kSplitForm | store::kOwnBoxForm);
     for (unsigned side = 0; side < 6; ++side) number(coder, context::kInset + side, 7 * (side % 2));
@@ -665,14 +668,14 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
   EXPECT_EQ(decoding(false, (1u << 20) + 1, 0, same_place), "a cluster has too many points");
 }
 
-TEST(StoreInvariants, ColumnsThatBreakTheirRulesAreNotRead) {
+TEST(StoreInvariants, RefusesColumnsThatBreakTheRules) {
   using store::ColumnKind;
   using store::SymbolEncoder;
   constexpr unsigned kAxis = store::context::kAttribute, kNext = store::context::kPerAttribute;
   const auto number = [](SymbolEncoder& coder, unsigned where, std::uint64_t value) {
     store::code_number(coder, where, value);
   };
-  // The places of two points: `first` writes the column of x, y and z are 5 for both.
+  // Writes the places of two points: `first` writes the column of x; y and z are 5 for both.
   const auto places = [number](const std::function<void(SymbolEncoder&)>& first) {
     return [first, number](SymbolEncoder& coder) {
       coder.symbol(store::context::kForm, 0);
@@ -687,7 +690,8 @@ TEST(StoreInvariants, ColumnsThatBreakTheirRulesAreNotRead) {
     return [head, numbers, number](SymbolEncoder& coder) {
       coder.symbol(kAxis, head);
       for (std::size_t i = 0; i < numbers.size(); ++i) {
-        // The first value and the divisor, then a difference after that first value's class.
+        // The first value and the divisor, then a difference in the context of the first value's
+        // class.
         const bool last = head != 0 && i + 1 == numbers.size();
         const unsigned step = store::difference_step(store::class_of(numbers[0]));
         number(coder, last ? kAxis + 2 + step : kAxis + 1, numbers[i]);
@@ -698,14 +702,13 @@ TEST(StoreInvariants, ColumnsThatBreakTheirRulesAreNotRead) {
   EXPECT_EQ(decoding(false, 2, 0, places(column(1, {4, 10}))), "read");
   EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 5, 2}))), "read");
 
-  const char* const outside = "a point lies outside of its cluster's box";
+  const char* const outside = "a point is outside its cluster's box";
   EXPECT_EQ(decoding(false, 2, 0, places(column(0, {16}))), outside);
   EXPECT_EQ(decoding(false, 2, 0, places(column(0, {1}))), outside);
   EXPECT_EQ(decoding(false, 2, 0, places(column(1, {4, 12}))), outside);
   EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 6, 2}))), outside);
   EXPECT_EQ(decoding(false, 2, 0, places(column(3, {4, 10}))), "a column has an unknown head");
-  EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 1, 2}))),
-            "a column has differences that are multiples of nothing");
+  EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 1, 2}))), "a column has a divisor below 2");
   const auto recent = [number](unsigned place) {
     return [place, number](SymbolEncoder& coder) {
       coder.symbol(kAxis, 1);
@@ -719,7 +722,7 @@ TEST(StoreInvariants, ColumnsThatBreakTheirRulesAreNotRead) {
             "a column has an unknown difference");
 }
 
-TEST(StoreInvariants, KindsOfColumnsThatDoNotExistAreNotRead) {
+TEST(StoreInvariants, RefusesUnknownKindsOfColumns) {
   StoreSchema schema;
   schema.attributes = {{.name = "a", .type = ScalarType::u8},
                        {.name = "b", .type = ScalarType::f32},
@@ -739,7 +742,7 @@ TEST(StoreInvariants, KindsOfColumnsThatDoNotExistAreNotRead) {
     const std::size_t kind = 9 + column, guide = 8;
     bytes[kind] = 3;
     EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
-    // With a guide more kinds exist, but not for the guide itself.
+    // With a guide there are more kinds, except for the guide itself.
     bytes[guide] = 4;
     if (column == 3) {
       EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage);
@@ -756,8 +759,8 @@ TEST(StoreInvariants, KindsOfColumnsThatDoNotExistAreNotRead) {
   }
 }
 
-/// Clusters that would take much memory are neither written nor read, however few bytes they are.
-TEST(StoreInvariants, ClustersOfManyBytesAreNotWritten) {
+/// Clusters that would take much memory are neither written nor read, however few bytes they have.
+TEST(StoreInvariants, RefusesClustersThatTakeMuchMemory) {
   StoreSchema schema = testing::cloud_schema();
   for (int i = 0; i < 4096; ++i) {
     schema.attributes.push_back(testing::channel(std::to_string(i)));
@@ -782,7 +785,7 @@ TEST(StoreInvariants, ClustersOfManyBytesAreNotWritten) {
                Error);
 }
 
-/// The store of small_blocks() written from its hierarchy after `edit`.
+/// Returns the store of small_blocks(), written from its hierarchy after `edit`.
 StoreFiles rewritten(const std::function<void(std::vector<OwnedBlock>&)>& edit) {
   std::vector<std::vector<Point3>> blocks;
   for (const auto& block : small_blocks()) blocks.push_back(block.positions);
@@ -805,9 +808,9 @@ OwnedBlock& block_of(std::vector<OwnedBlock>& blocks, unsigned level) {
                        [&](const OwnedBlock& block) { return block.level == level; });
 }
 
-TEST(StoreInvariants, VerifyFindsHierarchiesThatAreNone) {
+TEST(StoreInvariants, VerifyFindsInvalidHierarchies) {
   EXPECT_TRUE(rewritten([](auto&) {}) == grid_files());
-  // A point of the first block of level 1 that represents no cluster there.
+  // Returns a point of the first block of level 1 that does not represent a cluster there.
   const auto plain_member = [](const OwnedBlock& block) {
     std::uint32_t point = 0;
     while (std::find(block.representatives.begin(), block.representatives.end(), point) !=
@@ -821,7 +824,7 @@ TEST(StoreInvariants, VerifyFindsHierarchiesThatAreNone) {
                    const std::uint32_t point = plain_member(block);
                    block.children[point] = block.children[point + 1];
                  }),
-                 "is headed a second time");
+                 "is headed twice");
   expect_problem(rewritten([&](auto& blocks) {
                    OwnedBlock& block = block_of(blocks, 1);
                    const std::uint32_t point = plain_member(block);
@@ -838,7 +841,7 @@ TEST(StoreInvariants, VerifyFindsHierarchiesThatAreNone) {
                    block.positions[plain_member(block)][2] += 1;
                  }),
                  "are not the points above that head its clusters");
-  // A representative that says otherwise than the point above what it heads.
+  // A representative whose children differ from those of the point above.
   expect_problem(rewritten([](auto& blocks) {
                    OwnedBlock& block = block_of(blocks, 1);
                    std::swap(block.children[block.representatives[0]],
@@ -852,11 +855,11 @@ TEST(StoreInvariants, VerifyFindsHierarchiesThatAreNone) {
                    const Point3 at = block.positions[block.representatives[0]];
                    block.summaries[0].box = {at, at};
                  }),
-                 "a cluster below reaches out of its box");
+                 "a cluster below exceeds its box");
 }
 
-/// Boxes of 32 columns from a multiple of 32 on look as if they had been grown to that: the box
-/// above must hold the very points all the same.
+/// Boxes of 32 columns from a multiple of 32 on look as if they had been enlarged to that size. The
+/// box above must still contain the points themselves.
 TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
   for (const int missed : {0, 1, 31}) {
     const TemporaryFolder folder;
@@ -894,7 +897,7 @@ TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
     if (missed == 0) {
       EXPECT_EQ(problems, "");
     } else {
-      EXPECT_EQ(problems, "cluster 1/0: a cluster below reaches out of its box\n");
+      EXPECT_EQ(problems, "cluster 1/0: a cluster below exceeds its box\n");
     }
   }
 }

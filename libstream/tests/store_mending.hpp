@@ -19,12 +19,12 @@
 #include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
 
-/// Stores as bytes in memory that can be modified arbitrarily: mend() recomputes all checksums, so
-/// that the code after them is reached. For tests and for the fuzzer.
+/// Stores as bytes in memory that tests and fuzzers modify. mend() recomputes all checksums, so
+/// that the code after their checks is reached.
 
 namespace terrace::stream::testing {
 
-/// By name within the store's folder.
+/// Contents by name in the store's folder.
 using StoreFiles = std::map<std::string, std::string>;
 
 inline StoreFiles read_files(const std::filesystem::path& folder) {
@@ -36,7 +36,7 @@ inline StoreFiles read_files(const std::filesystem::path& folder) {
   return files;
 }
 
-/// Writes into an existing folder.
+/// Writes the files to an existing folder.
 inline void write_files(const std::filesystem::path& folder, const StoreFiles& files) {
   for (const auto& [name, bytes] : files) {
     std::ofstream(folder / name, std::ios::binary) << bytes;
@@ -53,19 +53,19 @@ inline void sign(std::string& bytes, std::size_t begin, std::size_t end) {
   std::memcpy(bytes.data() + end - 4, &checksum, 4);
 }
 
-/// A part of the index: where it begins, and where it ends, its checksum included.
+/// A part of the index: its begin, and its end including the checksum.
 struct Part {
   std::size_t begin = 0, end = 0;
 };
 
-/// One level's index and data as far as they can be found.
+/// The index and data of a level, with the parts that can be found.
 struct LevelBytes {
   std::string& data;
   std::string& index;
   std::size_t clusters = 0, directory_bytes = 0;
   store::Layout layout;
   std::vector<Part> page_parts{}, contents{}, sets{};  ///< before version 5 sets have no checksums
-  std::vector<std::uint64_t> set_firsts{};             ///< the clusters that they begin with
+  std::vector<std::uint64_t> set_firsts{};             ///< the first clusters of the sets
 
   [[nodiscard]] bool old() const { return layout.version < 5; }
   [[nodiscard]] std::size_t pages() const {
@@ -96,7 +96,7 @@ struct LevelBytes {
     const std::uint16_t checksum = store::crc16(bytes({part.begin, part.end - 2}));
     std::memcpy(&index[part.end - 2], &checksum, 2);
   }
-  /// Finds the parts, up to where the bytes make no sense.
+  /// Finds the parts, as far as the bytes are valid.
   void find() {
     try {
       store::ByteReader in(bytes({directory(), index.size()}));
@@ -156,7 +156,7 @@ struct LevelBytes {
   }
 };
 
-/// An index of the version that is written, to be changed and put together again.
+/// The parts of an index of the current version, which can be changed and put together again.
 struct IndexParts {
   struct Page {
     std::string bytes, box;
@@ -188,7 +188,7 @@ struct IndexParts {
       sets.emplace_back(level.set_firsts[s], set.substr(0, set.size() - 4));
     }
   }
-  /// Changes index and directory_bytes of `level`.
+  /// Sets the index and directory_bytes of `level`.
   void put_together(LevelBytes& level) const {
     std::string all_pages, all_contents, all_sets;
     store::Bytes directory;
@@ -226,10 +226,11 @@ struct IndexParts {
   }
 };
 
-/// In old pages the checksum column, the twelfth, is 16 bits wide in everything the library wrote.
+/// Sets the checksums of an old page. Their column, the twelfth, is 16 bits wide in all stores that
+/// the library wrote.
 inline void mend_old_checksums(LevelBytes& level, std::size_t page, const store::Bytes& checksums) {
   const std::size_t begin = level.page_parts[page].begin, count = level.clusters_of(page);
-  // Where the columns begin, and how many bits precede the checksums.
+  // Finds where the columns begin, and how many bits precede the checksums.
   store::ByteReader in(level.bytes(level.page_parts[page]));
   in.varint();
   std::size_t bits = 0;
@@ -285,13 +286,13 @@ inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
       }
     }
   } catch (const store::Damage&) {
-    return;  // no page: nothing to mend
+    return;  // not a page
   }
   level.sign_page(page);
 }
 
-/// The levels whose files exist. `manifest`: as JSON; its size of a directory and its number of
-/// clusters need not be true.
+/// Visits the levels whose files exist. manifest: as JSON; its sizes of directories and numbers of
+/// clusters may be wrong.
 inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
                            const std::function<void(LevelBytes&, nlohmann::ordered_json&)>& use) {
   if (!manifest.contains("levels") || !manifest["levels"].is_array()) return;
@@ -357,7 +358,7 @@ inline void mend(StoreFiles& files) {
   text.replace(text.size() - kDigitsFromEnd, 8, checksum);
 }
 
-/// Calls edit(manifest) and mends.
+/// Calls edit(manifest) and mends the store.
 inline void edit_manifest(StoreFiles& files,
                           const std::function<void(nlohmann::ordered_json&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
@@ -367,7 +368,7 @@ inline void edit_manifest(StoreFiles& files,
 }
 
 /// Calls edit(entries, offset of the first in the data file) for a page of a level, writes the
-/// result, moves what follows it, and mends.
+/// result, moves the bytes after it, and mends the store.
 inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
                       const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);

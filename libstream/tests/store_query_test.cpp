@@ -27,7 +27,7 @@ namespace {
 using testing::TemporaryFolder;
 using testing::uniform;
 
-/// A store and all its points with their levels, for brute force.
+/// A store and all its points with their levels, for comparison by brute force.
 class QueriedStore {
  public:
   QueriedStore(const StoreSchema& schema, const std::vector<testing::Block>& blocks,
@@ -54,8 +54,8 @@ class QueriedStore {
   std::vector<FoundPoint> points_;
 };
 
-/// A small box is found without reading the index of what is far away.
-TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
+/// The points of a small box are found without reading the index of distant clusters.
+TEST(StoreQuery, ReadsOnlyTheNearbyPartOfTheIndex) {
   const TemporaryFolder folder;
   testing::write_store(
       folder.path() / "s", testing::grid_schema(ScalarType::i16),
@@ -76,7 +76,7 @@ TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
   read = 0;
   StoreQuery query(store);
   const Box3 box{{300, 200, -1e9}, {304, 204, 1e9}};
-  const std::size_t inside = query.in_box(box).size();  // some cells are empty
+  const std::size_t inside = query.in_box(box).size();  // some cells have no data
   EXPECT_GT(inside, 10u);
   EXPECT_EQ(query.count(box), inside);
   EXPECT_EQ(query.nearest({100, 100, store.mean_height()}, 1).size(), 1u);
@@ -84,8 +84,8 @@ TEST(StoreQuery, ReadsTheIndexOfWhatIsNearAlone) {
   EXPECT_LT(read, index / 20);
 }
 
-/// In an index of many chapters the contents of those nearby are read, once, and no others.
-TEST(StoreQuery, ReadsTheContentsOfTheIndexThatAreNearAlone) {
+/// In an index of many chapters, only the contents of nearby chapters are read, and once.
+TEST(StoreQuery, ReadsOnlyTheContentsOfNearbyChapters) {
   const TemporaryFolder folder;
   const std::vector<testing::Block> blocks =
       testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 1200, 1200, 30, 1);
@@ -104,7 +104,7 @@ TEST(StoreQuery, ReadsTheContentsOfTheIndexThatAreNearAlone) {
           ++reads;
         });
   });
-  // The directory is small, and all that has been read.
+  // The directory is small, and nothing else has been read.
   ASSERT_GT(store.levels()[0].clusters, 150000u);
   EXPECT_EQ(reads, 1u);
   EXPECT_LT(read, 10000u);
@@ -138,7 +138,7 @@ std::vector<Key> keys_of(std::vector<FoundPoint> points, bool sorted) {
   return keys;
 }
 
-/// Distances as long doubles, which hold the squares of all doubles here.
+/// Returns distances as long doubles, which do not overflow here.
 double distance_between(const LinearMap& map, const Point3& a, const Point3& b) {
   long double square = 0;
   for (std::size_t row = 0; row < 3; ++row) {
@@ -164,7 +164,7 @@ std::vector<QueriedStore> stores_of_all_kinds() {
       testing::grid_schema(ScalarType::i16),
       testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 70, 60, 20, 12),
       testing::StandInHierarchy::Options{.block_points = 400, .cluster_points = 40});
-  // One block, so that the root holds all points; and an empty store.
+  // One block, so that the root has all points; and an empty store.
   stores.emplace_back(testing::cloud_schema(),
                       testing::cloud_blocks(testing::Numbers::decimals, 30, 500, 13),
                       testing::StandInHierarchy::Options{});
@@ -173,7 +173,7 @@ std::vector<QueriedStore> stores_of_all_kinds() {
   return stores;
 }
 
-/// Boxes of all sizes around points and anywhere, including flat and inverted ones.
+/// Returns boxes of all sizes, around points and anywhere, including flat and inverted ones.
 Box3 random_box(std::mt19937_64& random, const QueriedStore& queried) {
   const auto& points = queried.points();
   const auto corner = [&]() -> Point3 {
@@ -215,7 +215,7 @@ TEST(StoreQuery, RangesAndCountsAreThoseOfBruteForce) {
         ASSERT_EQ(keys_of(found, false), keys_of(expected, false)) << "level " << level;
         if (level > 0) continue;
         ASSERT_EQ(query.count(box), expected.size());
-        // Whatever the shares of clusters on the border are, those inside count in full.
+        // Whatever the shares of clusters on the border, clusters inside count completely.
         EXPECT_LE(query.estimate(box), static_cast<double>(queried.points().size()) * (1 + 1e-9));
       }
     }
@@ -248,7 +248,7 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
         if (level_of(point.cluster) < level) continue;
         expected.push_back(point);
       }
-      // First all of them: their distances are correct and in order.
+      // First all points: their distances are correct and in order.
       const auto all = query.nearest(place, expected.size() + 1, metric, level);
       ASSERT_EQ(all.size(), expected.size());
       for (const FoundPoint& point : all) {
@@ -263,7 +263,7 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
       }
       std::vector<Key> in_order = keys_of(all, true);
       EXPECT_TRUE(std::is_sorted(in_order.begin(), in_order.end()));
-      // Fewer of them, and those within a radius, are the first of all.
+      // Fewer points, and those within a radius, are the first of these.
       for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{7},
                                       static_cast<std::size_t>(random() % 500)}) {
         std::vector<Key> first = in_order;
@@ -279,7 +279,7 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
   }
 }
 
-/// A cloud whose points have the sum of their coordinates as an attribute.
+/// Returns a cloud whose points have the sum of their coordinates as an attribute.
 QueriedStore store_of_sums() {
   StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("sum"));
@@ -311,7 +311,7 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
   }
 }
 
-TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
+TEST(StoreQuery, FindsOnlyPointsThatMeetTheCondition) {
   const QueriedStore queried = store_of_sums();
   std::vector<double> sums;
   for (const FoundPoint& point : queried.points()) {
@@ -369,7 +369,7 @@ TEST(StoreQuery, FindsThePointsThatMeetAConditionAlone) {
   }
 }
 
-TEST(StoreView, CountsThePointsThatMeetItsConditionAlone) {
+TEST(StoreView, CountsOnlyPointsThatMeetTheCondition) {
   const QueriedStore queried = store_of_sums();
   const Store& store = queried.store();
   for (const char* condition : {"sum > 150", "sum > 150 && sum < 150.5", "x > 40 && y < 20",
@@ -384,7 +384,7 @@ TEST(StoreView, CountsThePointsThatMeetItsConditionAlone) {
     Box3 bounds;
     std::size_t left_out = 0;
     for (unsigned level = 0; level <= store.top(); ++level) {
-      // By all points of all clusters, whatever their ranges say.
+      // By all points of all clusters, without using their ranges.
       std::vector<std::pair<ClusterId, std::uint32_t>> expected, marked;
       std::size_t clusters = 0;
       store.for_each(level, [&](ClusterId id, const ClusterRecord&, const ClusterPoints& points) {
@@ -413,12 +413,12 @@ TEST(StoreView, CountsThePointsThatMeetItsConditionAlone) {
     }
     EXPECT_EQ(view.bounds(), bounds);
     EXPECT_EQ(view.with_stop({}).bounds(), bounds);
-    // The first has points everywhere, of the second few clusters have one.
+    // The first condition is met everywhere, the second in few clusters.
     const std::string_view text = condition;
     EXPECT_EQ(text == "sum == sum" && left_out > 0, false);
     EXPECT_EQ(text == "sum > 150 && sum < 150.5" && left_out == 0, false);
   }
-  // A view of a view; an empty condition; one that none meets; one that is none.
+  // A view of a view; an empty condition; one that no point meets; and an invalid one.
   const Store both = store.where("sum > 150 || x < 5").where("y < 30 || z < 1");
   EXPECT_EQ(
       StoreQuery(both).count(store.bounds()),
@@ -427,7 +427,7 @@ TEST(StoreView, CountsThePointsThatMeetItsConditionAlone) {
   EXPECT_EQ(StoreQuery(store.where("sum < -1")).count(store.bounds()), 0U);
   try {
     static_cast<void>(store.where("sum < -1").bounds());
-    FAIL() << "there are bounds of nothing";
+    FAIL() << "a view without points has bounds";
   } catch (const Error& error) {
     EXPECT_EQ(error.parts().cause, "no point meets the condition 'sum < -1'");
   }
@@ -438,7 +438,7 @@ TEST(StoreView, CountsThePointsThatMeetItsConditionAlone) {
   EXPECT_THROW(static_cast<void>(stopped.bounds()), Stopped);
 }
 
-TEST(StoreQuery, EndsOnceTheStoreIsAskedToStop) {
+TEST(StoreQuery, EndsWhenTheStoreIsStopped) {
   const QueriedStore queried(testing::cloud_schema(),
                              testing::cloud_blocks(testing::Numbers::decimals, 20000, 500, 5),
                              {.block_points = 500, .cluster_points = 40});

@@ -23,7 +23,7 @@ using testing::StandInHierarchy;
 using testing::TemporaryFolder;
 using testing::uniform;
 
-TEST(Store, EmptyStoreOpens) {
+TEST(Store, OpensAnEmptyStore) {
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", testing::grid_schema(ScalarType::i16));
   StandInHierarchy(writer, {}).finish();
@@ -39,7 +39,7 @@ TEST(Store, EmptyStoreOpens) {
   EXPECT_TRUE(store.verify(testing::expect_no_problem));
 }
 
-TEST(Store, OnePointComesBack) {
+TEST(Store, RoundTripsOnePoint) {
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", testing::cloud_schema());
   StandInHierarchy hierarchy(writer, {});
@@ -50,7 +50,7 @@ TEST(Store, OnePointComesBack) {
   EXPECT_TRUE(store.verify(testing::expect_no_problem));
 }
 
-TEST(Store, ReadingEndsOnceItIsAskedToStop) {
+TEST(Store, ReadingEndsWhenStopped) {
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", testing::cloud_schema());
   StandInHierarchy hierarchy(writer, {});
@@ -75,7 +75,7 @@ TEST(Store, ReadingEndsOnceItIsAskedToStop) {
 }
 
 /// Rasters of every sample type, smooth and rough, are read back bit for bit.
-TEST(Store, GridsComeBackBitForBit) {
+TEST(Store, RoundTripsGridsBitForBit) {
   for (const ScalarType type : testing::kAllTypes) {
     for (const testing::Relief relief :
          {testing::Relief::flat, testing::Relief::fractal, testing::Relief::noise,
@@ -89,7 +89,7 @@ TEST(Store, GridsComeBackBitForBit) {
   }
 }
 
-TEST(Store, GridsFarFromTheOriginComeBack) {
+TEST(Store, RoundTripsGridsFarFromTheOrigin) {
   auto blocks = testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 60, 60, 30, 2);
   for (auto& block : blocks) {
     for (Point3& p : block.positions) {
@@ -101,7 +101,7 @@ TEST(Store, GridsFarFromTheOriginComeBack) {
                             {.block_points = 900, .cluster_points = 30});
 }
 
-TEST(Store, CellsGivenTwiceAreKept) {
+TEST(Store, KeepsCellsThatOccurTwice) {
   std::vector<testing::Block> blocks(3);
   std::mt19937_64 random(3);
   for (auto& block : blocks) {
@@ -121,7 +121,7 @@ TEST(Store, CellsGivenTwiceAreKept) {
                             {.block_points = 500, .cluster_points = 50});
 }
 
-TEST(Store, CloudsOfAllNumbersComeBackBitForBit) {
+TEST(Store, RoundTripsCloudsOfAllNumbersBitForBit) {
   for (const auto numbers :
        {testing::Numbers::decimals, testing::Numbers::floats, testing::Numbers::doubles,
         testing::Numbers::extremes, testing::Numbers::mixed, testing::Numbers::lines}) {
@@ -131,7 +131,7 @@ TEST(Store, CloudsOfAllNumbersComeBackBitForBit) {
   }
 }
 
-TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
+TEST(Store, RoundTripsAttributesOfAllTypesBitForBit) {
   StoreSchema schema = testing::cloud_schema();
   for (const ScalarType type : testing::kAllTypes)
     schema.attributes.push_back(testing::channel(std::string(name_of(type)), type));
@@ -140,7 +140,7 @@ TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
   std::uint64_t row = 0;
   for (auto& block : blocks) {
     for (std::size_t i = 0; i < block.positions.size(); ++i, ++row) {
-      // Constant, counting and random bytes in turn: the last also make NaNs with every payload.
+      // Constant, counting and random bytes in turn; random ones include NaNs with every payload.
       for (const Channel& channel : schema.attributes) {
         const std::uint64_t value = row < 1800 ? 0 : row < 3600 ? row : random();
         const auto* bytes = reinterpret_cast<const std::byte*>(&value);
@@ -151,9 +151,9 @@ TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
   testing::check_round_trip(schema, blocks, {.block_points = 900, .cluster_points = 60});
 }
 
-// Typical attributes of a survey: colours that change together in fields too wide for them, pulses
-// at a few intervals, a field that is never set. With random points the order of the lines is lost.
-TEST(Store, AttributesOfScanLinesAreSmall) {
+// Typical attributes of a survey: colours that change together in fields wider than needed, pulses
+// at a few intervals, a field that is never set. Random points lose the order of the lines.
+TEST(Store, AttributesOfScanLinesTakeFewBytes) {
   StoreSchema schema = testing::cloud_schema();
   for (const char* colour : {"red", "green", "blue"}) {
     schema.attributes.push_back(testing::channel(colour, ScalarType::u16));
@@ -182,12 +182,12 @@ TEST(Store, AttributesOfScanLinesAreSmall) {
     bytes[lines ? 0 : 1] =
         testing::check_round_trip(schema, blocks, {.block_points = 900, .cluster_points = 60});
   }
-  // Of 22 bytes of attributes: grey 1, time 1/4, the rest little.
+  // Of 22 bytes of attributes, grey takes 1, the time 1/4, the others little.
   EXPECT_LT(bytes[0], 8000 * 5);
   EXPECT_LT(bytes[0], bytes[1] / 2);
 }
 
-TEST(Store, DecimalAttributesAreSmall) {
+TEST(Store, DecimalAttributesTakeFewBytes) {
   StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("t", ScalarType::f64));
   auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 7);
@@ -207,8 +207,8 @@ TEST(Store, DecimalAttributesAreSmall) {
   EXPECT_LT(with, without + 6000 * 2);
 }
 
-// For any values, including NaN and the ends of 64 bits, ranges are close to the values.
-TEST(Store, RangesOfAttributesHoldTheirValues) {
+// Ranges contain the values and are close to them, also for NaN and the limits of 64 bits.
+TEST(Store, RangesOfAttributesContainTheirValues) {
   StoreSchema schema = testing::cloud_schema();
   for (const ScalarType type : testing::kAllTypes) {
     schema.attributes.push_back(testing::channel(std::string(name_of(type)), type));
@@ -254,7 +254,7 @@ TEST(Store, RangesOfAttributesHoldTheirValues) {
           high = std::max(high, value);
         }
         at += size_of(channel.type);
-        // By a 32nd of the range of a page at either end.
+        // Wider by at most a 32nd of the page's range at either end.
         if (channel.type == ScalarType::u32) {
           EXPECT_LE(ranges[a].high - ranges[a].low, high - low + 0x1p32 / 31 * 2);
         }
@@ -267,7 +267,7 @@ TEST(Store, RangesOfAttributesHoldTheirValues) {
   EXPECT_THROW(static_cast<void>(store.attribute_ranges(cluster_id(0, 1u << 20))), Error);
 }
 
-/// The files of a store in memory, by name.
+/// Reads the files of a store into memory, by name.
 std::map<std::string, std::vector<std::byte>> files_in_memory(const std::filesystem::path& store) {
   std::map<std::string, std::vector<std::byte>> files;
   for (const auto& entry : std::filesystem::directory_iterator(store)) {
@@ -290,12 +290,12 @@ TEST(Store, OpensFromMemory) {
   EXPECT_EQ(testing::all_points(store), testing::all_points(Store::open(folder)));
 }
 
-TEST(Store, FailuresOfTheCallersBytesReachTheCaller) {
+TEST(Store, PassesOnExceptionsOfTheCallersFiles) {
   const auto files = files_in_memory(std::filesystem::path(TERRACE_TEST_DATA) / "stores" / "grid");
   struct Lost : std::runtime_error {
     using std::runtime_error::runtime_error;
   };
-  // Each read in turn fails: opening and verifying throw what the function threw.
+  // Each read in turn fails, and opening and verifying throw what the function threw.
   for (int failing = 0;; ++failing) {
     int reads = 0;
     const auto open = [&] {
@@ -325,7 +325,7 @@ TEST(Store, FailuresOfTheCallersBytesReachTheCaller) {
   EXPECT_THROW(Store::open("server", cut), Error);
 }
 
-TEST(Store, TheVersionThatWasNeverReleasedIsRefused) {
+TEST(Store, RefusesTheVersionThatWasNeverReleased) {
   auto files = files_in_memory(std::filesystem::path(TERRACE_TEST_DATA) / "stores" / "island");
   std::vector<std::byte>& manifest = files.at("manifest.json");
   std::string text(reinterpret_cast<const char*>(manifest.data()), manifest.size());
@@ -341,8 +341,8 @@ TEST(Store, TheVersionThatWasNeverReleasedIsRefused) {
   }
 }
 
-/// Blocks of still water are alike: their clusters take the bytes of the first of them.
-TEST(Store, BlocksThatAreAlikeShareTheirBytes) {
+/// Blocks of still water are equal, so their clusters share the bytes of the first one.
+TEST(Store, EqualBlocksShareTheirBytes) {
   const auto water = [](int side, bool still) {
     std::mt19937_64 random(1);
     std::vector<testing::Block> blocks;
@@ -368,7 +368,7 @@ TEST(Store, BlocksThatAreAlikeShareTheirBytes) {
   EXPECT_GT(data_bytes(false), 20000u);
 }
 
-/// data/stores/README.md: every version must read them.
+/// Every version must read these stores; see data/stores/README.md.
 TEST(Store, GoldenStoresAreSound) {
   const std::filesystem::path folder = std::filesystem::path(TERRACE_TEST_DATA) / "stores";
   for (const auto& [name, version, points] :
@@ -392,7 +392,7 @@ TEST(Store, GoldenStoresAreSound) {
 }
 
 /// The bytes of a store do not depend on the compiler or its optimisation: GCC at -O3 and with
-/// sanitizers, and Clang at -O1, give the same checksums. They change only with the format.
+/// sanitizers, and Clang at -O1, give these checksums. They change only with the format.
 TEST(Store, ChecksumsAreTheSameWithEveryCompiler) {
   const TemporaryFolder folder;
   const auto checksum = [&](const char* name, const StoreSchema& schema, const auto& blocks) {

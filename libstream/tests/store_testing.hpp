@@ -129,7 +129,8 @@ inline double limit_high(ScalarType type) {
   return 0;
 }
 
-/// A raster in square tiles of at most `tile` cells a side, a tenth of the cells without data.
+/// Returns a raster in square tiles of at most `tile` cells per side, with a tenth of the cells
+/// without data.
 inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width, int height,
                                       int tile, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -178,7 +179,7 @@ inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width,
   return blocks;
 }
 
-/// `lines`: decimals, each point near the previous one.
+/// lines: decimals, with each point near the previous one.
 enum class Numbers { decimals, floats, doubles, extremes, mixed, lines };
 
 inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
@@ -217,7 +218,7 @@ inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
   return blocks;
 }
 
-/// Points as bit patterns, with their attributes, and the number of occurrences of each.
+/// A multiset of points, as bit patterns with their attributes.
 class PointBag {
  public:
   struct Item {
@@ -244,7 +245,7 @@ inline void expect_no_problem(const Problem& problem) {
   ADD_FAILURE() << problem.file << ", byte " << problem.offset << ": " << problem.what;
 }
 
-/// The members of all levels: every point of the store once.
+/// Returns the members of all levels, that is, every point of the store once.
 inline PointBag all_points(const Store& store) {
   PointBag bag;
   const std::size_t stride = store.schema().payload_size();
@@ -295,10 +296,11 @@ inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vect
     const double size = std::max(std::abs(bounds.min[2]), std::abs(bounds.max[2]));
     EXPECT_NEAR(store.mean_height(), mean, 1e-9 * size);
   }
-  EXPECT_TRUE(all_points(store) == expected) << "other points came back";
+  EXPECT_TRUE(all_points(store) == expected) << "the points differ";
   EXPECT_TRUE(store.verify(expect_no_problem));
 
-  // One by one, the same as in sequence; and the head of a cluster is its representative.
+  // Reading one by one gives the same as in sequence, and the head of a cluster equals its
+  // representative.
   ClusterPoints single, head;
   for (unsigned level = 0; level <= store.top(); ++level) {
     std::uint64_t next = 0;

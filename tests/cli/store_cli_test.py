@@ -149,11 +149,11 @@ class StoreTest(unittest.TestCase):
                      ('raster',), ('contour', '--interval', 50)):
             output = out + {'tile': '', 'raster': '.tif', 'contour': '.geojson'}.get(verb[0], '.out')
             error = self.expect_error(1, *verb, store, '-o', output, '-q')
-            self.assertIn('outside of the bounds of the store', error, verb)
+            self.assertIn('outside the bounds of the store', error, verb)
             self.assertFalse(os.path.exists(output), verb)
         result = terrace('verify', store)
         self.assertEqual(result.returncode, 1, result.stderr)
-        self.assertIn('outside of the bounds of the store', result.stdout + result.stderr)
+        self.assertIn('outside the bounds of the store', result.stdout + result.stderr)
 
     def test_points_of_every_level_are_as_many_as_info_says(self):
         for level in json.loads(self.run_ok('info', self.store, '--json'))['levels']:

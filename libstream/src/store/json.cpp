@@ -103,7 +103,7 @@ class JsonParser {
       if (!take_digits()) fail("digits are missing");
     }
   }
-  /// After its opening quote.
+  /// Parses a string after its opening quote.
   std::string string() {
     std::string out;
     while (!take('"')) {
@@ -119,8 +119,8 @@ class JsonParser {
     }
     return out;
   }
-  /// The bytes of the next character in UTF-8 (RFC 3629); 0 for control characters and what is
-  /// none.
+  /// Returns the bytes of the next character in UTF-8 (RFC 3629); 0 for control characters and
+  /// invalid bytes.
   [[nodiscard]] std::size_t character() const {
     const auto byte = [&](std::size_t i) {
       return at_ + i < text_.size() ? static_cast<unsigned char>(text_[at_ + i]) : 0u;
@@ -128,7 +128,7 @@ class JsonParser {
     const unsigned first = byte(0), second = byte(1);
     if (first < 0x80) return first >= 0x20 ? 1 : 0;
     const std::size_t length = first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-    // Neither longer than needed, nor half of a pair, nor beyond the last character.
+    // Rejects overlong forms, surrogates, and numbers above the last character.
     if (first > 0xF4 || (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
         (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F)) {
       return 0;
@@ -149,7 +149,7 @@ class JsonParser {
     if (code >= 0xD800 && code < 0xE000) {
       expect('\\', "half of a pair of escapes is missing");
       const unsigned low = code_unit();
-      if (code >= 0xDC00 || low < 0xDC00 || low >= 0xE000) fail("a pair of escapes is none");
+      if (code >= 0xDC00 || low < 0xDC00 || low >= 0xE000) fail("a pair of escapes is bad");
       code = 0x10000 + ((code - 0xD800) << 10) + (low - 0xDC00);
     }
     const auto put = [&](unsigned byte) { out += static_cast<char>(byte); };
@@ -167,7 +167,7 @@ class JsonParser {
     }
     put(0x80 | (code & 0x3F));
   }
-  /// "u" and four hexadecimal digits.
+  /// Parses "u" and four hexadecimal digits.
   unsigned code_unit() {
     expect('u', "an escape is unknown");
     unsigned code = 0;
@@ -220,7 +220,7 @@ std::uint64_t JsonValue::count() const {
   const char* const end = text_.data() + text_.size();
   const auto [rest, error] = std::from_chars(text_.data(), end, value);
   if (kind_ != Kind::number || error != std::errc() || rest != end) {
-    throw Damage("a count is not an integer from 0 up");
+    throw Damage("a count is not an unsigned integer");
   }
   return value;
 }

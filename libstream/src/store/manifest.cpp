@@ -23,7 +23,7 @@ std::uint32_t from_hexadecimal(const std::string& text) {
   return value;
 }
 
-/// JSON has no infinities and no NaN; they are words.
+/// JSON has no infinities and NaN, so they are words.
 double number(const JsonValue& json) {
   if (json.kind() != JsonValue::Kind::string) return json.number();
   const std::string& word = json.string();
@@ -65,7 +65,7 @@ Point3 point_of(const JsonValue& json) {
 FileEntry file_of(const JsonValue& json) {
   FileEntry file{json.at("file").string(), json.at("bytes").count(),
                  from_hexadecimal(json.at("crc32").string())};
-  // A name, not a way out of the folder.
+  // A name must not lead out of the folder.
   if (file.name.empty() || file.name.find('/') != std::string::npos || file.name[0] == '.') {
     throw Damage("a file name is not allowed");
   }
@@ -116,7 +116,7 @@ Manifest from_json(const JsonValue& json) {
     const JsonValue& segment =
         items(level.at("segments"), 1, "a level does not have one segment").front();
     if (level.at("level").count() != m.levels.size()) {
-      throw Damage("the levels do not follow one another from 0 up");
+      throw Damage("the levels are not numbered from 0 up");
     }
     LevelEntry entry;
     entry.points = level.at("points").count();
@@ -133,13 +133,14 @@ Manifest from_json(const JsonValue& json) {
   return m;
 }
 
-/// What must hold whatever the files hold. Readers and all who size arrays by a manifest rely on
-/// it: sums and products of its counts do not wrap, and no count is out of proportion to the files.
+/// Throws Damage unless the counts are consistent with one another and with the sizes of the files.
+/// Readers, and callers that size arrays by a manifest, rely on this: sums and products of its
+/// counts do not wrap, and no count is out of proportion to the files.
 void check_counts(const Manifest& m) {
   if (m.levels.empty() || m.levels.size() > 255) throw Damage("the number of levels is impossible");
   if (m.levels[0].points != m.points) throw Damage("the points of level 0 are not all points");
   if (m.points > kMostStorePoints || m.schema.nodata > kMostStorePoints) {
-    throw Damage("the store is said to have more points than one can have");
+    throw Damage("the store has more points than possible");
   }
   if (m.points == 0 && (m.levels.size() > 1 || m.levels[0].data.bytes > 0)) {
     throw Damage("a store without points has clusters");
@@ -151,7 +152,7 @@ void check_counts(const Manifest& m) {
     if (level.points < above || level.members != level.points - above) {
       throw Damage("the members of level " + std::to_string(l) + " do not add up");
     }
-    // Every cluster is headed by a point of the next level, but for the root.
+    // Every cluster except the root is headed by a point of the next level.
     if (level.clusters != (top ? 1 : above)) {
       throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
     }
@@ -176,7 +177,7 @@ void check_places(const Manifest& m) {
       !std::isfinite(xy[5])) {
     throw Damage("the world transform cannot be inverted");
   }
-  if (m.bounds.empty() != (m.points == 0)) throw Damage("the bounds do not suit the points");
+  if (m.bounds.empty() != (m.points == 0)) throw Damage("the bounds do not fit the points");
   for (std::size_t axis = 0; axis < 3 && m.points > 0; ++axis) {
     if (!std::isfinite(m.bounds.min[axis]) || !std::isfinite(m.bounds.max[axis])) {
       throw Damage("the bounds are not finite");
@@ -197,21 +198,22 @@ void check_places(const Manifest& m) {
     const double low = m.bounds.min[axis], high = m.bounds.max[axis];
     if (m.points > 0 && !(low >= 0 && high < static_cast<double>(cells[axis]) &&
                           low == std::floor(low) && high == std::floor(high))) {
-      throw Damage("the bounds do not lie on the raster's columns and rows");
+      throw Damage("the bounds are not on the raster's columns and rows");
     }
   }
 }
 
-/// Words of which the format knows a few: programs compare them, and show them as they are.
+/// Throws Damage for a word unless it is one of the few that the format defines. Programs compare
+/// these words and show them unchanged.
 void check_words(const Manifest& m) {
   const auto check = [](const std::string& word, std::initializer_list<const char*> known,
                         const char* otherwise) {
     if (std::find(known.begin(), known.end(), word) == known.end()) throw Damage(otherwise);
   };
-  check(m.schema.vertical, {"", "ellipsoidal", "orthometric"}, "what heights refer to is unknown");
+  check(m.schema.vertical, {"", "ellipsoidal", "orthometric"}, "the kind of heights is unknown");
   for (const auto& [name, value] : m.schema.parameters) {
     if (name != "entities") continue;
-    // The names of Entities.
+    // The names of the enumeration Entities.
     check(value, {"points", "triangles", "segments", "polylines"}, "the entities are unknown");
   }
 }
@@ -220,7 +222,7 @@ void check_words(const Manifest& m) {
   throw Error({.file = file,
                .where = {},
                .cause = "damaged manifest: " + cause,
-               .remedy = "restore the file or build the store anew"});
+               .remedy = "restore the file or rebuild the store"});
 }
 
 }  // namespace
@@ -252,9 +254,9 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
   try {
     const JsonValue json = JsonValue::parse(text);
     if (json.at("format").string() != kFormatName) {
-      damaged(file, "it does not say that this is a store");
+      damaged(file, "its format is not terrace-store");
     }
-    // Before anything that a newer version may do otherwise.
+    // Checked before anything that may differ in a newer version.
     const auto version = json.at("version").count();
     if (version > kVersion) {
       throw Error({.file = file,
@@ -268,7 +270,7 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
       throw Error({.file = file,
                    .where = {},
                    .cause = "store version " + std::to_string(version) + " was never released",
-                   .remedy = "build the store anew"});
+                   .remedy = "rebuild the store"});
     }
     if (version < 1) damaged(file, "the version is impossible");
 

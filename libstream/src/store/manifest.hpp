@@ -16,14 +16,14 @@ namespace terrace::stream::store {
 
 inline constexpr std::uint64_t kMostManifestBytes = 64u << 20;
 inline constexpr std::size_t kMostAttributes = 4096;
-/// Limits of points, cells without data, columns and rows: sums and products of them, and of points
-/// and the bytes of a point, fit into 64 bits.
+/// Limits of points, cells without data, columns and rows, so that their sums and products, and
+/// that of points and the bytes of a point, fit into 64 bits.
 inline constexpr std::uint64_t kMostStorePoints = std::uint64_t{1} << 48;
 inline constexpr std::uint64_t kMostColumns = std::uint64_t{1} << 31;
 
 inline constexpr std::string_view kFormatName = "terrace-store";
-/// The text ends with this, eight hexadecimal digits, and the closing below. The checksum is the
-/// CRC-32 of the whole text with zeros for its digits.
+/// The text ends with this key, eight hexadecimal digits, and the closing below. The checksum is
+/// the CRC-32 of the whole text with zeros for its digits.
 inline constexpr std::string_view kChecksumKey = "\"checksum\": \"";
 inline constexpr std::string_view kClosing = "\"\n}\n";
 inline constexpr std::string_view kZeros = "00000000";
@@ -51,24 +51,24 @@ struct Manifest {
   std::uint32_t checksum = 0;      ///< of the text; set by parse_manifest()
 };
 
-/// True if the corners of the box, in the CRS, are.
+/// True if the corners of the box in the CRS are finite.
 bool is_finite_in_crs(const Placement& placement, const Box3& stored);
 
-/// Eight lower-case digits.
+/// Returns eight lower-case hexadecimal digits.
 std::string hexadecimal(std::uint32_t value);
 
-/// The manifest as JSON text, including its checksum.
+/// Returns the manifest as JSON text, including its checksum.
 std::string to_text(const Manifest& manifest);
 
-/// The text of a manifest. Throws: Error if it is too large or cannot be read.
+/// Reads the text of a manifest. Throws: Error if it is too large or cannot be read.
 std::string read_manifest(const ByteSource& file);
 
-/// Throws: Error, in the name of `file`, if the text is not a manifest of this version or earlier,
-/// or was modified.
+/// Parses a manifest. Throws: Error, naming `file`, if the text is not a manifest of this version
+/// or an earlier one, or was modified.
 Manifest parse_manifest(const std::string& text, const std::string& file);
 
-/// Whether `text`, from which parse_manifest() made `manifest`, has exactly the keys of the format,
-/// in the format's order.
+/// Whether `text`, the source of `manifest`, has exactly the keys of the format, in the format's
+/// order.
 bool is_as_written(const std::string& text, const Manifest& manifest);
 
 }  // namespace terrace::stream::store

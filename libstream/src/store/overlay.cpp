@@ -17,7 +17,7 @@ using namespace store;
 
 namespace {
 
-constexpr const char* kRestoreOverlay = "restore the file or make the overlay anew";
+constexpr const char* kRestoreOverlay = "restore the file or write the overlay again";
 
 std::unique_ptr<ByteSource> open_overlay(const std::filesystem::path& path) {
   std::error_code error;
@@ -25,7 +25,7 @@ std::unique_ptr<ByteSource> open_overlay(const std::filesystem::path& path) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no overlay here",
-                 .remedy = "name an overlay that terrace has written"});
+                 .remedy = "give an overlay written by terrace"});
   }
   return open_file(path);
 }
@@ -67,9 +67,9 @@ void Overlay::Impl::read_header(const Store& store) {
     file->read(0, std::as_writable_bytes(std::span(bytes)));
     if (bytes.size() < kOverlayMarkBytes + 4 ||
         !std::equal(kOverlayMark, kOverlayMark + kOverlayMarkBytes, bytes.begin())) {
-      throw Damage("the file does not say that it is an overlay");
+      throw Damage("the file is not an overlay");
     }
-    // Before anything that a newer version may do otherwise.
+    // Checked before anything that may differ in a newer version.
     const auto version = load<std::uint32_t>(bytes.data() + kOverlayMarkBytes);
     if (version > kOverlayVersion) {
       throw Error({.file = file->name(),
@@ -100,7 +100,7 @@ void Overlay::Impl::read_header(const Store& store) {
                    .where = {},
                    .cause = "was made for the store with the checksum " + hexadecimal(made_for) +
                             ", " + store.path().string() + " has " + hexadecimal(store.checksum()),
-                   .remedy = "name the store that it was made for, or make the overlay anew"});
+                   .remedy = "give the store that it was made for, or write the overlay again"});
     }
     read_directory(count, end, store.points());
   } catch (const Damage& damage) {
@@ -113,10 +113,10 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
   if (pages_end < header_end || pages_end > file->size() - 4 ||
       count != (file->size() - 4 - pages_end) / kOverlayEntryBytes ||
       count * kOverlayEntryBytes != file->size() - 4 - pages_end) {
-    throw Damage("the directory does not have the size that the header tells");
+    throw Damage("the directory does not have the size stated in the header");
   }
   try {
-    // In pieces: the entries are all that is kept.
+    // Read in pieces, of which only the entries are kept.
     std::uint32_t checksum = 0;
     Bytes bytes;
     std::uint64_t at = pages_end;
@@ -153,7 +153,7 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
       throw Damage("the checksum of the directory is wrong");
     }
     if (pages.empty() && pages_end != header_end) {
-      throw Damage("bytes that belong to no page");
+      throw Damage("there are bytes but no pages");
     }
   } catch (const Damage& damage) {
     throw damaged(pages_end, damage.what());
@@ -176,7 +176,7 @@ void Overlay::Impl::load_page(std::size_t number) {
     if (static_cast<std::uint64_t>(page.clusters.front()) != entry.first_cluster ||
         (!last &&
          static_cast<std::uint64_t>(page.clusters.back()) >= pages[number + 1].first_cluster)) {
-      throw Damage("the page does not have the clusters that the directory tells");
+      throw Damage("the page does not have the clusters stated in the directory");
     }
   } catch (const Damage& damage) {
     throw damaged(entry.offset, damage.what());

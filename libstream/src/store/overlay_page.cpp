@@ -51,7 +51,7 @@ void decode_overlay_page(ByteView bytes, std::uint64_t values, std::span<const L
   }
   ByteReader in(bytes.first(bytes.size() - 4));
   const auto clusters = in.get<std::uint32_t>();
-  // Every value takes a byte for its index and eight for itself; every cluster has a value.
+  // Every value takes nine bytes, one of them for its index, and every cluster has a value.
   if (values > in.left() / 9 || clusters > values) {
     throw Damage("the page is too short for its values");
   }
@@ -85,7 +85,7 @@ void decode_overlay_page(ByteView bytes, std::uint64_t values, std::span<const L
     }
   }
   if (page.values.size() != values || in.left() != 8 * values) {
-    throw Damage("the page does not have as many values as it should");
+    throw Damage("the page does not have the number of values stated in the directory");
   }
   for (OverlayValue& value : page.values) {
     value.value = in.get<double>();

@@ -13,26 +13,30 @@ namespace terrace::stream::store {
 inline constexpr char kOverlayMark[] = "terrace overlay\n";
 inline constexpr std::size_t kOverlayMarkBytes = sizeof kOverlayMark - 1;
 inline constexpr std::uint32_t kOverlayVersion = 1;
-/// Mark, version, checksum of the store, pages, offset of the directory, length of the name.
+/// Bytes of the mark, version, checksum of the store, pages, offset of the directory, length of the
+/// name.
 inline constexpr std::size_t kOverlayHeadBytes = kOverlayMarkBytes + 4 + 4 + 8 + 8 + 4;
 inline constexpr std::size_t kMostOverlayNameBytes = 65535;
 /// A page ends with the cluster that brings it to this many values.
 inline constexpr std::size_t kOverlayPageValues = 4096;
-/// In the directory: first cluster, offset, number of values.
+/// Bytes of a page's entry in the directory: first cluster, offset, number of values.
 inline constexpr std::size_t kOverlayEntryBytes = 8 + 8 + 4;
 
-/// The maximum bytes of a page of this many values: each in a separate cluster.
+/// Returns the maximum bytes of a page of this many values, which it has if each is in a separate
+/// cluster.
 constexpr std::uint64_t most_overlay_page_bytes(std::uint64_t values) {
   return 4 + values * (10 + 5 + 5 + 8) + 4;
 }
 
-/// Some complete clusters of an overlay. Cluster clusters[c] has values[first[c]] ... first[c + 1].
+/// Some complete clusters of an overlay. Cluster clusters[c] has values[first[c]] ...
+/// values[first[c + 1] - 1].
 struct OverlayPage {
   std::vector<ClusterId> clusters;
   std::vector<std::size_t> first{0};  ///< one more than clusters
   std::vector<OverlayValue> values;
 
-  /// `cluster` must not be below the last one, and indices of one cluster must ascend.
+  /// Adds a value. `cluster` must not be below the last one, and the indices of a cluster must
+  /// ascend.
   void add(ClusterId cluster, const OverlayValue& value);
   void clear();
   [[nodiscard]] std::span<const OverlayValue> of(std::size_t cluster) const {
@@ -42,11 +46,11 @@ struct OverlayPage {
   friend bool operator==(const OverlayPage&, const OverlayPage&) = default;
 };
 
-/// The bytes of a page, its CRC-32 at the end.
+/// Returns the bytes of a page, with its CRC-32 at the end.
 Bytes encode_overlay_page(const OverlayPage& page);
 
-/// Decodes into `page`, including a check of the checksum. Throws: Damage unless it has `values`
-/// values in ascending order of clusters and indices, all finite, of clusters that the levels have.
+/// Checks the checksum and decodes into `page`. Throws: Damage unless the page has `values` finite
+/// values, in ascending order of clusters and indices, of clusters that the levels have.
 void decode_overlay_page(ByteView bytes, std::uint64_t values, std::span<const LevelInfo> levels,
                          OverlayPage& page);
 

@@ -29,7 +29,7 @@ struct OverlayWriter::Impl {
   Bytes directory{};
   std::uint64_t last_cluster = 0;
   std::uint32_t last_index = 0;
-  std::optional<ClusterId> looked_up{};  // the cluster that has `members`
+  std::optional<ClusterId> looked_up{};  // the cluster to which `members` refers
   std::uint32_t members = 0;
 
   [[nodiscard]] Bytes header() const {
@@ -74,12 +74,12 @@ struct OverlayWriter::Impl {
 OverlayWriter::OverlayWriter(const std::filesystem::path& path, const Store& store,
                              const std::string& channel, Naming replace) {
   if (channel.size() > kMostOverlayNameBytes) {
-    throw std::invalid_argument("the channel of an overlay has a name of " +
-                                counted(channel.size(), "byte") + ", at most 65535 fit");
+    throw std::invalid_argument("the name of an overlay's channel has " +
+                                counted(channel.size(), "byte") + ", more than the limit of 65535");
   }
   impl_ = std::make_unique<Impl>(
       Impl{.file = AtomicFile(path, std::move(replace)), .store = store, .channel = channel});
-  // The counts follow when they are known.
+  // The counts are written when they are known.
   impl_->file.write(as_bytes(impl_->header()));
 }
 
@@ -92,7 +92,7 @@ void OverlayWriter::add(ClusterId cluster, std::uint32_t index, double value) {
   const auto id = static_cast<std::uint64_t>(cluster);
   const bool first = impl.values == 0;
   if (!first && (id < impl.last_cluster || (id == impl.last_cluster && index <= impl.last_index))) {
-    impl.refuse(cluster, index, "is not behind the value before");
+    impl.refuse(cluster, index, "does not come after the previous value");
   }
   if (!std::isfinite(value)) impl.refuse(cluster, index, "is not a finite number");
   impl.look_up(cluster, index);

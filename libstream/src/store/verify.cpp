@@ -15,8 +15,8 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Fingerprint of the point that heads cluster `ordinal`. children: what it heads on the levels
-/// below.
+/// Returns a hash of the point that heads cluster `ordinal`. children: the clusters that it heads
+/// on the levels below.
 std::uint64_t hash_of(std::uint64_t ordinal, const Point3& p, std::span<const std::byte> payload,
                       std::span<const std::uint64_t> children) {
   std::uint64_t h = base::splitmix64(ordinal);
@@ -25,19 +25,19 @@ std::uint64_t hash_of(std::uint64_t ordinal, const Point3& p, std::span<const st
   return base::mix64(h ^ crc32(0, payload.data(), payload.size()));
 }
 
-/// Pages that a thread checks before what was found is put together.
+/// Pages that a thread checks before results are merged.
 constexpr unsigned kPagesPerThread = 4;
 
-/// What is summed up over one level while it is read.
+/// Sums over the clusters of a level.
 struct LevelSums {
   std::uint64_t members = 0;
-  std::vector<bool> headed;  ///< clusters whose head has been found above
-  // Sums over clusters, and over the points that say they head them: equal if every point that
-  // heads a cluster is the cluster's representative, value by value.
+  std::vector<bool> headed;  ///< whether the head of each cluster has been found above
+  // Sums of the hashes of the representatives, and of the points that head clusters. They are equal
+  // if every point that heads a cluster equals the cluster's representative in all values.
   std::uint64_t representatives = 0, heads = 0;
 };
 
-/// The key of the value that lies at `bytes`.
+/// Returns the key of the value at `bytes`.
 std::uint64_t key_of(ScalarType type, const std::byte* bytes) {
   return with_type(type, [bytes](auto value) {
     std::memcpy(&value, bytes, sizeof value);
@@ -51,7 +51,7 @@ std::uint64_t key_of(ScalarType type, const std::byte* bytes) {
   });
 }
 
-/// Whether `outer` holds all of `inner`, which is of a cluster with points.
+/// Whether `outer` contains `inner`, the box of a cluster with points.
 bool holds(const Box3& outer, const Box3& inner) {
   return outer.contains(inner.min) && outer.contains(inner.max);
 }
@@ -84,9 +84,9 @@ class Verification {
   }
 
  private:
-  /// What a page of the index leads to.
+  /// The results of checking a page of the index.
   struct Page {
-    std::shared_ptr<const IndexPage> index;  ///< null: it could not be read
+    std::shared_ptr<const IndexPage> index;  ///< null if it could not be read
     std::vector<Problem> problems;
     std::uint64_t members = 0, representatives = 0;  ///< see LevelSums
     Box3 bounds;
@@ -100,7 +100,7 @@ class Verification {
       height_sum += p[2];
     }
   };
-  /// What a thread reads clusters with.
+  /// What a thread needs to read clusters.
   struct Reading {
     explicit Reading(const LevelReader& level) : ahead(level.data()) {}
 
@@ -128,8 +128,7 @@ class Verification {
   void check_manifest() {
     try {
       if (!is_as_written(read_manifest(manifest_file_), manifest_)) {
-        problem(manifest_file_.name(), 0,
-                "the manifest does not have the keys of the format in their order");
+        problem(manifest_file_.name(), 0, "the manifest's keys or their order are wrong");
       }
     } catch (const Error& error) {
       problem(manifest_file_.name(), 0, error.what());
@@ -173,8 +172,9 @@ class Verification {
     }
   }
 
-  /// Level 0 has nearly all there is and nothing below it: its pages are checked side by side,
-  /// those of other levels, which tell whom they head, one after another.
+  /// The pages of level 0, which has nearly all clusters and none below, are checked in parallel.
+  /// Those of other levels, which determine the heads of clusters below, are checked one after
+  /// another.
   void check_level(unsigned l) {
     const LevelReader& level = *levels_[l];
     std::vector<Reading> readings;
@@ -203,12 +203,12 @@ class Verification {
     const LevelReader& level = *levels_[l];
     if (page.index) {
       for (std::uint32_t i = 0; i < page.index->clusters(); ++i) {
-        // Bytes that clusters before have are read again, the others follow one another.
+        // A cluster may have bytes of earlier clusters; otherwise clusters are contiguous.
         const std::uint64_t offset = page.index->offset(i), end = page.index->end(i);
         if (offset != data_end && !(level.layout().small() && end <= data_end)) {
           problem(level.data().name(), offset,
                   about_cluster(l, number * level.layout().page_clusters() + i,
-                                "its bytes do not follow those before"));
+                                "its bytes are not contiguous"));
         }
         data_end = std::max(data_end, end);
       }
@@ -264,10 +264,10 @@ class Verification {
         all &= inside(points.payload.data() + i * stride);
       }
       if (!all) {
-        page.problem(level.data().name(), offset,
-                     about_cluster(l, ordinal,
-                                   "values of attribute " + std::to_string(a) +
-                                       " lie outside of their range"));
+        page.problem(
+            level.data().name(), offset,
+            about_cluster(l, ordinal,
+                          "values of attribute " + std::to_string(a) + " are outside their range"));
       }
       at += size_of(type);
     }
@@ -283,7 +283,7 @@ class Verification {
     bool inside = true;
     for (const Point3& p : points.positions) inside &= summary.box.contains(p);
     if (points.has_representative) inside &= summary.box.contains(points.representative);
-    if (!inside) problem("a point lies outside of its box");
+    if (!inside) problem("a point is outside its box");
     Box3 within = summary.box;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       within.min[axis] = std::max(within.min[axis], manifest_.bounds.min[axis]);
@@ -291,10 +291,10 @@ class Verification {
     }
     if (points.size() + points.has_representative > 0 &&
         !holds(levels_[l]->page_box(ordinal), within)) {
-      problem("the box reaches out of its page's");
+      problem("the box exceeds its page's");
     }
     if (!(summary.error >= 0)) {
-      problem("the error is not a number from 0 up");
+      problem("the error is negative or NaN");
     }
     if (points.has_representative) {
       page.representatives += hash_of(ordinal, points.representative, points.representative_payload,
@@ -307,7 +307,7 @@ class Verification {
     }
     const std::size_t stride = levels_[l]->layout().payload_size;
     std::uint64_t descendants = 0;
-    std::vector<std::uint64_t> uncertain;  // clusters below whose boxes reach out of this one's
+    std::vector<std::uint64_t> uncertain;  // clusters below whose boxes exceed this one's
     const auto check_child = [&](std::uint64_t child) {
       const ClusterSummary below = store_.record(cluster_id(l - 1, child)).summary;
       descendants += below.descendants;
@@ -320,7 +320,7 @@ class Verification {
         std::vector<bool>::reference headed = sums_[j].headed[static_cast<std::size_t>(child)];
         if (headed) {
           problem("cluster " + std::to_string(j) + "/" + std::to_string(child) +
-                  " is headed a second time");
+                  " is headed twice");
         }
         headed = true;
         sums_[j].heads += hash_of(child, points.positions[i], payload,
@@ -335,13 +335,13 @@ class Verification {
     if (!std::all_of(uncertain.begin(), uncertain.end(), [&](std::uint64_t child) {
           return descendants_lie_in(summary.box, l - 1, child);
         })) {
-      problem("a cluster below reaches out of its box");
+      problem("a cluster below exceeds its box");
     }
   }
 
-  /// For the few clusters whose boxes were grown more than that of the cluster above: looks at the
-  /// points. What points head may go in circles here as it was not checked yet: so many clusters
-  /// are read as the store has, for each level above, and no more.
+  /// Checks the points of the few clusters whose boxes were enlarged beyond that of the cluster
+  /// above. Children have not been checked yet and may form cycles, so for each level above at most
+  /// as many clusters are read as the store has.
   bool descendants_lie_in(const Box3& box, unsigned l, std::uint64_t ordinal) {
     if (++looked_into_ > most_looked_into_) return false;
     ClusterPoints points;
@@ -379,7 +379,7 @@ class Verification {
     if (manifest_.points == 0) return;
     const double mean = height_sum_ / static_cast<double>(manifest_.points);
     const double size = std::max({std::abs(bounds_.min[2]), std::abs(bounds_.max[2]), 1e-300});
-    // The sums run in different orders.
+    // The sums were computed in different orders.
     if (std::isfinite(mean) && !(std::abs(mean - manifest_.mean_height) <= 1e-9 * size)) {
       problem(manifest, 0, "the mean height is not that of the points");
     }

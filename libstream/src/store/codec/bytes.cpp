@@ -4,8 +4,8 @@
 #include <array>
 
 #ifdef TERRACE_STREAM_PORTABLE_CRC
-// Computed at the start: in a module that is fetched, tables are bytes that no compression makes
-// fewer.
+// Computed at startup, because in a module that is downloaded the tables would be bytes that do not
+// compress.
 #define TERRACE_CONSTANT
 #else
 #include <libdeflate.h>
@@ -15,8 +15,9 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Tables of a CRC that takes the most significant bit first. [k][b]: what byte b followed by k
-/// zero bytes leaves in the register, so that eight bytes are taken at once ("slicing by eight").
+/// Returns the tables of a CRC that takes the most significant bit first. Entry [k][b] is the
+/// register after byte b and k zero bytes, so that eight bytes are processed at once ("slicing by
+/// eight").
 template <class Register>
 TERRACE_CONSTANT std::array<std::array<Register, 256>, 8> crc_tables(unsigned polynomial) {
   constexpr unsigned kBits = 8 * sizeof(Register), kTop = 1u << (kBits - 1);
@@ -33,7 +34,7 @@ TERRACE_CONSTANT std::array<std::array<Register, 256>, 8> crc_tables(unsigned po
 TERRACE_CONSTANT const auto kCrc16Tables = crc_tables<std::uint16_t>(0x11021);
 TERRACE_CONSTANT const auto kCrc8Tables = crc_tables<std::uint8_t>(0x107);
 
-/// The same for the CRC-32, which takes the least significant bit first.
+/// Returns the same tables of CRC-32, which takes the least significant bit first.
 TERRACE_CONSTANT std::array<std::array<std::uint32_t, 256>, 8> crc32_tables() {
   std::array<std::array<std::uint32_t, 256>, 8> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {

@@ -18,34 +18,34 @@ using ByteView = std::span<const std::uint8_t>;
 static_assert(std::endian::native == std::endian::little,
               "multi-byte values are copied as they are; a big-endian machine needs swaps here");
 
-/// Damaged bytes inside a store: what is wrong, without the place. The callers that know file and
-/// offset turn it into an Error.
+/// Thrown for damaged bytes in a store. States what is wrong, but not where; callers that know file
+/// and offset turn it into an Error.
 class Damage : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A number of bytes of a file as one of memory, which is smaller where addresses have 32 bits.
-/// Throws: Damage if it is too large.
+/// Converts a number of bytes of a file to a size in memory, which may have only 32 bits. Throws:
+/// Damage if it is too large.
 inline std::size_t memory_size(std::uint64_t bytes) {
   if (bytes > SIZE_MAX / 2)
     throw Damage("a part of the file is too large for this machine's memory");
   return static_cast<std::size_t>(bytes);
 }
 
-/// The CRC-32 of zlib, continued from `crc` (0 at first).
+/// Returns zlib's CRC-32, continued from `crc` (initially 0).
 std::uint32_t crc32(std::uint32_t crc, const void* data, std::size_t size);
-/// The same without libdeflate, slower; crc32() is this where TERRACE_STREAM_PORTABLE_CRC is
-/// defined, as for WebAssembly.
+/// Computes crc32() without libdeflate, more slowly. crc32() calls it if
+/// TERRACE_STREAM_PORTABLE_CRC is defined, as for WebAssembly.
 std::uint32_t portable_crc32(std::uint32_t crc, const void* data, std::size_t size);
 inline std::uint32_t crc32(ByteView bytes) { return crc32(0, bytes.data(), bytes.size()); }
 
-/// CRC-16 with the polynomial 0x1021, from 0xFFFF, most significant bit first, inverted at the end
-/// ("CRC-16/GENIBUS"; of "123456789" 0xD64E).
-/// Finds every damage of one or two bits, or within 16 neighbouring bits, in 4 KiB.
+/// Returns the CRC-16 with the polynomial 0x1021, from 0xFFFF, most significant bit first, inverted
+/// at the end ("CRC-16/GENIBUS"; 0xD64E of "123456789").
+/// Detects every error of one or two bits, or within 16 adjacent bits, in 4 KiB.
 std::uint16_t crc16(ByteView bytes);
-/// CRC-8 with the polynomial 0x07, from 0, most significant bit first ("CRC-8/SMBUS"; of
-/// "123456789" 0xF4). Finds every damage of an odd number of bits, or within 8 neighbouring bits.
+/// Returns the CRC-8 with the polynomial 0x07, from 0, most significant bit first ("CRC-8/SMBUS";
+/// 0xF4 of "123456789"). Detects every error of an odd number of bits, or within 8 adjacent bits.
 std::uint8_t crc8(ByteView bytes);
 
 template <class T>
@@ -62,13 +62,14 @@ void put(Bytes& out, T value) {
   std::memcpy(out.data() + at, &value, sizeof value);
 }
 
-/// Unsigned, 7 bits per byte, low bits first, top bit of a byte: more follow.
+/// Appends an unsigned number, 7 bits per byte, low bits first; the top bit of a byte is set if
+/// more bytes follow.
 inline void put_varint(Bytes& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
   out.push_back(static_cast<std::uint8_t>(value));
 }
 
-/// 0, -1, 1, -2, ... become 0, 1, 2, 3, ...: small magnitudes give small numbers.
+/// Maps 0, -1, 1, -2, ... to 0, 1, 2, 3, ..., so that small magnitudes become small numbers.
 constexpr std::uint64_t zigzag(std::int64_t value) {
   return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
 }
@@ -76,7 +77,7 @@ constexpr std::int64_t unzigzag(std::uint64_t value) {
   return static_cast<std::int64_t>((value >> 1) ^ (std::uint64_t{0} - (value & 1)));
 }
 
-/// Reads what `put` wrote and never past the end.
+/// Reads the values written by put() and put_varint(), never past the end.
 class ByteReader {
  public:
   explicit ByteReader(ByteView bytes) : bytes_(bytes) {}

@@ -6,7 +6,7 @@
 #include "store/codec/rans.hpp"
 #include "store/codec/symbols.hpp"
 
-/// Coding in either direction by one description: `value` is read when encoding and written when
+/// Functions that code in either direction: they read `value` when encoding and set it when
 /// decoding.
 
 namespace terrace::stream::store {
@@ -35,7 +35,8 @@ TERRACE_STORE_INLINE unsigned code_number(Coder& coder, unsigned context, std::u
   }
 }
 
-/// A place among n, counted from the middle one by zigzag: a representative is mostly near it.
+/// Maps a position among n to the zigzag of its distance from the middle, which representatives are
+/// mostly near to.
 constexpr std::uint32_t centred(std::uint32_t place, std::uint32_t n) {
   return static_cast<std::uint32_t>(zigzag(std::int64_t{place} - n / 2));
 }
@@ -44,12 +45,13 @@ constexpr std::uint32_t uncentred(std::uint32_t code, std::uint32_t n) {
   return static_cast<std::uint32_t>(unzigzag(code) + n / 2);
 }
 
-/// A number below `size` (>= 1), every value costing the same but for a bit (truncated binary).
+/// Returns the truncated binary code of a number below `size` (>= 1): all values cost the same, to
+/// within one bit.
 TERRACE_STORE_INLINE RawBits uniform_bits(std::uint64_t value, std::uint64_t size) {
   const unsigned bits = static_cast<unsigned>(std::bit_width(size | 1)) - 1;  // size is not 0
   const std::uint64_t power = std::uint64_t{1} << bits;
   const std::uint64_t shorter = power - (size - power);  // this many values take `bits` bits
-  // A branch here would be a coin toss.
+  // A branch here would be unpredictable.
   const std::uint64_t longer = value >= shorter ? 1 : 0;
   return {value + (shorter & (0 - longer)), bits + static_cast<unsigned>(longer)};
 }

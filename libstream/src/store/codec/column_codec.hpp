@@ -12,14 +12,14 @@
 #include "store/codec/column_passes.hpp"
 #include "store/codec/numbers.hpp"
 
-/// What travels with the points of a cluster, in the order in which their positions are coded:
-/// attributes, column by column, and on levels above 0 the ordinals of the clusters that each point
-/// heads. Every value is coded as a difference to the one before. So are, of points that come in
-/// the order in which they were read, the coordinates.
+/// Codes the attributes of a cluster's points, column by column, in the order in which their
+/// positions are coded, and on levels above 0 the ordinals of the clusters that each point heads.
+/// Every value is coded as a difference from the previous one. Coordinates are coded likewise if
+/// points are in the order in which they were read.
 
 namespace terrace::stream::store {
 
-/// The last class of each step but the greatest.
+/// The last class of each step except the highest.
 inline constexpr std::array<unsigned, 7> kStepEnds{0, 2, 4, 8, 15, 21, 29};
 inline constexpr std::array<std::uint8_t, kClasses> kDifferenceSteps = [] {
   std::array<std::uint8_t, kClasses> steps{};
@@ -30,7 +30,7 @@ inline constexpr std::array<std::uint8_t, kClasses> kDifferenceSteps = [] {
   }
   return steps;
 }();
-/// Coarse logarithm of a class, 0 to 7: the context of the next difference.
+/// Returns a coarse logarithm of a class, 0 to 7, which is the context of the next difference.
 constexpr unsigned difference_step(unsigned number_class) { return kDifferenceSteps[number_class]; }
 
 template <class Coder>
@@ -49,7 +49,7 @@ TERRACE_STORE_INLINE unsigned code_difference(Coder& coder, unsigned context, st
   return number_class;
 }
 
-/// One attribute of a store of version 1. `form` is coded for floating point only.
+/// Codes one attribute of a store of version 1. `form` is coded only for floating-point types.
 template <class Coder>
 void code_old_column(Coder& coder, unsigned attribute, bool floating, NumberForm& form,
                      std::int64_t* values, std::uint32_t n) {
@@ -68,20 +68,21 @@ void code_old_column(Coder& coder, unsigned attribute, bool floating, NumberForm
   }
 }
 
-/// Differences that came last, the latest first: pulses of a scanner are a few intervals apart.
+/// The most recent differences, latest first. The intervals between a scanner's pulses have few
+/// different lengths.
 template <unsigned kSize>
 class RecentDifferences {
  public:
   static constexpr unsigned kCount = kSize;
 
   [[nodiscard]] std::int64_t operator[](unsigned i) const { return recent_[i]; }
-  /// Its place among them; kCount if it is none of them.
+  /// Returns the position of a difference in the list; kCount if it is not in it.
   [[nodiscard]] unsigned find(std::int64_t difference) const {
     unsigned place = kCount;
     for (unsigned i = kCount; i-- > 0;) place = recent_[i] == difference ? i : place;
     return place;
   }
-  /// Moves the difference that lies at `place`, or a new one (kCount), to the front.
+  /// Moves the difference at `place`, or a new one (kCount), to the front.
   void move_to_front(unsigned place, std::int64_t difference) {
     for (unsigned i = kCount; i-- > 1;) recent_[i] = place >= i ? recent_[i - 1] : recent_[i];
     recent_[0] = difference;
@@ -95,7 +96,7 @@ class RecentDifferences {
     return first;
   }();
 };
-/// How many recent differences the guide keeps, and every other column.
+/// Number of recent differences kept by the guide and by every other column.
 inline constexpr unsigned kGuideRecent = 7, kColumnRecent = 3;
 
 constexpr std::int64_t wrapped_sum(std::int64_t a, std::int64_t b) {
@@ -118,8 +119,8 @@ TERRACE_STORE_INLINE unsigned code_signed(Coder& coder, unsigned context, std::i
   return number_class;
 }
 
-/// What all differences are multiples of: 1 if of nothing more, 0 if they are all 0. Colours of 8
-/// bits in fields of 16 are multiples of 256 or 257.
+/// Returns the greatest common divisor of the differences: 0 if all are 0, 1 if it is 2^63. Colours
+/// of 8 bits in fields of 16 are multiples of 256 or 257.
 inline std::uint64_t common_divisor(const std::int64_t* differences, std::uint32_t n) {
   std::uint64_t divisor = 0;
   for (std::uint32_t i = 0; i < n && divisor != 1; ++i) {
@@ -130,14 +131,14 @@ inline std::uint64_t common_divisor(const std::int64_t* differences, std::uint32
   return divisor >> 63 != 0 ? 1 : divisor;
 }
 
-/// How the points of a cluster follow one another, as their guide tells: mostly the times of a
+/// The step from each point of a cluster to the next, given by the guide, mostly the times of a
 /// scanner's pulses.
 class Lines {
  public:
-  /// Further along the line; of the same pulse; at the beginning of a line.
+  /// A point further along the line, of the same pulse, or at the beginning of a line.
   enum Step : std::uint8_t { kAlong, kSame, kJump, kSteps };
 
-  /// From the differences of the guide, of which the first does not count.
+  /// Sets the steps from the guide's differences. The first difference does not count.
   void find_steps(const std::int64_t* differences, std::uint64_t least_jump, std::uint32_t n) {
     steps_.resize(n);
     for (std::uint32_t i = 1; i < n; ++i) {
@@ -168,13 +169,13 @@ class Lines {
   std::vector<std::uint32_t> references_;
 };
 
-/// Contexts of numbers by Lines::Step, and how far their differences' step is shifted.
+/// By Lines::Step: the contexts of numbers, and how far the step of a difference is shifted.
 inline constexpr std::array<unsigned, Lines::kSteps> kStepContexts{2, context::kWithinPulse,
                                                                    context::kBetweenLines};
 inline constexpr std::array<unsigned, Lines::kSteps> kStepShifts{0, 1, 1};
 
-/// The head of a column and its first value. Returns false if that is the value of all.
-/// form: coded where it is not null. Writes the divisor of the differences, 1 if there is none.
+/// Codes the head of a column and its first value. Returns false if all values equal the first.
+/// form: coded unless null. divisor: of the differences; 1 if they are not divided.
 template <class Coder>
 bool code_head(Coder& coder, unsigned first, NumberForm* form, std::int64_t& value, bool several,
                std::uint64_t& divisor, unsigned& number_class) {
@@ -194,12 +195,12 @@ bool code_head(Coder& coder, unsigned first, NumberForm* form, std::int64_t& val
   number_class = code_signed(coder, first + 1, value);
   if (head / forms == kMultiples) {
     code_number(coder, first + 1, divisor);
-    if (divisor < 2) throw Damage("a column has differences that are multiples of nothing");
+    if (divisor < 2) throw Damage("a column has a divisor below 2");
   }
   return head / forms != kOneValue;
 }
 
-/// A difference as one of those that came last, else as a number.
+/// Codes a difference as a position in the list of recent ones, otherwise as a number.
 template <class Coder, unsigned kCount>
 class RecentCoder {
  public:
@@ -221,7 +222,7 @@ class RecentCoder {
   unsigned place_ = 0, step_ = 0;
 };
 
-/// What the next difference along a line is expected to be.
+/// Predicts the next difference along a line.
 class Trend {
  public:
   explicit Trend(ColumnKind kind) : kind_(along_line(kind)) {}
@@ -237,10 +238,10 @@ class Trend {
 
  private:
   ColumnKind kind_;
-  std::array<std::int64_t, 3> last_{};  ///< the latest first
+  std::array<std::int64_t, 3> last_{};  ///< latest first
 };
 
-/// Makes differences of neighbours those that `kind` refers to the line.
+/// Replaces differences between successive points by the ones that `kind` codes.
 inline void refer_to_lines(const Lines& lines, ColumnKind kind, std::int64_t* differences,
                            std::uint32_t n) {
   Trend trend(kind);
@@ -259,10 +260,10 @@ inline void refer_to_lines(const Lines& lines, ColumnKind kind, std::int64_t* di
   }
 }
 
-/// Working memory of columns that are encoded.
+/// Working memory for encoding columns.
 struct ColumnScratch {
   std::vector<std::int64_t> differences;
-  std::vector<std::uint64_t> numbers;  ///< that stand for them
+  std::vector<std::uint64_t> numbers;  ///< the differences as numbers
   std::vector<std::uint8_t> classes;
   std::vector<std::uint32_t> slots;
 
@@ -274,8 +275,8 @@ struct ColumnScratch {
   }
 };
 
-/// By step and class before: where the slots of a number's context begin, from those of the
-/// column's first on.
+/// By step and previous class: the first slot of a number's context, relative to the first slot of
+/// the column's first context.
 inline constexpr auto kStepSlots = [] {
   std::array<std::array<std::uint16_t, 256>, Lines::kSteps> slots{};
   for (unsigned step = 0; step < Lines::kSteps; ++step) {
@@ -287,7 +288,7 @@ inline constexpr auto kStepSlots = [] {
   return slots;
 }();
 
-/// The same as code_differences() for kinds without recent ones, many at once.
+/// Does the same as code_differences() for kinds without recent differences, many at once.
 template <bool kLined, class Coder>
 void encode_differences(Coder& coder, unsigned first, const Lines* lines, ColumnScratch& scratch,
                         std::uint32_t n, unsigned number_class) {
@@ -303,7 +304,7 @@ void encode_differences(Coder& coder, unsigned first, const Lines* lines, Column
   coder.numbers(first, {scratch.numbers.data() + 1, n - 1}, classes + 1, slots + 1);
 }
 
-/// The differences of a column, which code_column() describes.
+/// Codes the differences of a column; see code_column().
 template <bool kLined, bool kRecent, class Coder>
 void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines* lines,
                       const std::int64_t* beside, std::int64_t* values, ColumnScratch* scratch,
@@ -340,10 +341,10 @@ void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines
   }
 }
 
-/// A column of values: the first, then differences as `kind` says, divided by what is common to
-/// them.
-/// first: context. form: coded where it is not null. lines: null if there is no guide. beside: the
-/// column before, for kinds beside it alone. scratch: of n, for encoding alone.
+/// Codes a column of values: the first value, then differences according to `kind`, divided by
+/// their common divisor.
+/// first: the first context. form: coded unless null. lines: null without a guide. beside: the
+/// preceding column, for kind beside only. scratch: of size n, for encoding only.
 template <class Coder>
 void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form,
                  const Lines* lines, const std::int64_t* beside, std::int64_t* values,
@@ -386,8 +387,8 @@ void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* for
   if constexpr (Coder::kDecoding) shared = coder;
 }
 
-/// The column of the guide: step by step, jumps less the jump before. `lines` become known by it.
-/// least_jump: for encoding alone.
+/// Codes the column of the guide: the step of each point, and jumps minus the previous jump. Sets
+/// `lines`. least_jump: for encoding only.
 template <class Coder>
 void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form, Lines& lines,
                 std::uint64_t least_jump, std::int64_t* values, ColumnScratch* scratch,
@@ -447,8 +448,8 @@ void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form
   }
 }
 
-/// The ordinals that n points head on `level` levels, nearest level first: values[i + n * j] is
-/// point i's on level j.
+/// Codes the ordinals of the clusters that n points head on `level` levels, nearest level first:
+/// values[i + n * j] is that of point i on level j.
 template <class Coder>
 void code_children(Coder& coder, unsigned level, std::int64_t* values, std::uint32_t n) {
   for (unsigned j = level; j-- > 0;) {

@@ -6,8 +6,8 @@
 #include "store/codec/bytes.hpp"
 #include "store/codec/symbols.hpp"
 
-/// Compiled for AVX2 as well, which takes half the time; the loader chooses by the processor. Not
-/// by Clang, with which sanitizers are built: their run-time starts after that choice.
+/// Also compiled for AVX2, which takes half the time; the loader chooses by the processor. Not with
+/// Clang, which builds sanitizers: their runtime starts after the loader's choice.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
 #define TERRACE_STORE_AVX2_TOO [[gnu::target_clones("default", "avx2")]]
 #else
@@ -50,8 +50,8 @@ TERRACE_STORE_AVX2_TOO void classify(const std::int64_t* differences,
     }
     return;
   }
-  // A float holds these as they are, and in its upper bits what makes the class. Masks, as a
-  // conversion within a branch is not made for many at once.
+  // A float represents these numbers exactly, and its upper bits give the class. Masks are used,
+  // because a conversion inside a branch is not vectorised.
   for (std::uint32_t i = 0; i < n; ++i) {
     const auto number = static_cast<std::int32_t>(numbers[i]);
     const std::int32_t large =

@@ -4,21 +4,20 @@
 #include <cstdint>
 #include <span>
 
-/// Passes over the values of a column before they are coded. Each takes as many values at once as
-/// the processor has room for.
+/// Passes over the values of a column before they are coded. They are vectorised.
 
 namespace terrace::stream::store {
 
-/// Fills `differences` from the second on with those of neighbours in the column, less those of the
-/// column before unless that is null. False if all values are one.
+/// Sets differences[i], from i = 1 on, to values[i] - values[i - 1], minus the same difference of
+/// the preceding column unless `beside` is null. Returns false if all values are equal.
 bool find_differences(const std::int64_t* values, const std::int64_t* beside,
                       std::int64_t* differences, std::uint32_t n);
 
-/// The numbers that stand for n differences, and their classes.
+/// Sets the numbers that represent n differences, and their classes.
 void classify(const std::int64_t* differences, std::uint64_t* numbers, std::uint8_t* classes,
               std::uint32_t n);
 
-/// Least and greatest value; none: low > high.
+/// Lowest and highest value; low > high if there are no values.
 struct Extent {
   std::int64_t low = INT64_MAX, high = INT64_MIN;
 };

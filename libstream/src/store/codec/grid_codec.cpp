@@ -4,8 +4,8 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Twice the logarithm of a residual's size, roughly: 0, 2, 4, 5, 6, 7, 8, ... for 0, 1, 2,
-/// 3, 4..5, 6..7, 8..11, ...
+/// Returns about twice the logarithm of a residual's size: 0, 2, 4, 5, 6, 7, 8, ... for 0, 1, 2, 3,
+/// 4..5, 6..7, 8..11, ...
 constexpr std::uint8_t magnitude_of(std::uint64_t zigzagged) {
   const std::uint64_t size = (zigzagged >> 1) + (zigzagged & 1);
   if (size == 0) return 0;
@@ -66,7 +66,7 @@ void GridCodec::find_patterns() {
 }
 
 std::uint64_t GridCodec::count_runs(std::uint32_t row) const {
-  // The cell before the first is padding, so a run begins wherever the mask rises.
+  // The cell before the first is padding, so a run begins wherever the mask changes from 0 to 1.
   const std::uint8_t* const cells = mask_.data() + cell_of(0, row);
   const std::ptrdiff_t width = stride_ - kPadX;
   unsigned runs = 0;

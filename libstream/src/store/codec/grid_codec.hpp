@@ -9,25 +9,26 @@
 #include "store/codec/coding.hpp"
 #include "store/codec/predictor.hpp"
 
-/// Clusters of a raster: their cells, as runs row by row, and the heights of the cells in that
-/// order, each predicted from its neighbours within the cluster. A cluster does not depend on
+/// Codes clusters of a raster: their cells, as runs row by row, and the heights of the cells in
+/// that order, each predicted from its neighbours in the cluster. A cluster does not depend on
 /// others.
 ///
-/// One description serves both directions: the functions are templates over SymbolEncoder and
-/// SymbolDecoder.
+/// The functions are templates over SymbolEncoder and SymbolDecoder, so each serves both
+/// directions.
 
 namespace terrace::stream::store {
 
 class GridCodec {
  public:
-  /// Whether a box of this many cells may be coded as runs by a cluster of n points. Beyond that, a
-  /// cluster is so sparse that the k-d codec is smaller, and the raster would cost memory.
+  /// Whether a cluster of n points in a box of this size may be coded as runs. In a larger box the
+  /// cluster is so sparse that the k-d codec is smaller, and the raster would take too much memory.
   static bool fits(std::uint64_t width, std::uint64_t height, std::uint64_t n) {
     const std::uint64_t cells = 8 * n + 1024;
     return width <= cells && height <= cells && (width + kPadX) * (height + kPadY) <= cells;
   }
 
-  /// Encoding: enters the points (cells relative to the box). Returns false if two are in one cell.
+  /// For encoding: enters the points, as cells relative to the box. Returns false if two are in one
+  /// cell.
   bool place(std::uint32_t width, std::uint32_t height, const std::uint64_t* x,
              const std::uint64_t* y, const std::uint64_t* z, std::uint32_t n) {
     start(width, height);
@@ -41,18 +42,18 @@ class GridCodec {
     }
     return true;
   }
-  /// Encoding, after `positions`: the point in the i-th coded cell.
+  /// For encoding, after positions(): returns the point in the i-th coded cell.
   [[nodiscard]] std::uint32_t point(std::size_t i) const { return points_[cells_[i]]; }
 
-  /// The cells, in the order of rows and columns. Decoding fills x and y with n cells.
-  /// borders: the first context of borders from version 5 on; 0 before.
+  /// Codes the cells by rows and columns. Decoding fills x and y with n cells. borders: the first
+  /// context of borders from version 5 on; 0 before.
   template <class Coder>
   void positions(Coder& shared, unsigned borders, std::uint32_t width, std::uint32_t height,
                  std::uint32_t n, std::uint64_t* x, std::uint64_t* y) {
     typename Coder::Local coder = shared;
     if constexpr (Coder::kDecoding) start(width, height);
     cells_.resize(n);
-    // Not by way of the vectors, which a byte that is written might change.
+    // Pointers, because the compiler must assume that writing a byte changes the vectors.
     std::uint32_t* const cells = cells_.data();
     [[maybe_unused]] std::uint8_t* const mask = mask_.data();
     std::uint32_t found = 0;
@@ -80,7 +81,7 @@ class GridCodec {
             if (borders == 0 || row + 1 < height || runs > 1) {
               right.move(coder, lower_half, end);
             } else if constexpr (Coder::kDecoding) {
-              end = begin + (n - found);  // all cells that are left
+              end = begin + (n - found);  // all remaining cells
             }
           }
           row_above = true;
@@ -89,14 +90,14 @@ class GridCodec {
           code_number(coder, context::kRunGap, gap);
           code_number(coder, context::kRunLength, length);
           if constexpr (Coder::kDecoding) {
-            if (gap >= width || length >= width) throw Damage("a run lies outside of its cluster");
+            if (gap >= width || length >= width) throw Damage("a run is outside its cluster");
             begin = column + 1 + gap;
             end = begin + 1 + length;
           }
         }
         if constexpr (Coder::kDecoding) {
           if (begin >= end || end > width || end - begin > n - found) {
-            throw Damage("a run lies outside of its cluster");
+            throw Damage("a run is outside its cluster");
           }
         }
         auto cell = static_cast<std::uint32_t>(cell_of(static_cast<std::uint32_t>(begin), row));
@@ -116,7 +117,8 @@ class GridCodec {
     if constexpr (Coder::kDecoding) shared = coder;
   }
 
-  /// The heights of the cells, in [0, size). Encoding takes them from `place`, decoding fills z.
+  /// Codes the heights of the cells, in [0, size). Encoding takes them from place(), decoding fills
+  /// z.
   template <class Coder>
   void heights(Coder& shared, const Predictor& predictor, std::uint64_t size, std::uint64_t* z) {
     if (size == 1) {
@@ -141,7 +143,7 @@ class GridCodec {
           return static_cast<std::uint64_t>(static_cast<std::int64_t>(c[n])) *
                  static_cast<std::uint64_t>(value);
         };
-        // Unsigned: sums of extreme values wrap, in both directions alike.
+        // Unsigned, because sums of extreme values wrap, in both directions alike.
         const std::uint64_t sum = term(kWest, at[-1]) + term(kNorth, at[-up]) +
                                   term(kNorthWest, at[-up - 1]) + term(kNorthEast, at[-up + 1]) +
                                   term(kWestWest, at[-2]) + term(kNorthNorth, at[-2 * up]);
@@ -174,34 +176,34 @@ class GridCodec {
     if constexpr (Coder::kDecoding) shared = coder;
   }
 
-  /// Training: adds the cells of `positions` to the least squares.
+  /// For training: adds the cells of positions() to the least squares.
   void fit(PredictorFit& sums);
 
  private:
   static constexpr std::uint32_t kPadX = 4, kPadY = 2;
 
-  /// A border of the first run of the rows: coded as the step outwards from the row above, in the
-  /// context of the previous step and of how far away the side of the box is. Both borders,
-  /// mirrored, share contexts.
+  /// Codes a border of the first run of each row as the step outwards from the row above, in the
+  /// context of the previous step and the distance to the side of the box. Both borders, mirrored,
+  /// share contexts.
   template <bool kRight>
   class Border {
    public:
     /// borders: as for positions().
     Border(unsigned borders, std::uint32_t width) : borders_(borders), width_(width) {}
 
-    /// In the first row that has cells.
+    /// Codes the border in the first row that has cells.
     template <class Coder>
     void begin(Coder& coder, std::uint64_t lowest, std::uint64_t& value) {
       std::uint64_t number = value - lowest;
       code_number(coder, kFirstContext + 5, number);
-      if (number > UINT32_MAX) throw Damage("a run lies outside of its cluster");
+      if (number > UINT32_MAX) throw Damage("a run is outside its cluster");
       value = lowest + number;
       at_ = static_cast<std::int64_t>(value);
     }
     template <class Coder>
     TERRACE_STORE_INLINE void move(Coder& coder, bool lower_half, std::uint64_t& value) {
       unsigned place = kFirstContext + last_;
-      const bool outwards = kRight || borders_ == 0;  // before version 5 to the right
+      const bool outwards = kRight || borders_ == 0;  // before version 5 steps go to the right
       if (borders_ > 0) {
         const std::int64_t room = kRight ? width_ - at_ : at_;
         place = borders_ + (lower_half ? context::kBorders / 2 : 0) +
@@ -211,7 +213,7 @@ class GridCodec {
       const std::int64_t moved = static_cast<std::int64_t>(value) - at_;
       std::uint64_t number = zigzag(outwards ? moved : -moved);
       code_number(coder, place, number);
-      if (number > 2ull * UINT32_MAX) throw Damage("a run lies outside of its cluster");
+      if (number > 2ull * UINT32_MAX) throw Damage("a run is outside its cluster");
       const std::int64_t step = unzigzag(number);
       at_ += outwards ? step : -step;
       last_ = static_cast<unsigned>(std::clamp<std::int64_t>(step, -2, 2) + 2);
@@ -221,13 +223,13 @@ class GridCodec {
    private:
     static constexpr unsigned kFirstContext = kRight ? context::kRunEnd : context::kRunStart;
 
-    unsigned borders_, last_ = 2;  ///< last: the step, -2 to 2
+    unsigned borders_, last_ = 2;  ///< last_: the previous step + 2, 0 to 4
     std::uint32_t width_;
     std::int64_t at_ = 0;
   };
 
-  /// How neighbours' magnitudes form a context: their mean, where the pattern has them. Cells that
-  /// have both W and N are separate from those at the edges, which are predicted less well.
+  /// How a pattern's neighbours form a context: by their mean magnitude. Cells with both W and N
+  /// have separate contexts from those at the edges, which are predicted less well.
   struct Step {
     std::uint16_t scale = 0;
     std::uint8_t base = 0, most = 0;
@@ -244,7 +246,7 @@ class GridCodec {
   void find_run(std::uint32_t row, std::uint64_t from, std::uint64_t& begin,
                 std::uint64_t& end) const;
 
-  std::ptrdiff_t stride_ = 0, rows_ = 0;  ///< rows with their padding
+  std::ptrdiff_t stride_ = 0, rows_ = 0;  ///< with padding
   std::vector<std::uint8_t> mask_, patterns_, magnitudes_;
   std::vector<std::int64_t> values_;
   std::vector<std::uint32_t> points_, cells_;

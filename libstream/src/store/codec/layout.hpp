@@ -16,19 +16,19 @@
 
 namespace terrace::stream::store {
 
-/// Limits of the points of a cluster and of its decoded bytes (see Layout): a few bytes can
+/// Limits of the points of a cluster and of its decoded bytes (see Layout). A few bytes can
 /// represent any number of points, so nothing else limits the cost of a damaged count.
 inline constexpr std::uint32_t kMostPoints = 1u << 20;
 inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
-/// Maximum bytes of a cluster: every point at its raw size, and as much again.
+/// Maximum bytes of a cluster, twice the raw size of its points.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
-/// The version that is written. Stores of earlier versions can be read, but for one that was never
-/// released.
+/// The version that is written. Stores of earlier versions can be read, except for one that was
+/// never released.
 inline constexpr int kVersion = 5, kDroppedVersion = 4;
 
-/// Clusters per page of the index, except the last of a level: a page's ordinals follow by
-/// arithmetic.
+/// Maximum clusters per page of the index. Every page of a level but the last has the same number,
+/// so page numbers follow from ordinals.
 inline constexpr std::uint32_t kMostPageClusters = 128;
 inline constexpr std::uint64_t kLeastPageBytes = 4;
 
@@ -53,29 +53,30 @@ struct Layout {
       offset += size_of(channel.type);
     }
   }
-  /// Maximum points of a cluster: their coordinates, attributes and children fit into
+  /// Maximum points of a cluster. Their coordinates, attributes and children fit into
   /// kMostDecodedBytes.
   [[nodiscard]] std::uint64_t most_points() const {
     const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
     return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);
   }
-  /// Attributes and, from version 2 on, the three axes: everything that may be coded as a column.
+  /// Number of columns: the attributes and, from version 2 on, the three axes.
   [[nodiscard]] unsigned columns() const {
     return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
   }
-  /// Attributes whose ranges the index has.
+  /// Number of attributes whose ranges the index has.
   [[nodiscard]] std::size_t ranges() const { return version > 1 ? attributes.size() : 0; }
-  /// As many as may be read in vain: entries above level 0 are of larger areas, those of rasters
-  /// large against their clusters.
+  /// Clusters per page. Few enough that reading the unneeded entries of a page is cheap: entries
+  /// above level 0 cover larger areas, and entries of rasters are large compared with their
+  /// clusters.
   [[nodiscard]] std::uint64_t page_clusters() const {
     if (version < 5) return kMostPageClusters;
     return level > 0 ? 4 : grid ? 16 : 64;
   }
-  /// Whether clusters are small for their number, as those of rasters: they may have their bytes in
-  /// common, and short checksums.
+  /// Whether clusters are small and many, as on level 0 of rasters. They may then share bytes, and
+  /// have short checksums.
   [[nodiscard]] bool small() const { return version > 4 && grid && level == 0; }
   [[nodiscard]] unsigned checksum_bits() const { return small() ? 8 : 16; }
-  /// The checksum that the index keeps for the bytes of a cluster.
+  /// Returns the checksum that the index has for the bytes of a cluster.
   [[nodiscard]] std::uint16_t checksum(ByteView bytes) const {
     return small() ? crc8(bytes) : crc16(bytes);
   }
@@ -83,10 +84,10 @@ struct Layout {
     const auto ends = 2 * static_cast<unsigned>(attributes.size());
     return version > 4 ? index_context() + context::kIndexRange + ends : border_context();
   }
-  /// The first context of borders, and of the index: both from version 5 on.
+  /// The first contexts of borders and of the index, both from version 5 on.
   [[nodiscard]] unsigned border_context() const { return first_context(columns()); }
   [[nodiscard]] unsigned index_context() const { return border_context() + context::kBorders; }
-  /// Whether points that are not split are coded as columns, instead of rows of a raster.
+  /// Whether points that are not split are coded as columns instead of rows of a raster.
   [[nodiscard]] bool has_point_columns() const {
     return grid ? version > 4 && level > 0 : version > 1;
   }
@@ -95,7 +96,8 @@ struct Layout {
     return context::kAttribute +
            column * (version > 2 ? context::kPerAttribute : context::kPerAttributeBefore3);
   }
-  /// Whether the column may be coded beside the preceding one: both are attributes of integers.
+  /// Whether the column may be coded beside the preceding one, which requires that both are
+  /// attributes of integers.
   [[nodiscard]] bool may_lie_beside(unsigned column) const {
     const auto integer = [](ScalarType t) { return t != ScalarType::f32 && t != ScalarType::f64; };
     return column > 0 && column < attributes.size() && integer(attributes[column]) &&
@@ -111,12 +113,12 @@ struct Entry {
   std::array<std::int64_t, 3> low{};           ///< of the box, in the form of each axis
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< of the box: integers per axis
   std::uint16_t error = 0;                     ///< see error_code
-  std::uint64_t descendants = 0;               ///< on level 0: 0
+  std::uint64_t descendants = 0;               ///< 0 on level 0
   std::uint16_t checksum = 0;                  ///< of the bytes
-  std::int64_t jump = 0;  ///< from the end of the bytes of the cluster before to these
+  std::int64_t jump = 0;  ///< from the end of the previous cluster's bytes to these
 };
 
-/// The least and the greatest value of an attribute in a cluster, as unsigned integers in the order
+/// The lowest and the highest value of an attribute in a cluster, as unsigned integers in the order
 /// of the values (see attribute_key).
 struct KeyRange {
   std::uint64_t low = UINT64_MAX, high = 0;
@@ -125,7 +127,7 @@ struct KeyRange {
 constexpr std::uint64_t attribute_key(std::int64_t value) {
   return static_cast<std::uint64_t>(value) ^ std::uint64_t{1} << 63;
 }
-/// NaN lies beyond the infinity of its sign.
+/// A NaN comes after the infinity of its sign.
 constexpr std::uint64_t attribute_key(double value) {
   const auto bits = std::bit_cast<std::uint64_t>(value);
   return bits >> 63 != 0 ? ~bits : bits | std::uint64_t{1} << 63;
@@ -134,8 +136,8 @@ constexpr double double_of_key(std::uint64_t key) {
   return std::bit_cast<double>(key >> 63 != 0 ? key ^ std::uint64_t{1} << 63 : ~key);
 }
 
-/// The range in the attribute's own numbers: as a reader of the points computes them, so that
-/// rounding leaves none outside.
+/// Returns the range of the attribute's real values, computed as a reader of the points computes
+/// them, so that rounding does not exclude any.
 inline ValueRange value_range(const Channel& channel, const KeyRange& keys) {
   const bool floating = channel.type == ScalarType::f32 || channel.type == ScalarType::f64;
   const auto value = [&](std::uint64_t key) {
@@ -149,7 +151,8 @@ inline ValueRange value_range(const Channel& channel, const KeyRange& keys) {
   return {std::min(ends[0], ends[1]), std::max(ends[0], ends[1]), false};
 }
 
-/// An error as 16 bits, never rounded down: the upper bits of the double (5 of the mantissa).
+/// An error is stored as 16 bits, the upper bits of the double (5 of the mantissa), never rounded
+/// down.
 inline constexpr unsigned kErrorShift = 47;
 constexpr std::uint16_t error_code(double error) {
   const auto bits = std::bit_cast<std::uint64_t>(error);
@@ -160,7 +163,7 @@ constexpr double error_of(std::uint16_t code) {
   return std::bit_cast<double>(std::uint64_t{code} << kErrorShift);
 }
 
-/// The entry as seen by the reader's callers. `root`: all points are members.
+/// Converts an entry to the record that callers of the reader see. root: all points are members.
 inline ClusterRecord record_of(const Entry& entry, unsigned level, std::uint64_t offset,
                                bool root) {
   ClusterRecord record;

@@ -20,7 +20,7 @@ bool holds(double value, NumberForm form) {
 }
 
 bool all_integers(std::span<const double> values) {
-  // One pass without branches: this is what nearly every raster and every column number takes.
+  // One pass without branches, because nearly every raster and every column number takes this path.
   std::uint64_t difference = 0;
   for (const double value : values) {
     const double bounded = std::abs(value) < kLargest ? value : 0.5;
@@ -31,8 +31,9 @@ bool all_integers(std::span<const double> values) {
   return difference == 0;
 }
 
-/// The first form of base, base + 1, ... base + 9 that holds all values; nothing: kDoubleBits.
-/// A value that n digits hold is held by n + 1, so one pass is enough but for the largest values.
+/// Returns the first form of base, base + 1, ... base + 9 that can represent all values, or
+/// kDoubleBits. A value that n digits represent is represented by n + 1, so one pass is enough,
+/// except for the largest values.
 NumberForm decimals(std::span<const double> values, NumberForm base) {
   auto form = base;
   std::size_t settled = 0;  // values before this one were tried with fewer digits
@@ -52,7 +53,7 @@ NumberForm decimals(std::span<const double> values, NumberForm base) {
 
 NumberForm form_of(std::span<const double> values) {
   if (all_integers(values)) return kIntegerForm;
-  // NaN has no place in an order: nothing but the bits will do.
+  // NaN is not ordered, so only the bits can represent it.
   if (std::any_of(values.begin(), values.end(), [](double v) { return std::isnan(v); })) {
     return kDoubleBits;
   }

@@ -10,11 +10,11 @@
 
 #include "terrace/stream/schema.hpp"
 
-/// Doubles as integers in the same order, bit for bit. A *number form* defines how:
-///    0 ..  9  k / 10^n, n = form: decimals, and with n = 0 plain integers
-///   10 .. 19  the same rounded to float32, n = form - 10
-///   20        the bits of the float32, as an ordered integer
-///   21        the bits of the float64, as an ordered integer
+/// Represents doubles exactly by integers in the same order. A *number form* defines how:
+///    0 .. 9 k / 10^n, n = form: decimals, and with n = 0 plain integers
+///   10 .. 19 the same rounded to float32, n = form - 10
+///   20 the bits of the float32, as an ordered integer
+///   21 the bits of the float64, as an ordered integer
 /// Forms 0 to 19 never represent -0.0, infinities or NaN.
 
 namespace terrace::stream::store {
@@ -44,7 +44,7 @@ constexpr float from_ordered_bits(std::int32_t bits) {
   return std::bit_cast<float>(bits < 0 ? bits ^ INT32_MAX : bits);
 }
 
-/// The number represented by `k`.
+/// Returns the number represented by `k`.
 inline double to_double(std::int64_t k, NumberForm form) {
   if (form == kIntegerForm) return static_cast<double>(k);
   if (form < kFloatDecimals) return static_cast<double>(k) / kPowersOfTen[form];
@@ -55,12 +55,14 @@ inline double to_double(std::int64_t k, NumberForm form) {
   return from_ordered_bits(k);
 }
 
-/// The integer that represents `value`. Requires that the form can represent it (see `form_of`).
+/// Returns the integer that represents `value`. Requires that the form can represent it (see
+/// form_of()).
 inline std::int64_t to_integer(double value, NumberForm form) {
   if (form == kIntegerForm) return static_cast<std::int64_t>(value);
   if (form < kFloatBits) {
     const unsigned digits = form < kFloatDecimals ? form : form - kFloatDecimals;
-    // Rounds to the nearest integer without a call, which std::nearbyint is without SSE 4.1.
+    // Rounds to the nearest integer without a function call; std::nearbyint() is a call without SSE
+    // 4.1.
     const double scaled = value * kPowersOfTen[digits];
     return static_cast<std::int64_t>(scaled + (scaled < 0 ? -0.5 : 0.5));
   }
@@ -68,8 +70,8 @@ inline std::int64_t to_integer(double value, NumberForm form) {
   return ordered_bits(value);
 }
 
-/// The form that holds all of `values`; if several do, the one in which they span the smallest
-/// range of integers. Time O(values).
+/// Returns the form that can represent all of `values`; if several can, the one in which they span
+/// the smallest range of integers. Time O(values).
 NumberForm form_of(std::span<const double> values);
 
 }  // namespace terrace::stream::store

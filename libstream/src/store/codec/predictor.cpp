@@ -9,10 +9,10 @@ namespace {
 
 constexpr std::int32_t kOne = 256;
 constexpr std::int32_t kMost = 16 * kOne;
-/// Fewer samples than this do not justify coefficients of their own.
+/// Fewer samples than this do not justify separate coefficients.
 constexpr std::uint64_t kFewest = 64;
 
-/// The neighbour that the others are measured from: the lowest of the pattern.
+/// Returns the neighbour from which the others are measured, the lowest of the pattern.
 unsigned reference(unsigned pattern) { return static_cast<unsigned>(std::countr_zero(pattern)); }
 
 }  // namespace

@@ -8,13 +8,13 @@
 
 #include "store/codec/bytes.hpp"
 
-/// Prediction of a height from already known neighbours: a linear combination whose coefficients
-/// (in 1/256, adding up to 256) are fitted by least squares, one set for each of the 64 possible
+/// Predicts a height from already known neighbours by a linear combination. Its coefficients (in
+/// 1/256, adding up to 256) are fitted by least squares, one set for each of the 64 possible
 /// patterns of neighbours.
 
 namespace terrace::stream::store {
 
-/// Neighbours in this order; bit i of a pattern is set if neighbour i exists.
+/// The neighbours. Bit i of a pattern is set if neighbour i exists.
 enum Neighbour : unsigned { kWest, kNorth, kNorthWest, kNorthEast, kWestWest, kNorthNorth };
 inline constexpr unsigned kNeighbours = 6;
 inline constexpr unsigned kPatterns = 1u << kNeighbours;
@@ -23,16 +23,16 @@ struct Predictor {
   using Coefficients = std::array<std::int32_t, kNeighbours>;
   std::array<Coefficients, kPatterns> coefficients = defaults();
 
-  /// Planes if three neighbours span one, otherwise the nearest neighbour. Pattern 0 predicts
-  /// nothing.
+  /// Returns coefficients of a plane if three neighbours span one, otherwise of the nearest
+  /// neighbour. Pattern 0 has none.
   static std::array<Coefficients, kPatterns> defaults();
 
   void write(Bytes& out) const;
-  /// Throws: Damage.
+  /// Parses the coefficients. Throws: Damage.
   static Predictor read(ByteReader& in);
 };
 
-/// Accumulates the sums of the least squares. All arithmetic is in one fixed order.
+/// Accumulates the sums of the least squares. All arithmetic is in a fixed order.
 class PredictorFit {
  public:
   PredictorFit() : sums_(kPatterns) {}

@@ -11,14 +11,15 @@
 namespace terrace::stream::store {
 namespace {
 
-/// 2^64 / frequency, rounded up but for the first two.
+/// 2^64 / frequency, rounded up except for the first two.
 constexpr std::array<std::uint64_t, kScale + 1> kReciprocals = [] {
   std::array<std::uint64_t, kScale + 1> reciprocals{};
   for (std::uint32_t f = 2; f <= kScale; ++f) reciprocals[f] = UINT64_MAX / f + 1;
   return reciprocals;
 }();
 
-/// state / frequency: exact, as the reciprocal is too large by less than 2^-32 of itself.
+/// Returns state / frequency, exactly, because the reciprocal is too large by less than 2^-32 of
+/// its value.
 inline std::uint32_t divided(std::uint32_t state, std::uint32_t frequency) {
   if (frequency == 1) [[unlikely]]
     return state;
@@ -47,9 +48,7 @@ void fill_decode_table(const Frequencies& frequencies, DecodeTable& table) {
   assert(start == kScale);
 }
 
-void SymbolDecoder::throw_bad_symbol() {
-  throw Damage("coded bytes have a symbol that does not exist");
-}
+void SymbolDecoder::throw_bad_symbol() { throw Damage("coded bytes have an unknown symbol"); }
 
 void BitWriter::append_reversed(Bytes& out) const {
   std::uint64_t rest = hold_;
@@ -94,15 +93,15 @@ void SymbolEncoder::numbers(unsigned first, std::span<const std::uint64_t> numbe
     any |= numbers[i];
   }
   used_ += n;
-  if (any < 16 && !escape) return;    // no open bits
-  BitWriter bits = std::move(bits_);  // a copy, which the compiler keeps in registers
+  if (any < 16 && !escape) return;    // no raw bits
+  BitWriter bits = std::move(bits_);  // a copy, which the compiler can keep in registers
   const auto open_bits = [&](std::size_t i) -> RawBits {
     const ClassRange& range = kClassRange[classes[i]];
     return {numbers[i] - range.base, range.bits};
   };
   std::size_t i = 0;
   if (any >> 17 == 0 && !escape) {
-    for (; i + 1 < n; i += 2) {  // two have at most 32
+    for (; i + 1 < n; i += 2) {  // the bits of two are at most 32
       const RawBits one = open_bits(i), other = open_bits(i + 1);
       bits.put_short(one.value << other.bits | other.value, one.bits + other.bits);
     }
@@ -118,11 +117,11 @@ void SymbolEncoder::numbers(unsigned first, std::span<const std::uint64_t> numbe
   bits_ = std::move(bits);
 }
 
-/// The rANS stream of an encoder's symbols. rANS is last in, first out: the symbols go in
-/// backwards, and the words come out from the last to the first.
+/// Produces the rANS stream of an encoder's symbols. rANS is last in, first out, so symbols are
+/// taken in reverse order and words are produced from the last to the first.
 class SymbolEncoder::Words {
  public:
-  /// The initial state is the decoder's final one, so it carries 16 bits for nothing.
+  /// The initial state is the decoder's final one, so it holds 16 bits at no cost.
   Words(SymbolEncoder& encoder, std::uint32_t last)
       : left(encoder.used_),
         symbols_(encoder.symbols_.data()),
@@ -133,12 +132,12 @@ class SymbolEncoder::Words {
     end_ = next_ = encoder.words_.data() + encoder.words_.size();
   }
 
-  std::size_t left;  ///< symbols to go in
+  std::size_t left;  ///< symbols not yet taken
 
   TERRACE_STORE_INLINE void step() {
     const Entry entry = symbols_[--left];
     const std::uint32_t frequency = entry & 0xffff, begin = entry >> 16;
-    // Written whether it counts or not: a branch upon that is often guessed wrong.
+    // Always written, even if it does not count, because a branch is often mispredicted.
     next_[-1] = static_cast<std::uint16_t>(state_);
     const unsigned full = state_ >> (32 - kScaleBits) >= frequency ? 1 : 0;
     next_ -= full;
@@ -147,7 +146,7 @@ class SymbolEncoder::Words {
   }
   void write(Bytes& out) const {
     const auto bytes = static_cast<std::size_t>(end_ - next_) * sizeof(std::uint16_t);
-    // Where it is all there is, no more of its bytes than it needs.
+    // If the string is only the state, it has only the bytes that the state needs.
     std::size_t of_state = sizeof state_;
     while (alone_ && bytes == 0 && of_state > 1 && state_ >> (8 * of_state - 8) == 0) --of_state;
     const std::size_t start = out.size();
@@ -163,13 +162,14 @@ class SymbolEncoder::Words {
   std::uint32_t state_;
 };
 
-/// Until one has no symbols left, and so on with the others while there are two.
+/// Codes the lanes in parallel until one has no symbols left, then continues with the others as
+/// long as there are two.
 template <std::size_t kLanes>
 void SymbolEncoder::finish_lanes(std::array<Words*, kTogether>& lanes) {
   std::sort(lanes.begin(), lanes.begin() + kLanes,
             [](const Words* a, const Words* b) { return a->left > b->left; });
   const auto finish_shortest = [&]<std::size_t... kLane>(std::index_sequence<kLane...>) {
-    std::array<Words, kLanes> words{*lanes[kLane]...};  // which the compiler keeps in registers
+    std::array<Words, kLanes> words{*lanes[kLane]...};  // which the compiler can keep in registers
     for (std::size_t steps = words.back().left; steps > 0; --steps) (words[kLane].step(), ...);
     ((*lanes[kLane] = words[kLane]), ...);
   };

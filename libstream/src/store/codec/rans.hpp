@@ -14,7 +14,7 @@
 /// Source: J. Duda, Asymmetric numeral systems, arXiv:1311.2540; F. Giesen, Interleaved entropy
 /// coders, arXiv:1402.3392.
 
-/// A decoder that is not inlined keeps its state in memory: half the speed.
+/// A decoder that is not inlined keeps its state in memory, which halves the speed.
 #if defined(__GNUC__)
 #define TERRACE_STORE_INLINE [[gnu::always_inline]] inline
 #else
@@ -25,22 +25,22 @@ namespace terrace::stream::store {
 
 inline constexpr unsigned kScaleBits = 11;
 inline constexpr std::uint32_t kScale = 1u << kScaleBits;
-/// The state lies in [kLow, 2^32) between symbols, and below kLow only where no words are left.
+/// Between symbols the state is in [kLow, 2^32), and below kLow only if no words are left.
 inline constexpr std::uint32_t kLow = 1u << 16;
 
-/// Frequencies of a context, adding up to kScale. Symbols of frequency 0 go by the escape, which
-/// always has one.
+/// Frequencies of a context, adding up to kScale. Symbols of frequency 0 are coded with the escape,
+/// whose frequency is positive.
 using Frequencies = std::array<std::uint16_t, kSymbols>;
 
 /// The tables of all contexts as the encoder uses them.
 class EncodeTables {
  public:
-  /// Frequency, and above its 16 bits the start; 0 for symbols that go by the escape.
+  /// The frequency in the lower 16 bits and the start above; 0 for symbols coded with the escape.
   using Entry = std::uint32_t;
 
-  /// That of the next context.
+  /// Appends the table of the next context.
   void append(const Frequencies& frequencies);
-  /// By *slot*: context * kSymbols + symbol.
+  /// The entries, indexed by *slot*: context * kSymbols + symbol.
   [[nodiscard]] const Entry* entries() const { return entries_.data(); }
   [[nodiscard]] std::size_t contexts() const { return entries_.size() / kSymbols; }
 
@@ -48,8 +48,8 @@ class EncodeTables {
   std::vector<Entry> entries_;
 };
 
-/// A context's table as the decoder uses it. Two small arrays rather than one of 32-bit slots: a
-/// set of tables then stays in the caches that are near, also when clusters are read at random.
+/// A context's table as the decoder uses it. Two small arrays instead of one of 32-bit slots, so
+/// that a set of tables stays in the nearest caches even if clusters are read at random.
 struct DecodeTable {
   struct Range {
     std::uint16_t frequency = 0, start = 0;
@@ -60,13 +60,14 @@ struct DecodeTable {
 
 void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
 
-/// Bits that stand for a number.
+/// Bits that represent a number.
 struct RawBits {
   std::uint64_t value = 0;
   unsigned bits = 0;
 };
 
-/// Bits, most significant first; `append_reversed` puts them so that the first is in the last byte.
+/// Writes bits, most significant first. append_reversed() appends the bytes in reverse, so that the
+/// first bit is in the last byte.
 class BitWriter {
  public:
   void clear() {
@@ -85,8 +86,8 @@ class BitWriter {
   }
   void append_reversed(Bytes& out) const;
   [[nodiscard]] bool empty() const { return used_ == 0 && held_ == 0; }
-  /// put() that requires bits <= 32. The next word is written whether it is full or not: a branch
-  /// upon that is close to a coin toss.
+  /// Like put(), but requires bits <= 32. Always writes the next word, full or not, because a
+  /// branch would be unpredictable.
   TERRACE_STORE_INLINE void put_short(std::uint64_t value, unsigned bits) {
     if (used_ == words_.size()) words_.resize(2 * used_ + 64);
     hold_ = hold_ << bits | value;
@@ -99,20 +100,20 @@ class BitWriter {
  private:
   std::vector<std::uint32_t> words_;  ///< the first used_
   std::size_t used_ = 0;
-  std::uint64_t hold_ = 0;  ///< the lower held_ (< 32) bits are still to go
+  std::uint64_t hold_ = 0;  ///< the lower held_ (< 32) bits are not written yet
   unsigned held_ = 0;
 };
 
-/// Counts the symbols of clusters instead of encoding them, for training.
+/// Counts the symbols of clusters for training instead of encoding them.
 class SymbolCounter {
  public:
   static constexpr bool kDecoding = false;
   using Local = SymbolCounter&;
 
-  /// `counts`: occurrences by context and symbol, to be added to.
+  /// counts: occurrences by context and symbol, which are increased.
   explicit SymbolCounter(std::span<std::array<std::uint32_t, kSymbols>> counts) : counts_(counts) {}
 
-  /// Those of classes included.
+  /// Number of raw bits, including those of classes.
   [[nodiscard]] std::uint64_t raw_bits() const { return raw_bits_; }
 
   TERRACE_STORE_INLINE void symbol(unsigned context, unsigned symbol) {
@@ -134,7 +135,7 @@ class SymbolEncoder {
   static constexpr bool kDecoding = false;
   using Local = SymbolEncoder&;
 
-  /// The tables must outlive the encoder.
+  /// `tables` must outlive the encoder.
   explicit SymbolEncoder(const EncodeTables& tables) : entries_(tables.entries()) {}
 
   void start() {
@@ -153,19 +154,19 @@ class SymbolEncoder {
     symbols_[used_++] = entry;
   }
   TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) { bits_.put(value, bits); }
-  /// Numbers with their classes, as symbol() and raw() take them one by one, faster.
-  /// slots: of the classes, counted from those of context `first` on.
+  /// Adds many numbers with their classes, faster than symbol() and raw() for each. slots: the
+  /// classes' slots, counted from the first slot of context `first`.
   void numbers(unsigned first, std::span<const std::uint64_t> numbers, const std::uint8_t* classes,
                const std::uint32_t* slots);
-  /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state: with
-  /// raw bits above kLow; otherwise the state itself, as the string's end then tells that no word
-  /// is left.
+  /// Appends the byte string. last: a number below 2^16 that the decoder finds in its final state,
+  /// which is kLow + last; without raw bits it is `last` itself, because the end of the string then
+  /// shows that no words are left.
   void finish(std::uint32_t last, Bytes& out) { finish({this, 1}, {&last, 1}, out); }
-  /// How many clusters are best finished at a time.
+  /// Number of clusters that are best finished together.
   static constexpr std::size_t kTogether = 4;
-  /// The same for up to kTogether clusters, one string after the other. Faster than one by one:
-  /// each step of rANS waits for the one before.
-  /// last: for each; replaced by how many bytes each has.
+  /// Appends the strings of up to kTogether clusters, one after another. Faster than one by one,
+  /// because each step of rANS waits for the previous one. last: one per cluster; replaced by the
+  /// bytes of its string.
   static void finish(std::span<SymbolEncoder> coders, std::span<std::uint32_t> last, Bytes& out);
 
  private:
@@ -182,11 +183,11 @@ class SymbolEncoder {
   BitWriter bits_;
 };
 
-/// Bytes that must be readable before and behind a cluster's byte string.
+/// Bytes that must be readable before and after a cluster's byte string.
 inline constexpr std::size_t kPadding = 16;
 
-/// Decodes what SymbolEncoder wrote. Reads at most kPadding bytes to either side of the string
-/// whatever is in it; `finish` tells whether the string was consumed exactly.
+/// Decodes what SymbolEncoder wrote. Whatever the string contains, reads at most kPadding bytes
+/// beyond either end; finish() checks that the string was consumed exactly.
 class SymbolDecoder {
  public:
   static constexpr bool kDecoding = true;
@@ -211,7 +212,7 @@ class SymbolDecoder {
     const DecodeTable::Range range = table.ranges[symbol];
     state_ = range.frequency * (state_ >> kScaleBits) + slot - range.start;
     const std::uint32_t refilled = state_ << 16 | load<std::uint16_t>(next_);
-    // Selected, not branched upon: whether a word is due is close to a coin toss.
+    // Without a branch, which would be unpredictable.
     const bool low = (state_ < kLow) & (next_ < end_);
     state_ = low ? refilled : state_;
     next_ += low ? 2 : 0;
@@ -226,12 +227,13 @@ class SymbolDecoder {
     }
     return short_raw(bits);
   }
-  /// The encoder's `last`. Throws: Damage unless both ends have met, with zero bits between.
+  /// Returns the encoder's `last`. Throws: Damage unless both ends have met, with zero bits between
+  /// them.
   std::uint32_t finish() const {
     const bool met = next_ == end_ - (used_bits_ + 7) / 8;
     if (!met || (used_bits_ % 8 != 0 && (*next_ & (0xff >> used_bits_ % 8)) != 0) ||
         state_ >= 2 * kLow || (state_ < kLow && used_bits_ > 0)) {
-      throw Damage("coded bytes do not end where their numbers do");
+      throw Damage("coded bytes do not end with their numbers");
     }
     return state_ % kLow;
   }

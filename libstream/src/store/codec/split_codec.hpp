@@ -9,9 +9,9 @@
 
 #include "store/codec/coding.hpp"
 
-/// A multiset of points in a box of integers, in no order: the box is halved across its longest
-/// side again and again, and the number of points in the lower half is coded, until one point is
-/// left in a box (its place there follows, evenly coded) or the box is one cell.
+/// Codes a multiset of points in a box of integers, without their order. The box is halved
+/// repeatedly across its longest side, and the number of points in the lower half is coded, until a
+/// box has one point, whose position is then coded uniformly, or is one cell.
 /// Source: O. Devillers, P.-M. Gandoin, Geometric compression for interactive transmission, IEEE
 /// Visualization 2000, doi:10.1109/VISUAL.2000.885711 (static tables by number of points here).
 
@@ -19,10 +19,10 @@ namespace terrace::stream::store {
 
 struct IntegerBox {
   std::array<std::uint64_t, 3> low{};
-  std::array<std::uint64_t, 3> size{1, 1, 1};  ///< low + size is the first value beyond
+  std::array<std::uint64_t, 3> size{1, 1, 1};  ///< low + size is the first value above it
 };
 
-/// How many of n points lie in the lower half.
+/// Codes how many of n points are in the lower half.
 template <class Coder>
 TERRACE_STORE_INLINE void code_split(Coder& coder, std::uint32_t n, std::uint32_t& below) {
   if (n < context::kSplitDirect) {
@@ -41,7 +41,7 @@ TERRACE_STORE_INLINE void code_split(Coder& coder, std::uint32_t n, std::uint32_
 
 class SplitDecoder {
  public:
-  /// n points in `box`, coordinate by coordinate, into `at`.
+  /// Decodes n points in `box` into `at`, by coordinate.
   template <class Coder>
   void decode(Coder& coder, const IntegerBox& box, const std::array<std::uint64_t*, 3>& at,
               std::uint32_t n) {
@@ -52,7 +52,7 @@ class SplitDecoder {
  private:
   template <class Coder>
   void split(Coder& coder, IntegerBox box, std::uint32_t first, std::uint32_t n) {
-    // The lower half recursively, the upper one by going round: at most 192 deep.
+    // The lower half is handled recursively, the upper half by the loop: at most 192 deep.
     while (n > 1) {
       std::size_t axis = box.size[1] > box.size[0] ? 1 : 0;
       if (box.size[2] > box.size[axis]) axis = 2;
@@ -84,19 +84,19 @@ class SplitDecoder {
   std::array<std::uint64_t*, 3> at_{};
 };
 
-/// A side of a box: its axis and its size less 1.
+/// A side of a box, as its axis and its size minus 1.
 struct BoxSide {
   unsigned axis = 0;
   std::uint64_t extent = 0;
 };
 
-/// How SplitEncoder keeps points and boxes where 16 bits suffice for each coordinate and the number
-/// of points, as in nearly all clusters: registers hold them.
+/// Points and boxes of SplitEncoder in registers, for clusters in which each coordinate and the
+/// number of points fit 16 bits, as in nearly all.
 struct NarrowPoints {
-  /// Coordinates x, y, z from the highest bits on, then the number.
+  /// The coordinates x, y, z from the highest bits on, then the point's number.
   using Point = std::uint64_t;
   struct Box {
-    Point low = 0, extent = 0;  ///< size less 1
+    Point low = 0, extent = 0;  ///< size minus 1
   };
   struct Limit {
     Point field = 0, middle = 0;
@@ -112,7 +112,7 @@ struct NarrowPoints {
   static Box box(const std::array<std::uint64_t, 3>& size) {
     return {0, point(size[0] - 1, size[1] - 1, size[2] - 1, 0)};
   }
-  // Without branches, which would be coin tosses.
+  // Without branches, which would be unpredictable.
   TERRACE_STORE_INLINE static BoxSide longest(const Box& box) {
     // The first of equal sides wins.
     const auto rank = [&](unsigned axis) {
@@ -129,7 +129,7 @@ struct NarrowPoints {
     return (point & limit.field) < limit.middle;
   }
   TERRACE_STORE_INLINE static Box half(const Box& box, const BoxSide& side, bool upper) {
-    const Point lower = side.extent / 2;  // its size less 1
+    const Point lower = side.extent / 2;  // its size minus 1
     const Point extent = lower - (Point{upper} & ~side.extent);
     return {box.low + ((lower + 1) * Point{upper} << shift(side.axis)),
             box.extent - ((side.extent - extent) << shift(side.axis))};
@@ -163,7 +163,7 @@ struct NarrowPoints {
   }
 };
 
-/// The same in words of their own.
+/// Points and boxes of SplitEncoder in separate words, for all other clusters.
 struct WidePoints {
   struct Point {
     std::array<std::uint64_t, 3> at;
@@ -215,9 +215,9 @@ struct WidePoints {
 
 class SplitEncoder {
  public:
-  /// n points in a box of these sizes, whose low side is 0; at(axis, i) is a coordinate of point i.
-  /// Fills `order` with the numbers of the points in the order of coding (points at one place:
-  /// ascending).
+  /// Encodes n points in a box of these sizes, whose low side is 0; at(axis, i) is a coordinate of
+  /// point i. Fills `order` with the numbers of the points in the order of coding; points at one
+  /// place are in ascending order.
   template <class Coder, class At>
   void encode(Coder& coder, const std::array<std::uint64_t, 3>& size, At&& at, std::uint32_t n,
               std::uint32_t* order) {
@@ -235,7 +235,7 @@ class SplitEncoder {
     using Box = typename Points::Box;
 
     Coder& coder;
-    std::uint32_t* order;  ///< where the numbers of the next points go
+    std::uint32_t* order;  ///< where to put the numbers of the next points
 
     template <class At>
     void encode(const std::array<std::uint64_t, 3>& size, At&& at, std::uint32_t n,
@@ -247,9 +247,9 @@ class SplitEncoder {
       split(Points::box(size), points.data(), points.data() + n, n);
     }
 
-    /// `room` is for as many points.
+    /// Codes n points. `room` must have room for as many.
     void split(Box box, Point* points, Point* room, std::uint32_t n) {
-      // The lower half recursively, the upper one by going round: at most 192 deep.
+      // The lower half is handled recursively, the upper half by the loop: at most 192 deep.
       while (n > 3) {
         const BoxSide side = Points::longest(box);
         if (side.extent == 0) return finish(points, n);
@@ -273,8 +273,8 @@ class SplitEncoder {
       }
     }
 
-    // Most boxes have two or three points: what is known of them spares branches, which are guessed
-    // wrong half of the time.
+    // Most boxes have two or three points. Special cases for them save branches, half of which
+    // would be mispredicted.
     void split_two(Box box, Point a, Point b) {
       for (;;) {
         const BoxSide side = Points::longest(box);
@@ -316,15 +316,15 @@ class SplitEncoder {
       *order++ = Points::number(point);
     }
 
-    /// Ends with points that are all at one place.
+    /// Ends a box whose points are all at one place.
     void finish(Point* points, std::uint32_t n) {
       std::sort(points, points + n);
       for (std::uint32_t i = 0; i < n; ++i) *order++ = Points::number(points[i]);
     }
 
-    /// Leaves the points below the limit, moves the others to `above` and returns how many are
-    /// below. Writes all to both: a branch here is a coin toss. Nothing written is read again,
-    /// which would be waited for.
+    /// Keeps the points below the limit, moves the others to `above` and returns how many are
+    /// below. Writes every point to both, because a branch would be unpredictable. Does not read
+    /// anything it wrote, which would stall.
     static std::uint32_t partition(Point* points, Point* above, std::uint32_t n,
                                    const typename Points::Limit& limit) {
       std::uint32_t below = 0;
@@ -338,7 +338,7 @@ class SplitEncoder {
     }
   };
 
-  // Points, and as much room.
+  // The points, followed by room for as many.
   std::vector<NarrowPoints::Point> narrow_;
   std::vector<WidePoints::Point> wide_;
 };

@@ -14,7 +14,8 @@ Frequencies escape_only() {
   return frequencies;
 }
 
-/// log2(x) with so many bits of fraction, by squaring: the same on every machine.
+/// Bits after the point of log2(x), which is computed by squaring, so that it is the same on every
+/// machine.
 constexpr unsigned kFraction = 16;
 std::uint64_t logarithm(std::uint64_t x) {
   const auto exponent = static_cast<unsigned>(std::bit_width(x)) - 1;
@@ -53,7 +54,7 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::u
     if (counts[s] <= std::max(least - 1, 1u)) rare += counts[s];
   }
   if (total == 0) return escape_only();
-  // As many unseen symbols are to be expected as there were that came once (Good-Turing).
+  // The expected number of unseen symbols is the number of those seen once (Good-Turing).
   const std::uint64_t escape =
       std::clamp<std::uint64_t>(rare * kScale / (total + 1), 1, kScale / 16);
   const std::uint64_t available = kScale - escape;
@@ -67,7 +68,7 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::u
     frequencies[s] = static_cast<std::uint16_t>(share);
     given += share;
   }
-  // Rounding is settled with the most frequent symbols, which feel it least.
+  // The most frequent symbols absorb the rounding, because it costs them least.
   while (given != available) {
     const auto largest = std::max_element(frequencies.begin(), frequencies.begin() + kClasses);
     if (given < available) {
@@ -126,12 +127,12 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
     const unsigned kind = in.get<std::uint8_t>();
     const bool lines = tables.guide.exists() && c != tables.guide.attribute;
     if (kind >= (lines ? kColumnKinds : kUnguidedKinds)) {
-      throw Damage("a table names a kind of columns that does not exist");
+      throw Damage("a table has an unknown kind of columns");
     }
     tables.kinds.push_back(static_cast<ColumnKind>(kind));
     if (along_line(tables.kinds[c]) == ColumnKind::beside &&
         !(layout.may_lie_beside(c) && c != tables.guide.attribute)) {
-      throw Damage("a table has a column beside one that is not of integers");
+      throw Damage("a table has kind beside for columns other than integers");
     }
   }
   const unsigned contexts = layout.contexts();
@@ -142,7 +143,7 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
     const std::uint64_t used = in.varint();
     if (layout.version > 4 && used == 0) {
       const std::uint64_t more = in.varint();
-      if (more >= contexts - c) throw Damage("a table has contexts that do not exist");
+      if (more >= contexts - c) throw Damage("a table has too many contexts");
       tables.frequencies.resize(c + 1 + static_cast<std::size_t>(more), escape_only());
       c += static_cast<unsigned>(more);
       continue;
@@ -150,7 +151,7 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
     for (std::uint64_t i = 0; i < used; ++i) {
       const std::uint64_t step = in.varint();
       if (step >= kClasses || (i > 0 && step == 0) || symbol + step >= kClasses) {
-        throw Damage("a table names a symbol that does not exist");
+        throw Damage("a table has an unknown symbol");
       }
       symbol += step;
       const std::uint64_t frequency = in.varint();

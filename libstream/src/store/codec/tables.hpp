@@ -17,25 +17,25 @@ namespace terrace::stream::store {
 /// The number of occurrences of each symbol in each context.
 using Counts = std::vector<std::array<std::uint32_t, kSymbols>>;
 
-/// Bits of the symbols of a context, coded with their own table ...
+/// Returns the bits of the symbols of a context if coded with their own table.
 [[nodiscard]] std::uint64_t entropy_of(const std::array<std::uint32_t, kSymbols>& counts);
-/// ... and the raw bits of their classes.
+/// Returns the raw bits of the symbols' classes.
 [[nodiscard]] std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts);
-/// Frequencies for `counts` that keep every symbol codable: those that occur less often than
+/// Returns frequencies for `counts`. Every symbol stays codable: those that occur less often than
 /// `least` by the escape.
 Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::uint32_t least = 1);
 
-/// The attribute that tells where scan lines begin: the time of the pulses.
+/// The attribute that shows where scan lines begin, the time of the pulses.
 struct Guide {
   static constexpr unsigned kNone = UINT32_MAX;
 
   unsigned attribute = kNone;
-  std::uint64_t least_jump = 0;  ///< a difference as large begins a line; not stored
+  std::uint64_t least_jump = 0;  ///< a difference of at least this begins a line; not stored
 
   [[nodiscard]] bool exists() const { return attribute != kNone; }
 };
 
-/// The tables of a segment of a level's clusters: height predictor and symbol frequencies.
+/// The tables of a range of a level's clusters: height predictor and symbol frequencies.
 struct Tables {
   Predictor predictor;
   Guide guide;                           ///< from version 3 on
@@ -43,7 +43,7 @@ struct Tables {
   std::vector<Frequencies> frequencies;  ///< one per context
 
   void write(Bytes& out, int version) const;
-  /// Throws: Damage.
+  /// Parses tables. Throws: Damage.
   static Tables read(ByteView bytes, const Layout& layout);
   /// Maximum bytes of tables.
   static std::uint64_t most_bytes(const Layout& layout) {
@@ -63,7 +63,7 @@ struct EncodingTables {
   explicit EncodingTables(const Tables& from);
 };
 
-/// Tables prepared for decoding; contexts without any symbols share one table.
+/// Tables prepared for decoding. Contexts without symbols share one table.
 struct DecodingTables {
   Predictor predictor;
   Guide guide;

@@ -20,11 +20,11 @@ namespace {
 
 constexpr std::uint64_t kInnerBytes = std::uint64_t{6} << 20;
 constexpr double kFar = std::numeric_limits<double>::infinity();
-/// More than sums of three products round by, for each unit of their terms.
+/// Upper bound of the rounding of a sum of three products, relative to the sum of their magnitudes.
 constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
 
-/// The length of a vector whatever its size: squares neither overflow nor vanish. Infinite if it is
-/// larger than a double can tell.
+/// Returns the length of a vector, without overflow or underflow of squares; infinite if a double
+/// cannot represent it.
 double norm(const Point3& v) {
   const double most = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
   if (most > 1e-140 && most < 1e140) return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -40,7 +40,7 @@ double norm(const Point3& v) {
   return std::ldexp(std::sqrt(square), exponent);
 }
 
-/// Half the way from b to a, which no finite numbers make infinite.
+/// Returns half of a - b, which is finite for finite numbers.
 Point3 half_way(const Point3& a, const Point3& b) {
   return {0.5 * a[0] - 0.5 * b[0], 0.5 * a[1] - 0.5 * b[1], 0.5 * a[2] - 0.5 * b[2]};
 }
@@ -50,13 +50,13 @@ double distance_of(const LinearMap& map, const Point3& a, const Point3& b) {
   Point3 mapped;
   for (std::size_t row = 0; row < 3; ++row) {
     mapped[row] = map[3 * row] * half[0] + map[3 * row + 1] * half[1] + map[3 * row + 2] * half[2];
-    if (std::isnan(mapped[row])) mapped[row] = kFar;  // of terms that are infinite
+    if (std::isnan(mapped[row])) mapped[row] = kFar;  // if terms are infinite
   }
   return 2 * norm(mapped);
 }
 
-/// Not above distance_of() from `place` to any point in the box, rounding included: the distance to
-/// the box around the mapped box.
+/// Returns a lower bound of distance_of() from `place` to any point in the box, including rounding:
+/// the distance to the box around the mapped box.
 double least_distance(const LinearMap& map, const Point3& place, const Box3& box) {
   const Point3 low = half_way(box.min, place), high = half_way(box.max, place);
   Point3 out;
@@ -70,9 +70,9 @@ double least_distance(const LinearMap& map, const Point3& place, const Box3& box
     }
     const double slack = kRounding * terms;
     const double beyond = std::max(least - slack, -(most + slack));
-    out[row] = beyond > 0.0 ? beyond : 0.0;  // also where infinite terms give NaN
+    out[row] = beyond > 0.0 ? beyond : 0.0;  // also if infinite terms give NaN
   }
-  // What is farther than a double can tell is no reason not to look.
+  // Finite, so that a box is not skipped because its distance overflows.
   return std::min(2 * norm(out) * (1 - kRounding), std::numeric_limits<double>::max());
 }
 
@@ -82,11 +82,12 @@ bool is_nearer(const FoundPoint& a, const FoundPoint& b) {
   return a.cluster != b.cluster ? a.cluster < b.cluster : a.member < b.member;
 }
 
-/// Share of `other`, which meets `box`, that lies inside it; 1 if `other` has no extent.
+/// Returns the share of `other` that is inside `box`; 1 if `other` has no extent. Requires that
+/// they intersect.
 double share_inside(const Box3& box, const Box3& other) {
   double share = 1.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // Halves, as the whole may be more than a double can tell.
+    // Halves, because the whole length may overflow.
     const double length = 0.5 * other.max[axis] - 0.5 * other.min[axis];
     const double inside = 0.5 * std::min(box.max[axis], other.max[axis]) -
                           0.5 * std::max(box.min[axis], other.min[axis]);
@@ -111,7 +112,7 @@ void StoreQuery::check_looked(std::uint64_t clusters) const {
   throw Error({.file = store_.path().string(),
                .where = {},
                .cause = "the hierarchy is damaged: clusters are headed by several points",
-               .remedy = "restore the files or build the store anew"});
+               .remedy = "restore the files or rebuild the store"});
 }
 
 void StoreQuery::fill(Node& node, ClusterId id) {
@@ -127,7 +128,7 @@ void StoreQuery::fill(Node& node, ClusterId id) {
   }
   store_.read(id, points_);
   if (points_.matches.empty()) {
-    // Not copied: the next cluster is read into what the node held before.
+    // Swapped, not copied: the next cluster is read into the node's former memory.
     std::swap(node.positions, points_.positions);
   } else {
     node.positions.clear();
@@ -146,7 +147,7 @@ void StoreQuery::fill(Node& node, ClusterId id) {
       node.branches_.push_back({store_.coarse_box(cluster_id(below, ordinal)), ordinal, 0});
     }
   }
-  // The node itself and its entries in list and map count too.
+  // Includes the node itself and its entries in the list and the map.
   node.bytes = node.positions.capacity() * sizeof(Point3) +
                node.members_.capacity() * sizeof(std::uint32_t) +
                node.branches_.capacity() * sizeof(Branch) + sizeof(Node) + 64;
@@ -176,8 +177,8 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
     cache.nodes.splice(cache.nodes.begin(), cache.nodes, found->second);
     return cache.nodes.front();
   }
-  // A node that has to go lends its memory to the one that comes. Until that one is whole it is in
-  // no map, so damage leaves nothing behind.
+  // The memory of a dropped node is reused for the new one. The new node is not in a map until it
+  // is complete, so damage leaves nothing behind.
   Nodes fresh, gone;
   if (cache.held_bytes >= cache.most_bytes && !cache.nodes.empty()) {
     cache.drop(fresh);
@@ -249,7 +250,7 @@ std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
 
 std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t count,
                                             const LinearMap& metric, unsigned level) {
-  std::vector<FoundPoint> found;  // a heap, the farthest on top
+  std::vector<FoundPoint> found;  // a heap with the farthest on top
   if (count == 0) return found;
   best_first(
       level, [&](const Box3& box) { return least_distance(metric, place, box); },
@@ -313,7 +314,7 @@ double StoreQuery::estimate(const Box3& box, double limit) {
   return sum;
 }
 
-/// The points that meet a condition.
+/// The view of the points that meet a condition.
 class Store::ConditionView final : public Store::View {
  public:
   explicit ConditionView(Where condition) : condition_(std::move(condition)) {}

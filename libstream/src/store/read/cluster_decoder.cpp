@@ -98,7 +98,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   out.before_representative = last;
   deliver(entry, root ? n : last, out);
 
-  // Everything but the representative, in the order of coding.
+  // All points except the representative, in the order of coding.
   const std::size_t stride = layout.payload_size;
   const std::uint32_t members = root ? n : n - 1;
   out.payload.resize(members * stride);
@@ -164,7 +164,7 @@ bool ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
   }
   if (layout.has_point_columns()) return false;
   if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
-    throw Damage("a cluster's box does not suit its form");
+    throw Damage("a cluster's box does not fit its form");
   }
   grid_.positions(coder, layout.version > 4 ? layout.border_context() : 0,
                   static_cast<std::uint32_t>(box_.size[0]),
@@ -172,7 +172,7 @@ bool ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
                   relative_[1].data());
   grid_.heights(coder, tables.predictor, box_.size[2], relative_[2].data());
   const std::uint64_t highest = *std::max_element(relative_[2].begin(), relative_[2].begin() + n);
-  if (highest >= box_.size[2]) throw Damage("a height lies outside of its cluster's box");
+  if (highest >= box_.size[2]) throw Damage("a height is outside its cluster's box");
   return true;
 }
 
@@ -188,7 +188,7 @@ void ClusterDecoder::sequence(SymbolDecoder& coder, const Layout& layout,
       relative_[axis][i] = static_cast<std::uint64_t>(column_[i]);
       highest = std::max(highest, relative_[axis][i]);
     }
-    if (highest >= box_.size[axis]) throw Damage("a point lies outside of its cluster's box");
+    if (highest >= box_.size[axis]) throw Damage("a point is outside its cluster's box");
   }
 }
 

@@ -12,17 +12,18 @@
 
 namespace terrace::stream::store {
 
-/// Decodes clusters. Keeps its memory from one to the next. One object per thread.
+/// Decodes clusters. Reuses its memory from one to the next. Not thread-safe.
 class ClusterDecoder {
  public:
-  /// bytes: entry.bytes of them, with kPadding readable bytes before and behind.
+  /// Decodes a cluster. bytes: entry.bytes of them, with kPadding readable bytes before and after.
   /// root: no point is the representative.
   /// Throws: Damage if the bytes are not a cluster of entry.points points in the entry's box.
   void decode(const Layout& layout, const DecodingTables& tables, const Entry& entry,
               ByteView bytes, bool root, ClusterPoints& out);
 
  private:
-  /// False if the points come in a sequence, whose coordinates follow.
+  /// Decodes the positions. False if the points are in a sequence, whose coordinates follow as
+  /// columns.
   bool positions(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
                  const Entry& entry);
   void sequence(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,

@@ -9,13 +9,13 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Contents of chapters and tables that are read with the directory if they take no more.
+/// Contents of chapters and tables of at most this many bytes are read with the directory.
 constexpr std::uint64_t kReadAtOnce = std::uint64_t{64} << 10;
-/// A writer makes one set per 1024 blocks, and no block without a cluster.
+/// A writer makes one set per 1024 blocks, each of which has a cluster.
 constexpr std::uint64_t kFewestClustersOfTables = 1024;
 constexpr std::uint64_t kMostVarint = 10, kChecksum = 4;
 
-/// What is before the CRC-32 that ends `bytes`.
+/// Checks the CRC-32 at the end of `bytes`. Returns the bytes before it.
 ByteView checked(ByteView bytes, const char* damage) {
   if (bytes.size() < kChecksum ||
       crc32(bytes.first(bytes.size() - kChecksum)) !=
@@ -116,7 +116,8 @@ void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
   }
 }
 
-/// at: where the first set begins if they lie `apart` from the directory.
+/// Reads the positions of the sets. at: where the first begins if they are `apart` from the
+/// directory.
 void Directory::read_sets(ByteReader& in, std::uint64_t sets, std::uint64_t at, bool apart) {
   for (std::uint64_t t = 0; t < sets; ++t) {
     TablesAt set;

@@ -15,7 +15,8 @@
 
 namespace terrace::stream::store {
 
-/// A box within another, its ends in as many steps as `Number` tells. By default it holds nothing.
+/// A box inside another, with its ends in steps of 1/kMost of the outer box. A default object is
+/// empty.
 template <class Number>
 struct BoxWithin {
   static constexpr Number kMost = std::numeric_limits<Number>::max();
@@ -30,7 +31,7 @@ struct BoxWithin {
     }
     return box;
   }
-  /// The least that holds what lies of `box` within `outer`.
+  /// Returns the smallest one that contains the intersection of `box` and `outer`.
   static BoxWithin around(const Box3& box, const Box3& outer) {
     BoxWithin found;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -40,7 +41,7 @@ struct BoxWithin {
         const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * kMost;
         return static_cast<Number>(share > 0 ? std::min<double>(share, kMost) : 0);
       };
-      // Rounding may have left an end inside.
+      // Rounding may have moved an end inside.
       Number& first = found.low[axis];
       first = place(box.min[axis]);
       while (first > 0 && !(between(low, high, first) <= box.min[axis])) --first;
@@ -52,33 +53,32 @@ struct BoxWithin {
   }
 
  private:
-  /// Both ends are exact.
+  /// Interpolates; exact at both ends.
   static double between(double low, double high, Number place) {
     const double share = place / static_cast<double>(kMost);
     return low * (1 - share) + high * share;
   }
 };
 
-/// A chapter is so many pages of the index; the last one may have fewer.
+/// Pages of the index in a chapter; the last one may have fewer.
 inline constexpr std::uint64_t kChapterPages = 64;
-/// In the bounds of the store.
+/// A box in the bounds of the store.
 using ChapterBox = BoxWithin<std::uint16_t>;
-/// In the box of its chapter.
+/// A box in its chapter's box.
 using PageBox = BoxWithin<std::uint8_t>;
 
-/// Where the parts of a level's index are: pages, the contents of each chapter, sets of tables.
-/// From version 5 on the contents of chapters are read when they are needed unless all of them are
-/// small. Any thread.
+/// The positions of the parts of a level's index: pages, the contents of each chapter, sets of
+/// tables. From version 5 on, the contents of chapters are read when needed, unless all of them
+/// together are small. Thread-safe.
 class Directory {
  public:
   struct TablesAt {
-    std::uint64_t first = 0;  ///< ordinal of the first cluster that they are for
+    std::uint64_t first = 0;  ///< ordinal of the first cluster that uses them
     std::uint64_t offset = 0;
-    std::size_t size = 0;  ///< without their checksum
+    std::size_t size = 0;  ///< without the checksum
   };
 
-  /// bytes: of the directory, at the end of `index`, which must outlive this.
-  /// Throws: Damage, Error.
+  /// bytes: the directory's, at the end of `index`, which must outlive this. Throws: Damage, Error.
   Directory(const ByteSource& index, std::uint64_t bytes, std::uint64_t clusters,
             const Layout& layout, const Box3& bounds);
   ~Directory();
@@ -90,13 +90,14 @@ class Directory {
   struct Range {
     std::uint64_t begin = 0, end = 0;
   };
-  /// Where a page is in the index. Throws: Damage, Error.
+  /// The position of a page in the index. Throws: Damage, Error.
   [[nodiscard]] Range page_range(std::uint64_t page) const;
   /// A box around all points of the page's clusters and below them. Throws: Damage, Error.
   [[nodiscard]] Box3 page_box(std::uint64_t page) const;
-  /// The same without reading: until the contents of its chapter have been read, the chapter's.
+  /// Like page_box(), but without reading: the chapter's box until the chapter's contents have been
+  /// read.
   [[nodiscard]] Box3 coarse_box(std::uint64_t page) const;
-  /// The sets of tables, by cluster.
+  /// The sets of tables, in the order of clusters.
   [[nodiscard]] const std::vector<TablesAt>& tables() const { return tables_; }
   /// The bytes of a set. Throws: Damage, Error.
   [[nodiscard]] Bytes read_tables(const TablesAt& at) const;
@@ -123,7 +124,7 @@ class Directory {
   std::uint64_t clusters_, pages_;
   std::size_t ranges_;
   Box3 bounds_;
-  Bytes held_;  ///< the file from held_at_ on, as far as it was read at once
+  Bytes held_;  ///< the part of the file from held_at_ on that was read with the directory
   std::uint64_t held_at_ = 0;
   std::vector<std::uint64_t> old_offsets_;  ///< before version 5
   std::vector<Chapter> chapters_;

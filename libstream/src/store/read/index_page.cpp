@@ -15,9 +15,11 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Bits of the ends of ranges: a page's clusters lie together, and so do their values.
+/// Bits of the ends of ranges. Few, because clusters of a page are close together and so are their
+/// values.
 constexpr unsigned kRangeBits = 5;
-/// The same for floating types, whose keys are as far apart from 0 to 1 as from 1 to 1e300.
+/// Bits for floating-point types, tried in this order; their keys are about as far apart from 0 to
+/// 1 as from 1 to 1e300.
 constexpr std::array<unsigned, 4> kFloatingRangeBits{kRangeBits, 8, 11, 14};
 
 unsigned shift_of(std::uint64_t reach, unsigned bits) {
@@ -25,14 +27,15 @@ unsigned shift_of(std::uint64_t reach, unsigned bits) {
   return width > bits ? width - bits : 0;
 }
 
-/// The end of a range, moved outwards to a multiple of 2^shift (`up`: to one less than a multiple).
+/// Returns the end of a range, moved outwards to a multiple of 2^shift, or with `up` to one less
+/// than a multiple.
 std::uint64_t widened(std::uint64_t key, unsigned shift, bool up) {
   const std::uint64_t mask = (std::uint64_t{1} << shift) - 1;
   return up ? key | mask : key & ~mask;
 }
 
-/// The shift for the ends of ranges of doubles: the mean one moves by a 32nd of their reach at most
-/// where so many bits are enough.
+/// Returns the shift for the ends of ranges of doubles. It moves them by at most a 32nd of their
+/// extent on average, if the bits suffice.
 unsigned floating_shift(std::span<const std::uint64_t> keys, std::uint64_t least,
                         std::uint64_t most, bool up) {
   const double reach = double_of_key(most) - double_of_key(least);
@@ -48,7 +51,7 @@ unsigned floating_shift(std::span<const std::uint64_t> keys, std::uint64_t least
   return shift;
 }
 
-/// The columns of a page, in either direction.
+/// Codes the columns of a page in either direction.
 template <class Coder>
 class PageCoder {
  public:
@@ -64,16 +67,16 @@ class PageCoder {
     const auto sizes_y = columns.column(PageColumns::kSizeY);
     const auto points = columns.column(PageColumns::kPoints);
     const auto bytes = columns.column(PageColumns::kBytes);
-    // Clusters of rasters take a certain share of their boxes.
+    // Clusters of rasters fill a certain share of their boxes.
     guessed(points, PageColumns::kPoints, [&](std::size_t i) {
       return small_ ? sizes_x[i] * sizes_y[i] * 45 >> 6 : i > 0 ? points[i - 1] : 0;
     });
-    // As many bytes per point as the one before.
+    // As many bytes per point as the previous cluster.
     guessed(bytes, PageColumns::kBytes, [&](std::size_t i) {
       return i > 0 ? bytes[i - 1] * points[i] / std::max<std::uint64_t>(points[i - 1], 1) : 0;
     });
     numbers(columns.column(PageColumns::kDescendants), PageColumns::kDescendants);
-    // As far as the one before for the size of the box.
+    // The same error relative to the size of the box as the previous cluster.
     const auto errors = columns.column(PageColumns::kError);
     const auto extent = [&](std::size_t i) {
       return error_code(static_cast<double>(sizes_x[i] + sizes_y[i]));
@@ -103,7 +106,7 @@ class PageCoder {
       std::uint64_t bits = 0;
       for (const std::uint64_t key : keys) bits |= ones ? ~key : key;
       const unsigned by = shift(bits);
-      // All in one context. The first from the least key.
+      // All in one context; the first relative to the lowest key.
       differences(keys, first_ + context::kIndexRange + end, {}, 1, by, ones, INT64_MIN >> by);
     }
   }
@@ -120,7 +123,7 @@ class PageCoder {
     return first_ + field * context::kIndexSteps;
   }
 
-  /// Sizes and lower ends of an axis.
+  /// Codes the sizes and lower ends of an axis.
   void boxes(PageColumns& columns, unsigned axis) {
     const std::span<std::uint64_t> sizes = columns.column(PageColumns::kSizeX + axis);
     const std::span<std::uint64_t> lows = columns.column(PageColumns::kLowX + axis);
@@ -140,7 +143,7 @@ class PageCoder {
       of_sizes[i++] = static_cast<std::uint8_t>(step);
     }
     keep(coder);
-    // What goes far in x goes less far in y.
+    // A large step in x mostly means a small one in y.
     if (axis == 1) steps_ = last_steps_;
     if (axis == 2) steps_ = of_sizes;
     differences(lows, context_of(PageColumns::kLowX + axis),
@@ -148,7 +151,7 @@ class PageCoder {
                 context::kIndexSteps, by);
   }
 
-  /// Numbers as they are, in contexts by the previous one.
+  /// Codes numbers unchanged, in contexts by the previous one.
   void numbers(std::span<std::uint64_t> values, unsigned field) {
     unsigned step = 0;
     typename Coder::Local coder = coder_;
@@ -157,7 +160,7 @@ class PageCoder {
     }
     keep(coder);
   }
-  /// Differences to what guess(i) is, which may depend on values before.
+  /// Codes differences from guess(i), which may depend on earlier values.
   template <class Guess>
   void guessed(std::span<std::uint64_t> values, unsigned field, const Guess& guess) {
     unsigned step = 0;
@@ -171,8 +174,9 @@ class PageCoder {
     keep(coder);
   }
 
-  /// Differences of neighbours, the first from `previous`, of values without their lowest bits,
-  /// which are 0 or, with `ones`, 1. steps: contexts; without, that of the previous difference.
+  /// Codes differences between successive values, the first from `previous`, without the lowest
+  /// bits, which are 0 or, with `ones`, 1. steps: determine the contexts; if empty, the previous
+  /// difference does.
   void differences(std::span<std::uint64_t> values, unsigned context,
                    std::span<const std::uint8_t> steps = {},
                    unsigned contexts = context::kIndexSteps, unsigned by = 0, bool ones = false,
@@ -182,7 +186,7 @@ class PageCoder {
     typename Coder::Local coder = coder_;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!steps.empty()) step = steps[i];
-      // Ranges are unsigned, but differences of either kind wrap.
+      // Ranges are unsigned, but differences wrap either way.
       std::int64_t now = static_cast<std::int64_t>(values[i]) >> by;
       const unsigned found = code_difference(coder, context + step % contexts, previous, now);
       step = difference_step(found);
@@ -193,8 +197,8 @@ class PageCoder {
     keep(coder);
   }
 
-  /// The number of lowest bits that all values of a column lack. bits: that they have, for
-  /// encoding.
+  /// Codes the number of lowest bits that are 0 in all values of a column. bits: the union of the
+  /// values' bits, for encoding.
   unsigned shift(std::uint64_t bits) {
     std::uint64_t by = bits == 0 ? kTop : static_cast<unsigned>(std::countr_zero(bits));
     code_number(coder_, first_ + context::kIndexShift, by);
@@ -206,18 +210,18 @@ class PageCoder {
   unsigned first_;
   bool small_;
   unsigned checksum_bits_;
-  Steps steps_{}, last_steps_{};  ///< last: of the last differences
+  Steps steps_{}, last_steps_{};  ///< last_steps_: those of the last differences
 };
 
-/// The columns of a page before version 5, in the order in which they come.
+/// The columns of a page before version 5, in their order.
 constexpr std::array<PageColumns::Field, 12> kOldOrder{
     PageColumns::kBytes, PageColumns::kPoints, PageColumns::kForms,       PageColumns::kLowX,
     PageColumns::kLowY,  PageColumns::kLowZ,   PageColumns::kSizeX,       PageColumns::kSizeY,
     PageColumns::kSizeZ, PageColumns::kError,  PageColumns::kDescendants, PageColumns::kChecksum};
 
-/// A page before version 5, checksum left out: each column a base, a shift and a width, then that
-/// many bits per cluster. Calls use(number of the column, cluster, value).
-/// Returns the offset of the first cluster.
+/// Reads a page before version 5, without its checksum: for each column a base, a shift and a
+/// width, then the columns with that many bits per cluster. Calls use(number of the column,
+/// cluster, value). Returns the offset of the first cluster.
 template <class Use>
 std::uint64_t read_old_page(ByteView bytes, std::uint32_t clusters, std::size_t ranges, Use&& use) {
   struct Packed {
@@ -243,7 +247,7 @@ std::uint64_t read_old_page(ByteView bytes, std::uint32_t clusters, std::size_t 
   if (bits % 8 != 0 && bytes.back() >> bits % 8 != 0) {
     throw Damage("an index page ends with bits that are not zero");
   }
-  // Readable bytes behind the page, so that a value is one load.
+  // With readable bytes after the page, so that a value is one load.
   Bytes room(bytes.begin() + static_cast<std::ptrdiff_t>(in.offset()), bytes.end());
   room.resize(room.size() + 16);
   std::size_t bit = 0;
@@ -255,7 +259,7 @@ std::uint64_t read_old_page(ByteView bytes, std::uint32_t clusters, std::size_t 
       std::uint64_t steps = load<std::uint64_t>(room.data() + bit / 8) >> skip;
       if (skip + width > 64) steps |= static_cast<std::uint64_t>(room[bit / 8 + 8]) << (64 - skip);
       if (width < 64) steps &= (std::uint64_t{1} << width) - 1;
-      // The last step up may lead beyond the greatest key.
+      // The last step up may exceed the highest key.
       const bool beyond = high && steps > (UINT64_MAX - base) >> shift;
       use(f, i, beyond ? UINT64_MAX : base + (steps << shift));
       bit += width;
@@ -270,7 +274,7 @@ Bytes padded_copy(ByteView bytes) {
   return room;
 }
 
-/// Calls use(PageCoder) on a string of symbols, padded. Returns what its last state holds.
+/// Calls use(PageCoder) for a padded string of symbols. Returns the number in its last state.
 template <class Use>
 std::uint32_t decode_symbols(const Bytes& padded, const Layout& layout,
                              const DecodingTables& tables, Use&& use) {
@@ -393,7 +397,7 @@ RangeColumns read_ranges(const Bytes& coded, std::uint32_t clusters, const Layou
                   });
   } else {
     if (decode_symbols(coded, layout, *tables, [&](auto coder) { coder.ranges(columns); }) != 0) {
-      throw Damage("an index page does not end as it should");
+      throw Damage("an index page does not end correctly");
     }
   }
   return columns;
@@ -408,7 +412,7 @@ IndexPage::IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layou
   for (std::uint32_t i = 0; i < clusters_; ++i) {
     const std::uint64_t size = page.entries.column(Field::kBytes)[i];
     std::uint64_t& offset = page.entries.column(kOffset)[i];
-    at += offset;  // beyond the file if that is out of range
+    at += offset;  // beyond the file if the offset is out of range
     if (size >= kMostBytes || at > UINT64_MAX - size) {
       throw Damage("an index entry is out of range");
     }
@@ -420,13 +424,13 @@ IndexPage::IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layou
 
 void IndexPage::keep(const PageColumns& columns) {
   std::uint32_t end = 0;
-  bytes_.reserve(columns_.size() * clusters_ + sizeof(std::uint64_t));  // mostly enough
+  bytes_.reserve(columns_.size() * clusters_ + sizeof(std::uint64_t));  // usually enough
   for (std::size_t f = 0; f < columns_.size(); ++f) {
     const auto values = columns.column(f);
     std::uint64_t differences = 0;
     for (const std::uint64_t value : values) differences |= value ^ values[0];
     Column& column = columns_[f];
-    // What all values have in common, above and below the bits in which they differ.
+    // The bits above and below those in which the values differ are the same in all.
     const auto bits = static_cast<unsigned>(std::bit_width(differences));
     column.shift = static_cast<std::uint8_t>(differences == 0 ? 0 : std::countr_zero(differences));
     column.width = static_cast<std::uint8_t>((bits - column.shift + 7) / 8);
@@ -435,7 +439,7 @@ void IndexPage::keep(const PageColumns& columns) {
     column.start = end;
     end += column.width * clusters_;
     bytes_.resize(end + sizeof(std::uint64_t));
-    // Each one overwrites what the one before left behind its bytes.
+    // Each store overwrites the extra bytes of the previous one.
     std::uint8_t* to = bytes_.data() + column.start;
     for (const std::uint64_t value : values) {
       const std::uint64_t kept = value >> column.shift;

@@ -11,9 +11,9 @@
 
 namespace terrace::stream::store {
 
-/// Maximum bytes of a page: thirteen columns and two for each attribute. Before version 5 each has
-/// its base, shift and width, and at most 64 bits per cluster; from then on its shift, and a number
-/// takes at most 81 bits.
+/// Returns the maximum bytes of a page of thirteen columns and two for each attribute. Before
+/// version 5 a column has its base, shift and width, and at most 64 bits per cluster; from version
+/// 5 on it has its shift, and a number takes at most 81 bits.
 constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
   return 28 + (13 + 2 * std::uint64_t{attributes}) * (10 + 2 + 11 * kMostPageClusters) + 4;
 }
@@ -62,11 +62,12 @@ struct PageColumns : NumberColumns {
   explicit PageColumns(std::span<const Entry> entries);
 };
 
-/// The ranges of a page's clusters: a column for each end of each attribute's.
+/// The ranges of a page's clusters, with a column for each end of each attribute's range.
 struct RangeColumns : NumberColumns {
   RangeColumns(std::uint32_t of_clusters, std::size_t attributes)
       : NumberColumns(of_clusters, 2 * attributes) {}
-  /// ranges: for each cluster, attribute by attribute; they are widened to a few bits.
+  /// ranges: cluster by cluster, then attribute by attribute; they are widened so that few bits
+  /// represent them.
   RangeColumns(std::span<const KeyRange> ranges, std::span<const ScalarType> types);
 
   /// The range of an attribute in cluster i.
@@ -75,34 +76,34 @@ struct RangeColumns : NumberColumns {
   }
 };
 
-/// What a page consists of.
+/// The contents of a page.
 struct PageContent {
   std::uint64_t offset = 0;  ///< of the first cluster in the level's data file
   PageColumns entries;
   RangeColumns ranges;
 
-  /// Adds the symbols to `counts`, by the contexts of `layout`.
+  /// Adds the symbols to `counts`, by context of `layout`.
   void count(const Layout& layout, std::span<std::array<std::uint32_t, kSymbols>> counts);
   /// Appends a page of the version that is written.
   void write(const Layout& layout, const EncodingTables& tables, Bytes& out);
 };
 
-/// A page as it is read: its ranges are still coded, as few readers want them.
+/// A page whose ranges are still coded, because few readers need them.
 struct CodedPage {
   std::uint64_t offset = 0;  ///< see PageContent
   PageColumns entries;
   Bytes ranges;  ///< padded; before version 5 the whole page
 };
 
-/// bytes: as in the file, checksum included. tables: those of the first cluster, from version 5 on.
-/// Throws: Damage.
+/// Decodes a page. bytes: as in the file, including the checksum. tables: the first cluster's, from
+/// version 5 on. Throws: Damage.
 CodedPage read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
                     const DecodingTables* tables);
 /// Throws: Damage.
 RangeColumns read_ranges(const Bytes& coded, std::uint32_t clusters, const Layout& layout,
                          const DecodingTables* tables);
 
-/// A checked page, with random access to entries.
+/// A page that has been checked, with random access to its entries.
 class IndexPage {
  public:
   /// See read_page(). Throws: Damage.
@@ -111,12 +112,11 @@ class IndexPage {
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
-  /// The ranges, possibly widened, decoded by this call. layout, tables: as for the page.
-  /// Throws: Damage.
+  /// Decodes the ranges, which may be widened. layout, tables: the page's. Throws: Damage.
   [[nodiscard]] RangeColumns ranges(const Layout& layout, const DecodingTables* tables) const {
     return read_ranges(ranges_, clusters_, layout, tables);
   }
-  /// Where the bytes of cluster i begin and end in the data file.
+  /// Where the bytes of cluster i begin in the data file; end() is where they end.
   [[nodiscard]] std::uint64_t offset(std::uint32_t i) const { return value(kOffset, i); }
   [[nodiscard]] std::uint64_t end(std::uint32_t i) const {
     return offset(i) + value(Field::kBytes, i);
@@ -124,11 +124,11 @@ class IndexPage {
 
  private:
   using Field = PageColumns::Field;
-  /// Offsets take the place of jumps.
+  /// Offsets replace the jumps.
   static constexpr Field kOffset = Field::kJump;
-  /// Values above a base, in as few bytes as the largest takes.
+  /// Values above a base, in as few bytes as the largest needs.
   struct Column {
-    std::uint64_t base = 0, mask = 0;  ///< mask: the bits that are in bytes_
+    std::uint64_t base = 0, mask = 0;  ///< mask: the bits stored in bytes_
     std::uint32_t start = 0;           ///< of the first value, in bytes_
     std::uint8_t shift = 0, width = 0;
   };
@@ -138,7 +138,7 @@ class IndexPage {
 
   std::uint32_t clusters_ = 0;
   std::array<Column, Field::kFields> columns_;
-  Bytes bytes_;   ///< and eight more, so that a value is one load
+  Bytes bytes_;   ///< followed by eight more, so that a value is one load
   Bytes ranges_;  ///< see CodedPage
 };
 

@@ -9,14 +9,15 @@
 namespace terrace::stream::store {
 namespace {
 
-constexpr const char* kRestoreStore = "restore the file or build the store anew";
-/// About 0.5 KB each, those of clouds 2.
+constexpr const char* kRestoreStore = "restore the file or rebuild the store";
+/// About 0.5 KB each, 2 KB for clouds.
 constexpr std::uint64_t kCachedPages = 8192;
-/// Ranges of a page take 1 KB per attribute. Whoever wants them goes from page to page.
+/// The ranges of a page take 1 KB per attribute. Few are kept, because callers go from page to
+/// page.
 constexpr std::uint64_t kCachedRanges = 64;
-/// About 100 KB each; one set is for about ten million points of level 0.
+/// About 100 KB each. One set serves about ten million points of level 0.
 constexpr std::uint64_t kCachedTables = 32;
-/// Stores with very many attributes keep fewer.
+/// Stores with very many attributes keep fewer tables.
 constexpr std::uint64_t kCachedContexts = 512 * kCachedTables;
 
 Error damaged_file(const ByteSource& file, std::uint64_t offset, const std::string& cause) {
@@ -172,7 +173,7 @@ void LevelReader::check_entry(const Entry& entry) const {
     if (layout_.grid && axis < 2 && form != kIntegerForm) {
       throw Damage("an index entry of a raster has columns or rows that are not integers");
     }
-    // Between two ends that are numbers lie numbers only, in the same order.
+    // If both ends represent finite numbers, so do all integers between them, in the same order.
     const std::int64_t low = entry.low[axis];
     const auto high =
         static_cast<std::int64_t>(static_cast<std::uint64_t>(low) + (entry.size[axis] - 1));
@@ -203,7 +204,7 @@ std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal)
 void LevelReader::check_range(std::uint64_t ordinal, std::uint64_t offset,
                               std::uint64_t size) const {
   if (offset > data_->size() || size > data_->size() - offset) {
-    throw damaged(ordinal, "its bytes are said to lie behind the end of the file");
+    throw damaged(ordinal, "its bytes are beyond the end of the file");
   }
 }
 
@@ -229,13 +230,13 @@ void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_
 
 void LevelReader::check_points(const Entry& entry, const ClusterPoints& points) const {
   if (entry.points == 0) return;
-  // The decoder leaves no point outside of the entry's box. What lies inside of the store's bounds
-  // as a whole, most clusters do, needs no look at its points.
+  // The decoder ensures that all points are in the entry's box. If the box is inside the store's
+  // bounds, as for most clusters, points need not be checked.
   const Box3 box = record_of(entry, layout_.level, 0, top_).summary.box;
   if (!bounds_.contains(box.min) || !bounds_.contains(box.max)) {
     bool inside = !points.has_representative || bounds_.contains(points.representative);
     for (const Point3& p : points.positions) inside &= bounds_.contains(p);
-    if (!inside) throw Damage("a point lies outside of the bounds of the store");
+    if (!inside) throw Damage("a point is outside the bounds of the store");
   }
   const auto exist = [&](const std::vector<std::uint64_t>& children) {
     bool good = true;

@@ -16,14 +16,14 @@
 
 namespace terrace::stream::store {
 
-/// A cache of `Value`s by number, any thread. A slot holds one value; what falls on it takes its
-/// place. Values stay alive for those who have them.
+/// A thread-safe cache of `Value`s by number. A slot holds one value, which the next value for the
+/// slot replaces. Values stay alive as long as callers hold them.
 template <class Value>
 class SlotCache {
  public:
   explicit SlotCache(std::size_t slots) : slots_(slots) {}
 
-  /// The value of `key`, made by `make` if it is not there.
+  /// Returns the value of `key`, created by make() if it is not cached.
   template <class Make>
   std::shared_ptr<const Value> get(std::uint64_t key, Make&& make) {
     Slot& slot = slots_[key % slots_.size()];
@@ -47,14 +47,14 @@ class SlotCache {
   std::vector<Slot> slots_;
 };
 
-/// Parts of a file that mostly follow one another, read many at a time. Parts of before may come
+/// Reads parts of a file that are mostly contiguous, many at a time. Earlier parts may be requested
 /// again.
 class SequentialBytes {
  public:
   explicit SequentialBytes(const ByteSource& file) : file_(file) {}
 
-  /// The bytes, with kPadding readable ones before and behind, until the next call. Requires that
-  /// they exist.
+  /// Returns the bytes, with kPadding readable bytes before and after, valid until the next call.
+  /// Requires that they exist.
   ByteView at(std::uint64_t offset, std::size_t size) {
     const std::uint64_t end = ahead_.begin + ahead_.size();
     if (offset >= ahead_.begin && offset + size <= end) return ahead_.part(offset, size);
@@ -95,7 +95,7 @@ struct ReadSpace {
   Bytes bytes;
 };
 
-/// The two files of a level, open for reading. Any thread.
+/// The two files of a level, open for reading. Thread-safe.
 class LevelReader {
  public:
   /// Reads directory and tables. Throws: Error.
@@ -107,32 +107,32 @@ class LevelReader {
   [[nodiscard]] const ByteSource& data() const { return *data_; }
   [[nodiscard]] const ByteSource& index() const { return *index_; }
   [[nodiscard]] std::uint64_t pages() const { return directory_->pages(); }
-  /// Where a page begins. Throws: Error.
+  /// The offset of a page. Throws: Error.
   [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const;
 
-  /// A box around all points of the cluster and below it, and those of its neighbours in the index:
-  /// without reading there, or as the index's contents tell. Requires that the cluster exists.
+  /// See Store::coarse_box(). Requires that the cluster exists.
   [[nodiscard]] Box3 coarse_box(std::uint64_t ordinal) const {
     return directory_->coarse_box(ordinal / layout_.page_clusters());
   }
-  /// Throws: Error.
+  /// See Store::page_box(). Throws: Error.
   [[nodiscard]] Box3 page_box(std::uint64_t ordinal) const;
-  /// Throws: Error.
+  /// Reads a page, or returns it from the cache. Throws: Error.
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
-  /// The entry and where its bytes begin. Throws: Error.
+  /// Returns the entry of a cluster, and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
-  /// The entry of a cluster that `page` has, checked against the manifest. Throws: Error.
+  /// Returns the entry of a cluster in `page`, checked against the manifest. Throws: Error.
   [[nodiscard]] Entry entry(const IndexPage& page, std::uint64_t ordinal) const;
-  /// The ranges of a cluster that exists. Throws: Error.
+  /// Reads the ranges of a cluster that exists. Throws: Error.
   void ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const;
-  /// Throws: Error.
+  /// Reads a cluster. Throws: Error.
   void read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const;
-  /// A cluster whose entry and offset are known. `ahead`: of data(). The points lie in the entry's
-  /// box and in the bounds of the store, and what they head exists. Throws: Error.
+  /// Reads a cluster whose entry and offset are known. ahead: reads data(). The points are in the
+  /// entry's box and in the bounds of the store, and the clusters that they head exist. Throws:
+  /// Error.
   void read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, SequentialBytes& ahead,
             ClusterDecoder& decoder, ClusterPoints& out) const;
-  /// Calls visit(page, from, to) for each page of the index with some of the clusters `first` to
-  /// before `end`: `from` to before `to`. Throws: Error.
+  /// Calls visit(page, from, to) for each page of the index that has clusters from `first` up to,
+  /// but not including, `end`; it has those from `from` to before `to`. Throws: Error.
   template <class Visit>
   void for_each_page(std::uint64_t first, std::uint64_t end, Visit&& visit) const {
     SequentialBytes ahead(*index_);
@@ -144,11 +144,11 @@ class LevelReader {
     }
   }
 
-  /// An Error about a cluster of this level.
+  /// Returns an Error about a cluster of this level.
   [[nodiscard]] Error damaged(std::uint64_t ordinal, const std::string& cause) const;
 
  private:
-  /// What `read` returns, damage in the directory made an Error.
+  /// Returns the result of read(); turns damage in the directory into an Error.
   template <class Read>
   auto from_directory(Read&& read) const;
   [[nodiscard]] std::shared_ptr<const IndexPage> read_page(std::uint64_t number,
@@ -156,7 +156,7 @@ class LevelReader {
   [[nodiscard]] std::shared_ptr<const DecodingTables> tables(std::uint64_t ordinal) const;
   void check_entry(const Entry& entry) const;
   void check_range(std::uint64_t ordinal, std::uint64_t offset, std::uint64_t size) const;
-  /// `bytes`: of the cluster, padded. Throws: Error.
+  /// Decodes a cluster. bytes: the cluster's, padded. Throws: Error.
   void decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, ByteView bytes,
               ClusterDecoder& decoder, ClusterPoints& out) const;
   void check_points(const Entry& entry, const ClusterPoints& points) const;

@@ -15,7 +15,7 @@
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/store.hpp"
 
-/// A store in its folder, where a writer that died may have left it under another name.
+/// Opens a store in a folder, where a writer that died may have left it under another name.
 
 namespace terrace::stream {
 
@@ -25,8 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The manifest and the files that it lists; empty if the folder is not a store. Manifests of any
-/// version are read, damaged ones as far as possible.
+/// Returns the names of the manifest and the files that it lists; empty if the folder is not a
+/// store. Reads manifests of any version, and damaged ones as far as possible.
 std::set<std::string> files_of_store(const fs::path& folder) {
   std::error_code error;
   const fs::path path = folder / kManifestName;
@@ -73,7 +73,7 @@ Store Store::open(const std::filesystem::path& path) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no store here",
-                 .remedy = "name a folder that terrace build has written"});
+                 .remedy = "give a folder written by terrace build"});
   }
   return open(path.string(), [path](const std::string& name) { return open_file(path / name); });
 }

@@ -156,8 +156,8 @@ Error Store::miscounted(unsigned level) const {
                 .where = {},
                 .cause = "the clusters do not have the " +
                          std::to_string(impl_->infos[level].members) +
-                         " members that the manifest tells",
-                .remedy = "restore the file or build the store anew"});
+                         " members that the manifest lists",
+                .remedy = "restore the file or rebuild the store"});
 }
 
 }  // namespace terrace::stream

@@ -17,7 +17,7 @@
 
 namespace terrace::stream {
 
-/// What the copies of an open store share.
+/// The state shared by copies of an open store.
 struct Store::Impl {
   std::filesystem::path path;
   std::unique_ptr<ByteSource> manifest_file;

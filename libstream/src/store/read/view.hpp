@@ -5,8 +5,8 @@
 
 namespace terrace::stream {
 
-/// What makes a store a view. An interface, so that programs without views contain neither
-/// conditions nor the search for bounds. Const members may be called by several threads at once.
+/// The condition of a view and its bounds. An interface, so that programs without views contain
+/// neither conditions nor the search for bounds. Several threads may call const members at once.
 class Store::View {
  public:
   View() = default;
@@ -16,7 +16,7 @@ class Store::View {
 
   [[nodiscard]] virtual const Where& condition() const = 0;
   virtual void mark(ClusterPoints& points) const = 0;
-  /// view: the store itself, with its request to stop.
+  /// view: the store itself, with its stop token.
   [[nodiscard]] virtual bool may_match(const Store& view, ClusterId id) const = 0;
   [[nodiscard]] virtual const Box3& bounds(const Store& view) const = 0;
 };

@@ -18,12 +18,12 @@
 namespace terrace::stream::store {
 namespace {
 
-/// A block's extent in steps of its boxes, in bits: boxes of clusters are grown to multiples of
-/// 1/2048 of the block, which costs a point a thousandth of a bit and saves the index half.
+/// Bits of a block's extent in steps of its boxes. Boxes of clusters are enlarged to multiples of
+/// 1/2048 of the block, which costs a thousandth of a bit per point and saves half of the index.
 constexpr unsigned kBoxBits = 11;
 
-/// The greatest number of low bits that a form's largest values leave all set (see record_of: a
-/// grown box must still be finite).
+/// Returns the maximum shift of a form: a box enlarged to multiples of 2^shift must still be finite
+/// (see record_of()).
 unsigned most_shift(NumberForm form) {
   if (form == kFloatBits) return 23;
   return form == kDoubleBits ? 52 : 40;
@@ -43,12 +43,12 @@ void gather_integers(const std::byte* payload, std::size_t stride,
   for (std::size_t i = 0; i < points.size(); ++i) {
     T value;
     std::memcpy(&value, payload + points[i] * stride, sizeof value);
-    // The sign of int8 is meant.
+    // The sign of int8 is intended.
     out[i] = static_cast<std::int64_t>(value);  // NOLINT(bugprone-signed-char-misuse)
   }
 }
 
-/// One attribute of some points: integers, or the bits of floating types.
+/// Gathers one attribute of some points: integers, or the bits of floating-point types.
 void gather_integers(ScalarType type, const std::byte* payload, std::size_t stride,
                      std::span<const std::uint32_t> points, std::int64_t* out) {
   switch (type) {
@@ -73,7 +73,7 @@ void gather_integers(ScalarType type, const std::byte* payload, std::size_t stri
   }
 }
 
-/// The extent of a column of an attribute, as keys.
+/// Returns the range of an attribute's column, as keys.
 KeyRange range_of(ScalarType type, NumberForm form, std::span<const std::int64_t> values) {
   if (values.empty()) return {0, UINT64_MAX};
   if (type == ScalarType::u64) {
@@ -86,11 +86,11 @@ KeyRange range_of(ScalarType type, NumberForm form, std::span<const std::int64_t
   }
   const auto [low, high] = extent_of(values);
   if (!is_floating(type)) return {attribute_key(low), attribute_key(high)};
-  // Number forms keep the order, and NaN at its ends.
+  // Number forms keep the order, with NaN at its ends.
   return {attribute_key(to_double(low, form)), attribute_key(to_double(high, form))};
 }
 
-/// Counts the columns of a cluster as each kind would have them, and nothing else.
+/// Counts the symbols of a cluster's columns in each kind, and nothing else.
 class KindCounter {
  public:
   static constexpr bool kDecoding = false;
@@ -112,7 +112,7 @@ class KindCounter {
   KindCounts& trials_;
 };
 
-/// Has `code` code a column with its kind, or with each that is tried.
+/// Calls `code` for a column with its kind, or with each kind that is tried.
 template <class Coder, class Code>
 void code_as_kinds(Coder& coder, const Columns& columns, unsigned number, Code&& code) {
   if constexpr (std::is_same_v<Coder, KindCounter>) {
@@ -138,7 +138,7 @@ void BlockEncoder::load_axes() {
     axes_[axis].resize(order.size());
     out[axis] = axes_[axis].data();
   }
-  // As integers without branches: what nearly every raster and laser scan takes.
+  // As integers without branches, because nearly every raster and laser scan takes this path.
   std::array<std::uint64_t, 3> differences{};
   for (std::size_t i = 0; i < order.size(); ++i) {
     const Point3& position = block_->positions[order[i]];
@@ -173,7 +173,7 @@ void BlockEncoder::load_decimals(std::size_t axis) {
       throw Error({.file = {},
                    .where = {},
                    .cause = "a point has a coordinate that is not finite",
-                   .remedy = "leave such points out"});
+                   .remedy = "remove such points"});
     }
   }
   for (const ClusterSummary& summary : block_->summaries) {
@@ -185,7 +185,8 @@ void BlockEncoder::load_decimals(std::size_t axis) {
   for (std::size_t i = 0; i < n; ++i) axes_[axis][i] = to_integer(doubles_[i], forms_[axis]);
 }
 
-/// Extents of the clusters, and by that of the block the steps of their boxes.
+/// Determines the extents of the clusters, and the steps of their boxes from the extent of the
+/// block.
 void BlockEncoder::measure(std::size_t axis) {
   const std::size_t clusters = block_->representatives.size();
   const std::int64_t* const values = axes_[axis].data();
@@ -233,7 +234,7 @@ void BlockEncoder::load_attributes() {
   }
 }
 
-/// The values of a floating type: one for all points, or one each.
+/// Loads the values of a floating-point type: one for all points, or one for each.
 void BlockEncoder::load_numbers(Attribute& attribute) {
   const bool single = attribute.type == ScalarType::f32;
   std::size_t count = block_->positions.size();
@@ -251,7 +252,7 @@ void BlockEncoder::load_numbers(Attribute& attribute) {
   if (form == kDoubleBits && single) form = kFloatBits;
   attribute.form = form;
   for (std::size_t i = 0; i < count; ++i) {
-    // From the bits where the form is bits: arithmetic would not keep a signalling NaN.
+    // From the bits if the form has bits, because arithmetic would change a signalling NaN.
     if (form == kFloatBits && single) {
       const auto bits = static_cast<std::int32_t>(numbers[i]);
       numbers[i] = bits < 0 ? bits ^ INT32_MAX : bits;
@@ -271,8 +272,9 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   if (n > layout_->most_points()) {
     throw Error({.file = {},
                  .where = {},
-                 .cause = "a cluster has " + counted(n, "point") + ", of this size a store " +
-                          "has at most " + std::to_string(layout_->most_points()) + " in one",
+                 .cause = "a cluster has " + counted(n, "point") +
+                          " of this size, more than the limit of " +
+                          std::to_string(layout_->most_points()),
                  .remedy = "make the blocks smaller"});
   }
   Entry entry;
@@ -309,10 +311,8 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   }
   if (summary != nullptr) {
     if (!(summary->error >= 0)) {
-      throw Error({.file = {},
-                   .where = {},
-                   .cause = "a cluster's error is not a number from 0 up",
-                   .remedy = {}});
+      throw Error(
+          {.file = {}, .where = {}, .cause = "a cluster's error is negative or NaN", .remedy = {}});
     }
     entry.error = error_code(std::abs(summary->error));
     entry.descendants = layout_->level == 0 ? 0 : summary->descendants;
@@ -360,7 +360,7 @@ bool BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights
   return !sequence;
 }
 
-/// The coordinates of points in their order.
+/// Codes the coordinates of points in their order.
 template <class Coder>
 void BlockEncoder::sequence(Coder& coder, const Columns& columns) {
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -378,7 +378,7 @@ NumberForm* BlockEncoder::coded_form(Attribute& attribute) {
   return is_floating(attribute.type) ? &attribute.form : nullptr;
 }
 
-/// Brings the values of the present cluster's points into column_, in the order of coding.
+/// Copies the values of the current cluster's points to column_, in the order of coding.
 void BlockEncoder::gather(const Attribute& attribute) {
   column_.resize(coded_.size());
   if (!is_floating(attribute.type)) {
@@ -410,7 +410,7 @@ void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
   }
   const Lines* const lines = columns.guide.exists() ? &lines_ : nullptr;
   if (!placed) sequence(coder, columns);
-  bool beside = false;  // whether the column before rises and falls
+  bool beside = false;  // whether the preceding column has several values
   for (unsigned a = 0; a < attributes_.size(); ++a) {
     Attribute& attribute = attributes_[a];
     NumberForm* const form = coded_form(attribute);
@@ -525,7 +525,7 @@ void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& by
       coder.start();
       encode_cluster(coder, tables.predictor, columns);
       const std::uint32_t at = place_of_representative(c);
-      // Most clusters' representatives fit into the coder's free 16 bits.
+      // The positions of most representatives fit into the coder's free 16 bits.
       if (entries.back().points >= kLow) coder.raw(at >> 16, 16);
       last[waiting] = at & 0xffff;
       entry_of[waiting] = entries.size() - 1;

@@ -12,38 +12,38 @@
 
 namespace terrace::stream::store {
 
-/// How clusters of points that lie on no grid are coded.
+/// How clusters of points other than rows of a raster are coded.
 struct Columns {
-  bool sequence = false;  ///< points in their order, coordinates as columns; else SplitCodec's
+  bool sequence = false;  ///< points keep their order, with coordinates as columns; otherwise split
   Guide guide;
   std::span<const ColumnKind> kinds;
 };
 
-/// The symbols of columns, each coded as several kinds would have it.
+/// The symbols of columns, each coded in several kinds.
 struct KindCounts {
   std::vector<std::vector<ColumnKind>> kinds;  ///< to be tried, by column
   std::array<Counts, kColumnKinds> counts;
 };
 
-/// Encodes the clusters of a block, each into a byte string of its own. Keeps its memory between
-/// blocks. One object per thread.
+/// Encodes the clusters of a block, each into a separate byte string. Reuses its memory for the
+/// next block. Not thread-safe.
 class BlockEncoder {
  public:
-  /// Takes in a block, which must outlive the calls below.
-  /// Throws: Error on a position that is not finite or a cluster of more than kMostPoints points.
+  /// Loads a block, which must outlive the calls below. Throws: Error for a position that is not
+  /// finite or a cluster of more than kMostPoints points.
   void load(const Layout& layout, const ClusteredBlock& block);
 
-  /// Training: the loaded block enters the least squares ...
+  /// For training: adds the loaded block to the least squares.
   void fit(PredictorFit& sums);
-  /// ... the differences of an attribute in its clusters are counted, by bit width ...
+  /// For training: counts the differences of an attribute within clusters, by bit width.
   void count_differences(unsigned attribute, std::array<std::uint64_t, 65>& widths);
-  /// ... and its symbols are counted. Returns the raw bits beside them.
+  /// For training: counts the symbols. Returns the number of raw bits besides them.
   std::uint64_t count(const Predictor& predictor, const Columns& columns, Counts& counts);
-  /// The same for all kinds of columns to choose from.
+  /// For training: counts the symbols of all kinds of columns to choose from.
   void count_kinds(const Predictor& predictor, bool sequence, const Guide& guide,
                    KindCounts& trials);
 
-  /// Appends the clusters' bytes, entries and, attribute by attribute, ranges.
+  /// Appends the clusters' bytes, their entries and their ranges, attribute by attribute.
   void encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
               std::vector<Entry>& entries, std::vector<KeyRange>& ranges);
 
@@ -53,9 +53,9 @@ class BlockEncoder {
     ScalarType type{};
     std::size_t offset = 0;  ///< in the payload of a point
     NumberForm form = kIntegerForm;
-    bool one_value = false;  ///< all points of the block have `value`
+    bool one_value = false;  ///< whether all points of the block have `value`
     std::int64_t value = 0;
-    std::vector<std::int64_t> numbers;  ///< point by point, of floating types with several values
+    std::vector<std::int64_t> numbers;  ///< by point, for floating-point types with several values
   };
   void load_axes();
   void load_decimals(std::size_t axis);
@@ -64,18 +64,18 @@ class BlockEncoder {
   void load_numbers(Attribute& attribute);
   Entry enter(std::size_t cluster);
   void find_relative();
-  /// In the order of coding, centred(); 0 without one.
+  /// The representative's position in the order of coding, centred(); 0 without a representative.
   [[nodiscard]] std::uint32_t place_of_representative(std::size_t cluster) const;
   void gather(const Attribute& attribute);
-  /// Null for integers.
+  /// Returns where to code the form; null for integers.
   static NumberForm* coded_form(Attribute& attribute);
-  /// Codes the head and the places of the points, but for those of a sequence: false. On a grid
-  /// hands over to `heights`. Sets order_.
+  /// Codes the head and the positions of the points; returns false for a sequence, whose positions
+  /// it does not code. On a grid calls `heights` for the rest. Sets order_.
   template <class Coder, class Use>
   bool positions(Coder& coder, const Columns& columns, Use&& heights);
   template <class Coder>
   void sequence(Coder& coder, const Columns& columns);
-  /// Leaves the ranges of the attributes in ranges_.
+  /// Codes the attributes. Sets ranges_ to their ranges.
   template <class Coder>
   void encode_cluster(Coder& coder, const Predictor& predictor, const Columns& columns);
 
@@ -84,19 +84,19 @@ class BlockEncoder {
   // The block, as integers.
   std::array<NumberForm, 3> forms_{};
   std::array<unsigned, 3> shifts_{};
-  std::array<std::vector<std::int64_t>, 3> axes_;  ///< in the order of the block: by cluster
+  std::array<std::vector<std::int64_t>, 3> axes_;  ///< in the order of the block, by cluster
   std::array<std::vector<Extent>, 3> extents_;     ///< of the clusters
   std::vector<Attribute> attributes_;
   std::vector<std::byte> differing_;
-  // The present cluster.
+  // The current cluster.
   std::uint32_t first_ = 0;  ///< in the order of the block
   std::span<const std::uint32_t> members_;
-  IntegerBox coded_box_;  ///< within the entry's box
+  IntegerBox coded_box_;  ///< inside the entry's box
   IntegerBox entry_box_;
   std::array<std::uint64_t, 3> origin_{};  ///< of coded_box_
   bool own_box_ = false;
-  std::array<std::vector<std::uint64_t>, 3> relative_;  ///< to origin_
-  std::vector<std::uint32_t> order_;                    ///< of coding, as numbers within members_
+  std::array<std::vector<std::uint64_t>, 3> relative_;  ///< relative to origin_
+  std::vector<std::uint32_t> order_;                    ///< order of coding, as indices of members_
   std::vector<std::uint32_t> coded_;                    ///< the points in that order
   std::vector<KeyRange> ranges_;
   GridCodec grid_;

@@ -14,17 +14,17 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Blocks of so many bytes are looked for among those before.
+/// Blocks of at most this many bytes are looked up among earlier ones.
 constexpr std::size_t kMostSharedBytes = 1024;
-/// At most so many of the blocks held back are used to choose how columns are coded. Rasters have
-/// them above level 0 alone, where little depends on it.
+/// Maximum number of held blocks that are used to choose how columns are coded. Rasters have
+/// columns only above level 0, where the choice matters little.
 constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
-/// All blocks of a level are written in the order that suits the first ones. They seldom tell more
-/// than this share of the bits: what is nearly as good is then to be the simpler one.
+/// All blocks of a level are written in the order that is best for the first ones. Their sizes are
+/// only an estimate, so keeping the points' sequence must save more than this share of the bits.
 constexpr std::uint64_t kOrderShare = 64;
-/// The first attributes of 64 bits are tried as guides.
+/// Number of 64-bit attributes, from the first, that are tried as guides.
 constexpr std::size_t kMostGuides = 2;
-/// At least one in so many differences of a guide begins a line, and as many do not.
+/// At least one in this many differences of a guide begins a line, and at least as many do not.
 constexpr std::uint64_t kLeastShare = 50;
 
 template <class Box>
@@ -68,7 +68,8 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   clusters_ += block.clusters;
 
   if (block.raw == nullptr && block.tables != tables_) {
-    // Encoded ahead of its turn, with tables of the segment before: undone.
+    // The block was encoded ahead of its turn with tables of the previous segment, so it is
+    // decoded.
     block.raw =
         std::make_unique<RawBlock>(decoded_block(layout_, block.tables->tables, block.bytes,
                                                  block.entries, std::move(block.summaries), root));
@@ -134,7 +135,7 @@ std::vector<LevelWriter::Trial> LevelWriter::count(const Predictor& predictor,
   return all;
 }
 
-/// Every so many-th block is used to choose how columns are coded.
+/// Returns the step between the blocks that are used to choose how columns are coded.
 std::size_t LevelWriter::trial_step() const {
   const std::size_t most = layout_.grid && layout_.level > 0 ? kRasterTrialBlocks : kTrialBlocks;
   return (held_.size() + most - 1) / most;
@@ -146,9 +147,9 @@ bool LevelWriter::possible(ColumnKind kind, unsigned column, const Guide& guide)
   return guide.exists() || static_cast<unsigned>(kind) < kUnguidedKinds;
 }
 
-/// Attributes that may tell scan lines: times are doubles or long integers. Takes for jumps what
-/// lies beyond the sizes of differences that are rarest, if some lie on either side: points of
-/// scanners are microseconds apart, their lines milliseconds.
+/// Returns attributes that may be guides. Times are doubles or 64-bit integers. Points of scanners
+/// are microseconds apart, their lines milliseconds, so differences are taken for jumps above the
+/// rarest size, if there are enough on either side.
 std::vector<Guide> LevelWriter::find_guides() {
   std::vector<unsigned> attributes;
   for (unsigned a = 0; a < layout_.attributes.size() && attributes.size() < kMostGuides; ++a) {
@@ -182,8 +183,8 @@ std::vector<Guide> LevelWriter::find_guides() {
   return guides;
 }
 
-/// The kind of each column that takes the fewest bits, with the guide that saves the most; the
-/// first time also the order of points.
+/// Chooses the kind of each column that takes the fewest bits, with the guide that saves the most;
+/// the first time also the order of points.
 void LevelWriter::choose_columns(Tables& tables) {
   tables.kinds.assign(layout_.columns(), ColumnKind::plain);
   if (layout_.attributes.empty() && !layout_.has_point_columns()) {
@@ -213,7 +214,7 @@ void LevelWriter::choose_columns(Tables& tables) {
   choose_kinds(tables, trials[best].counts);
 }
 
-/// plain: the counts of columns that are coded as ColumnKind::plain.
+/// plain: the counts with all columns coded as ColumnKind::plain.
 void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
   std::vector<std::vector<ColumnKind>> possible_kinds(layout_.columns());
   for (unsigned c = 0; c < layout_.columns(); ++c) {
@@ -244,7 +245,7 @@ void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
 
 void LevelWriter::train() {
   encoders_.resize(team_.threads());
-  // Where there are many blocks, a part of them tells as much: others wait for this.
+  // Of many blocks only a part is counted, because other threads wait for this.
   const bool many = held_.size() == kTrainingBlocks;
   Tables tables;
   if (layout_.grid && layout_.level == 0) {
@@ -259,8 +260,8 @@ void LevelWriter::train() {
   choose_columns(tables);
   const Columns columns{*sequence_, tables.guide, tables.kinds};
   Counts counts = std::move(count(tables.predictor, {&columns, 1}, many ? 2 : 1)[0].counts);
-  // A symbol costs its table two bytes and more. Where the tables are for what was counted alone,
-  // one that came once does not earn them.
+  // A symbol costs its table at least two bytes. If the tables serve only the counted blocks, a
+  // symbol that occurred once is not worth them.
   const std::uint32_t least = many ? 1 : 2;
   for (const auto& context : counts) tables.frequencies.push_back(normalised(context, least));
 
@@ -286,7 +287,7 @@ void LevelWriter::train() {
   held_.shrink_to_fit();
 }
 
-/// As if the first of the blocks began a page.
+/// Counts the symbols of the index as if the first block began a page.
 void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& counts) const {
   std::vector<Entry> entries;
   std::vector<KeyRange> ranges;

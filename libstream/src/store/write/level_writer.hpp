@@ -18,12 +18,13 @@
 
 namespace terrace::stream::store {
 
-/// Blocks of a level that share tables, and how many of them, from the first, are held back until
+/// Number of blocks of a level that share tables, and of those, from the first, that are held until
 /// the tables are made from them.
 inline constexpr std::uint64_t kSegmentBlocks = 1024;
 inline constexpr std::size_t kTrainingBlocks = 64;
 
-/// Tables in both shapes: a block that was encoded with those of an earlier segment is decoded.
+/// Tables for encoding and decoding. A block that was encoded with those of an earlier segment must
+/// be decoded.
 struct SharedTables {
   SharedTables(Tables made, bool in_sequence)
       : tables(std::move(made)), encoding(tables), sequence(in_sequence) {}
@@ -33,7 +34,7 @@ struct SharedTables {
 };
 using SharedTablesPtr = std::shared_ptr<const SharedTables>;
 
-/// A block on its way into a level: raw while there are no tables, else encoded.
+/// A block to be written to a level: raw as long as there are no tables, then encoded.
 struct PreparedBlock {
   std::size_t clusters = 0;
   std::unique_ptr<RawBlock> raw;
@@ -45,42 +46,42 @@ struct PreparedBlock {
   std::vector<ClusterSummary> summaries;
 };
 
-/// The two files of a level. One thread at a time, which has the team at work while it trains: all
-/// blocks to come wait for that. The bytes depend on the blocks and their order alone, not on which
-/// of them came encoded.
+/// Writes the two files of a level. Not thread-safe; training uses the team, because all further
+/// blocks wait for it. The bytes depend only on the blocks and their order, not on which of them
+/// were passed encoded.
 class LevelWriter {
  public:
-  /// shown: the store in messages.
+  /// shown: the name of the store in messages.
   LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
               Layout layout, base::ThreadTeam& team);
 
-  /// What blocks are to be encoded with just now; null while there are no tables.
+  /// The tables to encode blocks with now; null if there are none.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::uint64_t clusters() const { return clusters_; }
 
-  /// Returns the ordinal of the block's first cluster.
+  /// Appends a block. Returns the ordinal of its first cluster.
   std::uint64_t append(PreparedBlock block, bool root);
-  /// Writes what is held back, the directory and the tables; syncs and closes. `members` of the
-  /// result are the points of all clusters, representatives left out; `points` is not set.
-  /// bounds: of the store.
+  /// Writes the held blocks, the directory and the tables; syncs and closes the files. `members` of
+  /// the result are the points of all clusters without representatives; `points` is not set.
+  /// bounds: the store's.
   LevelEntry finish(bool root, const Box3& bounds);
 
-  /// Whether the next block starts a segment: its tables are not those of the last.
+  /// Whether the next block starts a segment, which gets new tables.
   [[nodiscard]] bool at_segment_start() const { return blocks_ % kSegmentBlocks == 0; }
 
  private:
-  /// What was held back, encoded to be counted.
+  /// The counts of held blocks, as if encoded.
   struct Trial {
     Counts counts;
     std::uint64_t raw_bits = 0;
 
     [[nodiscard]] std::uint64_t bits() const;
   };
-  /// Has an encoder count every step-th block held back.
+  /// Calls `count` with an encoder for every step-th held block.
   template <class Count>
   void each_block(std::size_t step, Count&& count);
-  /// Counts every step-th block held back, with each of these columns.
+  /// Counts every step-th held block, with each of these columns.
   std::vector<Trial> count(const Predictor& predictor, std::span<const Columns> columns,
                            std::size_t step);
   [[nodiscard]] std::size_t trial_step() const;
@@ -93,22 +94,23 @@ class LevelWriter {
   void count_index(std::span<const PreparedBlock> blocks, Counts& counts) const;
   void write(const PreparedBlock& block);
   void write_page();
-  /// Writes the contents of the chapters, the tables and the directory. Returns the bytes of the
-  /// directory.
+  /// Writes the contents of the chapters, the tables and the directory. Returns the size of the
+  /// directory in bytes.
   std::uint64_t write_directory(const Box3& bounds);
 
   Layout layout_;
   OutputFile data_, index_;
   std::vector<RawBlock> held_;
-  /// Whether points are coded in the order in which they come. One choice for the whole level: a
-  /// block that was encoded with the tables of the segment before has no other order any more.
+  /// Whether points are coded in the order in which they were passed. One choice for the whole
+  /// level, because a block that was encoded with the tables of the previous segment has lost any
+  /// other order.
   std::optional<bool> sequence_;
   SharedTablesPtr tables_;
   base::ThreadTeam& team_;
   std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
-  std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
-  SharedTablesPtr page_tables_;      ///< those of the page's first cluster
+  std::uint64_t segment_start_ = 0;  ///< ordinal of the current segment's first cluster
+  SharedTablesPtr page_tables_;      ///< tables of the page's first cluster
   std::vector<Entry> page_;
   std::vector<KeyRange> page_ranges_;
   struct PageAt {
@@ -118,11 +120,11 @@ class LevelWriter {
   std::vector<PageAt> pages_;
   std::uint64_t page_offset_ = 0;  ///< of the page's first cluster, in the data
   std::uint64_t last_end_ = 0;     ///< of the last cluster, in the data
-  /// Where blocks of the segment are in the data that take few bytes: those of still water are
-  /// alike.
+  /// Offsets in the data of the segment's blocks of few bytes. Blocks of still water, for example,
+  /// are equal.
   std::map<std::string, std::uint64_t> small_blocks_;
   struct Set {
-    std::uint64_t first = 0;  ///< ordinal of the first cluster that it is for
+    std::uint64_t first = 0;  ///< ordinal of the first cluster that uses it
     Bytes bytes;
   };
   std::vector<Set> sets_;  ///< of tables

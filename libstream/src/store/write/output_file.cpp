@@ -61,8 +61,8 @@ void OutputFile::flush() {
     left -= static_cast<std::size_t>(written);
   }
 #ifdef SYNC_FILE_RANGE_WRITE
-  // On its way to the disk while blocks to come are encoded: finish() then has little to wait for.
-  // Whether it gets there finish() tells.
+  // Starts writing to disk while further blocks are encoded, so that finish() waits less. finish()
+  // reports errors.
   static_cast<void>(::sync_file_range(fd_.get(), static_cast<off_t>(flushed_),
                                       static_cast<off_t>(buffer_.size()), SYNC_FILE_RANGE_WRITE));
 #endif

@@ -29,11 +29,11 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// A new file, written front to back through a buffer, with its CRC-32. Every failed write is
-/// thrown as an Error, including one that appears only at fsync or close.
+/// Writes a new file sequentially through a buffer, and computes its CRC-32. Every failed write
+/// throws an Error, including one that is reported only by fsync or close.
 class OutputFile {
  public:
-  /// shown: the output in messages, which do not name its temporary files.
+  /// shown: the name of the output in messages, instead of its temporary files.
   OutputFile(std::filesystem::path path, std::filesystem::path shown);
 
   void write(ByteView bytes);

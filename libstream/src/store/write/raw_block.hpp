@@ -20,14 +20,14 @@ struct RawBlock {
 
   RawBlock() = default;
   explicit RawBlock(const ClusteredBlock& block);
-  /// Adds a cluster, but no summary. The representative goes back to its place in the order of
-  /// coding: among points at one position, order is what tells them apart.
+  /// Adds a cluster without a summary. The representative is put back at its position in the order
+  /// of coding, because only the order distinguishes points at one place.
   void add(const ClusterPoints& cluster);
   [[nodiscard]] ClusteredBlock view() const;
 };
 
-/// The block that was encoded into `bytes` and `entries`; encoding it again gives the same bytes as
-/// the first original would. The boxes of entries may be enlarged, so the caller supplies the
+/// Returns the block that was encoded into `bytes` and `entries`. Encoding it gives the same bytes
+/// as encoding the original. The boxes of entries may be enlarged, so the caller supplies the
 /// summaries.
 RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& bytes,
                        std::span<const Entry> entries, std::vector<ClusterSummary> summaries,

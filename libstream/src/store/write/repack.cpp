@@ -19,23 +19,24 @@ using namespace store;
 
 namespace {
 
-/// Points of a block. Boxes are coded in steps of their block's extent, and where the curve leaves
-/// a surface in space and comes back elsewhere, blocks are wide unless they have few points.
+/// Points of a block. Boxes are coded in steps of their block's extent. A curve through space
+/// leaves a surface and returns to it elsewhere, so blocks of clouds are wide unless they have few
+/// points.
 constexpr std::uint64_t kRasterBlock = 10'000, kCloudBlock = 2'000;
-/// Blocks that are encoded side by side.
+/// Number of blocks that are encoded in parallel.
 constexpr std::size_t kBlocksAtOnce = 64;
 
-/// Ordinals of clusters: of each level below, by ordinals.
+/// New ordinals of clusters, by level and old ordinal.
 using Ordinals = std::vector<std::vector<std::uint64_t>>;
 
-/// Where along an axis of the store's bounds a value lies, 0 to 1. Halves do not overflow.
+/// Returns the position of a value between low and high, 0 to 1. Halves do not overflow.
 double share_of(double value, double low, double high) {
   const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0.0;
   return std::clamp(share, 0.0, 1.0);
 }
 
-/// The ordinals of a level's clusters along the curve. Axes count by the mean extents of the boxes,
-/// so that units and steepness do not matter; heights of rasters do not count at all.
+/// Returns the ordinals of a level's clusters along the curve. Axes are scaled by the mean extents
+/// of the boxes, so that units and steepness do not matter; heights of rasters are ignored.
 std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
   const std::size_t axes = store.schema().grid ? 2 : 3;
   const unsigned bits = axes == 2 ? 28 : 20;
@@ -56,7 +57,7 @@ std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
     if (extent > 0) least = std::min(least, extent);
   }
 
-  // The place on the curve, as far as there are bits for it, above the ordinal.
+  // Keys with the position on the curve in the bits above the ordinal.
   const auto ordinal_bits = static_cast<unsigned>(std::bit_width(clusters));
   const unsigned curve_bits = bits * static_cast<unsigned>(axes);
   const unsigned lost = curve_bits + ordinal_bits > 64 ? curve_bits + ordinal_bits - 64 : 0;
@@ -78,7 +79,7 @@ std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
   return order;
 }
 
-/// Adds a cluster whose points head clusters that have moved.
+/// Adds a cluster with the new ordinals of the clusters that its points head.
 void add(const Store& store, ClusterId id, const Ordinals& moved, RawBlock& block) {
   ClusterPoints points;
   store.read(id, points);
@@ -89,7 +90,7 @@ void add(const Store& store, ClusterId id, const Ordinals& moved, RawBlock& bloc
   }
   block.add(points);
   block.summaries.push_back(store.record(id).summary);
-  // That of points alone is found anew, and is not enlarged twice.
+  // A box of points only is recomputed, so that it is not enlarged twice.
   if (block.level == 0) block.summaries.back().box = {};
 }
 

@@ -24,7 +24,8 @@ class StoreWriter::Encoded {
   double height_sum = 0.0;
   Box3 bounds;
 
-  /// Enters the points. Two sums side by side, in a fixed order: one would wait for itself.
+  /// Adds the points to the totals. Two interleaved sums in a fixed order, because a single sum
+  /// would wait for each addition.
   void sum_up(std::span<const Point3> positions) {
     std::array<double, 2> sums{};
     for (std::size_t i = 0; i < positions.size(); ++i) sums[i % 2] += positions[i][2];
@@ -71,7 +72,7 @@ struct StoreWriter::Impl {
   std::uint64_t points = 0;
   double height_sum = 0.0;
   Box3 bounds;
-  bool broken = false;  ///< an append or finish has thrown
+  bool broken = false;  ///< whether append() or finish() has thrown
 
   // Shared between threads.
   Spares<BlockEncoder> encoders;
@@ -108,10 +109,10 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   if (broken) {
     throw Error({.file = staging.target().string(),
                  .where = {},
-                 .cause = "writing has failed before",
+                 .cause = "an earlier write failed",
                  .remedy = {}});
   }
-  broken = true;  // until this has gone well
+  broken = true;  // until this call succeeds
   const unsigned level = encoded->level;
   while (levels.size() <= level) {
     levels.push_back(std::make_unique<LevelWriter>(
@@ -128,7 +129,8 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   {
     const std::lock_guard lock(mutex);
     if (tables_by_level.size() < levels.size()) tables_by_level.resize(levels.size());
-    // At the end of a segment nobody need encode with tables that are about to go.
+    // At the end of a segment its tables are about to be replaced, so blocks are not encoded with
+    // them.
     tables_by_level[level] = writer.at_segment_start() ? nullptr : writer.tables();
   }
   broken = false;
@@ -217,7 +219,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   manifest.schema = std::move(w.schema);
   const std::string text = to_text(manifest);
   w.schema = std::move(manifest.schema);
-  // What was written must be readable: this also finds counts that the caller got wrong.
+  // Checks that the manifest can be read, which also finds wrong counts of the caller.
   const auto path = w.staging.folder() / kManifestName;
   static_cast<void>(parse_manifest(text, w.staging.target().string()));
   OutputFile file(path, w.staging.target());
