@@ -10,8 +10,8 @@
 
 namespace terrace::stream {
 
-/// Compares the CRS of files with that of the first one. Of thousands of files few describe the CRS
-/// in a way of their own: each description is compared once.
+/// Compares the CRS of files with that of the first file. Thousands of files share few different
+/// descriptions of a CRS, so each description is compared once.
 class CrsAgreement {
  public:
   /// same: may be empty.
@@ -27,7 +27,7 @@ class CrsAgreement {
  private:
   static constexpr std::size_t kMostKnown = 64;
 
-  std::vector<Crs> known_;  ///< that of the first file, and what means the same
+  std::vector<Crs> known_;  ///< the first file's, and others that mean the same
   SameCrs same_;
 };
 

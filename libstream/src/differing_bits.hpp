@@ -9,7 +9,8 @@
 
 namespace terrace::stream {
 
-/// Byte by byte of a record, the bits in which some of the records differ from the first.
+/// Sets `differing`, one byte per byte of a record, to the bits in which any record differs from
+/// the first.
 inline void find_differing_bits(std::span<const std::byte> records, std::size_t record_bytes,
                                 std::vector<std::byte>& differing) {
   differing.assign(record_bytes, std::byte{0});

@@ -8,11 +8,11 @@
 
 namespace terrace::stream {
 
-/// Objects whose memory is kept for the next user, any thread.
+/// A pool of objects that are kept for reuse, for their allocated memory. Thread-safe.
 template <class T>
 class Spares {
  public:
-  /// One that was put here, as it was, or a new one.
+  /// Returns an object from the pool, in the state in which it was put there, or a new one.
   std::unique_ptr<T> take() {
     const std::lock_guard lock(mutex_);
     if (spares_.empty()) return std::make_unique<T>();

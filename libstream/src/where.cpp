@@ -129,7 +129,7 @@ class Where::Parser {
         return;
       }
       if (found->precedence == compared) {
-        fail("comparisons do not follow one another", "join two with &&: a < b && b < c");
+        fail("comparisons cannot be chained", "join two with &&: a < b && b < c");
       }
       if (found->precedence == 3 || found->precedence == 4) compared = found->precedence;
       expression(found->precedence + 1);
@@ -180,7 +180,7 @@ class Where::Parser {
     std::string_view word;
     if (text_[at_] == '"') {
       const std::size_t end = text_.find('"', at_ + 1);
-      if (end == text_.npos) fail("the name has no second quotation mark");
+      if (end == text_.npos) fail("the name has no closing quote");
       word = text_.substr(at_ + 1, end - at_ - 1);
       at_ = end + 1;
     } else {
@@ -222,7 +222,7 @@ class Where::Parser {
 
 namespace {
 
-/// Points that are evaluated together: the operands stay in the first-level cache.
+/// Points that are evaluated together; few enough that the operands stay in the first-level cache.
 constexpr std::size_t kLanes = 256;
 template <class Number>
 using Lanes = std::array<Number, kLanes>;
@@ -236,7 +236,7 @@ bool is_wide(const Channel& channel) {
   return channel.type == ScalarType::i64 || channel.type == ScalarType::u64;
 }
 
-/// The values of an attribute of `count` records from `first` on.
+/// Loads the values of an attribute of `count` records from `first` on.
 template <class Number>
 void load(const Channel& channel, const std::byte* first, std::size_t stride, std::size_t count,
           Lanes<Number>& out) {
@@ -256,7 +256,8 @@ void combine(Lanes<Number>& a, const Lanes<Number>& b, const Function& function)
   for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<Number>(function(a[i], b[i]));
 }
 
-/// The range of a 64-bit integer's values, whose ends were rounded to doubles.
+/// Widens a range of 64-bit integers whose ends were rounded to doubles, so that it contains the
+/// exact values.
 ValueRange before_rounding(ValueRange range) {
   constexpr double kExact = 0x1p53, kInfinity = std::numeric_limits<double>::infinity();
   if (std::abs(range.low) >= kExact) range.low = std::nextafter(range.low, -kInfinity);
@@ -264,8 +265,9 @@ ValueRange before_rounding(ValueRange range) {
   return range;
 }
 
-/// Interval arithmetic. Every operation on doubles is monotonic in each operand, including
-/// rounding, so its ends are at those of the operands; if one is NaN anything is possible.
+/// Interval arithmetic. Every operation on doubles, including its rounding, is monotonic in each
+/// operand, so the ends of the result come from ends of the operands. If one is not finite, any
+/// result is possible.
 ValueRange hull(std::initializer_list<double> ends, bool nan) {
   ValueRange range{std::min(ends), std::max(ends), nan};
   for (const double end : ends) {
@@ -280,8 +282,7 @@ bool may_hold(const ValueRange& v) { return v.low != 0.0 || v.high != 0.0; }
 bool may_fail(const ValueRange& v) { return v.nan || (v.low <= 0.0 && v.high >= 0.0); }
 bool is_one(const ValueRange& v) { return !v.nan && v.low == v.high; }
 
-/// `sure` pairs compare as wanted and `never` ones do not, unless there is a NaN, which compares
-/// false.
+/// sure: the comparison is true for all pairs of values; never: for none. A NaN compares false.
 ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool never) {
   return truth(!sure || a.nan || b.nan, !never);
 }

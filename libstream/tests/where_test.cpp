@@ -68,10 +68,10 @@ struct Cloud {
 
 bool truth(double value) { return !std::isnan(value) && value != 0.0; }
 
-/// A condition as text and as a function.
+/// An expression as text and as a function.
 struct Expression {
   std::string text;
-  unsigned precedence;  ///< of its outermost operator; 9 for an operand
+  unsigned precedence;  ///< of the outermost operator; 9 for an operand
   std::function<double(std::size_t)> value;
 };
 
@@ -112,7 +112,7 @@ class RandomExpressions {
          {"/", 6, [](double a, double b) { return a / b; }}}};
     const Operator& op = kOperators[below(kOperators.size())];
     const Expression a = make(depth - 1), b = make(depth - 1);
-    // Parentheses where they are needed, and sometimes elsewhere.
+    // Parentheses where needed, and sometimes elsewhere.
     const bool compares = op.precedence == 3 || op.precedence == 4;
     const auto side = [&](const Expression& e, bool right) {
       const bool needed =
@@ -149,11 +149,11 @@ class RandomExpressions {
   std::mt19937_64 random_;
 };
 
-TEST(Where, RandomConditionsMeanWhatTheyMean) {
+TEST(Where, EvaluatesRandomConditions) {
   std::size_t met = 0, all = 0;
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    // One block of lanes, and more than one.
+    // Points for one block of lanes, or for several.
     const Cloud cloud(seed % 2 == 0 ? 40 : 700, seed);
     RandomExpressions expressions(cloud, seed);
     const Expression expression = expressions.make(5);
@@ -169,9 +169,9 @@ TEST(Where, RandomConditionsMeanWhatTheyMean) {
   EXPECT_LT(met, all - all / 10);
 }
 
-// Law: if a point meets the condition, its box and the ranges of its attributes say it is possible;
-// and often they exclude it otherwise.
-TEST(Where, RangesTellWhatIsPossible) {
+// If a point meets the condition, possible() must be true for its box and the ranges of its
+// attributes; otherwise it is often false.
+TEST(Where, ExcludesByRangesOnlyWhatIsImpossible) {
   std::size_t told = 0, none = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -205,7 +205,7 @@ TEST(Where, RangesTellWhatIsPossible) {
   EXPECT_GT(told, none / 2);
 }
 
-TEST(Where, ConditionsOfTheUsualKind) {
+TEST(Where, EvaluatesUsualConditions) {
   const Cloud cloud(500, 9);
   for (const auto& [text, same] : std::vector<std::pair<std::string, std::string>>{
            {"classification == 2 && number_of_returns == last", "classification==2"},
@@ -215,12 +215,12 @@ TEST(Where, ConditionsOfTheUsualKind) {
            {"1e0 == 1.0", "1"}}) {
     EXPECT_EQ(cloud.matches(text), cloud.matches(same)) << text;
   }
-  // NaN does not meet any condition.
+  // NaN does not meet a condition.
   EXPECT_EQ(cloud.matches("\"a b\" - \"a b\""), std::vector<std::uint8_t>(500, 0));
   EXPECT_EQ(cloud.matches("0 / 0"), std::vector<std::uint8_t>(500, 0));
 }
 
-TEST(Where, SaysWhatIsWrongAndWhere) {
+TEST(Where, NamesTheFaultAndItsPosition) {
   const Cloud cloud(1, 1);
   for (const auto& [text, where, cause] : std::vector<std::array<std::string, 3>>{
            {"", "character 1", "ends"},
@@ -231,8 +231,8 @@ TEST(Where, SaysWhatIsWrongAndWhere) {
            {"classification == ground", "character 19", "no 'ground'"},
            {"(z > 1", "character 7", "')' is missing"},
            {"z > 1)", "character 6", "operator"},
-           {"1 < z < 3", "character 8", "follow"},
-           {"\"a b == 1", "character 1", "quotation"},
+           {"1 < z < 3", "character 8", "chained"},
+           {"\"a b == 1", "character 1", "closing quote"},
            {"z > +3", "character 5", "number"},
            {"z ? 1", "character 3", "operator"},
            {std::string(100, '('), "character 65", "nested"},
@@ -247,7 +247,7 @@ TEST(Where, SaysWhatIsWrongAndWhere) {
   }
 }
 
-/// A PLY of points with four attributes.
+/// Returns a PLY of points with four attributes.
 std::string made_ply(std::size_t count) {
   std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(count) +
                      "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar a\n"
@@ -285,7 +285,7 @@ TEST(Selection, LeavesPointsAndAttributesOut) {
     PointBlock block;
     while (source->next(block)) {
       ASSERT_FALSE(block.empty());
-      // Full except for the last one.
+      // Every block but the last is full.
       const bool last = found.size() + block.size() == expected.size();
       ASSERT_TRUE(block.size() == block_points || (last && block.size() < block_points));
       ASSERT_EQ(block.payload.size(), block.size() * 3);
@@ -307,7 +307,7 @@ TEST(Selection, LeavesPointsAndAttributesOut) {
   }
 }
 
-TEST(Selection, NamesWhatIsNotThere) {
+TEST(Selection, NamesUnknownAttributes) {
   const TempFolder folder;
   const std::string file = (folder.path() / "a.ply").string();
   std::ofstream(file) << made_ply(3);
@@ -318,22 +318,22 @@ TEST(Selection, NamesWhatIsNotThere) {
   EXPECT_THROW(static_cast<void>(open({.selection = {.keep = std::vector<std::string>{"d"}}})),
                Error);
   EXPECT_THROW(static_cast<void>(open({.selection = {.drop = {"a", "d"}}})), Error);
-  // No attribute is kept, and no point is left: an empty stream is valid too.
+  // No attribute is kept and no point is left; an empty stream is valid.
   const auto none = open({.selection = {.where = "z > 100", .keep = std::vector<std::string>{}}});
   EXPECT_EQ(none->info().payload_size(), 0u);
   PointBlock block;
   EXPECT_FALSE(none->next(block));
 }
 
-// Integers of 64 bits are compared as such, and no cluster that has one is skipped.
-TEST(Where, LargeIntegersAreComparedExactly) {
+// 64-bit integers are compared exactly, and clusters that have matches are not excluded.
+TEST(Where, ComparesLargeIntegersExactly) {
   Schema schema;
   schema.attributes = {{.name = "i", .type = ScalarType::i64},
                        {.name = "u", .type = ScalarType::u64}};
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
-    // Within a few units of one another, where doubles lie 1 to 2048 apart.
+    // Within a few units of one another, where doubles are 1 to 2048 apart.
     const std::uint64_t base = (std::uint64_t{1} << (52 + random() % 11)) + random() % 3000;
     const auto near = [&] { return base + random() % 5; };
     std::vector<std::int64_t> values;
