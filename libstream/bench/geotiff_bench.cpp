@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading rasters as points, one thread, from the page cache. The terrain is value noise: the sum
-// of a few octaves of a lattice of random values, 16-bit.
+// Measures reading rasters as points on one thread, from the page cache. The terrain is 16-bit
+// value noise: the sum of a few octaves of a lattice of random values.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -21,7 +21,7 @@ namespace {
 
 std::uint32_t side() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr ? 300 : 8192; }
 
-/// A random value in 0 ... 1023 for a node of the lattice.
+/// Returns a random value in 0 ... 1023 for a node of the lattice.
 std::uint32_t noise(std::uint32_t x, std::uint32_t y) {
   std::uint64_t h = (std::uint64_t{x} << 32 | y) * 0x9e3779b97f4a7c15u;
   h = (h ^ h >> 29) * 0xbf58476d1ce4e5b9u;
@@ -42,7 +42,7 @@ std::int16_t height(std::uint32_t column, std::uint32_t row) {
   return static_cast<std::int16_t>(sum);
 }
 
-/// Files made once and removed at the end.
+/// The input files, which are written once and removed at the end.
 class Inputs {
  public:
   Inputs()
@@ -95,7 +95,8 @@ void read_points(benchmark::State& state, stream::GeoTiffCompression compression
   state.SetItemsProcessed(static_cast<std::int64_t>(points));
 }
 
-/// The lower limit: libtiff's decoding and the copy into windows, without points.
+/// Measures the lower limit of the time: libtiff's decoding and the copy into windows, without
+/// points.
 void read_windows(benchmark::State& state, stream::GeoTiffCompression compression) {
   const std::string file = inputs().file(compression, false);
   const auto raster = stream::open_geotiff(file);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding and encoding LAZ on one core, in memory: synthetic scans of some formats, and the files
-// in TERRACE_DATA if it is set. Items are points, bytes those of the records.
+// Measures decoding and encoding of LAZ on one core, in memory, with synthetic scans of some
+// formats and with the files in TERRACE_DATA if it is set. Items are points, bytes are those of the
+// records.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading and writing files of points, warm: survey coordinates (millimetres in a UTM zone), the
-// same with three more columns, and with those of LAS point format 6. Items are points.
+// Measures reading and writing of point files with a warm cache: survey coordinates (millimetres in
+// a UTM zone), alone, with three more columns, and with those of LAS point format 6. Items are
+// points.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +26,7 @@ std::size_t point_count() {
 
 enum class Columns : std::uint8_t { none, three, laser };
 
-/// Points of a survey in blocks of 10,000, the last shorter.
+/// Points of a survey in blocks of 10,000; the last block is shorter.
 class Survey {
  public:
   explicit Survey(Columns columns) : random_(1) {
@@ -69,7 +70,7 @@ class Survey {
       for (const Channel& channel : header_.attributes) {
         const float confidence = static_cast<float>(random_() % 1000) / 1000.0f;
         const double time = 0.25 * static_cast<double>(random_() % 1'000'000);
-        // Bit fields of LAS hold 1 as well.
+        // 8-bit columns are 0 or 1, which all bit fields of LAS can hold.
         const std::uint64_t bits = random_() & (channel.type == ScalarType::u8 ? 1U : ~0ULL);
         const auto bytes = channel.type == ScalarType::f32
                                ? std::as_bytes(std::span(&confidence, 1))
@@ -109,7 +110,8 @@ void read(benchmark::State& state, const std::string& format, Columns columns) {
   std::filesystem::remove(path);
 }
 
-/// Without the syncs, which would measure the disk: the file is abandoned after its last point.
+/// Measures writing without syncs, which would measure the disk: the file is abandoned after its
+/// last point.
 void write(benchmark::State& state, const std::string& format, Columns columns) {
   const std::string path = scratch_file();
   Survey survey(columns);
@@ -122,7 +124,8 @@ void write(benchmark::State& state, const std::string& format, Columns columns) 
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(point_count()));
 }
 
-/// COPC of a hilly survey, including syncs: its work begins after the last point.
+/// Measures writing COPC of a hilly survey, including syncs, because its work begins after the last
+/// point.
 void write_octree(benchmark::State& state) {
   const std::string path = scratch_file();
   Survey survey(Columns::laser);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The store on a fractal int16 raster (midpoint displacement with an RMS step of about 2.65 m from
-// cell to cell) and on a cloud of decimals on a surface: encoding, reading everything, reading
-// random clusters, and the size. Blocks are clustered once beforehand by a stand-in.
+// Measures stores of a fractal int16 raster (midpoint displacement with an RMS step of about 2.65 m
+// from cell to cell) and of a cloud of decimals on a surface: encoding, reading everything, reading
+// random clusters, and the size. A stand-in clusters the blocks once beforehand.
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -73,7 +73,7 @@ std::uint64_t write(const Input& in, const std::filesystem::path& path) {
   return 0;
 }
 
-/// A store that lives as long as the program.
+/// Returns a store that exists as long as the program.
 const Store& built(bool grid) {
   struct Built {
     explicit Built(bool of_grid) : path(store_path(of_grid)) {
@@ -92,7 +92,7 @@ void count_points(benchmark::State& state, std::uint64_t points) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(points));
 }
 
-/// encode() of blocks whose tables exist, without I/O.
+/// Measures encode() of blocks whose tables exist, without I/O.
 void encode(benchmark::State& state, bool grid) {
   const Input& in = input(grid);
   const auto path = store_path(grid).string() + "-encode";
@@ -113,7 +113,7 @@ void encode(benchmark::State& state, bool grid) {
   state.SetItemsProcessed(static_cast<std::int64_t>(points));
 }
 
-/// Every cluster of every level with checksums, one thread.
+/// Measures reading every cluster of every level, with checksums, on one thread.
 void read_all(benchmark::State& state, bool grid) {
   const Store& store = built(grid);
   double sum = 0;
@@ -137,7 +137,7 @@ void read_all(benchmark::State& state, bool grid) {
       static_cast<double>(index) / static_cast<double>(clusters);
 }
 
-/// One random cluster of level 0: record and points.
+/// Measures reading one random cluster of level 0: its record and points.
 void read_one(benchmark::State& state, bool grid) {
   const Store& store = built(grid);
   std::mt19937_64 random(1);
@@ -149,9 +149,8 @@ void read_one(benchmark::State& state, bool grid) {
   }
 }
 
-/// A store written anew in the order of the curve, the one that TERRACE_BENCH_STORE names if it
-/// does; how much larger it is, and in how many pieces a window of a tenth of each side is read,
-/// the same before.
+/// Measures repack() of a store, TERRACE_BENCH_STORE if it is set. Reports how much larger the
+/// store gets, and in how many pieces a window of a tenth of each side is read before and after.
 void repack_store(benchmark::State& state, bool grid) {
   const char* const named = std::getenv("TERRACE_BENCH_STORE");
   const Store store = named != nullptr ? Store::open(std::filesystem::path(named)) : built(grid);
