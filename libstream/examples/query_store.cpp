@@ -9,8 +9,8 @@
 
 namespace stream = terrace::stream;
 
-/// query_store STORE [X Y Z]: prints how many points are near a place (by default the centre), and
-/// the ten nearest.
+/// query_store STORE [X Y Z] prints how many points are near a place (by default the centre), and
+/// the ten nearest points.
 
 int main(int argc, char** argv) {
   if (argc != 2 && argc != 5) {

@@ -17,7 +17,7 @@ namespace stream = terrace::stream;
 
 namespace {
 
-/// A hill of 100 x 100 points as binary PLY.
+/// Writes a hill of 100 x 100 points as binary PLY. Returns the name of the file.
 std::string write_hill() {
   std::string path = std::filesystem::temp_directory_path() / "terrace-hill-XXXXXX.ply";
   const int file = mkstemps(path.data(), 4);

@@ -10,8 +10,8 @@
 #include "format/copc/hierarchy.hpp"
 #include "fuzz_points.hpp"
 
-/// Any bytes are an octree or refused: 8 with the number of points in the header, the info VLR, and
-/// then the file that contains its page.
+/// Any input is read as an octree or refused. The input is 8 bytes with the header's number of
+/// points, the info VLR, and then the file that contains its page.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   constexpr std::size_t kPointsBytes = 8, kInfoBytes = 160;
@@ -29,17 +29,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const OctreeNode& node : octree.nodes) {
       found += node.points;
       coded += node.bytes;
-      require(node.offset + node.bytes <= file_bytes, "nodes that lie in the file");
+      require(node.offset + node.bytes <= file_bytes, "nodes are in the file");
     }
-    require(found == points, "the points of the header");
-    require(coded <= file_bytes, "nodes that share no bytes");
+    require(found == points, "nodes have the header's number of points");
+    require(coded <= file_bytes, "nodes do not share bytes");
     const std::size_t nodes = octree.nodes.size();
     octree.keep({}, 0, {});
-    require(octree.nodes.size() == nodes, "all nodes without a wish");
+    require(octree.nodes.size() == nodes, "without a selection all nodes are kept");
     octree.keep(Box3{{-1, -1, -1}, {1, 1, 1}}, octree.spacing, {});
-    require(octree.nodes.size() <= 1, "the root alone at its own spacing");
+    require(octree.nodes.size() <= 1, "only the root is kept at its spacing");
   } catch (const Error&) {
-    // Refused, in words.
+    // The input is refused.
   }
   return 0;
 }

@@ -13,12 +13,12 @@
 
 namespace {
 
-/// A folder for the files of one dataset, removed with the process.
+/// A folder for the files of one dataset, which is removed at the end of the process.
 class Folder {
  public:
   Folder() {
     std::string name = (std::filesystem::temp_directory_path() / "terrace-fuzz-XXXXXX").string();
-    terrace::stream::require(mkdtemp(name.data()) != nullptr, "a folder");
+    terrace::stream::require(mkdtemp(name.data()) != nullptr, "a folder can be created");
     path_ = name;
     for (const char* inner : {"ept-data", "ept-hierarchy"}) {
       std::filesystem::create_directory(path_ / inner);
@@ -43,8 +43,8 @@ class Folder {
 
 }  // namespace
 
-/// Any files are a dataset or refused: ept.json, two files of the hierarchy, and the root's points
-/// in each of the three forms, with zero bytes between them.
+/// Any input is read as a dataset or refused. The input is ept.json, two files of the hierarchy,
+/// and the points for each of the three encodings, separated by zero bytes.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   static const Folder folder;
@@ -65,8 +65,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Reading large = read_through(file, {.format = "ept", .block_points = 500});
   limit.add(large.points);
   const Reading small = read_through(file, {.format = "ept", .block_points = 3});
-  require(large == small, "the same points in blocks of any size");
+  require(large == small, "points do not depend on the block size");
   const Reading threads = read_through(file, {.format = "ept", .block_points = 500, .threads = 2});
-  require(large == threads, "the same points by any number of threads");
+  require(large == threads, "points do not depend on the threads");
   return 0;
 }

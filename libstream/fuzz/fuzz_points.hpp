@@ -17,27 +17,27 @@
 
 namespace terrace::stream {
 
-/// Stops the fuzzer if the library broke a guarantee, in release builds too.
+/// Stops the fuzzer if the library broke a guarantee, also in release builds.
 inline void require(bool good, const char* what) {
   if (good) return;
-  std::fprintf(stderr, "broken promise: %s\n", what);
+  std::fprintf(stderr, "broken guarantee: %s\n", what);
   std::abort();
 }
 
-/// Stops the fuzzer where work grows faster than with the bytes of the input and what they hold:
-/// more than two seconds of processor time and ten microseconds for each, a hundred times what
-/// parsers take.
+/// Stops the fuzzer if the work is out of proportion to the bytes of the input and the items they
+/// hold: more than two seconds of processor time plus ten microseconds for each, a hundred times
+/// what parsers take.
 class WorkLimit {
  public:
   explicit WorkLimit(std::uint64_t bytes) : items_(bytes) {}
   ~WorkLimit() {
     const double seconds = static_cast<double>(std::clock() - begin_) / CLOCKS_PER_SEC;
-    require(seconds <= 2 + 1e-5 * static_cast<double>(items_), "time in proportion to the input");
+    require(seconds <= 2 + 1e-5 * static_cast<double>(items_), "time is proportional to the input");
   }
   WorkLimit(const WorkLimit&) = delete;
   WorkLimit& operator=(const WorkLimit&) = delete;
 
-  /// Points or triangles that the input holds.
+  /// Adds points or triangles of the input.
   void add(std::uint64_t items) { items_ += items; }
 
  private:
@@ -45,7 +45,7 @@ class WorkLimit {
   std::clock_t begin_ = std::clock();
 };
 
-/// The input as a file in memory, so that the reader uses its ordinary path.
+/// The input as a file in memory, so that readers use their ordinary code for files.
 class MemoryFile {
  public:
   MemoryFile(const std::uint8_t* data, std::size_t size) : fd_(memfd_create("fuzz", 0)) {
@@ -63,7 +63,7 @@ class MemoryFile {
   std::string name_;
 };
 
-/// The result of reading a file: its points folded into one number, or an Error.
+/// The result of reading a file: a hash of its points, or an Error.
 struct Reading {
   bool refused = false;
   std::uint64_t points = 0;
@@ -73,8 +73,8 @@ struct Reading {
   friend bool operator==(const Reading&, const Reading&) = default;
 };
 
-/// Reads a complete file and checks the reader's guarantees: blocks within their size, columns of
-/// the right length, finite coordinates, no exception but Error.
+/// Reads a complete file and checks the reader's guarantees: blocks and columns of the right size,
+/// finite coordinates, no exceptions except Error.
 inline Reading read_through(const std::string& file, const SourceOptions& options) {
   Reading reading;
   const auto fold = [&](const void* bytes, std::size_t size) {
@@ -86,29 +86,29 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
     const std::size_t record = source->info().payload_size();
     PointBlock block;
     while (source->next(block)) {
-      require(!block.empty() && block.size() <= options.block_points, "size of a block");
-      require(block.payload.size() == block.size() * record, "size of the records");
+      require(!block.empty() && block.size() <= options.block_points, "blocks have the right size");
+      require(block.payload.size() == block.size() * record, "records have the right size");
       for (std::size_t i = 0; i < block.size(); ++i) {
         for (const double value : block.positions[i]) {
-          require(value - value == 0.0, "finite coordinates");
+          require(value - value == 0.0, "coordinates are finite");
         }
-        // In the order of the points, so that blocks of any size give the same number.
+        // In the order of the points, so that the hash does not depend on the block size.
         fold(&block.positions[i], sizeof(Point3));
         fold(block.payload.data() + i * record, record);
       }
       reading.points += block.size();
     }
-    require(block.empty(), "an empty block at the end");
-    require(source->progress().points == reading.points, "progress");
+    require(block.empty(), "the block at the end is empty");
+    require(source->progress().points == reading.points, "progress agrees with the points");
     const auto promised = source->info().points;
     const Progress done = source->progress();
     reading.empty_values = done.empty_values;
     require(done.empty_values <= reading.points * source->info().attributes.size(),
-            "no more empty values than values");
+            "empty values do not exceed the values");
     require(!promised || *promised == reading.points + done.nodata + done.lost,
-            "as many points as promised");
+            "points agree with the announced number");
   } catch (const Error& error) {
-    require(!error.parts().cause.empty(), "a cause");
+    require(!error.parts().cause.empty(), "errors have a cause");
     reading = {.refused = true};
   }
   return reading;
@@ -121,15 +121,15 @@ inline void read_cells(PointSource& source, std::size_t block_points) {
   PointBlock block;
   std::uint64_t points = 0;
   for (int i = 0; i < 200 && source.next(block); ++i) {
-    require(!block.empty() && block.size() <= block_points, "size of a block");
+    require(!block.empty() && block.size() <= block_points, "blocks have the right size");
     points += block.size();
     for (const Point3& p : block.positions) {
       require(p[0] >= 0 && p[0] < static_cast<double>(info.columns) && p[1] >= 0 &&
                   p[1] < static_cast<double>(info.rows) && p[2] - p[2] == 0.0,
-              "cells of the raster, with data");
+              "points are cells of the raster with data");
     }
   }
-  require(points <= *info.points, "no more points than promised");
+  require(points <= *info.points, "points do not exceed the announced number");
 }
 
 }  // namespace terrace::stream

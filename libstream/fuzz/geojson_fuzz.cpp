@@ -3,8 +3,8 @@
 
 #include "fuzz_points.hpp"
 
-/// GeoJSON is refused, or has no more positions than the file can hold, and as many in its lines as
-/// in its segments.
+/// Any input is refused, or has no more positions than the file can hold, and polylines have as
+/// many vertices as segments.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const WorkLimit limit(size);
@@ -17,7 +17,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const SourceInfo& info = source->info();
       std::uint64_t seen = 0;
       for (PointBlock block; source->next(block);) {
-        require(block.payload.size() == block.size() * info.payload_size(), "records");
+        require(block.payload.size() == block.size() * info.payload_size(),
+                "each point has a record");
         if (entities == Entities::points) {
           seen += block.size();
           continue;
@@ -26,17 +27,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const auto part = info.view<std::uint32_t>(block.payload, column + 1);
         const auto count = info.view<std::uint8_t>(block.payload, column + 2);
         for (std::size_t i = 0; i < block.size(); ++i) {
-          require(count[i] >= 2 && count[i] <= kPolylineVertices, "vertices of a piece");
+          require(count[i] >= 2 && count[i] <= kPolylineVertices, "a piece has 2 to 4 vertices");
           seen += count[i] - (part[i] == 0 ? 0u : 1u);
         }
       }
-      require(seen <= size, "no more than the file can hold");
+      require(seen <= size, "positions fit the file's size");
       vertices.push_back(seen + source->progress().excluded);
     } catch (const Error& error) {
-      require(!error.parts().cause.empty(), "a cause");
+      require(!error.parts().cause.empty(), "errors have a cause");
     }
   }
-  require(vertices.size() == 3 || vertices.empty(), "all of them are refused, or none");
-  for (const std::uint64_t count : vertices) require(count == vertices.front(), "as many vertices");
+  require(vertices.size() == 3 || vertices.empty(),
+          "either all kinds of entities are refused or none");
+  for (const std::uint64_t count : vertices) require(count == vertices.front(), "counts agree");
   return 0;
 }

@@ -2,8 +2,8 @@
 #include "fuzz_points.hpp"
 #include "terrace/stream/raster.hpp"
 
-/// Any bytes as a GeoTIFF: an Error, or points within the raster and as many as announced at most;
-/// so is a region of it.
+/// Any input is refused as a GeoTIFF, or gives points inside the raster, at most as many as
+/// announced. The same holds for a region of it.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
@@ -17,11 +17,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         world_box(info, {{columns / 3, rows / 3, 0}, {columns / 2, rows / 2, 0}});
     const auto part = points_of(open_geotiff(file.name(), raster), options);
     const std::uint64_t cells = info.columns * info.rows;
-    require(*part->info().points + part->progress().excluded == cells, "all cells counted");
+    require(*part->info().points + part->progress().excluded == cells, "all cells are counted");
     read_cells(*part, options.block_points);
     read_cells(*whole, options.block_points);
   } catch (const Error& error) {
-    require(!error.parts().cause.empty(), "a cause");
+    require(!error.parts().cause.empty(), "errors have a cause");
   }
   return 0;
 }

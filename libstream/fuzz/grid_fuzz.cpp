@@ -21,16 +21,16 @@ void read_or_refuse(Open&& open) {
   try {
     read_cells(*points_of(open(), options), options.block_points);
   } catch (const Error& error) {
-    require(!error.parts().cause.empty(), "a cause");
+    require(!error.parts().cause.empty(), "errors have a cause");
   }
 }
 
-/// A file with the name of a tile.
+/// A file with the name of an HGT tile.
 class TileFile {
  public:
   TileFile(const std::uint8_t* data, std::size_t size) {
     std::string folder = (std::filesystem::temp_directory_path() / "terrace-fuzz-XXXXXX").string();
-    require(mkdtemp(folder.data()) != nullptr, "a folder");
+    require(mkdtemp(folder.data()) != nullptr, "a folder can be created");
     folder_ = folder;
     std::ofstream(name(), std::ios::binary)
         .write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
@@ -51,8 +51,8 @@ class TileFile {
 }  // namespace
 }  // namespace terrace::stream
 
-/// Any bytes as each of the grids: an Error, or points within the grid. As a binary grid they are
-/// both its header and its samples.
+/// Any input is refused, or gives points inside the grid, in each of the grid formats. For a binary
+/// grid the input is both header and samples.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
@@ -74,7 +74,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                              bytes_in_memory("grid", {bytes, bytes + size}));
     });
   }
-  // Data that is not an archive is a tile only if its size is right.
+  // Other data than archives is a tile only if its size is right, so large input is skipped.
   if (text.starts_with("PK") || text.starts_with("\x1f\x8b") || size < 1000) {
     const TileFile tile(data, size);
     read_or_refuse([&] { return open_hgt(tile.name()); });

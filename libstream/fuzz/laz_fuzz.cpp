@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chunks of LAZ, chunk tables and LASzip VLRs: refused with Corrupt, or decoded within bounds, the
-// same in steps as at once. Decoded records are encoded again and must round-trip.
+// LAZ chunks, chunk tables and LASzip VLRs are refused with Corrupt, or decoded within bounds, with
+// the same result in steps as at once. Decoded records are encoded again and must round-trip.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -60,8 +60,8 @@ std::optional<Records> decoded_in_steps(Decoder& decoder, std::span<const std::b
   return records;
 }
 
-/// The codecs of a point format, version and number of extra bytes; kept from input to input, which
-/// must make no difference.
+/// The codecs of a point format, version and number of extra bytes. They are reused for further
+/// inputs, which must not make a difference.
 struct Coders {
   explicit Coders(const Vlr& vlr)
       : length(vlr.record_length()), all(vlr), few(vlr, kZ | kGpsTime | kRgb), encoder(vlr) {}
@@ -89,7 +89,7 @@ void fuzz_chunk(std::span<const std::byte> bytes, unsigned format, unsigned choi
   const std::size_t size = (choice / 8 + 1) * length;
   const auto records = decoded(all, bytes, size);
   require(decoded_in_steps(all, bytes, size, length) == records);
-  // Less is decoded, so no more is refused.
+  // A decoder of fewer attributes must not refuse more.
   require(decoded(few, bytes, size).has_value() || !records);
   if (!records) return;
   std::vector<std::byte> again;
@@ -132,8 +132,8 @@ void fuzz_vlr(std::span<const std::byte> bytes, unsigned format, unsigned extra)
 
 }  // namespace
 
-/// The first byte selects the meaning of the bytes from the third on: a chunk of a point format, a
-/// table, a VLR; the second selects extra bytes, version and number of points.
+/// The first byte selects what the bytes from the third on are: a chunk of a point format, a table
+/// or a VLR. The second byte selects extra bytes, version and number of points.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 2) return 0;
   const unsigned what = data[0] % 24, choice = data[1];

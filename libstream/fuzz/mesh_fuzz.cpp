@@ -5,9 +5,9 @@
 #include "fuzz_points.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 
-/// Mesh files, PLY, GLB, OBJ, OFF and STL: refused, or triangles of existing vertices, with a
-/// complete record for each vertex, and no more of them than the file can hold. As a stream there
-/// are as many.
+/// Any input is refused as PLY, GLB, OBJ, OFF and STL, or gives triangles of existing vertices,
+/// with a complete record for each vertex, and no more of them than the file can hold. Streaming
+/// gives the same number of triangles.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   WorkLimit limit(size);
@@ -18,28 +18,30 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                       {.format = format, .entities = Entities::triangles});
       std::size_t streamed = 0;
       for (PointBlock block; source->next(block);) {
-        require(block.payload.size() == block.size() * source->info().payload_size(), "records");
+        require(block.payload.size() == block.size() * source->info().payload_size(),
+                "each point has a record");
         streamed += block.size();
       }
       const auto mesh = read_mesh(file.name(), {.format = format});
-      require(mesh && mesh->triangles.size() == streamed, "as many triangles in a stream");
+      require(mesh && mesh->triangles.size() == streamed, "streaming gives as many triangles");
     } catch (const Error& error) {
-      require(!error.parts().cause.empty(), "a cause");
+      require(!error.parts().cause.empty(), "errors have a cause");
     }
     try {
       const auto mesh = read_mesh(file.name(), {.format = format});
       if (!mesh) continue;
       const std::size_t vertices = mesh->vertices.size();
       limit.add(vertices + mesh->triangles.size());
-      require(mesh->vertices.payload.size() == vertices * mesh->info.payload_size(), "records");
+      require(mesh->vertices.payload.size() == vertices * mesh->info.payload_size(),
+              "each vertex has a record");
       for (const TriangleIndices& triangle : mesh->triangles) {
         for (const std::uint32_t v : triangle) require(v < vertices, "corners are vertices");
       }
-      // The nodes of a GLB may show one mesh in many places.
+      // The nodes of a GLB may place one mesh many times.
       const std::size_t most = std::string_view(format) == "glb" ? size * size : size;
-      require(vertices <= most && mesh->triangles.size() <= most, "no more than the file can hold");
+      require(vertices <= most && mesh->triangles.size() <= most, "the mesh fits the file's size");
     } catch (const Error& error) {
-      require(!error.parts().cause.empty(), "a cause");
+      require(!error.parts().cause.empty(), "errors have a cause");
     }
   }
   return 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of an overlay: refused with Damage, or consistent and the same after rewriting.
+// A page of an overlay is refused with Damage, or is consistent and the same after rewriting.
 #include <cstdint>
 #include <cstdlib>
 #include <vector>
@@ -14,7 +14,7 @@ void require(bool condition) {
 
 }  // namespace
 
-/// The first byte is the number of values, the rest the page without its checksum.
+/// The first byte is the number of values, the rest is the page without its checksum.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   using namespace terrace::stream::store;
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                              {.level = 1, .clusters = 5000},
                                              {.level = 2, .clusters = 1}};
   Bytes bytes(data + 1, data + size);
-  put(bytes, crc32(bytes));  // a fuzzer cannot guess a checksum: the parser after it is the target
+  put(bytes, crc32(bytes));  // added because a fuzzer cannot guess a checksum
   OverlayPage page;
   try {
     decode_overlay_page(bytes, data[0], levels, page);
@@ -33,7 +33,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(page.values.size() == data[0]);
   require(page.first.size() == page.clusters.size() + 1 && page.first.back() == data[0]);
   const Bytes again = encode_overlay_page(page);
-  // a number may have been written in more bytes than necessary
+  // A number may have been written in more bytes than necessary.
   require(again.size() <= bytes.size());
   OverlayPage second;
   decode_overlay_page(again, data[0], levels, second);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fuzz_points.hpp"
 
-/// Any bytes are read or refused, and the size of the blocks makes no difference.
+/// Any input is read or refused, and the block size does not make a difference.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   WorkLimit limit(size);
   const MemoryFile file(data, size);
   const Reading large = read_through(file.name(), {.format = "ply", .block_points = 500});
   const Reading small = read_through(file.name(), {.format = "ply", .block_points = 3});
-  require(large == small, "the same points in blocks of any size");
+  require(large == small, "points do not depend on the block size");
   limit.add(large.points);
   read_through(file.name(), {});
   return 0;

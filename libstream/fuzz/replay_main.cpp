@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a fuzz target over the files of a corpus folder, so that the target compiles everywhere and
-// every input that once failed stays tested.
+// Runs a fuzz target over the files of a corpus folder, so that the target is compiled everywhere
+// and inputs that once failed are tested again.
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>

@@ -15,14 +15,14 @@
 namespace terrace::stream {
 namespace {
 
-/// A little-endian TIFF of 2 x 2 bytes without a place.
+/// Returns a little-endian TIFF of 2 x 2 bytes without georeferencing.
 std::string small_tiff() {
   std::string bytes("II*\0\x0c\0\0\0\1\2\3\4", 12);
   const std::array<std::pair<int, int>, 9> fields{
       {{256, 2}, {257, 2}, {258, 8}, {259, 1}, {262, 1}, {273, 8}, {277, 1}, {278, 2}, {279, 4}}};
   bytes += {static_cast<char>(fields.size()), '\0'};
   for (const auto& [tag, value] : fields) {
-    // A field of one 16-bit number.
+    // Adds a field of one 16-bit number.
     bytes += {static_cast<char>(tag & 255),
               static_cast<char>(tag >> 8),
               3,
@@ -43,7 +43,7 @@ class Folder {
  public:
   Folder() {
     std::string name = (std::filesystem::temp_directory_path() / "terrace-fuzz-XXXXXX").string();
-    require(mkdtemp(name.data()) != nullptr, "a folder");
+    require(mkdtemp(name.data()) != nullptr, "a folder can be created");
     path_ = name;
   }
   ~Folder() {
@@ -67,8 +67,8 @@ class Folder {
 }  // namespace
 }  // namespace terrace::stream
 
-/// Any bytes next to a raster, as its world file and as its .aux.xml: it is refused, or its cells
-/// have places and heights.
+/// A raster with any input as its world file, and as its .aux.xml, is refused, or its cells have
+/// finite places and heights.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
@@ -80,12 +80,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     try {
       const auto source = open_source(std::span(&file, 1));
       const SourceInfo& info = source->info();
-      for (const double number : info.world.xy) require(std::isfinite(number), "a place");
+      for (const double number : info.world.xy) require(std::isfinite(number), "places are finite");
       const Channel& height = info.coordinates[2];
-      require(std::isfinite(height.scale) && height.scale != 0, "a scale");
-      require(std::isfinite(height.offset), "an offset");
+      require(std::isfinite(height.scale) && height.scale != 0, "the scale is finite and not 0");
+      require(std::isfinite(height.offset), "the offset is finite");
     } catch (const Error&) {
-      // As above.
+      // The raster is refused.
     }
   }
   return 0;

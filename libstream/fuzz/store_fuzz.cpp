@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parsers of a store: a cluster's bytes with given tables, tables, an index page, a manifest.
-// The first byte selects one. All input must be refused with Damage or Error, or be consistent.
+// The parsers of a store, of which the first byte selects one: a cluster's bytes with given tables,
+// tables, an index page, a manifest. All input must be refused with Damage or Error, or be
+// consistent.
 #include <cassert>
 #include <cstdint>
 #include <cstdlib>
@@ -27,7 +28,7 @@ StoreSchema schema_for(bool grid, int version) {
   StoreSchema schema;
   schema.grid = grid;
   std::vector<ScalarType> types{ScalarType::u8, ScalarType::f32, ScalarType::f64};
-  // A column of kind "beside" needs one of integers before it.
+  // A column of kind "beside" needs a preceding column of integers.
   if (version > 1) types.insert(types.begin(), {ScalarType::u64, ScalarType::i16});
   for (const ScalarType type : types) {
     schema.attributes.push_back({std::string(name_of(type)), type, 1.0, 0.0, {}});
@@ -35,8 +36,8 @@ StoreSchema schema_for(bool grid, int version) {
   return schema;
 }
 
-/// Frequencies in which everything is likely, so that bytes reach far into the decoder. All levels
-/// have the same contexts.
+/// Returns tables in which every symbol is likely, so that input reaches far into the decoder. All
+/// levels have the same contexts.
 Tables even_tables(const Layout& layout, ColumnKind kind) {
   Tables tables;
   if (layout.version > 2) tables.guide.attribute = 0;
@@ -92,7 +93,7 @@ void decode_page(ByteReader in, int version, bool grid = false) {
       static_cast<std::uint32_t>(1 + in.get<std::uint8_t>() % layout.page_clusters());
   const ByteView rest = in.take(in.left());
   Bytes bytes(rest.begin(), rest.end());
-  // A fuzzer cannot guess a checksum: the parser after it is the target.
+  // Sets the checksum, which a fuzzer cannot guess, to test the parser after it.
   if (version < 5) {
     put(bytes, crc32(bytes));
   } else {
@@ -104,7 +105,7 @@ void decode_page(ByteReader in, int version, bool grid = false) {
   for (std::uint32_t i = 0; i < clusters; ++i) entries.push_back(page.entry(i));
   static_cast<void>(page.end(clusters - 1));
   if (version < 5) return;
-  // Written again they are the same.
+  // They are the same after rewriting.
   Bytes again;
   PageContent{page.offset(0), PageColumns(entries), ranges}.write(
       layout, EncodingTables(even_tables(layout, ColumnKind::plain)), again);
@@ -136,7 +137,7 @@ void read_tables(ByteReader in, int version) {
   require(second.predictor.coefficients == tables.predictor.coefficients);
 }
 
-/// A fuzzer cannot guess a checksum: the parser after it is the target.
+/// Sets the checksum, which a fuzzer cannot guess, to test the parser after it.
 void mend_manifest(std::string& text) {
   constexpr std::size_t kDigitsFromEnd = 12;  // eight digits, a quote, newline, brace, newline
   if (text.size() < kDigitsFromEnd) return;
@@ -222,7 +223,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);
         mend_manifest(text);
         const Manifest manifest = parse_manifest(text, "manifest.json");
-        // Written again it is the same, with its keys in order.
+        // It is the same after rewriting, with its keys in order.
         const std::string again = to_text(manifest);
         const Manifest second = parse_manifest(again, "manifest.json");
         require(is_as_written(again, second));

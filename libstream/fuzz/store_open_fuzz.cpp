@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A complete store: Store::open, all ways to read it, and verify. Its checksums are recomputed
-// first, so that the code after them is the target. The input is file after file: two bytes for the
-// length of the name, the name, four bytes for the number of bytes, the bytes.
+// first, to test the code after them. The input is one file after another: two bytes for the length
+// of the name, the name, four bytes for the number of bytes, the bytes.
 #include <cmath>
 #include <cstdlib>
 #include <optional>
@@ -22,7 +22,7 @@ class Folder {
  public:
   Folder() {
     std::string name = (fs::temp_directory_path() / "terrace-fuzz-XXXXXX").string();
-    require(mkdtemp(name.data()) != nullptr, "a temporary folder");
+    require(mkdtemp(name.data()) != nullptr, "a temporary folder can be created");
     path_ = name;
   }
   ~Folder() { fs::remove_all(path_); }
@@ -64,30 +64,31 @@ class Promises {
 
   void check_cluster(ClusterId id, const ClusterRecord& record, const ClusterPoints& points) {
     const unsigned level = level_of(id);
-    require(points.size() == record.points, "as many members as the index says");
-    require(points.has_representative == (id != store_.root()), "a representative");
-    require(points.payload.size() == points.size() * store_.schema().payload_size(), "attributes");
-    require(points.children.size() == points.size() * level, "children");
+    require(points.size() == record.points, "members agree with the index");
+    require(points.has_representative == (id != store_.root()),
+            "all clusters but the root have a representative");
+    require(points.payload.size() == points.size() * store_.schema().payload_size(),
+            "every member has attributes");
+    require(points.children.size() == points.size() * level, "every member has children");
     for (const Point3& p : points.positions) check_point(p, record);
     if (points.has_representative) check_point(points.representative, record);
     for (std::size_t i = 0; i < points.children.size(); ++i) {
-      require(points.children[i] < store_.levels()[i % level].clusters, "children that exist");
+      require(points.children[i] < store_.levels()[i % level].clusters, "children exist");
     }
     for (std::size_t j = 0; j < points.representative_children.size(); ++j) {
-      require(points.representative_children[j] < store_.levels()[j].clusters,
-              "children that exist");
+      require(points.representative_children[j] < store_.levels()[j].clusters, "children exist");
     }
   }
 
  private:
   void check_point(const Point3& p, const ClusterRecord& record) {
     const StoreSchema& schema = store_.schema();
-    require(record.summary.box.contains(p), "points in the cluster's box");
-    require(store_.bounds().contains(p), "points in the bounds");
+    require(record.summary.box.contains(p), "points are in the cluster's box");
+    require(store_.bounds().contains(p), "points are in the bounds");
     if (!schema.grid) return;
-    require(p[0] == std::floor(p[0]) && p[1] == std::floor(p[1]), "whole columns and rows");
-    require(p[0] >= 0 && p[0] < static_cast<double>(schema.columns), "columns of the raster");
-    require(p[1] >= 0 && p[1] < static_cast<double>(schema.rows), "rows of the raster");
+    require(p[0] == std::floor(p[0]) && p[1] == std::floor(p[1]), "columns and rows are integers");
+    require(p[0] >= 0 && p[0] < static_cast<double>(schema.columns), "columns are in the raster");
+    require(p[1] >= 0 && p[1] < static_cast<double>(schema.rows), "rows are in the raster");
   }
 
   const Store& store_;
@@ -103,14 +104,14 @@ void read_all(const Store& store) {
                      [&](ClusterId id, const ClusterRecord& record, const ClusterPoints& points) {
                        promises.check_cluster(id, record, points);
                        members += points.size();
-                       require(members <= level.members, "no more members than the manifest says");
+                       require(members <= level.members, "members do not exceed the manifest's");
                      });
-      require(members == level.members, "as many members as the manifest says");
+      require(members == level.members, "members agree with the manifest");
     } catch (const Error&) {
       whole = false;
     }
   }
-  // One by one, backwards, so that the readable parts of a damaged store are read.
+  // One by one in reverse, so that the readable parts of a damaged store are read.
   ClusterPoints points;
   for (const LevelInfo& level : store.levels()) {
     for (std::uint64_t i = std::min<std::uint64_t>(level.clusters, 300); i-- > 0;) {
@@ -124,30 +125,31 @@ void read_all(const Store& store) {
       }
     }
   }
-  // Queries terminate, whatever the hierarchy says, and find all points of an intact store.
+  // Queries end whatever the hierarchy contains, and find all points of an intact store.
   std::optional<std::uint64_t> counted;
   try {
     StoreQuery query(store);
     const std::uint64_t found = query.in_box(store.bounds()).size();
     counted = query.count(store.bounds());
-    require(!(query.estimate(store.bounds()) < 0), "an estimate");
+    require(!(query.estimate(store.bounds()) < 0), "estimates are not negative");
     require(
         query.nearest(store.bounds().min, 3).size() == std::min<std::uint64_t>(3, store.points()) ||
             found != store.points(),
-        "nearest points");
-    require(query.within(store.bounds().max, 1).size() <= store.points(), "points within");
+        "nearest points are found");
+    require(query.within(store.bounds().max, 1).size() <= store.points(),
+            "points within a radius are points of the store");
     if (found != store.points()) whole = false;
   } catch (const Error&) {
     whole = false;
   }
   std::size_t problems = 0;
   const bool good = store.verify([&problems](const Problem& problem) {
-    require(!problem.file.empty() && !problem.what.empty(), "a problem says where and what");
+    require(!problem.file.empty() && !problem.what.empty(), "a problem has a place and a cause");
     ++problems;
   });
-  require(good == (problems == 0), "problems are told");
-  require(!good || whole, "what is sound can be read");
-  require(!good || counted == store.points(), "what is sound is counted");
+  require(good == (problems == 0), "verify() returns whether there were problems");
+  require(!good || whole, "a sound store can be read");
+  require(!good || counted == store.points(), "a sound store is counted completely");
 }
 
 }  // namespace
@@ -160,7 +162,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     read_all(Store::open(folder.path()));
   } catch (const Error& error) {
-    require(!error.parts().cause.empty(), "a cause");
+    require(!error.parts().cause.empty(), "errors have a cause");
   }
   for (const auto& [name, bytes] : files) fs::remove(folder.path() / name);
   return 0;

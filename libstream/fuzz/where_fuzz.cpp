@@ -12,8 +12,8 @@
 namespace terrace::stream {
 namespace {
 
-/// Points with an attribute of each type, two of them with a scale, from bytes that begin anew when
-/// they are used up.
+/// Points with an attribute of each type, two of them with a scale, made from bytes that are
+/// repeated as needed.
 struct Points {
   Schema schema;
   std::vector<Point3> positions;
@@ -44,7 +44,7 @@ struct Points {
 
   [[nodiscard]] std::size_t record_bytes() const { return schema.payload_size(); }
 
-  /// The ranges of the attributes of some of the points, no wider than need be.
+  /// Returns the exact ranges of the attributes of some of the points.
   [[nodiscard]] std::vector<ValueRange> ranges(std::size_t begin, std::size_t end) const {
     std::vector<ValueRange> ranges;
     for (std::size_t a = 0; a < schema.attributes.size(); ++a) {
@@ -70,8 +70,9 @@ struct Points {
 }  // namespace
 }  // namespace terrace::stream
 
-/// A line of any text is a condition or refused, at a character of it. A point meets a condition or
-/// not whatever points are asked about with it, and where one does, its box and ranges may.
+/// A line of any text is a condition, or is refused with the position of a character. Whether a
+/// point meets a condition does not depend on the points tested with it, and if it does, possible()
+/// is true for its box and ranges.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
@@ -80,7 +81,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(bytes.substr(0, end));
   try {
     const Where where(text, points.schema);
-    require(where.text() == text, "its text");
+    require(where.text() == text, "the text is kept");
     std::vector<std::uint8_t> matches(points.positions.size(), 7);
     where.test(points.positions, points.records, matches);
     Box3 box;
@@ -89,17 +90,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           std::span(points.records).subspan(i * points.record_bytes(), points.record_bytes());
       std::uint8_t alone = 7;
       where.test(std::span(points.positions).subspan(i, 1), record, std::span(&alone, 1));
-      require(alone == matches[i] && alone <= 1, "the same of one point and of many");
+      require(alone == matches[i] && alone <= 1, "a point's result does not depend on others");
       Box3 place;
       place.include(points.positions[i]);
       box.include(points.positions[i]);
-      require(alone == 0 || where.possible(place, points.ranges(i, i + 1)), "possible if so");
+      require(alone == 0 || where.possible(place, points.ranges(i, i + 1)),
+              "a match is possible for its point");
     }
     const bool any = std::find(matches.begin(), matches.end(), 1) != matches.end();
-    require(!any || where.possible(box, points.ranges(0, matches.size())), "possible of all");
-    require(!any || where.possible(box, {}), "possible where no range is known");
+    require(!any || where.possible(box, points.ranges(0, matches.size())),
+            "a match is possible for all points");
+    require(!any || where.possible(box, {}), "a match is possible without ranges");
   } catch (const Error& error) {
-    require(!error.parts().cause.empty(), "a cause");
+    require(!error.parts().cause.empty(), "errors have a cause");
   }
   return 0;
 }
