@@ -39,8 +39,7 @@ constexpr std::uint64_t kBlockSide = 16;
 /// Records which blocks of a raster were read.
 struct Reading {
   std::uint64_t cells = 0;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>>
-      blocks;  ///< the blocks of each window, with repeats
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> blocks;  ///< of each window, with repeats
 };
 
 /// A raster whose samples are a function of their place; one in eleven is void.

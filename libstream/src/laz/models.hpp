@@ -49,8 +49,8 @@ inline constexpr unsigned kSymbolBits = 15;
 /// call.
 template <unsigned Capacity>
 struct SymbolModel {
-  /// A decoder looks up the first candidate by the upper bits of the value and compares eight
-  /// symbols at once from it on. Values can exceed 2^15 by 63, so there is one extra bucket.
+  /// A decoder looks up the first candidate by the upper bits of the value, and compares eight
+  /// symbols at once from there on. Values can exceed 2^15 by 63, so there is one extra bucket.
   static constexpr unsigned kLanes = 8;
   static constexpr unsigned kBucketBits = Capacity <= kLanes ? 0 : std::bit_width(Capacity - 1) - 1;
   using Candidate = std::conditional_t<(Capacity > 256), std::uint16_t, std::uint8_t>;

@@ -20,7 +20,7 @@ namespace terrace::stream::store {
 /// represent any number of points, so nothing else limits the cost of a damaged count.
 inline constexpr std::uint32_t kMostPoints = 1u << 20;
 inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
-/// Maximum bytes of a cluster, twice the raw size of its points.
+/// Limit of the coded bytes of a cluster; the limits above keep valid clusters far below it.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
 /// The version that is written. Stores of earlier versions can be read, except for one that was

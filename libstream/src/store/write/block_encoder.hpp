@@ -75,7 +75,7 @@ class BlockEncoder {
   bool positions(Coder& coder, const Columns& columns, Use&& heights);
   template <class Coder>
   void sequence(Coder& coder, const Columns& columns);
-  /// Codes the attributes. Sets ranges_ to their ranges.
+  /// Codes the current cluster. Sets ranges_ to the ranges of its attributes.
   template <class Coder>
   void encode_cluster(Coder& coder, const Predictor& predictor, const Columns& columns);
 
