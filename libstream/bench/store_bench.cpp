@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures stores of a fractal int16 raster (midpoint displacement with an RMS step of about 2.65 m
 // from cell to cell) and of a cloud of decimals on a surface: encoding, reading everything, reading
-// random clusters, and the size. A stand-in clusters the blocks once beforehand.
+// random clusters, and the size. A simple hierarchy builder clusters the blocks once beforehand.
 #include <cstdlib>
 #include <filesystem>
 #include <optional>

@@ -41,7 +41,7 @@ struct EptParts {
         {{"name", "X"}, {"type", "signed"}, {"size", 4}, {"scale", 0.5}, {"offset", 4}},
         {{"name", "Y"}, {"type", "signed"}, {"size", 4}, {"scale", 0.5}, {"offset", 4}},
         {{"name", "Z"}, {"type", "signed"}, {"size", 4}, {"scale", 0.25}},
-        {{"name", "Of its own"}, {"type", "float"}, {"size", 8}}}}};
+        {{"name", "Custom value"}, {"type", "float"}, {"size", 8}}}}};
   std::map<std::string, std::string> hierarchy{{"0-0-0-0", R"({"0-0-0-0": 0})"}};
   std::map<std::string, std::string> nodes{};  ///< by file name
 

@@ -37,7 +37,7 @@ TEST(Ept, ReadsTheTypesOfItsSchema) {
   EXPECT_EQ(all.info.octree->nodes, 3u);
   ASSERT_EQ(all.info.attributes.size(), 2u);
   EXPECT_EQ(all.info.attributes[0], (Channel{.name = "intensity", .type = ScalarType::u16}));
-  EXPECT_EQ(all.info.attributes[1], (Channel{.name = "Of its own", .type = ScalarType::f64}));
+  EXPECT_EQ(all.info.attributes[1], (Channel{.name = "Custom value", .type = ScalarType::f64}));
   const std::vector<Point3> places{{-8, -8, 0}, {7, 7, 31},  {-7, -7, 1},
                                    {-6, -7, 2}, {-5, -5, 3}, {4, -8, 4}};
   EXPECT_EQ(all.points.positions, places);

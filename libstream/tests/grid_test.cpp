@@ -575,7 +575,7 @@ TEST_F(Grids, TilesFollowTheShapeOfCells) {
 TEST_F(Grids, RejectsDamagedAsciiGrids) {
   const std::string head = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 2\n";
   const std::vector<std::pair<std::string, std::string>> cases{
-      {head + "1 2 3 4 5", "holds 5 numbers where 3 x 2 are due"},
+      {head + "1 2 3 4 5", "holds 5 numbers where 3 x 2 are expected"},
       {head + "1 2 3 4 5 6 7", "holds more numbers"},
       {head + "1 2 3 4 x 6", "row 1, column 1: 'x' is not a number"},
       {head + "1 2 3 4 1,2,3 6", "'1,2,3' is not a number"},

@@ -12,9 +12,9 @@
 
 namespace terrace::stream::testing {
 
-/// A stand-in for the hierarchy builder. Clusters blocks by the nearest of evenly strided seeds and
-/// passes them on, level by level, the root last. The hierarchy is valid, but the clusters are not
-/// good.
+/// A simple substitute for the hierarchy builder. Clusters blocks by the nearest of evenly strided
+/// seeds and passes them on, level by level, the root last. The hierarchy is valid, but the
+/// clusters are not good.
 class StandInHierarchy {
  public:
   struct Options {

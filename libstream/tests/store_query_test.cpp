@@ -215,7 +215,7 @@ TEST(StoreQuery, RangesAndCountsAreThoseOfBruteForce) {
         ASSERT_EQ(keys_of(found, false), keys_of(expected, false)) << "level " << level;
         if (level > 0) continue;
         ASSERT_EQ(query.count(box), expected.size());
-        // Whatever the shares of clusters on the border, clusters inside count completely.
+        // Clusters on the border count in part, clusters inside count completely.
         EXPECT_LE(query.estimate(box), static_cast<double>(queried.points().size()) * (1 + 1e-9));
       }
     }

@@ -102,7 +102,8 @@ TEST_F(Xyz, ReadsEverySeparatorLineEndAndComment) {
     EXPECT_TRUE(same_bits(all.points.positions, expected));
     EXPECT_TRUE(all.info.attributes.empty());
     EXPECT_FALSE(all.info.crs.geographic);
-    EXPECT_TRUE(same_bits(read(text, {}).points.positions, expected)) << "told by content";
+    EXPECT_TRUE(same_bits(read(text, {}).points.positions, expected))
+        << "format determined from content";
   }
 }
 

@@ -14,7 +14,7 @@
 namespace terrace::stream {
 namespace {
 
-/// What the readers of all threads share for their checks.
+/// Data that the readers of all threads share for their checks.
 struct CubeCheck {
   RecordParts parts;
   std::vector<OctreeNode> nodes;

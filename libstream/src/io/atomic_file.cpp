@@ -30,7 +30,7 @@ constexpr std::size_t kBufferBytes = 1u << 20;
 
 constexpr const char* kNoteName = "user.terrace";
 
-/// Differs after every change of a file.
+/// Returns the attribute's value, which is different after every change of a file.
 std::string note_of(const struct stat& status) {
   return "written, " + std::to_string(status.st_size) + " bytes, " +
          std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec);
@@ -40,7 +40,7 @@ std::string note_of(const struct stat& status) {
 
 struct AtomicFile::Impl {
   fs::path target;  ///< as given
-  fs::path shown;   ///< in messages
+  fs::path shown;   ///< its name in messages
   fs::path place;   ///< after following symbolic links
   fs::path temporary;
   Naming naming;
@@ -120,7 +120,7 @@ struct AtomicFile::Impl {
   void complete() {
     flush();
     if (::fsync(descriptor) != 0) fail("cannot be synced", errno);
-    // Now that its time is final. Without the attribute the file is still whole.
+    // After the sync, the file's time is final. Without the attribute the file is still complete.
     struct stat status {};
     if (::fstat(descriptor, &status) == 0) {
       const std::string note = note_of(status);

@@ -92,7 +92,7 @@ Ownership OutputPlacement::ownership_of(const fs::path& old) const noexcept {
     if (!same_kind || !naming_.is_ours) return same_kind;
     return naming_.is_ours(old);
   } catch (...) {
-    return false;  // what cannot be looked at is not ours
+    return false;  // a file that cannot be examined is not ours
   }
 }
 

@@ -24,9 +24,9 @@ class OutputPlacement {
   [[nodiscard]] const std::filesystem::path& shown() const { return shown_; }
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
 
-  /// Renames; what has been replaced is kept. Throws: Error, and then nothing has changed.
+  /// Renames and keeps the replaced output. Throws: Error, and then nothing has changed.
   void put();
-  /// Gives the name back to what had it. The output has its temporary name again.
+  /// Restores the replaced output; the new one has its temporary name again.
   void undo() noexcept;
   /// Where the old output is after put(); empty if there was none.
   [[nodiscard]] std::filesystem::path replaced() const;
@@ -57,7 +57,7 @@ class OutputPlacement {
 /// they had before.
 void put_together(std::span<OutputPlacement* const> outputs);
 
-/// What to do about the failure of a system call that makes or writes a file.
+/// The remedy for an error of a system call that creates or writes a file; empty if none is known.
 std::string remedy_for(int error_number);
 
 /// fsync of a folder that may be read; one that cannot be synced by its file system counts as

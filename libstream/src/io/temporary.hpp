@@ -6,8 +6,8 @@
 
 /// Where files and folders are written before they have their names, and how they are cleaned up if
 /// the writer is killed. A file being written is `.NAME.tmp-PID` and is itself locked; a folder has
-/// that name and the lock file `.NAME.tmp-PID.lock` next to it. What it replaces gets the temporary
-/// name in exchange, or is briefly `.NAME.tmp-PID-old` under the same lock.
+/// that name and the lock file `.NAME.tmp-PID.lock` next to it. The replaced output gets the
+/// temporary name in exchange, or is briefly `.NAME.tmp-PID-old` under the same lock.
 
 namespace terrace::stream {
 

@@ -100,7 +100,7 @@ class Verification {
       height_sum += p[2];
     }
   };
-  /// What a thread needs to read clusters.
+  /// State of a thread that reads clusters.
   struct Reading {
     explicit Reading(const LevelReader& level) : ahead(level.data()) {}
 

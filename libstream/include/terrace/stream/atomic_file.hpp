@@ -51,7 +51,8 @@ Ownership ownership_of_entries(
 /// not all of it. Requires !found.ours.
 Error not_replaced(std::string file, const Ownership& found);
 
-/// What an output may replace under its name. Converts from bool: true replaces anything.
+/// How an output takes its name, and which files or folders it may replace. Converts from bool:
+/// true replaces anything.
 struct Naming {
   Naming() = default;
   template <std::same_as<bool> Bool>  // not from pointers, and so not from functions

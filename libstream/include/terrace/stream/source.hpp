@@ -130,9 +130,9 @@ enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 /// points. Called by the thread that reads. Damage that affects all points is still thrown.
 using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
-/// What a source delivers from a file. Entities of several corners are delivered as points: the
-/// position is the first corner, the attributes are the other corners, of the coordinates' type,
-/// bit for bit. Other attributes are left out.
+/// The parts of a file that a source delivers. Entities of several corners are delivered as points:
+/// the position is the first corner, the attributes are the other corners, of the coordinates'
+/// type, bit for bit. Other attributes are left out.
 enum class Entities : std::uint8_t {
   points,  ///< the points; of meshes and GeoJSON the vertices
   /// The triangles of a mesh (GLB, OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the

@@ -24,7 +24,8 @@ namespace {
 
 [[noreturn]] void fail_count(const std::string& file, std::uint64_t points,
                              const std::string& found) {
-  fail_ept(file, {}, "the hierarchy counts " + counted(points, "point") + ", but the file " + found);
+  fail_ept(file, {},
+           "the hierarchy counts " + counted(points, "point") + ", but the file " + found);
 }
 
 /// Records compressed with Zstandard, in one frame or several.

@@ -31,8 +31,8 @@ bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
 }
 
-/// True for warnings that must be errors: libtiff would go on without a field that it cannot read,
-/// or with blocks that have no offset, but a truncated file must not pass for a complete one.
+/// True for warnings that must be errors: libtiff would continue without a field that it cannot
+/// read, or with blocks that have no offset, but a truncated file must not pass for a complete one.
 bool is_fatal(std::string_view line) {
   return contains(line, "IO error during reading") || contains(line, "Out of memory") ||
          (contains(line, "Incorrect count") &&

@@ -23,7 +23,7 @@ struct GeoTiffLevel {
 
 /// The raster and its overviews, each with half the columns and rows of the previous one (rounded
 /// up), down to the first with at most 512 x 512 cells; only the raster if options.overviews is
-/// none.
+/// GeoTiffOverviews::none.
 std::vector<GeoTiffLevel> levels_of(const GeoTiffOptions& options);
 
 /// Computes the tiles of overviews from those of the raster, which may come in any order. Holds the

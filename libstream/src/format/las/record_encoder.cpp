@@ -308,8 +308,8 @@ std::string evlr_head(std::string_view user, std::uint16_t id, std::uint64_t byt
 
 namespace {
 
-/// GeoKeys of what has no WKT, such as units alone. Point formats from 6 on ask for WKT, and
-/// readers that insist on it see no CRS, as without the keys.
+/// Appends the GeoKeys of a CRS without WKT, such as only units. Point formats from 6 on require
+/// WKT; readers that insist on it see no CRS, as they would without the keys.
 void append_geo_keys(std::string& out, const Crs& crs, LasFile& file) {
   const GeoKeyDirectory keys = keys_of(crs, std::nullopt);
   if (keys.empty()) return;

@@ -127,8 +127,7 @@ bool is_separated_by_tabs(std::string_view header, std::string_view line) {
   return names.size() == fields.size() && std::none_of(names.begin() + 1, names.end(), empty);
 }
 
-/// True for "1,5 2,5 3" with blanks or tabs: numbers of which some have a decimal comma. Fields
-/// between commas would not be numbers.
+/// True if blanks or tabs separate numbers, some of which have a decimal comma ("1,5 2,5 3").
 bool has_decimal_commas(std::string_view line) {
   const std::vector<std::string_view> words = split_fields(line, ' ');
   bool found = false;

@@ -71,7 +71,7 @@ bool is_exact(std::string_view field, double value) {
 /// Doubles hold every integer up to this one.
 constexpr std::int64_t kMostOfDouble = std::int64_t{1} << 53;
 
-/// What the first fields of a column contain.
+/// Properties of the first fields of a column.
 struct ColumnContent {
   bool whole = true;   ///< all fields that are not empty are integers
   bool empty = false;  ///< some fields are empty
@@ -257,7 +257,7 @@ class XyzSource final : public PointSource {
     }
     if (!layout_.geographic && x != y && (is_length_unit(x) || is_length_unit(y))) {
       info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") +
-                    "x and y have different units in the header, which are ignored";
+                    "x and y have different units in the header; both are ignored";
     }
   }
   /// Makes columns 64-bit integers if the first lines have integers that doubles cannot hold.

@@ -283,7 +283,7 @@ class VrtRaster final : public Raster {
       open_.pop_back();
     }
     std::optional<std::string> nodata = sources_[source].nodata;
-    if (!nodata && nodata_.value) nodata = "";  // lay() applies nodata_ to all sources
+    if (!nodata && nodata_.value) nodata = "";  // nodata_ is applied to all sources
     open_.push_front({source, open(sources_[source], nodata)});
     held_bytes_ += held_[source];
     return *open_.front().raster;

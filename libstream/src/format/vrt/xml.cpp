@@ -27,7 +27,7 @@ constexpr std::size_t kDeepest = 32;
 /// The size of a node of a map with two short strings.
 constexpr std::size_t kAttributeBytes = 112;
 
-/// What the parser has read. Its handlers are called from C and must not throw.
+/// The state of parsing. The parser's handlers are called from C and must not throw.
 struct XmlReading {
   XML_Parser parser = nullptr;
   const TakeElement* take = nullptr;

@@ -186,8 +186,8 @@ class SymbolEncoder {
 /// Bytes that must be readable before and after a cluster's byte string.
 inline constexpr std::size_t kPadding = 16;
 
-/// Decodes what SymbolEncoder wrote. Whatever the string contains, reads at most kPadding bytes
-/// beyond either end; finish() checks that the string was consumed exactly.
+/// Decodes the output of SymbolEncoder. Reads at most kPadding bytes beyond either end, even of a
+/// damaged string; finish() checks that the string was consumed exactly.
 class SymbolDecoder {
  public:
   static constexpr bool kDecoding = true;

@@ -178,7 +178,7 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
     return cache.nodes.front();
   }
   // The memory of a dropped node is reused for the new one. The new node is not in a map until it
-  // is complete, so damage leaves nothing behind.
+  // is complete, so damage leaves no trace.
   Nodes fresh, gone;
   if (cache.held_bytes >= cache.most_bytes && !cache.nodes.empty()) {
     cache.drop(fresh);
