@@ -293,7 +293,7 @@ TEST_F(Grids, PlacesTilesByTheirName) {
   EXPECT_EQ(half.world.xy[0], 1.0 / 1800);
   EXPECT_NE(refusal_of(put("N01E001.hgt", tile_of(11, 10))).find("not a square of 16-bit samples"),
             std::string::npos);
-  EXPECT_NE(refusal_of(put("N01E001.hgt", "12")).find("no square"), std::string::npos);
+  EXPECT_NE(refusal_of(put("N01E001.hgt", "12")).find("not a square"), std::string::npos);
   EXPECT_NE(refusal_of(put("N01E001.hgt", tile_of(11, 11)), {.band = 2}).find("no band 2"),
             std::string::npos);
 }

@@ -249,7 +249,7 @@ TEST_F(MeshFormats, ErrorsNameTheDamage) {
            {"a.off", "OFF\n3 0 0\n0 0 0\n1 1 1\n", "ends after 2 of 3 vertices"},
            {"b.off", "OFF\n9999999999999 0 0\n0 0 0\n", "ends after 1 of 9999999999999"},
            {"c.off", "OFF\n", "counts"},
-           {"d.off", "OFF BINARY\nxyz", "binary form"},
+           {"d.off", "OFF BINARY\nxyz", "binary OFF"},
            {"e.off", "OFF\n1 0 0\n1 2\n", "three coordinates"},
            {"f.off", "OFF\n1 0 0\n1 2 inf\n", "three coordinates"},
            {"g.off", "OFF\n-1 0 0\n", "how many vertices"},

@@ -125,7 +125,7 @@ TEST_F(Sidecars, InternalGeoreferencingOverridesAWorldFile) {
   EXPECT_EQ(read_file(path("f.tif")).info.note, "");
   put("f.tfw", "10\n0\n0\n-10\n115\n195\n");
   EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);
-  EXPECT_NE(read_file(path("f.tif")).info.note.find("f.tfw places"), std::string::npos);
+  EXPECT_NE(read_file(path("f.tif")).info.note.find("f.tfw is ignored"), std::string::npos);
   // One that is ignored may be damaged.
   put("f.tfw", "10\n");
   EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);

@@ -118,7 +118,8 @@ TEST_F(Source, RejectsUnknownFormats) {
   EXPECT_NE(refusal({prose}).find("neither content nor name"), std::string::npos);
   EXPECT_NE(refusal({put("x.gtx", std::string(50, '\1'))}).find("gdal_translate"),
             std::string::npos);
-  EXPECT_NE(refusal({put("empty", "")}).find("empty: the file is empty; fetch"), std::string::npos);
+  EXPECT_NE(refusal({put("empty", "")}).find("empty: the file is empty; download"),
+            std::string::npos);
   EXPECT_NE(refusal({put("e.csv", "")}).find("e.csv: the file is empty"), std::string::npos);
   EXPECT_THROW(refusal({prose}, {.format = "lax"}), std::invalid_argument);
   EXPECT_NE(refusal({(folder_.path() / "none.xyz").string()}).find("No such file"),

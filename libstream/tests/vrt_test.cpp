@@ -138,7 +138,7 @@ TEST_F(Vrt, ItsNodataOverridesThatOfItsFiles) {
   // Without any, those of the files are used, and a note says so.
   const AllPoints undeclared = read_file(put_vrt(source("")));
   EXPECT_EQ(sorted_cells(undeclared), without(3));
-  EXPECT_NE(undeclared.info.note.find("a.tif, 3, counts"), std::string::npos)
+  EXPECT_NE(undeclared.info.note.find("a.tif, 3, is used"), std::string::npos)
       << undeclared.info.note;
   EXPECT_EQ(read_file(put_vrt(complex)).info.note, "");
 }

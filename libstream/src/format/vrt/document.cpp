@@ -141,7 +141,7 @@ class VrtReader {
     if (root.child("MaskBand") != nullptr) fail("MaskBand", "is not supported", kAsGeoTiff);
     if (wanted_ > bands_) {
       fail("", "has no band " + std::to_string(wanted_) + ", only " + std::to_string(bands_),
-           "choose another band");
+           "choose another band, or make it again: gdalbuildvrt");
     }
     int number_of_band = 0;
     for (const XmlElement& element : root.children) {
