@@ -10,31 +10,31 @@
 
 namespace terrace::terrain {
 
-/// How far a piece of work has come.
+/// How far a task has got.
 struct Progress {
   std::string_view what;    ///< what is counted, as in "tiles"
-  std::uint64_t count = 0;  ///< done so far
-  double fraction = 0.0;    ///< of the whole, from 0 to 1; 0 if that is unknown
-  bool ended = false;       ///< the last report of this piece, whether it is done or given up
+  std::uint64_t count = 0;  ///< done until now
+  double fraction = 0.0;    ///< of the whole task, from 0 to 1; 0 if unknown
+  bool ended = false;       ///< the last report of this task, completed or abandoned
 };
 
-/// How a job runs: passed to everything in this library that takes long. A job reads it and never
-/// changes it; whoever starts two jobs at once gives each its own.
+/// How a job runs. Every long-running function of this library takes one. A job only reads it; a
+/// caller that starts two jobs at the same time passes a separate context to each.
 struct Context {
-  unsigned threads = 1;                         ///< at most; results do not depend on it
-  std::optional<std::uint64_t> memory_bytes{};  ///< at most, if given
+  unsigned threads = 1;                         ///< upper limit; results do not depend on it
+  std::optional<std::uint64_t> memory_bytes{};  ///< upper limit, if set
   std::stop_token stop{};                       ///< ends the work with stream::Stopped
-  /// Called now and then, by one thread at a time; what it throws ends the work.
+  /// Called from time to time, by one thread at a time; an exception from it ends the work.
   std::function<void(const Progress&)> progress{};
-  /// What the user should know of the result: an assumption that was made, and the like.
+  /// Receives what the user should know about the result, such as an assumption that was made.
   std::function<void(const std::string&)> note{};
 
-  /// memory_bytes, or else `standard` bytes as far as the machine has them available; without a
-  /// standard (0) half of what is available.
+  /// Returns memory_bytes if set. Otherwise returns `standard` bytes, limited to the available
+  /// memory; if `standard` is 0, half of the available memory.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
-  /// Calls note, if there is one.
+  /// Calls note, if it is set.
   void say(const std::string& line) const;
-  /// Throws: stream::Stopped if the job is to end.
+  /// Throws: stream::Stopped if a stop was requested.
   void check_stop() const;
 };
 

@@ -16,37 +16,38 @@
 
 #include "terrace/terrain/region.hpp"
 
-/// Coordinate reference systems, and the ways between them.
+/// Coordinate reference systems and conversions between them.
 
 namespace terrace::terrain {
 
 struct CrsDefinition;
 class DatumChange;
 
-/// What heights refer to.
+/// The reference surface of heights.
 enum class Heights : std::uint8_t {
   unknown,
   ellipsoidal,  ///< the ellipsoid
-  orthometric,  ///< mean sea level, by some geoid or levelling
+  orthometric,  ///< mean sea level, from a geoid or levelling
 };
 
-/// To WGS 84's geocentric axes: translation in metres, rotation in arc-seconds and scale in parts
-/// per million, as a position vector transformation (EPSG 9606), the order of TOWGS84 in WKT.
+/// Shift to WGS 84's geocentric axes: translation in metres, rotation in arc-seconds and scale in
+/// parts per million, as a position vector transformation (EPSG 9606), in the order of TOWGS84 in
+/// WKT.
 using DatumShift = std::array<double, 7>;
 
-/// Degrees. west is greater than east across the antimeridian.
+/// In degrees. west is greater than east if the area crosses the antimeridian.
 struct GeographicArea {
   double west = 0, south = 0, east = 0, north = 0;
 };
 
-/// A coordinate reference system: what x and y mean on the earth. Definitions and datums are
-/// PROJ's, projections GeographicLib's where it has them, else PROJ's.
+/// A coordinate reference system: what x and y mean on the earth. PROJ provides definitions and
+/// datums. GeographicLib computes the projections that it supports, PROJ the others.
 ///
-/// x is always the longitude or easting, y the latitude or northing, in the system's own units
-/// (degrees, metres, feet). To WGS 84 leads one operation for the whole area; wgs84_note() names
-/// it.
+/// x is always the longitude or easting and y the latitude or northing, in the system's own units
+/// (degrees, metres, feet). A single operation for the whole area converts to WGS 84; wgs84_note()
+/// names it.
 ///
-/// Copies are cheap; const members may be called by several threads at once.
+/// Copies are cheap. Several threads may call const members at once.
 class CoordinateSystem {
  public:
   /// EPSG:4326.
@@ -54,52 +55,54 @@ class CoordinateSystem {
   /// Throws: CrsError if the projection cannot be computed.
   explicit CoordinateSystem(const CrsDefinition& definition);
 
-  /// What a user writes: "EPSG:n", "EPSG:n+m" (horizontal and vertical), a code of another
-  /// authority ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with one of these two
-  /// (.prj, .wkt). shift: for a datum that does not count as WGS 84; it overrides PROJ's
+  /// Reads a CRS as users write it: "EPSG:n", "EPSG:n+m" (horizontal and vertical), a code of
+  /// another authority ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with WKT or
+  /// PROJJSON (.prj, .wkt). shift: for a datum that does not count as WGS 84; it overrides PROJ's
   /// operations. Throws: UsageError, naming the code or text and the remedy.
   static CoordinateSystem parse(const std::string& text,
                                 const std::optional<DatumShift>& shift = std::nullopt);
-  /// What a source or a store records. nullopt if it does not name a CRS.
-  /// file: named in errors. Throws: stream::Error for one that is unknown, incomplete, or says two
+  /// Reads a CRS as a source or store records it. Returns nullopt if `crs` does not name one.
+  /// file: named in errors. Throws: stream::Error if the CRS is unknown, incomplete or contradicts
+  /// itself.
   /// things that contradict each other.
   static std::optional<CoordinateSystem> of(const stream::Crs& crs, const std::string& file);
-  /// The same system for data that lie in a box of it: operations are chosen for that area.
+  /// Returns the same system for data inside a box; operations are chosen for that area.
   [[nodiscard]] CoordinateSystem over(const stream::Box3& box) const;
 
   [[nodiscard]] bool is_geographic() const;
-  /// "EPSG:32632 (WGS 84 / UTM zone 32N)", "\"ETRS89 / LCC\"".
+  /// A title such as "EPSG:32632 (WGS 84 / UTM zone 32N)" or "\"ETRS89 / LCC\"".
   [[nodiscard]] std::string title() const;
-  /// Metres in a unit of x and y; 0 if geographic.
+  /// Metres per unit of x and y; 0 if geographic.
   [[nodiscard]] double metres_per_unit() const;
-  /// The y of the north pole where y is a latitude, else infinite.
+  /// The y of the north pole if y is a latitude, otherwise infinite.
   [[nodiscard]] double most_latitude() const;
-  /// What leads once around the earth along x, in its unit: 360 degrees, or the width of a
-  /// Mercator map; 0 if x does not lead around.
+  /// Length of a full turn around the earth along x, in its unit: 360 degrees, or the width of a
+  /// Mercator map; 0 if x does not go around the earth.
   [[nodiscard]] double turn() const;
   [[nodiscard]] Heights heights() const;
-  /// Metres in a unit of heights, if known.
+  /// Metres per unit of height, if known.
   [[nodiscard]] std::optional<double> metres_per_height() const;
 
-  /// As stores and files record it: code, name, WKT, units.
+  /// The record of this system in stores and files: code, name, WKT, units.
   [[nodiscard]] stream::Crs crs() const;
-  /// The same with the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
+  /// The same, plus the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
   [[nodiscard]] stream::Crs crs_with_keys() const;
-  /// The same with WKT 1 (OGC 01-009), which LAS asks for; with WKT 2 where that cannot say it.
+  /// The same with WKT 1 (OGC 01-009), which LAS requires, or with WKT 2 if WKT 1 cannot express
+  /// it.
   [[nodiscard]] stream::Crs crs_with_wkt1() const;
 
-  /// What the user should know of it: "EPSG:... to WGS 84 by \"...\" within 2 m"; empty if no
-  /// conversion is needed or possible.
+  /// What the user should know about the conversion: "EPSG:... to WGS 84 by \"...\" within 2 m";
+  /// empty if no conversion is needed or possible.
   [[nodiscard]] std::string wgs84_note() const;
-  /// Whether longitudes and latitudes of WGS 84 can be had.
+  /// Whether longitudes and latitudes of WGS 84 can be computed.
   [[nodiscard]] bool reaches_wgs84() const;
-  /// Whether those of its own datum are taken as they are.
+  /// Whether longitudes and latitudes of its own datum are used as WGS 84 without a shift.
   [[nodiscard]] bool counts_as_wgs84() const;
 
-  /// x, y to longitude and latitude of WGS 84 in degrees, in place, and back. What has no place
-  /// there, as a latitude beyond a pole, becomes NaN. Longitudes lie in [-180, 180], but those of a
-  /// geographic system that counts as WGS 84 are left as they are (0 to 360 stays so). 0.6 to 5
-  /// million places per second. Throws: stream::Error if no operation leads there.
+  /// Convert x, y to longitude and latitude of WGS 84 in degrees, in place, and back. Places
+  /// without an image, such as a latitude beyond a pole, become NaN. Longitudes are in [-180, 180],
+  /// except that a geographic system that counts as WGS 84 keeps its own (0 to 360 stays so). 0.6
+  /// to 5 million places per second. Throws: stream::Error if no operation leads to WGS 84.
   void to_geographic(std::span<Point2> places) const;
   void from_geographic(std::span<Point2> places) const;
   [[nodiscard]] Point2 to_geographic(Point2 place) const;
@@ -109,14 +112,14 @@ class CoordinateSystem {
   void to_own_geographic(std::span<Point2> places) const;
   void from_own_geographic(std::span<Point2> places) const;
 
-  /// Whether both are the same system but for names: coordinates need no conversion.
+  /// Whether both systems are the same apart from their names, so coordinates need no conversion.
   [[nodiscard]] bool same_places(const CoordinateSystem& other) const;
-  /// Where the data lie, if over() said it; on the system's own datum.
+  /// The area of the data, if over() set it; on the system's own datum.
   [[nodiscard]] const std::optional<GeographicArea>& area() const { return area_; }
 
-  /// What this library knows it by.
+  /// The definition that this library computes with.
   [[nodiscard]] const CrsDefinition& definition() const;
-  /// The way to WGS 84, found when it is first asked for.
+  /// The change of datum to WGS 84, computed on first use.
   [[nodiscard]] const DatumChange& to_wgs84() const;
 
  private:
@@ -128,31 +131,31 @@ class CoordinateSystem {
   std::shared_ptr<LazyChange> wgs84_;
 };
 
-/// Whether both describe the same system of places and heights: by code or in full, in WKT of any
-/// version or GeoKeys, with the units spelt out or not. Of systems that are not known only equal
-/// descriptions do. For stream::SourceOptions::same_crs.
+/// Whether both describe the same system of places and heights, be it by code or in full, in WKT of
+/// any version or GeoKeys, with or without explicit units. Unknown systems match only if their
+/// descriptions are equal. For stream::SourceOptions::same_crs.
 bool same_crs(const stream::Crs& a, const stream::Crs& b);
 
-/// What is named as for CoordinateSystem::parse, or a local (engineering) system, as stores and
-/// files record it. Throws: UsageError.
+/// Returns a CRS named as for CoordinateSystem::parse(), or a local (engineering) system, in the
+/// form that stores and files record. Throws: UsageError.
 stream::Crs crs_named(const std::string& text);
 
-/// From one system to another, by one operation between their datums.
+/// Converts from one system to another, by a single operation between their datums.
 class Transformation {
  public:
-  /// The operation is chosen for the area of the first that has one.
-  /// Throws: stream::Error if none leads from one datum to the other.
+  /// Chooses the operation for the area of the first system that has an area.
+  /// Throws: stream::Error if no operation leads from one datum to the other.
   Transformation(CoordinateSystem from, CoordinateSystem to);
 
-  /// x, y in place; NaN where there is no place.
+  /// Convert x, y in place; NaN where a place has no image.
   void forward(std::span<Point2> places) const;
   void reverse(std::span<Point2> places) const;
 
   [[nodiscard]] const CoordinateSystem& from() const { return from_; }
   [[nodiscard]] const CoordinateSystem& to() const { return to_; }
-  /// Whether nothing is done: both are the same.
+  /// Whether both systems are the same, so that nothing is converted.
   [[nodiscard]] bool identity() const { return same_; }
-  /// What the user should know of the operation; empty if coordinates stay on their datum.
+  /// What the user should know about the operation; empty if coordinates stay on their datum.
   [[nodiscard]] std::string note() const;
 
  private:
@@ -161,55 +164,56 @@ class Transformation {
   std::shared_ptr<const DatumChange> change_;
 };
 
-/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known, or if a
-/// latitude is beyond a pole. otherwise: what helps those without,
-/// besides naming it when the store is built.
+/// Returns the CRS of a store. Throws: stream::Error if it has none, if it is unknown, or if a
+/// latitude is beyond a pole. otherwise: a remedy to suggest for stores without a CRS, in addition
+/// to naming it when the store is built.
 CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise = {});
 
-/// From a store's CRS to another, named as for CoordinateSystem::parse, by the operation that is
-/// best where the store lies. shift: of the one whose datum does not count as WGS 84; of the named
-/// one if neither does. Throws: UsageError for an unknown CRS, stream::Error if the store has
-/// no CRS, or if nothing leads from one datum to the other.
+/// Converts from a store's CRS to another, named as for CoordinateSystem::parse(), by the best
+/// operation for the store's area. shift: belongs to the system whose datum does not count as WGS
+/// 84; to the named one if neither does. Throws: UsageError for an unknown CRS; stream::Error if
+/// the store has no CRS, or if no operation leads from one datum to the other.
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift = std::nullopt);
 
-/// Regions, of another CRS too, as regions in that of the data; made by default, it leaves them as
-/// they are. Longitudes may be off by whole turns, and a box of a raster holds what is within a
-/// millionth of a cell.
+/// Converts regions, also of another CRS, to the CRS of the data; default-constructed, it leaves
+/// them unchanged. Longitudes may be off by whole turns. A box over a raster includes cells within
+/// a millionth of a cell.
 ///
-/// Unless a CRS is given for all regions, boxes and polygons of the caller's are in that of the
+/// Unless one CRS is given for all regions, the caller's boxes and polygons are in the CRS of the
 /// data, and GeoJSON is in the CRS that it names. GeoJSON that names none is in longitude and
-/// latitude (RFC 7946) if the CRS of the data is known and its numbers can be that, else in the CRS
+/// latitude (RFC 7946) if the CRS of the data is known and the numbers can be degrees, otherwise in
+/// the CRS of the data.
 /// of the data.
 class RegionConversion {
  public:
   RegionConversion() = default;
-  /// Regions without a CRS of their own are in the store's. shift: see transformation_to().
+  /// Regions that name no CRS are in the store's. shift: see transformation_to().
   explicit RegionConversion(const stream::Store& store,
                             const std::optional<DatumShift>& shift = std::nullopt);
-  /// to_regions: from the store's CRS to that of all regions.
+  /// to_regions: from the store's CRS to the CRS of all regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
   /// For Region::restrict() of a source that is opened again. named: the CRS of the regions, as for
-  /// CoordinateSystem::parse; empty: the source's own, be it known or not. shift: of --towgs84.
-  /// Throws: UsageError for an unknown name, stream::Error if nothing leads from one CRS to the
-  /// other.
+  /// CoordinateSystem::parse(); empty: the source's own, known or not. shift: the value of
+  /// --towgs84. Throws: UsageError for an unknown name; stream::Error if no operation leads from
+  /// one CRS to the other.
   explicit RegionConversion(const stream::SourceInfo& source, const std::string& named = {},
                             const std::optional<DatumShift>& shift = {});
-  /// False for a region that is nowhere on the globe in angles of any unit: in the CRS of its data
-  /// it stays as it is, and a source need not be opened to learn its CRS.
+  /// Returns false for a region that cannot be on the globe in angles of any unit. Such a region is
+  /// already in the CRS of its data, so a source need not be opened to learn its CRS.
   static bool may_turn(const Region& region);
-  /// Outlines, a box's too, get so many corners that they run within a millionth of their length of
-  /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows, or if
-  /// a region's CRS is not known, or the data have none.
+  /// Adds corners to outlines, including those of boxes, until they run within a millionth of their
+  /// length of the true curve. Throws: stream::Error if an outline leaves the area of the other
+  /// CRS, if a region's CRS is unknown, or if the data have no CRS.
   [[nodiscard]] Region operator()(Region region) const;
-  /// From the CRS of the data to that of a GeoJSON file, whose places are in `box`; nullopt if its
-  /// places are in that of the data. Throws: as above.
+  /// Returns the conversion from the CRS of the data to the CRS of a GeoJSON file with places in
+  /// `box`; nullopt if the file uses the CRS of the data. Throws: as above.
   [[nodiscard]] std::optional<Transformation> to_places(const PlacesCrs& given,
                                                         const stream::Box3& box) const;
   /// Sets the function that receives notes: what was assumed about a GeoJSON file's CRS, and which
   /// operation converts from it.
   void on_note(std::function<void(const std::string&)> note) { note_ = std::move(note); }
-  /// What the user should know of it; empty: nothing.
+  /// What the user should know about the conversion; empty if there is nothing to report.
   [[nodiscard]] std::string note() const { return to_regions_ ? to_regions_->note() : ""; }
 
  private:
@@ -217,39 +221,41 @@ class RegionConversion {
     if (note_ && !line.empty()) note_(line);
   }
 
-  bool given_ = false;  ///< the CRS of all regions, whatever they say themselves
+  bool given_ = false;  ///< one CRS for all regions, which overrides their own
   std::optional<Transformation> to_regions_;
-  std::function<std::optional<CoordinateSystem>()> system_;  ///< of the data, found when needed
+  std::function<std::optional<CoordinateSystem>()> system_;  ///< of the data, computed when needed
   std::function<void(const std::string&)> note_;
   stream::Box3 bounds_;
   Point2 tolerance_{};
-  double turn_ = 0;  ///< of longitudes; 0: none
+  double turn_ = 0;  ///< a full turn of longitude; 0: no turns
 };
 
-/// Places of the store's CRS in another; made by default, it leaves them as they are. Heights stay.
+/// Converts places of the store's CRS to another; default-constructed, it leaves them unchanged.
+/// Heights do not change.
 class PlaceConversion {
  public:
   PlaceConversion() = default;
   explicit PlaceConversion(Transformation change);
-  /// Longitudes go on beyond 180 degrees where the store lies across the antimeridian, so that
+  /// Longitudes continue beyond 180 degrees where the store crosses the antimeridian, so that
   /// neighbours stay together.
   PlaceConversion(Transformation change, const stream::Store& store);
-  /// x and y in place. Throws: stream::Error for a point that has no place there.
+  /// Converts x and y in place. Throws: stream::Error for a point without an image in the other
+  /// CRS.
   void operator()(std::span<stream::Point3> points) const;
-  /// In place; NaN where there is no place.
+  /// Converts in place; NaN where a place has no image.
   void operator()(std::span<Point2> places) const;
-  /// A box around what becomes of the places in another; empty if they have none there.
+  /// Returns a box around the images of all places in `box`; empty if they have none.
   [[nodiscard]] stream::Box3 box_around(const stream::Box3& box) const;
   [[nodiscard]] bool has_effect() const { return change_.has_value(); }
-  /// The CRS that it leads to; nullopt if it leaves places as they are.
+  /// The CRS of the converted places; nullopt if places are left unchanged.
   [[nodiscard]] std::optional<stream::Crs> crs() const;
 
  private:
   std::optional<Transformation> change_;
-  double turn_ = 0, middle_ = 0;  ///< of longitudes that stay together; 0: they need not
+  double turn_ = 0, middle_ = 0;  ///< longitudes to keep together; 0: no need
 };
 
-/// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nothing if the text is empty. Throws: UsageError.
+/// Parses "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nullopt if the text is empty. Throws: UsageError.
 std::optional<DatumShift> parse_datum_shift(const std::string& text);
 
 }  // namespace terrace::terrain

@@ -14,20 +14,19 @@
 #include "terrace/terrain/metric_choice.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 
-/// Meshes and points of mixed levels of detail: a level, a region, finer focuses.
+/// Meshes and points of mixed levels of detail: a base level, a region, finer focuses.
 
 namespace terrace::terrain {
 
-/// Where the vertices of a mesh have other heights than in the store: first the overlay's, then
-/// smoothed ones.
+/// Changes to the heights of a mesh's vertices: heights from an overlay first, smoothing second.
 struct HeightOptions {
-  /// With a region only inside it; its border stays. Works on the triangulation, so for rasters on
-  /// the unit grid. An edge_height of 0 becomes four times the root mean square of the
+  /// With a region, smooths only inside it and keeps its border. Works on the triangulation, so on
+  /// the unit grid for rasters. An edge_height of 0 becomes four times the root mean square of the
   /// height differences along edges.
   std::optional<tri::SmoothingOptions> smoothing{};
-  /// Replaces the heights of the points that it has; see open_height_overlay().
+  /// Replaces the heights of the points that it contains; see open_height_overlay().
   stream::Overlay* overlay = nullptr;
-  /// Gets the heights that in the end are not the store's, in the name of the vertices' points.
+  /// Receives the final heights that differ from the store's, keyed by the vertices' points.
   stream::OverlayWriter* save = nullptr;
 
   [[nodiscard]] bool any() const { return smoothing || overlay != nullptr || save != nullptr; }
@@ -35,44 +34,45 @@ struct HeightOptions {
 
 struct DetailMeshOptions {
   HeightOptions heights{};
-  /// Elliptical: triangles within a region suit its metric on the ground (see
-  /// tri::metric_triangles); outside all regions nothing changes. What triangles cover, and how
-  /// many there are, does not depend on the metric.
+  /// If elliptical, triangles within a region follow its metric on the ground (see
+  /// tri::metric_triangles), and nothing changes outside all regions. The covered area and the
+  /// number of triangles do not depend on the metric.
   MetricChoice metric{};
 };
 
-/// The 2D Delaunay triangulation of what `detail` wants: rasters in column and row, exactly; other
-/// points in x and y. Triangles of a raster that span samples without data are left out, as
-/// StoreView::spans_gap() tells them. Positions are in the store's CRS, triangles counter-clockwise
-/// seen from above, levels the highest of each vertex's point. With a region, the triangles that
-/// reach into it, whole. With a cluster, of the points that it stands for alone; its representative
-/// counts as of its level. The store never changes. One thread.
+/// Returns the 2D Delaunay triangulation of what `detail` wants: exact in column and row for
+/// rasters, in x and y for other points. Leaves out triangles of a raster that span samples without
+/// data, see StoreView::spans_gap(). Positions are in the store's CRS, triangles are
+/// counter-clockwise seen from above, and a vertex's level is the highest of its point. With a
+/// region, returns every triangle that reaches into it, uncut. With a cluster, triangulates only
+/// the points that the cluster represents; its representative counts as a point of the cluster's
+/// level. The store never changes. Single-threaded.
 ///
-/// A store of triangles gives those that `detail` wants, bit for bit and with their orientation;
-/// equal corners are one vertex. A triangle is where its first corner is, for
-/// regions too. Without options.
+/// For a store of triangles, returns those that `detail` wants, bit for bit and with their
+/// orientation; equal corners become one vertex. A triangle is located at its first corner, also
+/// with respect to regions. Options do not apply.
 ///
-/// Takes half of the available memory unless the context gives another bound. Throws:
-/// stream::Error on a damaged store, or when the points would not fit, saying what they need;
-/// UsageError for a metric that triangles cannot follow, for boxes on a rotated raster, for
-/// options beside a store of triangles, for a cluster as for_each_wanted(), or heights beside one;
-/// stream::Stopped.
+/// Uses half of the available memory unless the context sets another bound. Throws: stream::Error
+/// on a damaged store, or if the points do not fit in memory (the message says how much they need);
+/// UsageError for a metric that triangles cannot follow, for boxes on a rotated raster, for options
+/// with a store of triangles, for an invalid cluster as for_each_wanted(), or for changed heights
+/// together with a cluster; stream::Stopped.
 [[nodiscard]] TriangleMesh detail_mesh(const stream::Store& store, const Detail& detail,
                                        const DetailMeshOptions& options = {},
                                        const Context& context = {});
 
-/// The same points without triangles, of a region only those inside, with their colours, classes
-/// and normals; `left_out` says where they are coarse. All are held in memory, 26 to 50 bytes each.
-/// Throws: stream::Error on a damaged store.
+/// Returns the same points without triangles, with a region only those inside, with their colours,
+/// classes and normals. `left_out` says where they are coarse. All are held in memory, 26 to 50
+/// bytes each. Throws: stream::Error on a damaged store.
 [[nodiscard]] TriangleMesh detail_points(const stream::Store& store, const Detail& detail);
 
-/// The finest level with at most `most_points` points; the top if none has so few. Reads the points
-/// of a view, down to that level and the next, to count them. Throws, of a view: stream::Error on a
-/// damaged store; stream::Stopped.
+/// Returns the finest level with at most `most_points` points, or the top if every level has more.
+/// In a view, reads the points of that level and of the levels above and next below it to count
+/// them. Throws, in a view: stream::Error on a damaged store; stream::Stopped.
 [[nodiscard]] unsigned level_within(const stream::Store& store, std::uint64_t most_points);
 
-/// Opens an overlay with other heights of a store's points. Throws: stream::Error, as
-/// Overlay::open and for one of other values than heights.
+/// Opens an overlay that replaces heights of a store's points. Throws: stream::Error, as
+/// Overlay::open(), and if its values are not heights.
 [[nodiscard]] stream::Overlay open_height_overlay(const std::string& path,
                                                   const stream::Store& store);
 

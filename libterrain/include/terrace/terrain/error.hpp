@@ -6,8 +6,7 @@
 
 namespace terrace::terrain {
 
-/// An option or value that makes no sense, whatever the data is. (What is wrong with data is a
-/// stream::Error.)
+/// An option or value that is invalid for any data. (Faults in data are a stream::Error.)
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -5,13 +5,13 @@
 
 namespace terrace::terrain {
 
-/// What a store's heights are taken to be measured from where heights above the ellipsoid are
-/// wanted, as on a globe.
+/// The assumed reference of a store's heights when heights above the ellipsoid are needed, as on a
+/// globe.
 enum class HeightReference : std::uint8_t {
-  recorded,     ///< what the store says; not the ellipsoid: a geoid grid has to be given
+  recorded,     ///< as the store says; if not the ellipsoid, a geoid grid must be given
   ellipsoidal,  ///< the ellipsoid, whatever the store says
-  orthometric,  ///< the sea: by the store's vertical CRS, or by EGM96 if it has none
-  ignore,       ///< the ellipsoid though it is not: heights are off by up to about 100 m
+  orthometric,  ///< sea level: by the store's vertical CRS, or by EGM96 if it has none
+  ignore,       ///< the ellipsoid, although it is wrong: off by up to about 100 m
 };
 
 }  // namespace terrace::terrain

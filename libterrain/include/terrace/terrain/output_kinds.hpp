@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-/// What terrace writes, and what the names of such files may end in. A name that promises another
-/// format is refused: a program that opens the file later goes by its ending.
+/// The kinds of files that terrace writes, and the file name endings for each format. A name with
+/// the ending of another format is refused, because the program that opens the file relies on it.
 
 namespace terrace::terrain {
 
@@ -19,8 +19,8 @@ struct OutputFormat {
 struct OutputKind {
   std::string_view what;  ///< for messages, as in "a raster"
   std::span<const OutputFormat> formats;
-  /// Listed: the ending is one of `formats`, and may be missing only if there is one format.
-  /// Free: any ending that does not belong to another format, or none.
+  /// Listed: the ending must be one of `formats`; it may be missing only if there is one format.
+  /// Free: any ending, or none, that does not belong to another format.
   enum class Names : std::uint8_t { listed, free } names = Names::listed;
   bool streams = true;  ///< may go to standard output
 };
@@ -43,7 +43,7 @@ inline constexpr OutputFormat kOverlay[] = {{"overlay", ".overlay"}};
 inline constexpr OutputFormat kFolder[] = {{"folder", ""}};
 }  // namespace output_formats
 
-/// One row for everything that a verb or a function of the Python module writes.
+/// One row for each output of a verb or a function of the Python module.
 namespace outputs {
 using namespace output_formats;
 using enum OutputKind::Names;
@@ -59,7 +59,7 @@ inline constexpr OutputKind kProfileTable{"a profile", kTable};
 inline constexpr OutputKind kSampleTable{"a table of heights", kPlaces};
 inline constexpr OutputKind kPairsTable{"a table of pairs", kTable};
 inline constexpr OutputKind kDendrogramTable{"a dendrogram", kTable};
-/// Also what `sample` reads.
+/// Also an input of `sample`.
 inline constexpr OutputKind kPlaceTable{"a table of places", kPlaces, free};
 inline constexpr OutputKind kLabelFile{"a list of labels", kLabels, free};
 inline constexpr OutputKind kOverlayFile{"an overlay", kOverlay, free, false};
@@ -68,16 +68,17 @@ inline constexpr OutputKind kTileSet{"a tile set, which is a folder,", kFolder, 
 inline constexpr OutputKind kSite{"a site, which is a folder,", kFolder, free, false};
 }  // namespace outputs
 
-/// ".ply, .obj or .glb".
+/// Returns a list such as ".ply, .obj or .glb".
 std::string endings_of(const OutputKind& kind);
 
-/// The format of the output `path`: `format` if it is given, else by the ending, else the only one;
-/// "-" has the first unless `format` is given. Throws: UsageError if there is no such format, and
-/// for a name that promises another one; both list what is possible.
+/// Returns the format of the output `path`: `format` if given, otherwise by the ending, otherwise
+/// the only format; "-" gets the first format unless `format` is given. Throws: UsageError if there
+/// is no such format, or if the name has the ending of another one; both messages list the choices.
 std::string_view format_of_output(const OutputKind& kind, const std::string& path,
                                   const std::string& format = {});
 
-/// For an input of such a kind. Throws: UsageError for a name that promises another format.
+/// Checks the name of an input of this kind. Throws: UsageError if it has the ending of another
+/// format.
 void check_input_name(const OutputKind& kind, const std::string& path);
 
 }  // namespace terrace::terrain

@@ -20,8 +20,8 @@ namespace terrace::terrain {
 
 struct ProfileRequest {
   SamplerOptions sampler{};
-  std::vector<Point2> line{};  ///< straight between its places in the store's CRS
-  /// From the store's CRS to that of the line, if it is another.
+  std::vector<Point2> line{};  ///< in the store's CRS, with straight segments there
+  /// From the store's CRS to the CRS of the line; empty if they are the same.
   std::optional<Transformation> to_line{};
   std::optional<double> step{};  ///< metres
 };
@@ -32,31 +32,31 @@ struct ProfileOutcome {
 };
 
 struct ProfilePoint {
-  double metres = 0;  ///< from the line's begin
+  double metres = 0;  ///< from the start of the line
   Point2 place{};     ///< in the store's CRS
-  double height = 0;  ///< in the store's vertical unit; NaN where there is none
+  double height = 0;  ///< in the store's vertical unit; NaN without a surface
 };
 
-/// The surface along the line.
+/// Computes the surface along a line.
 ///
-/// With a step, every so many metres and at the end. Without, at the line's places and wherever it
-/// crosses a column, a row or a diagonal of a raster's lattice, or, of irregular points and coarser
-/// levels, an edge of their triangulation: between them the linear surface is straight, so the
-/// profile is the surface itself.
+/// With a step, there is a point every `step` metres and one at the end. Without one, there is a
+/// point at each place of the line and wherever the line crosses a column, a row or a diagonal of a
+/// raster's lattice or, for irregular points and coarser levels, an edge of their triangulation.
+/// The linear surface is straight between these points, so the profile is exact.
 ///
-/// Distances are geodesics (line_distance.hpp) summed over pieces so short that the line's bend
-/// does not show; without a CRS they are the map's.
+/// Distances are geodesics (line_distance.hpp), summed over pieces so short that the curvature of
+/// the line does not matter; without a CRS they are distances in the map.
 ///
-/// take: gets the points in order, some thousand at a time.
-/// Throws: stream::Error on a damaged store and for a latitude beyond a pole, stream::Stopped,
-/// UsageError as make_sampler() and for a line of less than two places or with one that is 2^40
-/// stored units away or not finite.
+/// take: receives the points in order, a few thousand at a time.
+/// Throws: stream::Error on a damaged store and for a latitude beyond a pole; stream::Stopped;
+/// UsageError as make_sampler(), for a line of fewer than two places, and for a place that is not
+/// finite or 2^40 stored units away.
 ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request,
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context = {});
 
-/// The same as rows distance,x,y,height of text with a line of names before them, the height empty
-/// where there is none.
+/// Writes the same as text: a header line, then rows of distance,x,y,height. The height is empty
+/// where there is no surface.
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write,
                              const Context& context = {});

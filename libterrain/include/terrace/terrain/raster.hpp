@@ -21,11 +21,11 @@ enum class RasterValue : std::uint8_t { height, slope, aspect, hillshade };
 struct RasterRequest {
   RasterValue value = RasterValue::height;
   SamplerOptions sampler{};
-  std::optional<double> cell{};        ///< width and height in units of the output's CRS
-  std::string align{};                 ///< in place of `cell`: a raster, whose grid is taken
+  std::optional<double> cell{};        ///< cell size in units of the output's CRS
+  std::string align{};                 ///< a raster whose grid to use, in place of `cell`
   std::optional<Region> region{};      ///< in the store's CRS
-  std::optional<Transformation> to{};  ///< to the output's CRS if it is not the store's
-  std::string output;                  ///< a GeoTIFF
+  std::optional<Transformation> to{};  ///< to the output's CRS, if that is not the store's
+  std::string output;                  ///< the GeoTIFF to write
   stream::Naming replace{};            ///< of an existing file
 };
 
@@ -33,32 +33,33 @@ struct RasterOutcome {
   std::uint64_t columns = 0, rows = 0, cells_with_data = 0;
 };
 
-/// Writes a Cloud Optimized GeoTIFF, PixelIsArea: the value of a cell is that of the surface in its
-/// centre. Overviews, down to 512 x 512 cells, have the mean of the cells with data below theirs;
-/// of aspect, which has no mean, the first of them.
+/// Writes a Cloud Optimized GeoTIFF, PixelIsArea. The value of a cell is the surface's value at its
+/// centre. Overviews, down to 512 x 512 cells, contain the mean of the cells with data that they
+/// cover or, for aspect, which has no mean, the first of these cells.
 ///
-/// The grid: without a cell size, at level 0 and in the store's CRS it is a raster's own lattice
-/// (rotated ones have none). Cells of a given size have their borders at its multiples (as gdalwarp
-/// -tap has them), so that all rasters of one cell size fit each other, whatever was selected;
-/// together they hold the part of the region that is in the area of the store, conditions aside.
-/// Else cells go from the upper left corner of the region, or of the selected area, on; they have
-/// about the area that a point of the level has on average, the size rounded to two digits. Cells
-/// whose centres are outside the region's polygons are nodata.
+/// The grid: without a cell size, at level 0 and in the store's CRS, it is the raster's own lattice
+/// unless that is rotated. With a cell size, cell borders are at multiples of it (as with gdalwarp
+/// -tap), so that all rasters of one cell size match, whatever was selected; the grid covers the
+/// part of the region inside the store's area, ignoring conditions. Otherwise cells start at the
+/// upper left corner of the region or of the selected area; a cell has about the mean area per
+/// point of the level, with its size rounded to two digits. Cells with centres outside the region's
+/// polygons are nodata.
 ///
-/// With `align` the grid is that of another raster, cell by cell: its CRS, origin, cell and size.
-/// Cells whose centres are outside the region are nodata then, those outside of a box too.
+/// With `align` the grid is that of another raster, cell by cell: its CRS, origin, cell size and
+/// extent. Cells with centres outside the region, be it polygons or a box, are then nodata.
 ///
-/// Slope, aspect and hillshade come from the 3 x 3 heights around a cell of this grid by Horn's
-/// formula (B. K. P. Horn, "Hill shading and the reflectance map", doi:10.1109/PROC.1981.11918),
-/// with the ground's metres per cell and heights in metres; nodata where one of the nine is. Slope
-/// in degrees; aspect in degrees clockwise from north, downhill, nodata where it is level;
-/// hillshade 1 to 255 (0: nodata) under a light from 315 degrees, 45 degrees high.
+/// Slope, aspect and hillshade are computed from the 3 x 3 heights around a cell of this grid with
+/// Horn's formula (B. K. P. Horn, "Hill shading and the reflectance map",
+/// doi:10.1109/PROC.1981.11918), using metres per cell on the ground and heights in metres. They
+/// are nodata if one of the nine heights is. Slope is in degrees. Aspect is in degrees clockwise
+/// from north, downhill, and nodata on level ground. Hillshade is 1 to 255 (0: nodata) with light
+/// from 315 degrees at 45 degrees altitude.
 ///
-/// Tiles come in the order of a quadtree, so that a store of points is triangulated little more
-/// than once. Memory: some tiles at a time within the context's bound. Reports "cells"; notes an
-/// assumption about units that slopes rest on, and that no cell has data. Throws: stream::Error if
-/// the region does not meet the store, or for a raster to align with that is rotated, or in a CRS
-/// that is not known; UsageError for a grid of more than 2^31 columns or rows, and for `align` with
+/// Tiles are computed in quadtree order, so that a store of points is triangulated little more than
+/// once. Memory: some tiles at a time, within the context's bound. Reports "cells"; notes any
+/// assumption about units that slopes rest on, and if no cell has data. Throws: stream::Error if
+/// the region does not meet the store, or if the raster to align with is rotated or its CRS is
+/// unknown; UsageError for a grid of more than 2^31 columns or rows, and for `align` together with
 /// `cell` or another `to`.
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
                            const Context& context = {});

@@ -20,10 +20,10 @@
 
 namespace terrace::terrain {
 
-/// A caller's own way from points, in metres, to a surface.
+/// The caller's own method of making a surface from points in metres.
 struct SurfaceMethod {
-  /// Corners that are input points are named in RestoredSurface::input; a surface without any has
-  /// new points as its corners. Calls check_stop at intervals and lets its exceptions pass.
+  /// RestoredSurface::input names the corners that are input points; it is empty for a surface with
+  /// new corners. Calls check_stop at intervals and lets its exceptions pass.
   std::function<tri::RestoredSurface(std::span<const tri::Point3>,
                                      const base::StopCheck& check_stop)>
       restore;
@@ -31,34 +31,36 @@ struct SurfaceMethod {
 };
 
 struct ScanSurfaceOptions {
-  tri::RestoreOptions restore{};          ///< threads and check_stop are the context's
-  std::optional<SurfaceMethod> method{};  ///< in place of tri::restore_surface()
-  bool tetrahedra = false;  ///< the tetrahedra inside the surface, not triangles; without `method`
+  tri::RestoreOptions restore{};          ///< threads and check_stop are taken from the context
+  std::optional<SurfaceMethod> method{};  ///< replaces tri::restore_surface()
+  bool tetrahedra = false;  ///< returns tetrahedra inside the surface instead of triangles; not
+                            ///< with `method`
 };
 
 /// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
 struct ScanSurface {
   TriangleMesh mesh;
-  std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< where asked for, in place of triangles
-  /// The surface's measures, in metres. Components and Euler characteristic are those of
-  /// tri::ShapeParts; a surface by a method has those of tri::measure().
+  std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< if requested, in place of triangles
+  /// Measures of the surface, in metres. Components and Euler characteristic come from
+  /// tri::ShapeParts or, for a surface made by `method`, from tri::measure().
   tri::SurfaceMeasures measures;
-  /// Samples that are a corner of no face; samples at the same place count once. nullopt of a
-  /// surface that has corners of its own.
+  /// Number of samples that are not a corner of any face; samples at the same place count once.
+  /// nullopt if the surface has new corners.
   std::optional<std::size_t> samples_off;
-  /// Where nothing is enclosed: 0 if all points are at one place, 1 if they are on a line, 2 if
-  /// they are in a plane, else 3.
+  /// If nothing is enclosed: 0 if all points are at one place, 1 if they are on a line, 2 if they
+  /// are in a plane, otherwise 3.
   unsigned spanned = 3;
-  /// The scan is open: the lids over what has not been scanned were left out, see
-  /// tri::BasicShape3::surface_without_lids(). Never of tetrahedra, which fill the closed surface.
+  /// True if the scan is open: lids over unscanned parts were left out, see
+  /// tri::BasicShape3::surface_without_lids(). Always false for tetrahedra, which fill the closed
+  /// surface.
   bool open = false;
-  std::size_t lids = 0;  ///< how many lids were left out or, if it is not open, are triangles
+  std::size_t lids = 0;  ///< number of lids left out or, if not open, kept as triangles
 };
 
-/// The surface of the points that `detail` wants, restored in metres on the ground: of points in
-/// degrees about the middle of their box. Throws: stream::Error on a damaged store, and
-/// where the points do not fit into the context's memory, saying what they need; UsageError for
-/// tetrahedra beside a method; what the method throws; stream::Stopped.
+/// Restores the surface of the points that `detail` wants, in metres on the ground; degrees are
+/// converted about the middle of the points' box. Throws: stream::Error on a damaged store, and if
+/// the points do not fit in the context's memory (the message says how much they need); UsageError
+/// for tetrahedra together with a method; what the method throws; stream::Stopped.
 [[nodiscard]] ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
                                        const ScanSurfaceOptions& options = {},
                                        const Context& context = {});

@@ -11,18 +11,19 @@
 
 namespace terrace::terrain {
 
-/// Hands the finished blocks of libcluster's hierarchy builder to libstream's store writer: encoded
-/// on the thread that clustered them, appended in order. The two libraries do not know each other.
+/// Passes the finished blocks of libcluster's hierarchy builder to libstream's store writer. Blocks
+/// are encoded on the thread that clustered them and appended in order. The two libraries do not
+/// know each other.
 class StoreSink final : public cluster::HierarchySink {
  public:
   /// The writer must outlive the sink. publish: false for a trial. stop: ends the build with
-  /// stream::Stopped, on each thread after the block that it is clustering.
+  /// stream::Stopped; each thread completes its current block first.
   explicit StoreSink(stream::StoreWriter& writer, bool publish = true, std::stop_token stop = {})
       : writer_(writer), publish_(publish), stop_(std::move(stop)) {}
 
   std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override;
   void commit(unsigned level, std::unique_ptr<Prepared> prepared) override;
-  /// Finishes the store: it stands under its name when this returns, unless it is a trial.
+  /// Finishes the store. On return it is published under its name, unless it is a trial.
   void root(const cluster::FinishedBlock& block) override;
 
   /// Bytes of the finished store; 0 before root().

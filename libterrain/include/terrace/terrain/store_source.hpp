@@ -6,10 +6,10 @@
 
 namespace terrace::terrain {
 
-/// Lets libtri's multiresolution model read libstream's store, in stored coordinates; values are
+/// Connects libtri's multiresolution model to libstream's store, in stored coordinates. Values are
 /// the attributes, as records of the store's schema. In a view (stream::Store::where()) all points
-/// come, as a model has no conditions. The two libraries do not know each other;
-/// their cluster ids are the same numbers.
+/// are delivered, because a model does not support conditions. The two libraries do not know each
+/// other; their cluster ids are the same numbers.
 class StoreSource final : public tri::ClusterSource {
  public:
   /// The store must outlive the source.
@@ -22,7 +22,7 @@ class StoreSource final : public tri::ClusterSource {
 
  private:
   const stream::Store& store_;
-  stream::ClusterPoints points_;  // what the last read() shows
+  stream::ClusterPoints points_;  // result of the last read()
 };
 
 }  // namespace terrace::terrain

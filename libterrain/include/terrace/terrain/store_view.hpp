@@ -17,10 +17,10 @@ namespace terrace::terrain {
 
 struct ViewTraffic {
   std::uint64_t clusters = 0, points = 0;
-  std::uint64_t bytes = 0;  ///< as they are stored
+  std::uint64_t bytes = 0;  ///< as stored
 };
 
-/// What a view makes of a store's points.
+/// Maps `Shown` to the structure that a view builds from a store's points.
 template <class Shown>
 struct ViewTriangulation {
   using type = tri::Delaunay2<Shown>;
@@ -34,54 +34,54 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
   using type = tri::DynamicSurface<Coord>;
 };
 
-/// Whether the points of a store are taken for the scan of a body, to be shown by its surface: no
-/// raster, triangles or lines, in no reference system, without classes as laser clouds have them,
-/// and the Delaunay triangles of their horizontal places, at the top, are steeper than 60 degrees
-/// by more than half of their area, as those between the two sides of a body are. ground: the
-/// linear map from stored coordinates to metres. O(n log n) for the n points of the top.
+/// Whether a store's points look like the scan of a body, to be shown by its surface. They do if
+/// they are not a raster, triangles or lines, have no CRS and no classes as laser clouds have, and
+/// if at the top more than half of the area of the Delaunay triangles of their horizontal places is
+/// steeper than 60 degrees, as triangles between two sides of a body are. ground: the linear map
+/// from stored coordinates to metres. O(n log n) for the n points of the top.
 /// Throws: stream::Error if the top is damaged; stream::MissingBytes.
 [[nodiscard]] bool is_scan(const stream::Store& store, const stream::LinearMap& ground);
 
-/// A store under a camera: clusters expand where the camera comes near and collapse where it has
-/// been, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
-/// large geometric data, section 8.4; the control is tri::ViewControl, which this feeds.)
+/// A store seen by a camera. Clusters expand where the camera approaches and collapse where it has
+/// left, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
+/// large geometric data, section 8.4; tri::ViewControl decides, and this class feeds it.)
 ///
-/// Cameras, regions and focuses are in the *view frame*: metres east, north and up, its origin
-/// above the middle of the store at height 0. It is flat: one linear map for the whole store, of
-/// the CRS's scale at the middle. The triangulation itself stays in stored coordinates;
-/// in_view_frame() tells where its vertices are.
+/// Cameras, regions and focuses are in the *view frame*: metres east, north and up, with the origin
+/// above the middle of the store at height 0. The frame is flat: one linear map for the whole
+/// store, with the CRS's scale at the middle. The triangulation itself stays in stored coordinates;
+/// in_view_frame() converts its vertices.
 ///
-/// Shown: std::int32_t for rasters, whose triangulation is exact on integers; double for any store;
-/// tri::PointCloud for the points alone; tri::DynamicSurface<std::int32_t> for scans: the surface
-/// in space that the points lie on, of open scans without lids (tri::DynamicSurface), which is part
-/// of what a frame may spend. Its vertices are not in stored coordinates but on a lattice in the
-/// view frame, of a power of two metres, 2^-29 to 2^-28 of the longest side of the store's box, to
-/// which points are rounded.
+/// Shown: std::int32_t for rasters, with exact integer triangulation; double for any store;
+/// tri::PointCloud for points without triangles; tri::DynamicSurface<std::int32_t> for scans, with
+/// the surface in space that the points are on, for open scans without lids (tri::DynamicSurface).
+/// The surface takes part of a frame's budget. Its vertices are not in stored coordinates but
+/// rounded to a lattice in the view frame, with a spacing that is a power of two metres, 2^-29 to
+/// 2^-28 of the longest side of the store's box.
 ///
-/// All points of a store are shown, whatever condition it was given (stream::Store::where()).
+/// Shows all points of a store, even if a condition was set (stream::Store::where()).
 ///
-/// Members may be called by one thread at a time.
+/// One thread at a time may call members.
 template <class Shown>
 class StoreView {
  public:
   using Control = tri::ViewControl<typename ViewTriangulation<Shown>::type>;
   using Step = typename Control::Step;
 
-  /// Who reads and decodes what a frame lacks.
+  /// Who reads and decodes the clusters that a frame lacks.
   enum class Reader : std::uint8_t {
-    thread,   ///< a thread of its own; a frame takes what is there
+    thread,   ///< a separate thread; a frame uses what is loaded
     in_frame  ///< the calling thread, within the frame's time
   };
 
-  /// Throws: stream::Error if the root is damaged; std::invalid_argument for options out of range.
-  /// Requires a raster if Shown is std::int32_t.
+  /// Requires a raster if Shown is std::int32_t. Throws: stream::Error if the root is damaged;
+  /// std::invalid_argument for options out of range.
   explicit StoreView(const stream::Store& store, const tri::ViewOptions& options = {},
                      Reader reader = Reader::thread);
-  /// For stores of which some bytes may be missing (stream::GivenBytes), read by the calling thread
-  /// within the frame's time. ground: the linear map from stored coordinates to metres, as the
-  /// other constructor finds it and ground() tells. given: as GivenBytes::has(), by which a
-  /// frame tells faster that bytes are still missing. Needs neither threads nor PROJ.
-  /// Throws: as above, and stream::MissingBytes.
+  /// For stores with missing bytes (stream::GivenBytes), read by the calling thread within the
+  /// frame's time. ground: the linear map from stored coordinates to metres, as the other
+  /// constructor computes it and ground() returns it. given: as GivenBytes::has(); with it a frame
+  /// finds out faster that bytes are still missing. Needs neither threads nor PROJ. Throws: as
+  /// above, and stream::MissingBytes.
   StoreView(const stream::Store& store, const stream::LinearMap& ground,
             const tri::ViewOptions& options,
             std::function<bool(const stream::ByteRange&)> given = {});
@@ -89,18 +89,18 @@ class StoreView {
   StoreView(const StoreView&) = delete;
   StoreView& operator=(const StoreView&) = delete;
 
-  /// Brings the model nearer to what `view` asks for, which takes about `seconds` at most, less
-  /// `after` for each point that came and that went (tri::StepBudget). The step tells which
-  /// triangles came and went. Throws: stream::Error once a cluster could not be read;
-  /// stream::Stopped if the store is to stop.
+  /// Brings the model closer to what `view` asks for. Takes at most about `seconds`, less `after`
+  /// for each point that was added and removed (tri::StepBudget). The step lists the triangles
+  /// added and removed. Throws: stream::Error once a cluster could not be read; stream::Stopped if
+  /// the store was asked to stop.
   const Step& frame(const tri::View& view, double seconds, const std::array<double, 2>& after = {});
-  /// Computes from scratch what frames only follow, see tri::ViewControl::restore(): the surface of
-  /// a scan, for a camera that rests. The delta is valid until the next frame.
+  /// Recomputes from scratch what frames only update, see tri::ViewControl::restore(): the surface
+  /// of a scan, for a camera at rest. The delta is valid until the next frame.
   const typename Control::Delta& restore(unsigned threads = 1);
-  /// Whether another frame with the view of the last one would change nothing, now or later.
+  /// Whether another frame with the same view would change nothing, now or later.
   [[nodiscard]] bool settled() const;
-  /// The bytes that the last frame lacked for what is wanted, the most important first; a frame
-  /// after they were given goes on. Always empty with a reader of its own. O(1).
+  /// The byte ranges that the last frame lacked, the most important first; after they are given,
+  /// the next frame continues. Always empty with a reading thread. O(1).
   [[nodiscard]] std::span<const stream::ByteRange> missing() const;
 
   /// As in tri::ViewControl.
@@ -110,30 +110,30 @@ class StoreView {
   [[nodiscard]] const Control& control() const;
   [[nodiscard]] const typename Control::Model& model() const { return control().model(); }
 
-  /// From a step in stored coordinates to metres.
+  /// Maps a difference in stored coordinates to metres.
   [[nodiscard]] const stream::LinearMap& ground() const;
-  /// A vertex in stored coordinates; of a surface up to the lattice's rounding.
+  /// Returns a vertex in stored coordinates; for a surface, up to the lattice's rounding.
   [[nodiscard]] stream::Point3 stored(tri::VertexId vertex) const;
-  /// Metres east, north and up of a point in stored coordinates.
+  /// Returns a point in stored coordinates as metres east, north and up.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
-  /// The same of a place in the model's coordinates, in which slides are (tri::Geomorph).
+  /// The same for a place in the model's coordinates, which slides use (tri::Geomorph).
   [[nodiscard]] stream::Point3 model_in_view_frame(const stream::Point3& place) const;
 
-  /// Whether a triangle of a raster spans samples without data; false for other stores. Its corners
-  /// are then not neighbours in columns and rows, and its centroid is farther than a cell from the
-  /// boxes of all collapsed clusters. Never true where every sample has data; gaps narrower than
-  /// the clusters beside them are not seen. 0.03 to 0.6 us.
+  /// Whether a triangle of a raster spans samples without data; false for other stores. Such a
+  /// triangle's corners are not neighbours in columns and rows, and its centroid is farther than a
+  /// cell from the boxes of all collapsed clusters. Never true if every sample has data; misses
+  /// gaps narrower than the clusters next to them. 0.03 to 0.6 us.
   [[nodiscard]] bool spans_gap(tri::TriangleId triangle) const;
-  /// Whether that can be true of any triangle.
+  /// Whether spans_gap() can be true for any triangle.
   [[nodiscard]] bool has_gaps() const;
 
-  /// The attributes of a vertex's point, a record of the store's schema; empty if its cluster is no
-  /// longer kept. Those of what a frame has added are there until the next frame, those of the root
-  /// always.
+  /// The attributes of a vertex's point, as a record of the store's schema; empty if its cluster is
+  /// no longer kept. Those of points that a frame added are kept until the next frame, those of the
+  /// root always.
   [[nodiscard]] std::span<const std::byte> attributes(tri::VertexId vertex) const;
 
-  /// What has been read so far, the root included.
+  /// The traffic until now, the root included.
   [[nodiscard]] ViewTraffic traffic() const;
 
  private:
