@@ -502,8 +502,8 @@ TEST(Region, SaysWhatIsWrongWithRings) {
             "Self-intersection at 2, 2"},
            {{{{{0, 0}, {NAN, 4}, {4, 0}}}}, "polygon 1, outer ring", "not finite"},
            {{{{{0, 0}, {1, kAnyHeight}, {4, 0}}}}, "polygon 1, outer ring", "not finite"},
-           {{{hole, square}}, "polygon 1", "do not fit together"},
-           {{{square, hole, {{2, 2}, {7, 2}, {7, 7}}}}, "polygon 1", "do not fit together"},
+           {{{hole, square}}, "polygon 1", "do not form a valid polygon"},
+           {{{square, hole, {{2, 2}, {7, 2}, {7, 7}}}}, "polygon 1", "do not form a valid polygon"},
            {{{square, {{20, 1}, {25, 1}, {25, 5}}}}, "polygon 1", "Hole lies outside shell at 2"},
        }) {
     SCOPED_TRACE(test.cause);

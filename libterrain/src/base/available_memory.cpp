@@ -18,10 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A hierarchy of cgroups that limits memory.
+/// A cgroup hierarchy that limits memory.
 struct Hierarchy {
   bool version_2 = false;
-  std::string root;  ///< the cgroup that `mount` shows, seen from the hierarchy's root
+  std::string root;  ///< the cgroup mounted at `mount`, relative to the hierarchy's root
   fs::path mount;
 };
 
@@ -33,7 +33,7 @@ bool has_word(std::string_view list, std::string_view word) {
   return false;
 }
 
-/// mountinfo writes blanks in names as \040 and the like.
+/// mountinfo escapes blanks in names as \040, and other characters likewise.
 std::string unescaped(std::string_view text) {
   const auto octal = [](char c) { return c >= '0' && c <= '7'; };
   std::string out;
@@ -68,7 +68,7 @@ std::vector<Hierarchy> hierarchies(const fs::path& proc) {
   return found;
 }
 
-/// The process's place in a hierarchy: "/" and the names of the cgroups; nullopt if it has none.
+/// Returns the path of the process's cgroup in a hierarchy ("/" and names); nullopt if it has none.
 std::optional<std::string> place_in(const Hierarchy& hierarchy, const fs::path& proc) {
   std::ifstream list(proc / "cgroup");
   for (std::string line; std::getline(list, line);) {
@@ -85,7 +85,7 @@ std::optional<std::string> place_in(const Hierarchy& hierarchy, const fs::path& 
   return std::nullopt;
 }
 
-/// The number in a file; nullopt for "max" and if there is none.
+/// Returns the number in a file; nullopt for "max" or without a number.
 std::optional<std::uint64_t> number_in(const fs::path& file) {
   std::ifstream in(file);
   std::string word;
@@ -104,8 +104,8 @@ std::optional<std::uint64_t> cgroup_memory_limit(const fs::path& proc) {
   for (const Hierarchy& hierarchy : hierarchies(proc)) {
     const std::optional<std::string> place = place_in(hierarchy, proc);
     if (!place) continue;
-    // In a container the mount may show only a part of the hierarchy, and the process's path may
-    // start at its root or at the mount's.
+    // In a container the mount may show only a part of the hierarchy, and the process's path may be
+    // relative to the hierarchy's root or to the mount's.
     fs::path below = fs::path(*place).lexically_relative("/");
     const fs::path within = fs::path(*place).lexically_relative(hierarchy.root);
     if (!within.empty() && *within.begin() != "..") below = within;

@@ -8,7 +8,7 @@
 namespace terrace::terrain {
 
 DecimalMultiples::DecimalMultiples(double step) : step_(step), digits_(step) {
-  // The shortest text of the step: digits with a point after the first, and a power of ten.
+  // The shortest text of the step: digits with a point after the first, then a power of ten.
   std::array<char, 32> text{};
   const auto end =
       std::to_chars(text.data(), text.data() + text.size(), step, std::chars_format::scientific)
@@ -25,7 +25,7 @@ DecimalMultiples::DecimalMultiples(double step) : step_(step), digits_(step) {
     digits = 10 * digits + (c - '0');
   }
   const auto decimals = static_cast<int>(e > 1 ? e - 2 : 0) - exponent;
-  constexpr int kExactPower = 22;  // the largest power of ten that a double has
+  constexpr int kExactPower = 22;  // the largest power of ten that a double holds exactly
   if (decimals <= 0 || decimals > kExactPower || digits > kExact) return;
   digits_ = digits;
   for (int i = 0; i < decimals; ++i) power_ *= 10;

@@ -6,16 +6,16 @@
 
 namespace terrace::terrain {
 
-/// The multiples of a step as its decimal digits mean them: three times 0.1 is 0.3 and not
-/// 0.30000000000000004, which is the product of the doubles. Always the double nearest to the
-/// decimal product, as long as that has at most 15 digits.
+/// Multiples of a step in decimal arithmetic: three times 0.1 is 0.3, not 0.30000000000000004, the
+/// product of the doubles. Each is the double nearest to the decimal product, if that has at most
+/// 15 digits.
 class DecimalMultiples {
  public:
   /// step: positive and finite.
   explicit DecimalMultiples(double step);
 
   [[nodiscard]] double step() const { return step_; }
-  /// count: a whole number, or one and a half.
+  /// count: an integer, or 1.5.
   [[nodiscard]] double operator()(double count) const {
     // Both factors are exact, so the quotient is rounded once.
     const double digits = count * digits_;
@@ -29,7 +29,7 @@ class DecimalMultiples {
   static constexpr double kExact = 0x1p53;
 
   double step_;
-  double digits_, power_ = 1;  ///< the step is their quotient
+  double digits_, power_ = 1;  ///< the step is digits_ / power_
 };
 
 }  // namespace terrace::terrain

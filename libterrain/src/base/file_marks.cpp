@@ -10,13 +10,13 @@
 namespace terrace::terrain {
 namespace {
 
-/// No file of ours has longer lines or headers.
+/// No file written by terrace has longer lines or headers.
 constexpr std::size_t kLongestMarkLine = 64u << 10;
 constexpr std::uint64_t kLongestHeader = 1u << 20;
 
 using Bytes = std::string;
 
-/// The bytes from `offset` on; fewer at the end of the file.
+/// Returns the bytes from `offset` on; fewer at the end of the file.
 Bytes read_at(std::ifstream& file, std::uint64_t offset, std::size_t size) {
   Bytes bytes(size, '\0');
   file.clear();
@@ -27,7 +27,7 @@ Bytes read_at(std::ifstream& file, std::uint64_t offset, std::size_t size) {
   return bytes;
 }
 
-/// An unsigned number of up to 8 bytes; nullopt if there are not as many.
+/// Returns an unsigned number of up to 8 bytes; nullopt if `bytes` ends before it.
 std::optional<std::uint64_t> number_at(std::string_view bytes, std::size_t at, std::size_t size,
                                        bool big_endian) {
   if (at > bytes.size() || size > bytes.size() - at) return std::nullopt;
@@ -39,7 +39,7 @@ std::optional<std::uint64_t> number_at(std::string_view bytes, std::size_t at, s
   return number;
 }
 
-/// Takes the next line off `text`; nullopt if it has no end.
+/// Removes the first line from `text` and returns it; nullopt if no line end follows.
 std::optional<std::string_view> take_line(std::string_view& text) {
   const std::size_t end = text.find('\n');
   if (end == std::string_view::npos) return std::nullopt;
@@ -89,7 +89,7 @@ bool is_our_png(std::ifstream& file) {
   }
 }
 
-/// Looks through the first directory, of classic TIFF or of BigTIFF.
+/// Searches the first directory of a classic TIFF or a BigTIFF.
 bool is_our_tiff(std::ifstream& file, bool big_endian, bool big_tiff) {
   constexpr std::string_view kMark("terrace\0", 8);
   constexpr std::uint64_t kSoftware = 305, kAscii = 2;

@@ -5,26 +5,26 @@
 #include <string>
 #include <string_view>
 
-/// The marks that identify files written by terrace.
+/// Marks that identify files written by terrace.
 
 namespace terrace::terrain {
 
-/// The comment that marks files of formats with comments.
+/// The comment that marks files in formats with comments.
 inline constexpr const char* kWriterMark = "written by terrace";
-/// How files begin in formats without comments.
+/// The first bytes that mark files in formats without comments.
 inline constexpr std::string_view kContourHead =
     R"({"type":"FeatureCollection","generator":"terrace contour",)";
-/// How all GeoJSON of ours begins.
+/// The first bytes of every GeoJSON file that terrace writes.
 inline constexpr std::string_view kGeoJsonMark =
     R"({"type":"FeatureCollection","generator":"terrace)";
 inline constexpr std::string_view kLinesHead =
     R"({"type":"FeatureCollection","generator":"terrace",)";
 inline constexpr std::string_view kProfileHead = "distance,x,y,height";
 
-/// Whether the regular file at `path` is empty or has terrace's mark at the place that its format
-/// has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB, GeoJSON, LAS), the
-/// tag Software (TIFF, PNG), the first bytes (overlays). nullopt for formats without such a place,
-/// as CSV; false if the file cannot be read.
+/// Whether the regular file at `path` is empty or has terrace's mark where its format has room for
+/// one: a header comment (PLY, OBJ, VTK), the generator (GLB, GeoJSON, LAS), the tag Software
+/// (TIFF, PNG) or the first bytes (overlays). nullopt for formats without room for a mark, such as
+/// CSV; false if the file cannot be read.
 [[nodiscard]] std::optional<bool> marked_by_terrace(const std::string& path);
 
 }  // namespace terrace::terrain

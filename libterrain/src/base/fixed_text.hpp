@@ -17,7 +17,7 @@ class FixedText {
   explicit FixedText(int decimals) : decimals_(decimals) {
     for (int i = 0; i < decimals; ++i) power_ *= 10;
   }
-  /// Enough decimals for nine significant digits of `largest`, at least 3 and at most 15.
+  /// Returns a writer with enough decimals for nine significant digits of `largest`, from 3 to 15.
   static FixedText for_numbers_up_to(double largest) {
     int decimals = 8;
     for (double bound = 10; bound <= largest && decimals > 3; bound *= 10) --decimals;
@@ -25,16 +25,16 @@ class FixedText {
     return FixedText(decimals);
   }
 
-  /// Bytes that write() takes, at most.
+  /// The most bytes that write() produces.
   static constexpr std::size_t kLongest = 40;
 
-  /// Empty for NaN. Numbers with too many digits for 64 bits get their shortest text that reads
-  /// back the same.
+  /// Appends nothing for NaN. Numbers with too many digits for 64 bits get the shortest text that
+  /// reads back the same.
   void append(std::string& text, double value) const {
     char digits[kLongest];
     text.append(digits, write(digits, value));
   }
-  /// Writes the same from `at` on and returns its end.
+  /// Writes the same text at `at` and returns its end.
   char* write(char* at, double value) const {
     if (std::isnan(value)) return at;
     const double scaled = rounded(std::abs(value) * static_cast<double>(power_));
@@ -57,9 +57,9 @@ class FixedText {
   }
 
  private:
-  /// To the nearest integer, halves to even, without a call of the C library.
+  /// Rounds to the nearest integer, halves to even, without calling the C library.
   static double rounded(double value) {
-    constexpr double kWhole = 0x1p52;  ///< from here on there are integers alone
+    constexpr double kWhole = 0x1p52;  ///< doubles from here on are integers
     return value < kWhole ? value + kWhole - kWhole : value;
   }
   static constexpr std::array<char, 200> kPairs = [] {

@@ -11,13 +11,13 @@
 
 namespace terrace::terrain {
 
-/// What a GeoJSON object says of the CRS of its places, by a `crs` member as in GeoJSON 2008;
-/// nullopt if the member is null: they are in the CRS of the data. file: named in the error.
-/// Throws: stream::Error for a member that does not name a CRS.
+/// Returns the CRS of a GeoJSON object's places by its `crs` member, as in GeoJSON 2008; nullopt if
+/// the member is null, which means the CRS of the data. file: named in the error. Throws:
+/// stream::Error for a member that does not name a CRS.
 std::optional<PlacesCrs> crs_of_geojson(const nlohmann::json& object, const std::string& file);
 
-/// The member that names a CRS in GeoJSON, with the comma after it: null where nothing is known of
-/// it, empty for longitude and latitude of WGS 84.
+/// Returns the member that names a CRS in GeoJSON, with the comma after it: null if nothing is
+/// known about the CRS, empty for longitude and latitude of WGS 84.
 std::string geojson_crs_member(const stream::Crs& crs);
 
 }  // namespace terrace::terrain

@@ -59,7 +59,7 @@ std::string place_of(std::string_view text, std::size_t byte) {
 
 std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
                                            const std::string& remedy, const std::stop_token& stop) {
-  // A stream of the standard library throws at the first byte of a folder.
+  // An ifstream opens a folder, then throws at the first read.
   std::error_code ignored;
   if (std::filesystem::is_directory(name, ignored)) return std::nullopt;
   std::ifstream file(name, std::ios::binary);
@@ -76,7 +76,7 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
     if (text.size() > most_bytes) {
       fail({}, "is larger than the " + readable_bytes(most_bytes) + " that such a file may have");
     }
-    // Binary files are recognised before all of them is read.
+    // Recognises binary files early, before reading them to the end.
     const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
     if (first != std::string::npos && text[first] != '{' && text[first] != '[') {
       fail({}, "is not JSON");

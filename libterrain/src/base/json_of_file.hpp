@@ -10,17 +10,17 @@
 
 namespace terrace::terrain {
 
-/// The most that is read of a file of polygons or lines: some 6 million corners.
+/// Size limit of a file of polygons or lines: about 6 million corners.
 inline constexpr std::uint64_t kMostGeoJsonBytes = std::uint64_t{128} << 20;
 
-/// The JSON in a file; nothing if the file cannot be opened or is a folder. Memory: some ten times
-/// the file. Throws: stream::Error, with this remedy, if it is larger than most_bytes or not JSON,
-/// which names the place; stream::Stopped.
+/// Returns the JSON in a file; nullopt if the file cannot be opened or is a folder. Memory: about
+/// ten times the file. Throws: stream::Error with this remedy if the file is larger than most_bytes
+/// or is not JSON, in which case it names the place; stream::Stopped.
 std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
                                            const std::string& remedy,
                                            const std::stop_token& stop = {});
 
-/// A remedy for files that should be GeoJSON.
+/// A remedy for files that should be GeoJSON but are not.
 std::string convert_to_geojson(const std::string& name);
 
 }  // namespace terrace::terrain

@@ -19,8 +19,9 @@ struct FreeMemory {
 template <class T>
 using LargeArray = std::unique_ptr<T[], FreeMemory>;
 
-/// Plain data, not initialised: each page is touched first by the thread that fills it. In huge
-/// pages where the system has them, as arrays that are sorted into cells are filled here and there.
+/// Allocates plain data without initialising it, so each page is first touched by the thread that
+/// fills it. Uses huge pages where the system has them, because arrays that are sorted into cells
+/// are filled in random order.
 template <class T>
 LargeArray<T> large_array(std::size_t count) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -32,7 +33,7 @@ LargeArray<T> large_array(std::size_t count) {
     throw std::bad_alloc();
   }
 #ifdef __linux__
-  // Only a hint.
+  // Only a hint, so a failure does not matter.
   if (bytes >= kHugePage) static_cast<void>(madvise(memory, bytes, MADV_HUGEPAGE));
 #endif
   return LargeArray<T>(static_cast<T*>(memory));

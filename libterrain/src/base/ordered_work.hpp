@@ -15,14 +15,14 @@
 
 namespace terrace::terrain {
 
-/// Makes something of each item of a sequence by several threads, of which the calling one is the
-/// first, and takes the results in order: next(worker) gives the items as optionals until an empty
-/// one, then make(worker, item) runs on the same thread, whose number `worker` is (0 to threads -
-/// 1), and commit(result) takes the results in the order of the items, on any of the threads. next
-/// and commit run one at a time each. So the effect does not depend on the number of threads, and
-/// no thread waits for another's commits while there is something to make. At most two results per
-/// thread wait. Of the exceptions the one of the first item is rethrown, that of next counting as
-/// that of the item it did not give; other threads stop after their present result.
+/// Makes a result of each item of a sequence in several threads, including the calling one, and
+/// takes the results in order. next(worker) returns items as optionals, an empty one at the end.
+/// make(worker, item) then runs on the same thread, numbered `worker` (0 to threads - 1).
+/// commit(result) receives the results in the order of the items, on any of the threads. Calls of
+/// next never overlap, nor do calls of commit. So the effect does not depend on the number of
+/// threads, and no thread waits for another's commits while there is work. At most two results per
+/// thread wait. Rethrows the exception of the first item that failed; an exception from next counts
+/// for the item that it did not return. Other threads then stop after their current result.
 template <class Next, class Make, class Commit>
 void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& commit) {
   using Item = typename std::invoke_result_t<Next&, unsigned>::value_type;
@@ -38,14 +38,14 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
     [[nodiscard]] bool ready() const { return result.has_value() || error != nullptr; }
   };
   const std::size_t ahead = 2 * std::size_t{threads};
-  std::vector<Slot> slots(ahead);  // result i waits in slot i modulo their number
+  std::vector<Slot> slots(ahead);  // result i waits in slot i % ahead
   std::mutex mutex;
   std::condition_variable changed;
   std::size_t given = 0, committed = 0;
   bool giving = false, ended = false, committing = false, stop = false;
   std::exception_ptr failure;
 
-  // Commits what is ready, in order; the lock is held before and after, but not meanwhile.
+  // Commits ready results in order. The lock is held before and after, but not during a commit.
   const auto commit_ready = [&](std::unique_lock<std::mutex>& lock) {
     committing = true;
     while (!stop && slots[committed % ahead].ready()) {
@@ -73,7 +73,7 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
     std::unique_lock lock(mutex);
     for (;;) {
       if (!committing) commit_ready(lock);
-      if (stop || ended) return;  // who still makes or commits takes the rest
+      if (stop || ended) return;  // the threads that still make or commit take the rest
       if (giving || given == committed + ahead) {
         changed.wait(lock);
         continue;
@@ -108,7 +108,7 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
 
   {
     std::vector<std::jthread> others;
-    // If a thread cannot be started, the existing ones do the work.
+    // If a thread cannot be started, the existing threads do the work.
     try {
       for (unsigned worker = 1; worker < threads; ++worker) others.emplace_back(work, worker);
     } catch (const std::system_error&) {
@@ -118,7 +118,7 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
   if (failure) std::rethrow_exception(failure);
 }
 
-/// The same for the numbers below `count`: make(worker, i), commit(i, result).
+/// The same for the numbers below `count`: make(worker, i), then commit(i, result).
 template <class Make, class Commit>
 void in_order(std::size_t count, unsigned threads, const Make& make, const Commit& commit) {
   std::size_t given = 0, committed = 0;

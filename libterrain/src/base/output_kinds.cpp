@@ -11,7 +11,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Endings of formats that are not in the table: of files that terrace reads or does not know.
+/// Endings outside the table: formats that terrace only reads or does not know.
 constexpr std::string_view kOthers =
     ".7z .adf .asc .bil .bmp .bz2 .db .dbf .dem .doc .docx .dt0 .dt1 .dt2 .dxf .e57 .fgb .flt .gif "
     ".gltf .gml .gpkg .gpx .grb .grd .grib .gz .h5 .hdf .hdr .hgt .htm .html .img .jp2 .jpeg .jpg "
@@ -24,8 +24,8 @@ constexpr std::array<std::span<const OutputFormat>, 8> kAll{
     output_formats::kRaster, output_formats::kPicture, output_formats::kLines,
     output_formats::kPlaces, output_formats::kOverlay};
 
-/// Calls take(word) for each word of a list with blanks until it returns true. Returns whether one
-/// did.
+/// Calls take(word) for each word of a blank-separated list until it returns true. Returns whether
+/// it did.
 template <class Take>
 bool any_word(std::string_view words, const Take& take) {
   while (!words.empty()) {
@@ -36,14 +36,14 @@ bool any_word(std::string_view words, const Take& take) {
   return false;
 }
 
-/// Whether a file's name, in lower case, has one of the endings and more.
+/// Whether a file's name, in lower case, has one of the endings after at least one character.
 bool has_ending(const std::string& name, std::string_view endings) {
   return any_word(endings, [&](std::string_view ending) {
     return name.size() > ending.size() && name.ends_with(ending);
   });
 }
 
-/// Whether the ending is that of any known format.
+/// Whether the name has the ending of any known format.
 bool is_known(const std::string& name) {
   return has_ending(name, kOthers) ||
          std::ranges::any_of(kAll, [&](std::span<const OutputFormat> formats) {
@@ -124,7 +124,7 @@ std::string_view format_of_output(const OutputKind& kind, const std::string& pat
   } else if (!ending.empty()) {
     refuse(kind, path, cannot);
   } else if (kind.formats.size() > 1) {
-    refuse(kind, path, "has no ending, by which its format is chosen");
+    refuse(kind, path, "has no ending to choose its format by");
   }
   return kind.formats.front().name;
 }

@@ -18,8 +18,8 @@ namespace {
 constexpr std::size_t kLeaf = 8;
 constexpr unsigned kMostRank = 32;
 
-/// Halves the points across their longest side until few are left. The halves of [first, last) meet
-/// at its middle.
+/// Halves the points across their longest side until at most kLeaf are left. The halves of [first,
+/// last) meet at its middle.
 class Tree {
  public:
   explicit Tree(std::span<const stream::Point3> points) : points_(points), order_(points.size()) {
@@ -28,7 +28,7 @@ class Tree {
     divide(0, order_.size());
   }
 
-  /// The square of the distance to the `rank`-th nearest other point.
+  /// Returns the squared distance to the `rank`-th nearest other point.
   [[nodiscard]] double square(std::uint32_t of, unsigned rank) const {
     Nearest nearest{of, points_[of], rank};
     search(0, order_.size(), nearest);
@@ -95,7 +95,7 @@ class Tree {
     }
     const std::size_t middle = first + (last - first) / 2;
     const double beyond = nearest.place[splits_[middle].axis] - splits_[middle].value;
-    // Points on the plane may lie on either side of it.
+    // Points on the plane may be in either half.
     if (beyond < 0) {
       search(first, middle, nearest);
       if (beyond * beyond < nearest.worst()) search(middle, last, nearest);
@@ -107,7 +107,7 @@ class Tree {
 
   std::span<const stream::Point3> points_;
   std::vector<std::uint32_t> order_;
-  std::vector<Split> splits_;  // by the middle of a part
+  std::vector<Split> splits_;  // indexed by the middle of a part
 };
 
 }  // namespace

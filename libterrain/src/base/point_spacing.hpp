@@ -8,9 +8,9 @@
 
 namespace terrace::terrain {
 
-/// The distance from each point to its `rank`-th nearest other point (1: the nearest); to the
-/// farthest if there are fewer, 0 for a single point. Coordinates must be
-/// finite, rank from 1 to 32. Exact, by a k-d tree: O(n log n) time, 24 bytes per point.
+/// Returns the distance from each point to its `rank`-th nearest other point (1: the nearest), or
+/// to the farthest if there are fewer; 0 for a single point. Coordinates must be finite, rank from
+/// 1 to 32. Exact, by a k-d tree: O(n log n) time, 24 bytes per point.
 std::vector<float> neighbour_distances(std::span<const stream::Point3> points, unsigned rank,
                                        unsigned threads);
 

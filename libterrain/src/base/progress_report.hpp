@@ -9,10 +9,10 @@
 
 namespace terrace::terrain {
 
-/// Reports one piece of work to its context, and at destruction that no more will come.
+/// Reports the progress of one task to its context, and on destruction its end.
 class ProgressReport {
  public:
-  /// what: what is counted, as in "points". The context must outlive the report.
+  /// what: what is counted, such as "points". The context must outlive the report.
   ProgressReport(const Context& context, std::string what)
       : context_(context), what_(std::move(what)) {}
   ~ProgressReport() {
@@ -24,7 +24,7 @@ class ProgressReport {
   ProgressReport(const ProgressReport&) = delete;
   ProgressReport& operator=(const ProgressReport&) = delete;
 
-  /// count: things done so far. fraction: share of the work done, 0 to 1; 0 if unknown.
+  /// count: items completed. fraction: share of the work completed, 0 to 1; 0 if unknown.
   void update(std::uint64_t count, double fraction) const {
     report({.what = what_, .count = count, .fraction = fraction});
   }

@@ -51,7 +51,7 @@ Polygon polygon_of(const nlohmann::json& rings, const std::string& file) {
   return polygon;
 }
 
-/// Appends the polygons of any GeoJSON object. depth guards against files made to exhaust the
+/// Appends the polygons of any GeoJSON object. depth limits recursion, as a file could exhaust the
 /// stack.
 void collect_polygons(const nlohmann::json& json, const std::string& file, int depth,
                       std::vector<Polygon>& polygons) {
@@ -61,8 +61,8 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   if (depth > 0 && json.contains("crs") && !json["crs"].is_null()) {
     throw stream::Error({.file = file,
                          .where = {},
-                         .cause = "an object within it has a crs of its own",
-                         .remedy = "write the crs of all once, as the first member of the file, or "
+                         .cause = "an object within it has its own crs",
+                         .remedy = "write one crs for all, as the first member of the file, or "
                                    "give `region_crs`"});
   }
   const std::string type = json["type"].get<std::string>();
@@ -79,7 +79,7 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   } else if (type == "GeometryCollection") {
     each(member("geometries"));
   } else if (type == "Feature") {
-    // A feature may have no place (RFC 7946, 3.2).
+    // A feature may have a null geometry (RFC 7946, 3.2).
     const nlohmann::json& geometry = member("geometry");
     if (!geometry.is_null()) collect_polygons(geometry, file, depth + 1, polygons);
   } else if (type == "MultiPolygon") {
@@ -98,13 +98,13 @@ Region read_geojson(const std::string& name, const std::stop_token& stop) {
   if (!json) fail(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
   collect_polygons(*json, name, 0, polygons);
-  if (polygons.empty()) fail(name, "holds no polygon");
+  if (polygons.empty()) fail(name, "contains no polygon");
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name, stop)
       .in_crs(crs_of_geojson(*json, name));
 }
 
-/// A box is a list of numbers: whatever begins like one and has a comma is taken as such.
+/// A box is a list of numbers, so any text of only such characters with a comma is read as a box.
 bool looks_like_numbers(const std::string& text) {
   return text.find(',') != std::string::npos &&
          text.find_first_not_of("0123456789+-.,eE ") == std::string::npos;
@@ -152,7 +152,7 @@ Region Region::parse(const std::string& text, const std::stop_token& stop) {
     if (region.box_.empty()) {
       throw UsageError("the box '" + text + "' has a minimum above its maximum" +
                        (v[0] > v[v.size() / 2] && std::abs(v[0]) <= 180
-                            ? " (across the antimeridian longitudes go on: 170 to 190)"
+                            ? " (across the antimeridian longitudes continue: 170 to 190)"
                             : ""));
     }
     return region;
@@ -209,7 +209,7 @@ bool Region::covers(const Point2& place) const {
 }
 
 void Region::restrict(stream::Selection& selection) const {
-  // The source itself widens a box by what it may round.
+  // The source itself widens a box by its possible rounding.
   selection.region = shape_ ? box_ : extent();
   selection.covers = {};
   if (shape_) {
@@ -221,7 +221,7 @@ Overlap Region::overlap(const stream::Box3& box) const {
   if (box.empty() || !box_.intersects(box)) return Overlap::none;
   const bool inside = box_.contains(box.min) && box_.contains(box.max);
   if (!shape_) return inside ? Overlap::whole : Overlap::part;
-  // Only what is within the bounds counts, and is finite.
+  // Only the part within the bounds matters, which is also finite.
   Point2 low{}, high{};
   for (std::size_t axis = 0; axis < 2; ++axis) {
     low[axis] = std::max(box.min[axis], box_.min[axis]);
@@ -238,7 +238,8 @@ bool Region::touches(const std::array<stream::Point3, 3>& triangle) const {
   std::array<Point2, 3> flat{};
   for (std::size_t i = 0; i < 3; ++i) flat[i] = {triangle[i][0], triangle[i][1]};
   if (shape_) return shape_->touches(flat);
-  // Convex shapes whose bounds meet are apart only if a side of the triangle parts them.
+  // If the bounds meet, two convex shapes are disjoint only if a side of the triangle separates
+  // them.
   const int turn = tri::orientation(flat[0], flat[1], flat[2]);
   for (std::size_t i = 0; i < 3; ++i) {
     int least = 1, most = -1;

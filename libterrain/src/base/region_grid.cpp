@@ -8,12 +8,12 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kLeastGridSide = 16, kMostGridSide = 1024, kCellsPerCorner = 10;
-/// The most cells to mark, edge by edge.
+/// Limit on the cells that edges mark, counted per edge.
 constexpr double kMostMarks = 0x1p25;
 constexpr auto kOutside = static_cast<std::uint8_t>(Overlap::none);
 constexpr auto kRing = static_cast<std::uint8_t>(Overlap::part);
 constexpr auto kInside = static_cast<std::uint8_t>(Overlap::whole);
-static_assert(kOutside == 0 && kRing == 1 && kInside == 2, "their sums tell of all cells");
+static_assert(kOutside == 0 && kRing == 1 && kInside == 2, "sums over cells rely on these values");
 
 }  // namespace
 
@@ -50,7 +50,7 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
     }
   }
   while (side_ < kMostGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
-  // Spikes from side to side would mark the same cells again and again.
+  // Spikes across the whole box would mark the same cells many times.
   const Point2 reach = reach_of(polygons, low_, high_);
   while (side_ > kLeastGridSide &&
          (reach[0] + reach[1]) * static_cast<double>(side_) > kMostMarks) {
@@ -58,7 +58,7 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
   }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     per_unit_[axis] = static_cast<double>(side_) / (high_[axis] - low_[axis]);
-    // Points between the ends of an edge are rounded by less than this.
+    // Rounding moves points between the ends of an edge by less than this.
     margin_[axis] = std::max(std::abs(low_[axis]), std::abs(high_[axis])) * 0x1p-48;
   }
   cells_.assign(side_ * side_, kOutside);
@@ -107,7 +107,7 @@ void RegionGrid::mark_edge(const Point2& a, const Point2& b) {
   }
 }
 
-/// Neighbouring cells of a row without a ring between them lie on the same side: one is tested.
+/// Neighbouring cells of a row without a ring between them are on the same side, so one is tested.
 void RegionGrid::classify(const std::function<bool(const Point2&)>& inside) {
   for (std::size_t row = 0; row < side_; ++row) {
     const double y = low_[1] + (static_cast<double>(row) + 0.5) / per_unit_[1];
@@ -120,7 +120,7 @@ void RegionGrid::classify(const std::function<bool(const Point2&)>& inside) {
       }
       if (side == kRing) {
         const double x = low_[0] + (static_cast<double>(column) + 0.5) / per_unit_[0];
-        // Where cells are narrower than the steps of doubles a middle may be in another cell.
+        // Where cells are narrower than the spacing of doubles, a centre may be in another cell.
         if (cell(0, x) == column && cell(1, y) == row) side = inside({x, y}) ? kInside : kOutside;
       }
       value = side;

@@ -10,32 +10,32 @@
 
 namespace terrace::terrain {
 
-/// How often the edges of polygons go from side to side of the box from `low` to `high`, along each
-/// axis, all taken together.
+/// Returns the total length of the polygons' edges along each axis, in multiples of the side of the
+/// box from `low` to `high`.
 Point2 reach_of(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high);
 
-/// Cells over polygons, each inside, outside, or crossed by a ring: classifies most places and
-/// boxes in constant time. May be used by several threads at once.
+/// A grid over polygons with cells that are inside, outside, or crossed by a ring. Classifies most
+/// places and boxes in constant time. Several threads may use it at once.
 class RegionGrid {
  public:
-  /// About ten cells per corner, from 256 x 256 to 1024 x 1024 with 5 bytes each; fewer where edges
-  /// cross many cells, so that the time is linear in the corners. The polygons must
-  /// have finite corners. inside: called for places that lie on no ring.
+  /// Uses about ten cells per corner, from 256 x 256 to 1024 x 1024 with 5 bytes each; fewer where
+  /// edges cross many cells, so that the time is linear in the corners. The polygons must have
+  /// finite corners. inside: called for places that are not on a ring.
   RegionGrid(const std::vector<Polygon>& polygons,
              const std::function<bool(const Point2&)>& inside);
 
-  /// Classifies a place or a box. `none` and `whole` are certain, `whole` excludes touching a ring;
-  /// `part` is undecided. A place must lie within the polygons' bounds.
+  /// Classifies a place or a box. `none` and `whole` are certain, and `whole` excludes touching a
+  /// ring; `part` is undecided. A place must be within the polygons' bounds.
   [[nodiscard]] Overlap overlap(const Point2& place) const {
     return static_cast<Overlap>(cells_[cell(1, place[1]) * side_ + cell(0, place[0])]);
   }
   [[nodiscard]] Overlap overlap(const Point2& low, const Point2& high) const;
 
  private:
-  /// Monotone in `place`, so a place between two others lies between their cells.
+  /// Monotone in `value`, so the cell of a value between two others is between their cells.
   [[nodiscard]] std::size_t cell(std::size_t axis, double value) const {
     const double place = (value - low_[axis]) * per_unit_[axis];
-    // `!(place > 0)` also takes NaN, which an extent near the smallest double can give.
+    // `!(place > 0)` is also true for NaN, which an extent near the smallest double can produce.
     if (!(place > 0)) return 0;
     return place < static_cast<double>(side_) ? static_cast<std::size_t>(place) : side_ - 1;
   }
@@ -44,8 +44,8 @@ class RegionGrid {
 
   std::size_t side_ = 256;
   Point2 low_{}, high_{}, per_unit_{}, margin_{};
-  std::vector<std::uint8_t> cells_;  ///< an Overlap each, small enough for the caches
-  /// Summed-area table of those numbers: four of its entries give the sum of any rectangle.
+  std::vector<std::uint8_t> cells_;  ///< one Overlap per cell, small enough for the caches
+  /// Summed-area table of these numbers: four of its entries give the sum over any rectangle.
   std::vector<std::uint32_t> sums_;
 };
 

@@ -16,11 +16,11 @@
 namespace terrace::terrain {
 namespace {
 
-/// 20 MB each for 100,000 corners. The grid leaves one question in a hundred, so a few serve many
-/// threads.
+/// Each takes 20 MB for 100,000 corners. The grid answers all but one query in a hundred, so a few
+/// serve many threads.
 constexpr unsigned kMostPrepared = 4;
 
-/// GEOS's functions, and what it said last.
+/// GEOS's functions, with its last error message.
 class Geos {
  public:
   struct Destroy {
@@ -50,8 +50,8 @@ class Geos {
     if (made == nullptr) fail();
     return Owned<T>(made, Destroy{context_});
   }
-  /// A predicate's answer.
-  [[nodiscard]] bool told(char answer) const {
+  /// Converts the answer of a predicate.
+  [[nodiscard]] bool is_true(char answer) const {
     if (answer != 0 && answer != 1) fail();
     return answer == 1;
   }
@@ -59,14 +59,14 @@ class Geos {
   [[nodiscard]] Geometry point(const Point2& p) const {
     return own(GEOSGeom_createPointFromXY_r(context_, p[0], p[1]));
   }
-  /// Without the corner that closes it.
+  /// Adds the closing corner, which `corners` does not have.
   [[nodiscard]] Geometry ring(std::span<const Point2> corners) const {
     std::vector<Point2> closed(corners.begin(), corners.end());
     closed.push_back(corners.front());
     GEOSCoordSequence* places = GEOSCoordSeq_copyFromBuffer_r(
         context_, closed.front().data(), static_cast<unsigned>(closed.size()), 0, 0);
     if (places == nullptr) fail();
-    return own(GEOSGeom_createLinearRing_r(context_, places));  // which it takes in any case
+    return own(GEOSGeom_createLinearRing_r(context_, places));  // takes ownership even if it fails
   }
   [[nodiscard]] Geometry polygon(std::span<const Point2> corners) const {
     return own(GEOSGeom_createPolygon_r(context_, ring(corners).release(), nullptr, 0));
@@ -103,7 +103,7 @@ void require_valid(const std::vector<Polygon>& polygons, const std::string& file
                          .remedy = "repair the polygons, for example by \"Fix geometries\" of QGIS "
                                    "or ST_MakeValid of PostGIS"});
   };
-  if (polygons.empty()) refuse("the region holds no polygon");
+  if (polygons.empty()) refuse("the region contains no polygon");
   for (std::size_t i = 0; i < polygons.size(); ++i) {
     const std::string polygon = "polygon " + std::to_string(i + 1);
     where = polygon;
@@ -126,17 +126,17 @@ void require_valid(const std::vector<Polygon>& polygons, const std::string& file
       if (own) refuse("the ring is not valid: " + *own);
     }
     where = polygon;
-    refuse("the polygon's rings do not fit together: " + *fault);
+    refuse("its rings do not form a valid polygon: " + *fault);
   }
 }
 
 }  // namespace
 
-/// What GEOS makes of polygons to answer quickly. It fills its indexes while it answers, so only
-/// one thread at a time may ask.
+/// Polygons prepared by GEOS for fast queries. GEOS builds its indexes while it answers, so only
+/// one thread at a time may query.
 class RegionShape::Prepared {
  public:
-  /// swapped: x and y change places.
+  /// swapped: exchanges x and y.
   Prepared(const std::vector<Polygon>& polygons, bool swapped)
       : swapped_(swapped), tree_(geos_.own(GEOSSTRtree_create_r(geos_.context(), 10))) {
     for (const Polygon& polygon : polygons) {
@@ -161,7 +161,8 @@ class RegionShape::Prepared {
   [[nodiscard]] bool any_meets(const Geos::Geometry& other) const {
     return any(other, GEOSPreparedIntersects_r);
   }
-  /// Without touching a ring. (`covers` compares all edges where one is touched.)
+  /// Whether a polygon contains `other` without touching it with a ring. (`covers` compares all
+  /// edges where a ring is touched.)
   [[nodiscard]] bool any_holds(const Geos::Geometry& other) const {
     return any(other, GEOSPreparedContainsProperly_r);
   }
@@ -192,7 +193,7 @@ class RegionShape::Prepared {
               asked.predicate(asked.context, static_cast<Shapes*>(item)->get(), asked.other);
         },
         &question);
-    return geos_.told(question.answer);
+    return geos_.is_true(question.answer);
   }
 
   bool swapped_;
@@ -204,8 +205,8 @@ class RegionShape::Prepared {
 
 namespace {
 
-/// Whether edges go up and down more than to and fro. GEOS looks at all edges that cross the row of
-/// a place.
+/// Whether edges are longer in y than in x in total. GEOS visits all edges that cross the row of a
+/// place.
 bool crosses_rows(const std::vector<Polygon>& polygons) {
   stream::Box3 box;
   for (const Polygon& polygon : polygons) {
@@ -235,7 +236,7 @@ RegionShape::RegionShape(std::vector<Polygon> polygons, const std::string& file,
 
 RegionShape::~RegionShape() = default;
 
-/// Asks one that no other thread uses; waits if all are used.
+/// Queries a copy that no other thread uses; waits if all are in use.
 template <class Ask>
 bool RegionShape::ask(const Ask& question) const {
   std::unique_ptr<Prepared> shape;
@@ -302,7 +303,7 @@ bool RegionShape::touches(const std::array<Point2, 3>& triangle) const {
 
 namespace {
 
-/// Lines and points, which have no area, are left out.
+/// Appends the polygons of a geometry; leaves out lines and points, which have no area.
 void add_parts(const Geos& geos, const GEOSGeometry* shape, std::vector<Polygon>& polygons) {
   const GEOSContextHandle_t context = geos.context();
   const int type = GEOSGeomTypeId_r(context, shape);

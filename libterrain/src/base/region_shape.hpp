@@ -14,14 +14,14 @@
 
 namespace terrace::terrain {
 
-/// Polygons prepared for queries, answered by GEOS where the grid cannot decide. Its predicates use
-/// twice the precision of a double where rounding could matter. All functions may be called
-/// from several threads.
+/// Polygons prepared for queries; GEOS answers where the grid cannot decide. GEOS's predicates use
+/// twice the precision of a double where rounding could matter. Several threads may call all
+/// functions at once.
 class RegionShape {
  public:
   /// Throws: stream::Error that names `file`, the polygon, the ring and the place if there is no
-  /// polygon or one is not valid by OGC Simple Features; stream::Stopped. Polygons may overlap each
-  /// other.
+  /// polygon or if one is invalid by OGC Simple Features; stream::Stopped. Polygons may overlap
+  /// each other.
   RegionShape(std::vector<Polygon> polygons, const std::string& file,
               const std::stop_token& stop = {});
   RegionShape(const RegionShape&) = delete;
@@ -29,8 +29,7 @@ class RegionShape {
   ~RegionShape();
 
   [[nodiscard]] const std::vector<Polygon>& polygons() const { return polygons_; }
-  /// Requires that places, boxes and triangles have finite coordinates. A place on a ring is
-  /// covered.
+  /// Requires places, boxes and triangles with finite coordinates. A place on a ring is covered.
   [[nodiscard]] bool covers(const Point2& place) const;
   [[nodiscard]] Overlap overlap(const Point2& low, const Point2& high) const;
   /// Whether the closed triangle has a point in common with a polygon.
@@ -43,16 +42,16 @@ class RegionShape {
   bool ask(const Ask& question) const;
 
   std::vector<Polygon> polygons_;
-  bool swapped_;  ///< GEOS gets y, x
+  bool swapped_;  ///< whether GEOS gets y, x
   mutable std::mutex mutex_;
   mutable std::condition_variable back_;
   mutable std::vector<std::unique_ptr<Prepared>> idle_;
   mutable unsigned made_ = 0;
-  RegionGrid grid_;  // made by asking the above
+  RegionGrid grid_;  // its constructor queries the members above
 };
 
-/// The part of the plane that is inside the polygon by the even-odd rule, as valid polygons; the
-/// polygon itself where it is valid. Empty if it has no area.
+/// Returns the part of the plane inside the polygon by the even-odd rule, as valid polygons; the
+/// polygon itself if it is valid. Empty if it has no area.
 std::vector<Polygon> valid_polygons(const Polygon& polygon);
 
 }  // namespace terrace::terrain

@@ -8,11 +8,12 @@
 
 namespace terrace::terrain {
 
-/// How much of a surface is steeper than 60 degrees: above half of it, the triangles join the upper
-/// and the lower side of a body that was triangulated as if it were a terrain.
+/// Measures how much of a surface is steeper than 60 degrees. If more than half of it is, the
+/// triangles join the upper and the lower side of a body that was triangulated as if it were
+/// terrain.
 class Steepness {
  public:
-  /// `normal`: of a triangle, as long as its area, or all by the same factor longer.
+  /// `normal`: normal of a triangle with the length of its area; all may be scaled by one factor.
   void add(const std::array<double, 3>& normal) {
     const double area = std::sqrt(dot(normal, normal));
     all_ += area;

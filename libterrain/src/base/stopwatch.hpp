@@ -5,7 +5,7 @@
 
 namespace terrace::terrain {
 
-/// Wall clock since construction.
+/// Wall-clock time since construction.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {

@@ -20,7 +20,7 @@ void need_points(const stream::Store& store, const std::string& what) {
 }
 
 bool is_geocentric(const stream::Crs& recorded) {
-  // WKT 2 as PROJ writes it: that of a geographic system begins with GEOGCRS.
+  // In the WKT 2 that PROJ writes; a geographic system starts with GEOGCRS instead.
   return recorded.wkt.starts_with("GEODCRS[");
 }
 
@@ -33,7 +33,7 @@ void need_terrain(const stream::Store& store, const std::string& what) {
                        .cause = "has the geocentric CRS \"" + crs.name +
                                 "\", in which z is not a height, and " + what + " needs heights",
                        .remedy = "convert the points to a projected CRS and build a store of "
-                                 "those, or make a surface of the scan"});
+                                 "them, or make a surface of the scan"});
 }
 
 void need_level(const stream::Store& store, unsigned level) {
@@ -47,9 +47,9 @@ void need_all_points(const stream::Store& store, unsigned level, std::uint64_t p
   if (points == expected) return;
   throw stream::Error({.file = store.path().string(),
                        .where = "level " + std::to_string(level),
-                       .cause = "the clusters have " + counted(points, "point") + " and not the " +
-                                std::to_string(expected) + " that the manifest tells",
-                       .remedy = "restore the files or build the store anew"});
+                       .cause = "the clusters have " + counted(points, "point") +
+                                " instead of the " + std::to_string(expected) + " in the manifest",
+                       .remedy = "restore the files or rebuild the store"});
 }
 
 std::string extent_text(const stream::Store& store) {
@@ -67,8 +67,9 @@ void throw_none_inside(const stream::Store& store, const std::string& what) {
       {.file = store.path().string(),
        .where = {},
        .cause = "no " + what + " is in the region; the points have " + extent_text(store),
-       .remedy = "give a `region` that meets them: boxes are in their CRS or in `region_crs`, "
-                 "GeoJSON is in the CRS that it names, or else in longitude and latitude"});
+       .remedy =
+           "give a `region` that contains some of them: boxes are in their CRS or in `region_crs`, "
+           "GeoJSON is in the CRS that it names, by default longitude and latitude"});
 }
 
 }  // namespace terrace::terrain

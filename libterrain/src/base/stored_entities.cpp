@@ -50,7 +50,7 @@ CornerReader::Column CornerReader::column(const stream::Schema& schema,
   if (found == schema.attributes.end()) {
     throw stream::Error({.file = file_,
                          .where = {},
-                         .cause = "the column \"" + name + "\", of the corners, is not there",
+                         .cause = "the column \"" + name + "\" of the corners is missing",
                          .remedy = "keep all columns: leave `keep` and `drop` out"});
   }
   return {found->type,

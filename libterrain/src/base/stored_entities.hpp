@@ -11,17 +11,17 @@
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
 
-/// Stores of triangles, segments or polylines: every "point" is the first corner of one, with the
-/// others as attributes.
+/// Stores of triangles, segments or polylines: each "point" is the first corner of an entity, and
+/// its attributes are the other corners.
 
 namespace terrace::terrain {
 
-/// The parameter in a store's manifest that names what it holds, unless that is points.
+/// The parameter in a store's manifest that names its entities, unless they are points.
 inline constexpr std::string_view kEntitiesParameter = "entities";
 
 [[nodiscard]] stream::Entities entities_of(const stream::StoreSchema& schema);
 
-/// The place in the CRS, bit for bit as it was read: an identity transform is skipped, because sums
+/// Returns the place in the CRS exactly as it was read. Skips identity transforms, because sums
 /// would lose the sign of zeros.
 [[nodiscard]] stream::Point3 exact_world_point(const stream::Placement& placement,
                                                const stream::Point3& stored);
@@ -29,13 +29,14 @@ inline constexpr std::string_view kEntitiesParameter = "entities";
 /// Reads the corners of an entity from its record, in stored coordinates.
 class CornerReader {
  public:
-  /// entities: not points. Throws: stream::Error, about `file`, if the columns are not there.
+  /// entities: not points. Throws: stream::Error, about `file`, if the columns are missing.
   CornerReader(const stream::Schema& schema, stream::Entities entities, std::string file);
 
-  /// Most corners of an entity, at most stream::kPolylineVertices.
+  /// The most corners that an entity can have, at most stream::kPolylineVertices.
   [[nodiscard]] std::size_t most() const { return others_.size() / 3 + 1; }
-  /// Reads all corners but the first, to corners[1] and on, and returns how many there are with it.
-  /// corners: most() of them. Throws: stream::Error on an impossible number of vertices.
+  /// Reads all corners but the first into corners[1] and on, and returns the number of corners, the
+  /// first included. corners: has size most(). Throws: stream::Error on an impossible number of
+  /// vertices.
   std::size_t operator()(std::span<const std::byte> record,
                          std::span<stream::Point3> corners) const;
 
@@ -47,7 +48,7 @@ class CornerReader {
   [[nodiscard]] Column column(const stream::Schema& schema, const std::string& name) const;
 
   std::string file_;
-  std::vector<Column> others_;  ///< x, y, z of the second corner, of the third, ...
+  std::vector<Column> others_;  ///< x, y, z of the second corner, then of the third, ...
   std::optional<Column> vertices_;
 };
 

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kLeastWaiting = 4096;
 
-/// Where a side from `from` to `to` (counter-clockwise, so that the inside is to its left) has the
-/// coordinate c of `axis`; on the side or to its right.
+/// Returns the other coordinate at which a side from `from` to `to` (counter-clockwise, so that the
+/// inside is on its left) has the coordinate c along `axis`; on the side or to its right.
 double outward_place(const Point2& from, const Point2& to, unsigned axis, double c) {
   const unsigned along = 1 - axis;
   if (from[along] == to[along]) return from[along];
@@ -22,7 +22,7 @@ double outward_place(const Point2& from, const Point2& to, unsigned axis, double
   const auto left = [&](double t) {
     return tri::orientation(from, to, axis == 0 ? Point2{c, t} : Point2{t, c}) > 0;
   };
-  // To the right of a side that goes to larger x is down, of one that goes to larger y is right.
+  // Right of a side is down if the side goes to larger x, and up in x if it goes to larger y.
   const bool grows = (to[axis] > from[axis]) == (axis == 1);
   const double size = std::max(std::abs(from[along]), std::abs(to[along]));
   for (double step = std::max(size * 0x1p-53, 0x1p-1060); left(at); step *= 2.0)
@@ -46,7 +46,7 @@ std::vector<Point2> convex_hull(std::vector<Point2> points, bool keep_straight) 
     hull.push_back(p);
   };
   for (const Point2& p : points) add(p, 0);
-  // All on one line: there is no way back.
+  // All on one line: skip the upper chain.
   if (hull.size() == points.size() && tri::orientation(points[0], points[1], points.back()) == 0 &&
       std::all_of(points.begin(), points.end(), [&](const Point2& p) {
         return tri::orientation(points.front(), points.back(), p) == 0;
@@ -83,7 +83,7 @@ bool StreamingHull::inside(const Point2& point) const {
   const Point2& least = hull_.front();
   const Point2& greatest = hull_[upper_];
   if (point < least || greatest < point) return false;
-  // The chain below from the least corner to the greatest, the one above back again.
+  // The lower chain goes from the least corner to the greatest, the upper one back again.
   const bool below = tri::orientation(least, greatest, point) < 0;
   const auto begin = hull_.begin(), middle = begin + static_cast<std::ptrdiff_t>(upper_);
   if (below) {
@@ -104,7 +104,7 @@ void StreamingHull::keep(const Point2& point) {
   waiting_.clear();
   if (hull_.size() < 3) return;
   upper_ = static_cast<std::size_t>(std::max_element(hull_.begin(), hull_.end()) - hull_.begin());
-  // Between the extremes of the four diagonals, one in each quadrant about the box.
+  // A box between the extremes along the four diagonals, one in each quadrant.
   std::array<Point2, 4> extreme;
   extreme.fill(hull_.front());
   const auto reach = [](const Point2& p, std::size_t d) {

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The leading number of `text`; `rest` is what follows. False if there is none.
+/// Parses the leading number of `text`; `rest` is the remainder. Returns false without a number.
 bool leading_number(std::string_view text, double& value, std::string_view& rest) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || !std::isfinite(value)) return false;
@@ -22,7 +22,7 @@ bool leading_number(std::string_view text, double& value, std::string_view& rest
   return true;
 }
 
-/// Power of the suffix letter in "kMGT" (0 without one), or -1.
+/// Returns the power of the suffix letter in "kMGT" (0 without a letter), or -1.
 int suffix_power(std::string_view letters) {
   if (letters.empty()) return 0;
   switch (letters.front()) {
@@ -80,7 +80,7 @@ std::uint64_t parse_count(std::string_view text) {
     const int power = suffix_power(rest);
     const double count = power < 0 ? -1 : scaled(value, 1000, power);
     if (count >= 0 && count < kTooLarge && count == std::floor(count)) {
-      // A plain integer is taken digit by digit: doubles stop being exact at 2^53.
+      // Parse plain integers as such, because doubles are exact only up to 2^53.
       return number_from<std::uint64_t>(text).value_or(static_cast<std::uint64_t>(count));
     }
   }
@@ -183,7 +183,7 @@ std::string readable_number(double value, int digits) {
     std::snprintf(text.data(), text.size(), "%.*g", digits, value);
   }
   const std::string plain = text.data();
-  // Not in coordinates.
+  // Not for coordinates.
   const bool commas = digits < 10 && size >= 999.5 && plain.find_first_of(".e") == plain.npos;
   if (!commas) return plain;
   return (value < 0 ? "-" : "") + with_commas(static_cast<std::uint64_t>(std::llround(size)));
@@ -192,10 +192,10 @@ std::string readable_number(double value, int digits) {
 std::string readable_bound(double value) {
   if (!(value > 0.0) || !std::isfinite(value)) return readable_number(value);
   if (value >= 100.0) return readable_number(std::ceil(value));
-  // The least number of 3 digits that is not below the value.
+  // The smallest number of 3 digits that is not below the value.
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
   const double shorter = std::round(value / unit);
-  // Numbers that differ by rounding errors alone count as equal.
+  // Numbers that differ only by rounding errors count as equal.
   const double kept = value <= shorter * unit * (1.0 + 1e-12) ? shorter : std::ceil(value / unit);
   return readable_number(kept * unit);
 }

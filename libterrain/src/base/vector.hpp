@@ -19,7 +19,7 @@ inline std::array<double, 3> cross(const std::array<double, 3>& a, const std::ar
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// Unit vector in the direction of v; +z for the zero vector.
+/// Returns the unit vector in the direction of v; +z for the zero vector.
 inline std::array<double, 3> unit(const std::array<double, 3>& v) {
   const double length = std::sqrt(dot(v, v));
   if (!(length > 0)) return {0, 0, 1};

@@ -7,7 +7,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Patches along a side of the box, at most.
+/// The most patches along a side of the box.
 constexpr double kMostPatches = 64;
 constexpr double kPatchMetres = 20e3;
 constexpr double kMetresPerDegree = 111e3;
@@ -20,7 +20,7 @@ std::optional<GeographyPatch> GeographyPatch::fit(
   std::array<Point2, QuinticSurface::kPlaces> places = QuinticSurface::places();
   for (Point2& p : places) p = {low[0] + p[0] * size[0], low[1] + p[1] * size[1]};
   exact(places);
-  // Longitudes counted on from the first beyond 180, and how far that goes.
+  // Unwraps longitudes from the first one, also beyond 180, and finds their range.
   double least = places[0][0], most = places[0][0];
   std::array<double, QuinticSurface::kPlaces> longitudes{}, latitudes{};
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -36,7 +36,7 @@ std::optional<GeographyPatch> GeographyPatch::fit(
   const auto latitude = QuinticSurface::through(latitudes, tolerance);
   if (!longitude || !latitude) return std::nullopt;
   GeographyPatch patch(*longitude, *latitude);
-  // What the extremes of the places themselves are is not known: a margin for the edges.
+  // The extremes may be between the sampled places, so leave a margin.
   patch.within_turn_ = least - (most - least) >= -180.0 && most + (most - least) <= 180.0;
   return patch;
 }
@@ -95,7 +95,7 @@ BoxGeography::BoxGeography(const CoordinateSystem& system, const stream::Box3& b
 }
 
 void BoxGeography::operator()(std::span<Point2> places) const {
-  std::size_t exact = 0;  // the places before that are done; those from here on are not
+  std::size_t exact = 0;  // the places before this index are done
   for (std::size_t i = 0; i < places.size(); ++i) {
     Point2 place = places[i];
     if (!patches_.convert(place)) continue;

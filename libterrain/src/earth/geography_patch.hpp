@@ -12,10 +12,10 @@
 
 namespace terrace::terrain {
 
-/// Longitudes and latitudes in a rectangle of plane coordinates by polynomials.
+/// Polynomials for longitude and latitude in a rectangle of plane coordinates.
 class GeographyPatch {
  public:
-  /// The polynomials along a parallel of the rectangle's sides.
+  /// The polynomials along a parallel to two of the rectangle's sides.
   struct Row {
     Point2 base{};
     QuinticSurface::Quintic a{}, b{};
@@ -23,9 +23,10 @@ class GeographyPatch {
     [[nodiscard]] double latitude(double s) const { return base[1] + QuinticSurface::value(b, s); }
   };
 
-  /// exact: turns plane coordinates into longitudes and latitudes in place, NaN where there are
-  /// none. Longitudes must lie within one turn. nullopt where a place in the rectangle could be off
-  /// by more than `tolerance` degrees, as QuinticSurface tells. 42 exact places.
+  /// Fits the polynomials to 42 exact places. exact: converts plane coordinates to longitudes and
+  /// latitudes in place, NaN for places without an image. Longitudes must be within one turn.
+  /// Returns nullopt if a place in the rectangle could be off by more than `tolerance` degrees,
+  /// according to QuinticSurface.
   static std::optional<GeographyPatch> fit(const Point2& low, const Point2& size, double tolerance,
                                            const std::function<void(std::span<Point2>)>& exact);
 
@@ -33,7 +34,7 @@ class GeographyPatch {
   [[nodiscard]] Row row(double t) const {
     return {{longitude_.base(), latitude_.base()}, longitude_.along(t), latitude_.along(t)};
   }
-  /// Whether all longitudes lie in [-180, 180] as the polynomials give them.
+  /// Whether the polynomials give all longitudes in [-180, 180].
   [[nodiscard]] bool is_within_turn() const { return within_turn_; }
   static double in_turn(double longitude) {
     return longitude > 180 ? longitude - 360 : longitude < -180 ? longitude + 360 : longitude;
@@ -47,18 +48,18 @@ class GeographyPatch {
   bool within_turn_ = true;
 };
 
-/// Patches side by side over a box. Const members may be called by several threads at once.
+/// A grid of patches over a box. Several threads may call const members at once.
 class GeographyPatches {
  public:
-  /// None.
+  /// Without patches.
   GeographyPatches() = default;
-  /// longest: of a patch's sides; where the box has more than 64 of them along a side they are
-  /// longer. The others: as GeographyPatch::fit() wants them.
+  /// longest: the longest side of a patch; exceeded if the box would need more than 64 patches
+  /// along a side. For the other parameters see GeographyPatch::fit().
   GeographyPatches(const Point2& low, const Point2& high, const Point2& longest, double tolerance,
                    const std::function<void(std::span<Point2>)>& exact);
 
-  /// Converts a place; false, and nothing done, where polynomials do not suffice. The first
-  /// coordinate is not brought into one turn.
+  /// Converts a place; returns false and leaves it unchanged where polynomials are not accurate
+  /// enough. The longitude is not normalised to one turn.
   bool convert(Point2& place) const;
 
  private:
@@ -67,20 +68,21 @@ class GeographyPatches {
   std::vector<std::optional<GeographyPatch>> patches_;
 };
 
-/// Longitudes and latitudes of WGS 84 for many places in a box of a reference system, fast: by
-/// GeographyPatch in patches of at most 20 km where the box has no more than 64 of them along a
-/// side, exactly where polynomials do not suffice. Const members may be called by several threads
-/// at once.
+/// Converts many places in a box of a CRS to longitudes and latitudes of WGS 84, fast. Uses
+/// GeographyPatch in patches of at most 20 km (larger if the box would need more than 64 along a
+/// side), and exact conversion where polynomials are not accurate enough. Several threads may call
+/// const members at once.
 class BoxGeography {
  public:
-  /// Degrees: what a place may be off, a hundredth of a millimetre on the ground.
+  /// Largest error of a place in degrees, a hundredth of a millimetre on the ground.
   static constexpr double kTolerance = 1e-10;
 
-  /// box: x and y of `system`. Throws: stream::Error if no operation leads to WGS 84.
+  /// box: in x and y of `system`. Throws: stream::Error if no operation leads to WGS 84.
   BoxGeography(const CoordinateSystem& system, const stream::Box3& box);
 
-  /// As CoordinateSystem::to_geographic(), within kTolerance; the same bits for a place whatever
-  /// the others. 29 million places per second and core (tests/bench/geography_bench).
+  /// As CoordinateSystem::to_geographic(), within kTolerance. The result for a place does not
+  /// depend on the other places. 29 million places per second and core
+  /// (tests/bench/geography_bench).
   void operator()(std::span<Point2> places) const;
   [[nodiscard]] const CoordinateSystem& system() const { return system_; }
 

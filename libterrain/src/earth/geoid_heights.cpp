@@ -30,8 +30,8 @@ GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
   if (error) fail("cannot be read: " + error.message(), fetch);
   if (bytes > memory_bytes) {
     fail("takes " + std::to_string((bytes >> 20) + 1) + "M of memory, " +
-             std::to_string(memory_bytes >> 20) + "M are left of `memory_bytes`",
-         "raise `memory_bytes` or take a coarser grid");
+             std::to_string(memory_bytes >> 20) + "M of `memory_bytes` are left",
+         "raise `memory_bytes` or use a coarser grid");
   }
   try {
     const std::filesystem::path folder =
@@ -40,7 +40,7 @@ GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
     geoid_ = std::make_unique<const GeographicLib::Geoid>(path.stem().string(), folder.string(),
                                                           kCubic, kForThreads);
   } catch (const std::exception& damage) {
-    fail(std::string("is no geoid grid: ") + damage.what(), fetch);
+    fail(std::string("is not a geoid grid: ") + damage.what(), fetch);
   }
 }
 
@@ -61,7 +61,7 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::StoreSchema& schema, Height
   }
   const std::string& recorded = schema.vertical;
   if (recorded == "ellipsoidal" && (!geoid.empty() || orthometric)) {
-    throw UsageError("the store's heights are ellipsoidal already: leave " +
+    throw UsageError("the store's heights are already ellipsoidal: leave " +
                      std::string(geoid.empty() ? "`vertical` orthometric" : "`geoid`") +
                      " out, or build the store with `vertical` orthometric if they are not");
   }
@@ -73,7 +73,7 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::StoreSchema& schema, Height
                      "(by the store's vertical CRS, or EGM96), `geoid` FILE (a GeographicLib "
                      "geoid grid), `vertical` ellipsoidal if they are that, or `vertical` ignore");
   }
-  // One unit in all verbs, whatever had to be assumed.
+  // The same unit as all other verbs, with the same assumption.
   const Ground ground(schema);
   metres_per_unit_ = ground.metres_vertical();
   if (!metres_in_unit(schema.coordinates[2].unit) && !metres_in_unit(schema.crs.vertical_unit)) {

@@ -10,8 +10,8 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kPatch = 256;  // samples along a side at first
-constexpr std::size_t kFewest = 64;  // samples: for fewer, polynomials cost more than they spare
+constexpr std::size_t kPatch = 256;  // samples along a side of the first patches
+constexpr std::size_t kFewest = 64;  // samples below which polynomials cost more than they save
 
 }  // namespace
 
@@ -22,7 +22,7 @@ struct GridGeography::Output {
   double* latitude;
 };
 
-/// Samples within the window, counted from its corner.
+/// A rectangle of samples, relative to the window's corner.
 struct GridGeography::Patch {
   std::size_t column, row, columns, rows;
 };
@@ -93,7 +93,7 @@ bool GridGeography::interpolated(const Patch& patch, const Output& output) const
 }
 
 void GridGeography::fill(const Patch& patch, const Output& output) const {
-  // A single row or column has no rectangle.
+  // A single row or column has no area to fit.
   if (patch.columns * patch.rows < kFewest || patch.columns == 1 || patch.rows == 1) {
     return exact(patch, output);
   }

@@ -20,7 +20,7 @@ struct UnitName {
   double metres;
 };
 
-// The names that stream::canonical_unit() gives.
+// The names that stream::canonical_unit() returns.
 constexpr double kSurveyFoot = 1200.0 / 3937.0;
 constexpr std::array<UnitName, 18> kUnits{{
     {"metre", 1.0},
@@ -52,8 +52,8 @@ bool same_text(std::string_view a, std::string_view b) {
 }  // namespace
 
 MetresPerDegree metres_per_degree(double latitude) {
-  // Radii of the parallel and the meridian: Snyder, Map Projections - A Working Manual (1987),
-  // USGS Professional Paper 1395, equations 4-19 to 4-21.
+  // Radii of the parallel and the meridian: Snyder, Map Projections - A Working Manual (1987), USGS
+  // Professional Paper 1395, equations 4-19 to 4-21.
   const double a = GeographicLib::Constants::WGS84_a();
   const double f = GeographicLib::Constants::WGS84_f();
   const double e2 = f * (2.0 - f);
@@ -99,7 +99,7 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
     known = definition_of(crs);
     if (known && !known->geographic) system_.emplace(*known);
   } catch (const CrsError&) {
-    // Its unit counts all the same; whoever needs places says what is wrong with it.
+    // The unit is still used; callers that need positions report the error.
   }
   if (crs.geographic || degrees) {
     kind_ = Kind::geographic;
@@ -117,7 +117,7 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
     assume("the horizontal unit is unknown and taken as metres");
   }
 
-  // The heights' own unit if it is named, else that of a CRS in feet, else metres.
+  // The heights' own unit if it is named, then that of a CRS in feet, then metres.
   const std::string& own = placement_.coordinates[2].unit;
   // A file may name the unit in WKT alone.
   const double of_heights = crs.vertical_unit.empty() && known ? known->metres_per_height : 0;
@@ -147,11 +147,11 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
   metres_vertical_ *= z_weight;
 }
 
-/// East, the mixed term and north of the symmetric map from a step in x, y to metres: the square
-/// root of the metric that the ellipsoid has in the plane.
+/// Returns the east, mixed and north terms of the symmetric map from a step in x, y to metres: the
+/// square root of the ellipsoid's metric in the plane.
 std::array<double, 3> Ground::projected_scale(const stream::Point3& centre) const {
   const double unit = metres_horizontal_;
-  // A step of a hundred metres tells the slopes to nine digits.
+  // With a step of a hundred metres the slopes have nine correct digits.
   const double step = 100.0 / unit;
   std::array<Point2, 5> places{{{centre[0], centre[1]},
                                 {centre[0] - step, centre[1]},
@@ -170,12 +170,12 @@ std::array<double, 3> Ground::projected_scale(const stream::Point3& centre) cons
   const double xy = x[0] * y[0] + x[1] * y[1];
   const double root = std::sqrt(std::max(0.0, xx * yy - xy * xy));
   const double sum = std::sqrt(xx + yy + 2 * root);
-  // Projections call the C library's functions: rounded to five digits, their last bits do not
-  // reach what is clustered.
+  // Projections call the C library's functions. Rounding to five digits keeps their last bits from
+  // affecting clusters.
   const auto rounded = [&](double value) { return std::round(value / unit * 0x1p16) * 0x1p-16; };
   const std::array<double, 3> scale{rounded((xx + root) / sum), rounded(xy / sum),
                                     rounded((yy + root) / sum)};
-  // Outside of the projection, and where longitudes are lost at a pole.
+  // Fails outside the projection's area, and at a pole, where longitudes are undefined.
   const bool usable = scale[0] > 0.01 && scale[2] > 0.01 && scale[0] < 100 && scale[2] < 100 &&
                       std::abs(scale[1]) < 0.5 * std::min(scale[0], scale[2]);
   if (!usable) return {unit, 0, unit};
@@ -198,8 +198,8 @@ GroundMap Ground::map(const stream::Box3& stored) const {
       mixed = scale[1];
       north = scale[2];
     } else {
-      // y = a ln tan(pi/4 + phi/2), so cos(phi) = 1 / cosh(y/a). One metre of the map is
-      // rho cos(phi)/a metres northward on the ground, N cos(phi)/a eastward.
+      // y = a ln tan(pi/4 + phi/2), so cos(phi) = 1 / cosh(y/a). One metre in the map is rho
+      // cos(phi)/a metres north on the ground, and N cos(phi)/a metres east.
       const double a = GeographicLib::Constants::WGS84_a();
       const double growth = base::exp(-std::abs(centre[1]) / a);
       const double cosine = 2.0 * growth / (1.0 + growth * growth);

@@ -10,49 +10,51 @@
 #include "terrace/terrain/context.hpp"
 #include "terrace/terrain/crs.hpp"
 
-/// Ground distances. Points are stored as they came, in degrees, feet, or columns and rows; what is
-/// near or far is measured in metres on the ground.
+/// Ground distances. Points are stored as given, in degrees, feet, or columns and rows, but
+/// distances are measured in metres on the ground.
 
 namespace terrace::terrain {
 
-/// A linear map, row-major: ground = map * stored, in metres (east, north, up weighed).
+/// A linear map, row-major: ground = map * stored, in metres (east, north, weighted up).
 using GroundMap = std::array<double, 9>;
 
 struct MetresPerDegree {
   double longitude = 0.0, latitude = 0.0;
 };
-/// On the WGS 84 ellipsoid at `latitude` (degrees, clamped to [-90, 90]): the radii of the parallel
-/// and of the meridian's curvature, times pi/180. Within 1e-14 relative. The same bits on every
-/// machine, unlike what calls the C library's sin and cos.
+/// Returns metres per degree on the WGS 84 ellipsoid at `latitude` (degrees, clamped to [-90, 90]):
+/// the radii of the parallel and of the meridian's curvature, times pi/180. The relative error is
+/// at most 1e-14. The bits are the same on every machine, because it does not call the C library's
+/// sin and cos.
 MetresPerDegree metres_per_degree(double latitude);
 
-/// Metres in a unit of length, by any word that stream::canonical_unit() knows; nothing for a unit
-/// that is not known.
+/// Returns metres per unit of length, for any name that stream::canonical_unit() knows; nullopt for
+/// an unknown unit.
 std::optional<double> metres_in_unit(std::string_view unit);
 
-/// Local ground maps for a source or a store.
+/// Local maps to the ground for a source or a store.
 class Ground {
  public:
-  /// z_weight: what heights are multiplied by besides, `--z-weight`.
+  /// z_weight: an extra factor for heights, `--z-weight`.
   explicit Ground(stream::Placement placement, double z_weight = 1.0);
 
-  /// The map near the centre of `stored`, a box in stored coordinates: the local scale of the
-  /// projection, on the axes of the CRS (its east and north, not the meridian's). Without a known
-  /// CRS it is the same everywhere.
+  /// Returns the map near the centre of `stored`, a box in stored coordinates: the local scale of
+  /// the projection, along the axes of the CRS (its east and north, not the meridian's). Without a
+  /// known CRS it is the same everywhere.
   [[nodiscard]] GroundMap map(const stream::Box3& stored) const;
 
   [[nodiscard]] bool same_everywhere() const { return kind_ == Kind::linear; }
-  /// Whether the map is a projection's scale, which changes little over a hundredth of an area.
+  /// Whether the map is the scale of a projection, which changes little over a hundredth of an
+  /// area.
   [[nodiscard]] bool projected() const { return kind_ == Kind::projected; }
 
-  /// What had to be assumed because the source does not say; empty if nothing.
+  /// What was assumed because the source does not say it; may be empty.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
-  /// The part of assumption() that says which unit of heights, named by the source, is not known.
-  /// Empty if it is known or not named. Whatever turns heights into metres reports it.
+  /// The part of assumption() about a unit of heights that the source names but that is unknown.
+  /// Empty if the unit is known or not named. Every conversion of heights to metres reports it.
   [[nodiscard]] const std::string& unknown_height_unit() const { return unknown_height_unit_; }
-  /// Metres in a unit of heights, times the weight of heights.
+  /// Metres per unit of height, times the weight of heights.
   [[nodiscard]] double metres_vertical() const { return metres_vertical_; }
-  /// The name of the unit of z that was found or assumed.
+  /// The name of the known or assumed unit of z.
   [[nodiscard]] const std::string& height_unit() const { return height_unit_; }
 
  private:
@@ -62,18 +64,18 @@ class Ground {
 
   stream::Placement placement_;
   Kind kind_ = Kind::linear;
-  std::optional<CoordinateSystem> system_;  ///< of projected ones
-  double degrees_ = 1.0;                    ///< of a unit of x, y
-  double metres_horizontal_ = 1.0;          ///< of a unit of x, y
-  double metres_vertical_ = 1.0;            ///< of a unit of z, weighed
+  std::optional<CoordinateSystem> system_;  ///< only if projected
+  double degrees_ = 1.0;                    ///< per unit of x, y
+  double metres_horizontal_ = 1.0;          ///< per unit of x, y
+  double metres_vertical_ = 1.0;            ///< per unit of z, weighted
   std::string height_unit_ = "metre";
   std::string assumption_, unknown_height_unit_;
 };
 
-/// Tells the user if the unit of the heights, which the job turns into metres, is not known.
+/// Notes that the unit of heights is unknown, for a job that converts heights to metres.
 void say_unknown_height_unit(const Ground& ground, const Context& context);
 
-/// map * v.
+/// Returns map * v.
 stream::Point3 apply(const GroundMap& map, const stream::Point3& v);
 
 }  // namespace terrace::terrain

@@ -35,8 +35,7 @@ void check_latitudes(std::span<const Point2> places, double most, const std::str
     if (!(std::abs(latitude) > 90 + beyond) || !std::isfinite(latitude)) continue;
     if (!std::isnan(latitude_on_earth(latitude))) continue;
     fail_beyond_pole(file, where.empty() ? "place " + place_text(x, y) : where, latitude,
-                     "places are longitude, latitude: exchange them if they are the wrong way "
-                     "round");
+                     "places are longitude, latitude: exchange them if they are swapped");
   }
 }
 
@@ -58,7 +57,7 @@ double degrees_of_latitude(const stream::Crs& crs) {
     const std::optional<CrsDefinition> known = definition_of(crs);
     if (known && known->geographic) return known->degrees_per_unit;
   } catch (const CrsError&) {
-    // Callers that need places report what is wrong with it.
+    // Callers that need places report the error.
   }
   return 0;
 }
@@ -76,8 +75,8 @@ void LatitudeCheck::operator()(std::span<const stream::Point3> stored) const {
     if (!std::isnan(latitude_on_earth(y * degrees_))) continue;
     const double x = m[0] * p[0] + m[1] * p[1] + m[2];
     fail_beyond_pole(file_, "point " + place_text(x, y), y * degrees_,
-                     "x is the longitude and y the latitude: exchange them if they are the wrong "
-                     "way round, or name the right `crs`");
+                     "x is the longitude and y the latitude: exchange them if they are swapped, or "
+                     "name the right `crs`");
   }
 }
 

@@ -8,14 +8,14 @@ namespace {
 
 constexpr std::size_t kNodes = QuinticSurface::kNodes;
 
-/// Chebyshev's nodes in [0, 1]: the error of the polynomial through them is spread evenly, with
+/// Chebyshev's nodes in [0, 1], which spread the error of the interpolating polynomial evenly, with
 /// extremes at (1 - cos(k pi / 6)) / 2. C. W. Clenshaw, A. R. Curtis 1960; L. N. Trefethen,
 /// Approximation Theory and Approximation Practice (2013), chapter 2.
 constexpr std::array<double, kNodes> kNode{0.01703708685546585, 0.14644660940672624,
                                            0.37059047744873963, 0.62940952255126037,
                                            0.85355339059327376, 0.98296291314453415};
 constexpr double kInner = 0.06698729810778066;
-/// Where the polynomials are checked: each sign of the error along one axis with each of the other.
+/// Places to check the polynomials at: combinations of each sign of the error along both axes.
 constexpr std::array<Point2, 6> kChecks{
     {{0, 0}, {1, kInner}, {1 - kInner, 1}, {kInner, 1 - kInner}, {0.5, 0.5}, {0, 1}}};
 
@@ -41,7 +41,7 @@ NodeMatrix monomials() {
   return matrix;
 }
 
-/// [k][m]: of s^k t^m, through values[j * kNodes + i] at node i of s and j of t.
+/// Returns coefficients [k][m] of s^k t^m, from values[j * kNodes + i] at node i of s and j of t.
 std::array<QuinticSurface::Quintic, kNodes> coefficients(
     const std::array<double, kNodes * kNodes>& values, const NodeMatrix& matrix) {
   std::array<QuinticSurface::Quintic, kNodes> along{}, both{};
@@ -94,7 +94,7 @@ std::optional<QuinticSurface> QuinticSurface::through(const std::array<double, k
   surface.coefficients_ = coefficients(differences, matrix);
   for (std::size_t k = 0; k < kChecks.size(); ++k) {
     const double off = surface.at(kChecks[k][0], kChecks[k][1]) - values[kNodes * kNodes + k];
-    // Between the places checked the error may be some times larger. NaN fails.
+    // Between the checked places the error may be a few times larger. NaN fails this test.
     if (!(std::abs(off) <= tolerance / 8)) return std::nullopt;
   }
   return surface;

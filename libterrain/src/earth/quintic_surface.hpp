@@ -13,19 +13,19 @@ namespace terrace::terrain {
 class QuinticSurface {
  public:
   static constexpr std::size_t kNodes = 6;
-  /// The coefficients of a polynomial of fifth degree, the constant first.
+  /// Coefficients of a polynomial of fifth degree, the constant first.
   using Quintic = std::array<double, kNodes>;
-  /// Nodes, which the polynomial goes through, then places at which it is checked.
+  /// The nodes that the polynomial passes through, followed by places to check it at.
   static constexpr std::size_t kPlaces = kNodes * kNodes + 6;
 
-  /// s and t of the places at which values are wanted.
+  /// s and t of the places at which values are needed.
   static const std::array<Point2, kPlaces>& places();
-  /// values: of the function at places(). nullopt where it could be off by more than `tolerance`:
-  /// it is checked where the error of the polynomials has its extremes, with a margin of eight.
+  /// Fits the function to its values at places(). Returns nullopt if it could be off by more than
+  /// `tolerance`: checks where the polynomial's error has its extremes, with a margin of eight.
   static std::optional<QuinticSurface> through(const std::array<double, kPlaces>& values,
                                                double tolerance);
 
-  /// The function is base() and these polynomials.
+  /// The function is the sum of base() and these polynomials.
   [[nodiscard]] double base() const { return base_; }
   [[nodiscard]] Quintic along(double t) const {
     Quintic row;
@@ -33,9 +33,9 @@ class QuinticSurface {
     return row;
   }
   [[nodiscard]] double at(double s, double t) const { return base_ + value(along(t), s); }
-  /// Whether terms beyond s, t and s t change the function by no more than `tolerance`.
+  /// Whether all terms except s, t and s t change the function by at most `tolerance`.
   [[nodiscard]] bool is_bilinear(double tolerance) const;
-  /// The function without such terms.
+  /// The function without those terms.
   [[nodiscard]] double bilinear_at(double s, double t) const {
     const std::array<Quintic, kNodes>& c = coefficients_;
     return base_ + (c[0][0] + c[0][1] * t + (c[1][0] + c[1][1] * t) * s);
@@ -45,7 +45,7 @@ class QuinticSurface {
   }
 
  private:
-  /// One of the values: powers of t amplify what is rounded, so the rest are small numbers.
+  /// One of the values. Powers of t amplify rounding, so the other coefficients are kept small.
   double base_ = 0.0;
   std::array<Quintic, kNodes> coefficients_{};  ///< [k][m]: of s^k t^m
 };

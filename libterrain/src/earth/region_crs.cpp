@@ -37,12 +37,12 @@ class Outline {
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Point2 &a = corners[i], &b = corners[(i + 1) % corners.size()];
       result.push_back(start);
-      // An edge is cut a few times in any case: one that is straight in its middle may bend.
+      // Always split an edge a few times: one with a straight middle may still bend.
       start = add_from(a, b, start, 0, result);
     }
-    // Once round a pole: the outline comes back a full turn from where it began.
+    // Around a pole, the outline ends a full turn away from its start.
     if (turn_ != 0 && std::abs(start[0] - first[0]) > 0.5 * turn_) {
-      fail(to_, "the region holds a pole, and its outline is no polygon in");
+      fail(to_, "the region contains a pole, so its outline is not a polygon in");
     }
     return result;
   }
@@ -51,18 +51,19 @@ class Outline {
   [[nodiscard]] Point2 moved(Point2 place) const {
     change_.reverse({&place, 1});
     if (!std::isfinite(place[0]) || !std::isfinite(place[1])) {
-      fail(to_, "the region's outline reaches places that there are none of in");
+      fail(to_, "the region's outline leaves the area of");
     }
     return place;
   }
-  /// Longitudes go on beyond the antimeridian instead of jumping back.
+  /// Longitudes continue beyond the antimeridian instead of jumping back.
   [[nodiscard]] Point2 moved(const Point2& corner, const Point2& near) const {
     Point2 place = moved(corner);
     if (turn_ != 0) place[0] += turn_ * std::round((near[0] - place[0]) / turn_);
     return place;
   }
 
-  /// The curve from a, whose place is `start`, to b; without its ends. Returns the place of b.
+  /// Appends the curve from a, with its image `start`, to b, without its ends. Returns the image of
+  /// b.
   Point2 add_from(const Point2& a, const Point2& b, const Point2& start, int depth,
                   std::vector<Point2>& result) const {
     constexpr int kLeast = 4, kMost = 14;
@@ -78,8 +79,8 @@ class Outline {
         base::hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
     if (off <= 1e-6 * length) return end;
     if (depth == kMost) {
-      // By now the pieces of a smooth curve are straight; a jump never is.
-      if (off > 0.1 * length) fail(to_, "the region's outline is torn in");
+      // By now the pieces of a smooth curve are straight; only a jump is not.
+      if (off > 0.1 * length) fail(to_, "the region's outline is discontinuous in");
       return end;
     }
     const Point2 half = add_from(a, middle, start, depth + 1, result);
@@ -89,7 +90,7 @@ class Outline {
 
   const Transformation& change_;
   const CoordinateSystem& to_;
-  double turn_;  ///< see CoordinateSystem::turn()
+  double turn_;  ///< from CoordinateSystem::turn()
 };
 
 std::vector<Polygon> outlines(const Region& region) {
@@ -101,21 +102,21 @@ std::vector<Polygon> outlines(const Region& region) {
             {box.min[0], box.max[1]}}}};
 }
 
-/// Shifts by whole turns, from the first to the last.
+/// A range of shifts by whole turns.
 struct Turns {
   double first = 0, last = 0;
 };
 
 Turns turns_to(const stream::Box3& box, double turn, const stream::Box3& bounds) {
   if (!(turn > 0)) return {};
-  // Nobody is further off.
+  // No data are further away.
   constexpr double kMost = 4;
   const Turns turns{std::max(-kMost, std::ceil((bounds.min[0] - box.max[0]) / turn)),
                     std::min(kMost, std::floor((bounds.max[0] - box.min[0]) / turn))};
   return turns.first <= turns.last ? turns : Turns{};
 }
 
-/// Latitudes without bounds end beyond the data's: outlines are finite.
+/// Ends unbounded latitudes just beyond the data, because outlines must be finite.
 Region within_reach(stream::Box3 box, const stream::Box3& bounds) {
   box.min[1] = std::max(box.min[1], std::min(bounds.min[1] - 1, box.max[1]));
   box.max[1] = std::min(box.max[1], std::max(bounds.max[1] + 1, box.min[1]));
@@ -138,7 +139,7 @@ Region region_in(const Region& region, const Transformation& change, const strea
   std::vector<Polygon> polygons;
   for (Polygon& polygon : outlines(region)) {
     for (std::vector<Point2>& ring : polygon) ring = outline.ring(ring);
-    // Sides may come to lie on each other, as the meridians of 180 degrees east and west do.
+    // Sides may coincide, as the meridians of 180 degrees east and west do.
     for (Polygon& part : valid_polygons(polygon)) polygons.push_back(std::move(part));
   }
   if (polygons.empty()) fail(to, "the region has no area in");
@@ -157,9 +158,9 @@ Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
                   const Point2& tolerance) {
   const stream::Box3& given = region.box();
   const bool box = region.polygons().empty();
-  // What is wider than two turns, as an infinite box is, is meant as it is written.
+  // A box wider than two turns, such as an infinite one, is used as written.
   if (box && !(given.max[0] - given.min[0] <= 2 * turn)) turn = 0;
-  // A shift by whole turns rounds as well.
+  // Shifting by whole turns rounds as well.
   Point2 rounding{0x1p-50 * turn, 0};
   const auto [first, last] = turns_to(widened(widened(given, tolerance), rounding), turn, bounds);
   if (first == 0 && last == 0) rounding[0] = 0;
@@ -182,7 +183,7 @@ Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
           around.include(stream::Point3{p[0], p[1], 0});
         }
       }
-      // Some of several polygons may lie elsewhere.
+      // Only some of several polygons may be near the data.
       if (around.min[0] <= bounds.max[0] && around.max[0] >= bounds.min[0]) {
         polygons.push_back(std::move(polygon));
       }

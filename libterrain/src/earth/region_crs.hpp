@@ -6,22 +6,22 @@
 
 namespace terrace::terrain {
 
-/// A region given in the CRS that `change` leads to as one in that it comes from: its outline, a
-/// box's too, with so many corners between its own that it runs within a millionth of its length of
-/// the true curve. Heights stay as they are. In degrees, longitudes may go beyond 180 to cross the
-/// antimeridian (170 to 190); the part that is meant is moved by full turns to where `bounds`, a
-/// box in the result's CRS, lies. Throws: stream::Error if the outline leaves the places that that
-/// CRS shows, or is torn there.
+/// Converts a region from the target CRS of `change` to its source CRS. Its outline, also that of a
+/// box, gets as many additional corners as it needs to be within a millionth of its length of the
+/// true curve. Heights do not change. In degrees, longitudes may exceed 180 to cross the
+/// antimeridian (170 to 190); the region is shifted by full turns to `bounds`, a box in the
+/// result's CRS. Throws: stream::Error if the outline leaves the area of that CRS, or is
+/// discontinuous in it.
 Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds);
 
-/// The region whole turns away, where `bounds` lies: more than one part if both ends of the data
-/// do; where it is if none does, or if it is a box wider than two turns, as infinite ones are.
-/// turn: 0 if x does not lead around. A box is made wider by the tolerance on each side; its
-/// extent() is not.
+/// Returns the region shifted by whole turns to `bounds`: with several parts if it meets both ends
+/// of the data, and unchanged if no shift meets them or if it is a box wider than two turns, such
+/// as an infinite one. turn: 0 if x does not go around the earth. A box is widened by the tolerance
+/// on each side; its extent() is not.
 Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
                   const Point2& tolerance = {});
 
-/// The middle of a box in the CRS that `change` leads to; NaN if it has no place there.
+/// Returns the middle of a box in the target CRS of `change`; NaN if it has no image there.
 Point2 middle_in(const Transformation& change, const stream::Box3& box);
 
 }  // namespace terrace::terrain

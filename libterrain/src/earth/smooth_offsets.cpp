@@ -16,7 +16,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// For fewer, polynomials cost more than they spare.
+/// Below this number, polynomials cost more than they save.
 constexpr std::size_t kFewestOffsets = 256;
 
 using Exact = std::function<void(std::span<const Point2>, std::span<double>)>;
@@ -32,8 +32,8 @@ struct Box {
   }
 };
 
-/// Where a range of longitudes or latitudes is cut: near its middle, on a line that grids have
-/// there, if one does, so that what is beside it may be smooth.
+/// Returns where to split a range of longitudes or latitudes: near its middle, on a common grid
+/// line if there is one, so that the function may be smooth on either side.
 double cut_between(double low, double high) {
   constexpr std::array<double, 4> kLinesPerDegree{4, 12, 24, 60};
   const double middle = low + (high - low) / 2.0;
@@ -50,7 +50,7 @@ class Adder {
         const Exact& exact)
       : places_(places), heights_(heights), tolerance_(tolerance), exact_(exact) {}
 
-  /// The places with these numbers, which are reordered.
+  /// Handles the places with these numbers, which it reorders.
   void add(std::span<std::uint32_t> numbers) {
     if (numbers.size() < kFewestOffsets) return add_exactly(numbers);
     Box box;
@@ -64,7 +64,7 @@ class Adder {
           std::partition(begin, end, [&](std::uint32_t i) { return places_[i][0] < cut[0]; });
       for (const std::span<std::uint32_t> quarter :
            {std::span(begin, west), std::span(west, end)}) {
-        // All places are one.
+        // All places are equal.
         if (quarter.size() == numbers.size()) return add_exactly(quarter);
         if (!quarter.empty()) add(quarter);
       }
@@ -87,14 +87,14 @@ class Adder {
     exact_(at, offsets);
     const auto surface = QuinticSurface::through(offsets, tolerance_);
     if (!surface) return false;
-    // Along one meridian or parallel the function has one variable.
+    // Along a single meridian or parallel the function has one variable.
     const double s = size[0] > 0 ? 1.0 / size[0] : 0.0, t = size[1] > 0 ? 1.0 / size[1] : 0.0;
     const auto add_all = [&](const auto& offset) {
       for (const std::uint32_t i : numbers) {
         heights_[i] += offset((places_[i][0] - box.low[0]) * s, (places_[i][1] - box.low[1]) * t);
       }
     };
-    // Most grids are interpolated so.
+    // Most grids are interpolated bilinearly.
     if (surface->is_bilinear(tolerance_ / 8)) {
       add_all([&](double u, double v) { return surface->bilinear_at(u, v); });
     } else {

@@ -15,7 +15,7 @@ namespace {
   throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
 }
 
-/// Nothing for a local system, which `local` is set to.
+/// Returns nullopt for a local system, which it stores in `local`.
 std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std::string& contents,
                                              std::optional<stream::Crs>& local) {
   try {
@@ -28,8 +28,8 @@ std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std:
   }
 }
 
-/// What the .prj files say, which must be one thing. local: a system that has no place on earth.
-/// note: what the user should know of them.
+/// Returns the CRS of the .prj files, which must agree. local: receives a system without a place on
+/// the earth. note: receives what the user should know about the files.
 std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& info,
                                                    std::string& name,
                                                    std::optional<stream::Crs>& local,
@@ -46,7 +46,7 @@ std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& inf
     const std::optional<CoordinateSystem> other = read_sidecar(sidecar, contents, local);
     if (!other) continue;
     if (system && !system->same_places(*other)) {
-      fail(sidecar, "its CRS is not that of " + name,
+      fail(sidecar, "its CRS differs from that of " + name,
            "convert one of the files, or name the CRS of all: `crs` EPSG:n");
     }
     if (!system) {
@@ -71,7 +71,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   } catch (const ContradictoryCrs& error) {
     fail(file, error.what(), error.remedy());
   } catch (const CrsError& error) {
-    // Without a unit not even a distance is known.
+    // Without a unit, even distances are unknown.
     if (!info.crs.geographic && !metres_in_unit(info.crs.horizontal_unit)) {
       fail(file, error.what(), error.remedy());
     }
@@ -85,7 +85,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     local = local_crs_of(info.crs);
     if (!local) found.system = system_of_sidecars(info, sidecar, local, found.note);
   } else if (!info.crs.geo_keys.empty()) {
-    // A file that tells its own CRS needs no other; one beside it must not say anything else.
+    // A file with its own CRS needs no .prj file; if there is one, it must agree.
     const std::optional<CoordinateSystem> other =
         system_of_sidecars(info, sidecar, local, found.note);
     if (other && !other->same_places(*found.system)) {
@@ -103,7 +103,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
       if (found.crs.vertical_unit.empty()) found.crs.vertical_unit = local->vertical_unit;
       if (is_geocentric(found.crs)) {
         found.note = "the CRS \"" + local->name +
-                     "\" is geocentric, with x, y and z from the middle of the earth: z is not a "
+                     "\" is geocentric, with x, y and z from the centre of the earth: z is not a "
                      "height, and what needs a terrain will not work";
         return found;
       }

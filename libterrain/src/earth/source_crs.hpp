@@ -9,20 +9,20 @@
 
 namespace terrace::terrain {
 
-/// What is known of the CRS of a source.
+/// The known facts about a source's CRS.
 struct SourceCrs {
   stream::Crs crs;  ///< as a store records it
   Heights heights = Heights::unknown;
-  std::optional<CoordinateSystem> system;  ///< none: no CRS, or one that is not known
-  std::string note;                        ///< what the user should know; empty: nothing
+  std::optional<CoordinateSystem> system;  ///< nullopt: no CRS, or an unknown one
+  std::string note;                        ///< what the user should know; may be empty
 };
 
-/// What the source says, or else the file NAME.prj beside it (of several, all those that are there
-/// must agree). A CRS that is not known is let through with a note if its unit is: distances can be
-/// measured then, places cannot.
-/// shift: of --towgs84, for a datum that is not WGS 84's.
+/// Returns the CRS that the source states or, failing that, the file NAME.prj next to it (if there
+/// are several, they must agree). An unknown CRS with a known unit is accepted with a note:
+/// distances can be measured then, places cannot be converted.
+/// shift: the value of --towgs84, for a datum other than WGS 84's.
 /// Throws: stream::Error for a CRS that contradicts itself or its .prj file, for an unknown one
-/// without a unit, and for a shift that has no use.
+/// without a unit, and for a shift that does not apply.
 SourceCrs crs_of_source(const stream::SourceInfo& info,
                         const std::optional<DatumShift>& shift = std::nullopt);
 

@@ -27,7 +27,7 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
   check_latitudes(store);
   std::optional<CoordinateSystem> system = CoordinateSystem::of(store.schema().crs, file);
   if (!system) {
-    // What is recorded by name alone is a local (engineering) system.
+    // A CRS recorded by name alone is a local (engineering) system.
     const std::string& name = store.schema().crs.name;
     throw stream::Error(
         {.file = file,
@@ -36,7 +36,7 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
                   : is_geocentric(store.schema().crs)
                       ? "has the geocentric CRS \"" + name + "\", which is not converted"
                       : "has the CRS \"" + name + "\", which has no place on the earth",
-         .remedy = "build it anew with `crs` EPSG:n" + otherwise});
+         .remedy = "rebuild it with `crs` EPSG:n" + otherwise});
   }
   return system->over(world_box(store.schema(), store.bounds()));
 }
@@ -55,7 +55,7 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 
 namespace {
 
-/// A shift counts for the system whose datum is another than WGS 84's.
+/// The shift belongs to the system whose datum is not WGS 84's.
 CoordinateSystem shifted(const CoordinateSystem& system, const std::optional<DatumShift>& shift) {
   if (!shift || system.counts_as_wgs84()) return system;
   CrsDefinition definition = system.definition();
@@ -84,7 +84,7 @@ CoordinateSystem system_named_in(const PlacesCrs& given) {
   throw stream::Error({.file = given.file,
                        .where = {},
                        .cause = "its crs \"" + given.name.substr(0, 80) + "\" is not known",
-                       .remedy = "name one that is, as EPSG:n, or give `region_crs`"});
+                       .remedy = "write a known one, like EPSG:n, or give `region_crs`"});
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ RegionConversion::RegionConversion(const stream::Store& store,
         try {
           return shifted(system_of(store), shift);
         } catch (const stream::Error&) {
-          return std::nullopt;  // none, or one that is not known
+          return std::nullopt;  // none, or an unknown one
         }
       }),
       bounds_(world_box(store.schema(), store.whole().bounds())),
@@ -123,7 +123,7 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
     throw stream::Error(
         {.file = source.files.empty() ? std::string() : source.files.front(),
          .where = {},
-         .cause = "has no known CRS, into which the region could be converted",
+         .cause = "has no known CRS, so the region cannot be converted to it",
          .remedy = "leave `region_crs` out and give the region in its coordinates"});
   }
   const bool degrees = source.crs.geographic && source.crs.horizontal_unit == "degree";
@@ -137,11 +137,11 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   if (stored) area = world_box(source, *stored);
   bounds_ = area;
   if (source.grid) {
-    // What is wider is no place on the earth.
+    // A wider area is not on the earth.
     if (!(area.max[0] - area.min[0] <= turn_)) turn_ = 0;
   } else {
-    // Longitudes from -180 to 180, or from 0 to 360, whatever bounds a header states: if they are
-    // wrong, the points are elsewhere.
+    // Longitudes from -180 to 180, or from 0 to 360, in addition to the bounds that a header
+    // states: if those are wrong, the points are elsewhere.
     bounds_.include(stream::Box3{{-0.5 * turn_, -0.5 * turn_, 0}, {turn_, 0.5 * turn_, 0}});
   }
   if (system && stored) system = system->over(area);
@@ -169,15 +169,16 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
                          .where = {},
                          .cause = "its crs is " + system_named_in(given).title() +
                                   ", and the CRS of the data is not known",
-                         .remedy = "name that of the data with `crs` EPSG:n when they are read or "
-                                   "built, or leave the crs out if it is the same"});
+                         .remedy =
+                             "name the CRS of the data with `crs` EPSG:n when they are read or "
+                             "built, or leave the crs out if it is the same"});
   }
   if (given.name.empty()) {
-    // Longitudes may be counted to 360, and go on beyond the antimeridian.
+    // Longitudes may be counted to 360, and continue beyond the antimeridian.
     const bool fits =
         box.min[0] >= -360 && box.max[0] <= 540 && box.min[1] >= -90 && box.max[1] <= 90;
     if (!fits || !own->reaches_wgs84()) {
-      say(given.file + ": has no crs, and its places are taken in that of the data, " +
+      say(given.file + ": has no crs, and its places are read in the CRS of the data, " +
           own->title() + (fits ? "" : ", because they are not longitudes and latitudes"));
       return std::nullopt;
     }
@@ -254,8 +255,8 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {
         throw stream::Error({.file = {},
                              .where = "point " + plain_number(p[0]) + " " + plain_number(p[1]),
-                             .cause = "has no place in " + change_->to().title(),
-                             .remedy = "take another `to_crs` or a smaller `region`"});
+                             .cause = "has no image in " + change_->to().title(),
+                             .remedy = "choose another `to_crs` or a smaller `region`"});
       }
       p[0] = places[i][0];
       p[1] = places[i][1];
@@ -284,7 +285,7 @@ stream::Box3 PlaceConversion::box_around(const stream::Box3& box) const {
     around.include(stream::Point3{place[0], place[1], box.max[2]});
   }
   if (around.empty()) return around;
-  // The places between bend by less than that.
+  // The images between the sampled places bend by less than this.
   constexpr double kBend = 0.02;
   const double margin =
       kBend * std::max(around.max[0] - around.min[0], around.max[1] - around.min[1]);

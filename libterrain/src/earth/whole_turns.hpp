@@ -9,12 +9,12 @@
 
 namespace terrace::terrain {
 
-/// Longitudes (and x of Web Mercator) moved by whole turns to where the data lie: across the
-/// antimeridian, or counted from 0 to 360, one place has two.
+/// Shifts longitudes (and x of Web Mercator) by whole turns to the data: across the antimeridian,
+/// or when counted from 0 to 360, one place has two longitudes.
 class WholeTurns {
  public:
   WholeTurns() = default;
-  /// To half a turn on either side of the middle, which may be NaN: nothing is moved then.
+  /// Shifts to within half a turn of the middle; if that is NaN, shifts nothing.
   WholeTurns(double middle, double turn) : turn_(turn), middle_(middle), reach_(0.5 * turn) {}
   /// stored: the store's bounds.
   WholeTurns(const stream::Placement& placement, const stream::Box3& stored) {
@@ -23,11 +23,11 @@ class WholeTurns {
     if (!(degrees || crs.epsg == kWebMercator) || stored.empty()) return;
     const stream::Box3 box = world_box(placement, stored);
     const double turn = degrees ? 360 : kWebMercatorWidth;
-    // What is wider is no place on the earth.
+    // Wider data are not on the earth.
     if (box.max[0] - box.min[0] <= turn) *this = {0.5 * (box.min[0] + box.max[0]), turn};
   }
 
-  /// 0 where longitudes have no turns.
+  /// 0 if longitudes are not shifted.
   [[nodiscard]] double turn() const { return turn_; }
   [[nodiscard]] Point2 operator()(Point2 place) const {
     const double off = middle_ - place[0];

@@ -9,23 +9,24 @@
 
 #include "terrace/terrain/region.hpp"
 
-/// Latitudes beyond a pole, which data have where latitude and longitude are exchanged, or where
-/// metres are declared as degrees. Nothing may be made of them.
+/// Detects latitudes beyond a pole, which occur if latitude and longitude are exchanged or metres
+/// are declared as degrees. Such data are refused.
 
 namespace terrace::terrain {
 
-/// Throws: stream::Error if one of the places, longitude and latitude, is beyond a pole.
-/// most: the y of the north pole, see CoordinateSystem::most_latitude(). file: named in the error;
-/// where: likewise, else the place. beyond: how far is let through, in degrees.
+/// Throws: stream::Error if one of the places, given as longitude and latitude, is beyond a pole.
+/// most: the y of the north pole, see CoordinateSystem::most_latitude(). file, where: named in the
+/// error; without `where` it names the place. beyond: tolerance in degrees.
 void check_latitudes(std::span<const Point2> places, double most, const std::string& file,
                      const std::string& where = {}, double beyond = 0);
-/// The y of the north pole where y is a latitude, else infinite.
+/// Returns the y of the north pole if y is a latitude, otherwise infinity.
 double most_latitude(const stream::Crs& crs);
 
-/// The latitude in degrees, a pole where rounding alone is beyond it; NaN beyond a pole.
+/// Returns the latitude in degrees; the pole if it exceeds it only by rounding, NaN if it exceeds
+/// it by more.
 double latitude_on_earth(double degrees);
 
-/// Degrees in a unit of y where y is a latitude, else 0.
+/// Degrees per unit of y if y is a latitude, otherwise 0.
 double degrees_of_latitude(const stream::Crs& crs);
 
 /// Throws: stream::Error that names a stored point beyond a pole.
@@ -38,10 +39,10 @@ class LatitudeCheck {
  private:
   stream::WorldTransform world_;
   std::string file_;
-  double degrees_;  ///< see degrees_of_latitude()
+  double degrees_;  ///< from degrees_of_latitude()
 };
 
-/// The same of the bounds of a store, for those that were built without the check.
+/// The same check on the bounds of a store, for stores that were built without it.
 void check_latitudes(const stream::Store& store);
 
 }  // namespace terrace::terrain

@@ -37,7 +37,7 @@ const CrsDefinition& wgs84() {
   return definition;
 }
 
-/// Throws: stream::Error if PROJ cannot compute what its database has.
+/// Throws: stream::Error if PROJ cannot compute an operation from its database.
 DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
                            const std::optional<GeographicArea>& area) {
   try {
@@ -65,7 +65,7 @@ DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
 
 struct CoordinateSystem::Data {
   CrsDefinition definition;
-  std::shared_ptr<const Projection> projection;  ///< none: geographic
+  std::shared_ptr<const Projection> projection;  ///< null if geographic
 };
 
 struct CoordinateSystem::LazyChange {
@@ -295,7 +295,7 @@ bool CoordinateSystem::same_places(const CoordinateSystem& other) const {
 
 namespace {
 
-/// Without a shift of zeros where the datum counts as WGS 84 anyway: writers add
+/// Removes a shift of zeros if the datum counts as WGS 84 anyway, because writers add
 /// TOWGS84[0,0,0,...].
 CrsDefinition without_idle_shift(CrsDefinition definition) {
   if (!definition.shift || *definition.shift != DatumShift{}) return definition;
@@ -335,7 +335,7 @@ Transformation::Transformation(CoordinateSystem from, CoordinateSystem to)
           change_between(from_.definition(), same_ ? from_.definition() : to_.definition(),
                          from_.area() ? from_.area() : to_.area()))) {
   if (!change_->possible()) {
-    // The remedy is for the one whose datum is another.
+    // The remedy is for the system whose datum differs from WGS 84.
     const bool other = from_.counts_as_wgs84() && !to_.counts_as_wgs84();
     fail_without_way(other ? to_ : from_, (other ? from_ : to_).definition().datum, *change_);
   }

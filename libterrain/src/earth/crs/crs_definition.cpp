@@ -19,7 +19,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// A projection that PROJ computes.
+/// A projection computed by PROJ.
 class ProjProjection final : public Projection {
  public:
   ProjProjection(const std::string& pipeline, double degrees_per_unit, double metres_per_unit)
@@ -57,7 +57,7 @@ std::string wkt_name(std::string_view text) {
   return result + '"';
 }
 
-/// In full, never with an exponent, which not every reader takes.
+/// Writes all digits, never an exponent, which some readers do not support.
 std::string plain_number(double value) {
   std::array<char, 400> text{};
   const auto [end, error] =
@@ -65,7 +65,7 @@ std::string plain_number(double value) {
   return error == std::errc{} ? std::string(text.data(), end) : std::string("0");
 }
 
-/// With a shift: a bound system, the shift as a position vector transformation.
+/// Returns a bound CRS with the shift as a position vector transformation.
 std::string bound(const std::string& text, const DatumShift& shift) {
   static constexpr std::array<const char*, 7> kNames{
       "X-axis translation", "Y-axis translation", "Z-axis translation", "X-axis rotation",
@@ -75,7 +75,7 @@ std::string bound(const std::string& text, const DatumShift& shift) {
                        "],ABRIDGEDTRANSFORMATION[\"to WGS 84\",METHOD[\"Position Vector "
                        "transformation (geog2D domain)\",ID[\"EPSG\",9606]]";
   for (std::size_t i = 0; i < kNames.size(); ++i) {
-    // As a scale the difference is 1 + it; an abridged transformation has no units of its own.
+    // WKT writes the scale as 1 + the difference, because an abridged transformation has no units.
     const double value = i == 6 ? 1 + shift[i] * 1e-6 : shift[i];
     result += std::string(",PARAMETER[\"") + kNames[i] + "\"," + plain_number(value) +
               ",ID[\"EPSG\"," + std::to_string(8605 + i) + "]]";
@@ -109,7 +109,7 @@ bool near(const Ellipsoid& a, const Ellipsoid& b) {
          std::abs(a.flattening() - b.flattening()) < 1e-9;
 }
 
-/// Whether both projections have the same numbers, by their parameters or as PROJ writes them.
+/// Whether both projections have equal parameters or, failing that, equal PROJ strings.
 bool same_projection(const CrsDefinition& a, const CrsDefinition& b) {
   if (a.method && a.method == b.method) return nearly_equal(a.parameters, b.parameters);
   return proj_pipeline_of(a) == proj_pipeline_of(b);
@@ -181,7 +181,7 @@ std::string wkt1_of(const CrsDefinition& definition) {
   const std::string wkt = wkt_of(definition);
   const ProjObject crs = proj_crs_of_text(wkt);
   if (crs == nullptr) return {};
-  // GDAL leaves axes out, which count where they do not point east and north (Krovak's).
+  // GDAL omits axes, which matter unless they point east and north (as in Krovak's projection).
   for (const char* const axes : {"OUTPUT_AXIS=AUTO", "OUTPUT_AXIS=YES"}) {
     const std::array<const char*, 3> options{"MULTILINE=NO", axes, nullptr};
     const std::string text =

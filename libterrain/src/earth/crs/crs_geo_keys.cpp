@@ -18,14 +18,14 @@
 namespace terrace::terrain {
 namespace {
 
-/// The value of a code that says: by the parameters beside it.
+/// The code that means: defined by the other keys.
 constexpr int kUserDefined = 32767;
 
 [[noreturn]] void fail_geo_keys(const std::string& cause) {
   throw CrsError(cause, "name the system by its code: `crs` EPSG:n");
 }
 
-/// The keys of one file.
+/// The GeoKeys of one file.
 class GeoKeyValues {
  public:
   explicit GeoKeyValues(const stream::Crs& crs) : crs_(crs) {}
@@ -36,7 +36,7 @@ class GeoKeyValues {
     }
     return nullptr;
   }
-  /// Nothing if there is none. Throws: CrsError if it is not finite.
+  /// Returns nullopt if the key is missing. Throws: CrsError if the number is not finite.
   [[nodiscard]] std::optional<double> number(int key) const {
     const stream::GeoKey* const found = find(key);
     if (found == nullptr || found->values.empty()) return std::nullopt;
@@ -45,7 +45,7 @@ class GeoKeyValues {
     }
     return found->values.front();
   }
-  /// 0 if there is none. Throws: CrsError if it is not a whole number of 16 bits, as codes are.
+  /// Returns 0 if the key is missing. Throws: CrsError unless it is a 16-bit integer, as codes are.
   [[nodiscard]] int code(int key) const {
     const double value = number(key).value_or(0);
     if (!(value >= 0 && value <= 65535 && value == std::floor(value))) {
@@ -53,7 +53,7 @@ class GeoKeyValues {
     }
     return static_cast<int>(value);
   }
-  /// Likewise 0 for what parameters describe.
+  /// Also returns 0 for systems defined by parameters.
   [[nodiscard]] int known_code(int key) const {
     const int value = code(key);
     return value == kUserDefined ? 0 : value;
@@ -62,8 +62,8 @@ class GeoKeyValues {
     const stream::GeoKey* const found = find(key);
     return found == nullptr ? std::string() : found->text;
   }
-  /// Radians in the angular unit, metres in the linear one; 0 if the file names none.
-  /// Throws: CrsError for a unit that is not known.
+  /// Returns radians per angular or metres per linear unit; 0 if the file names no unit. Throws:
+  /// CrsError for an unknown unit.
   [[nodiscard]] double unit(int key, const char* kind) const {
     const int unit = code(key);
     if (unit == 0) return 0;
@@ -99,7 +99,7 @@ class GeoKeyValues {
 
 using Role = ParameterRole;
 
-/// Several keys have one role; a file has one of them.
+/// The role of each parameter key. Several keys share a role; a file uses one of them.
 struct RoleOfKey {
   int key;
   Role role;
@@ -114,11 +114,11 @@ constexpr std::array<RoleOfKey, 19> kRoles{{
     {3096, Role::skew},
 }};
 
-/// GeoTIFF's own numbers of methods, with the codes of EPSG's method and its parameters.
+/// GeoTIFF's method numbers, each with the codes of EPSG's method and its parameters.
 struct MethodOfKey {
   int number;
   int code;
-  std::array<int, 7> parameters;  ///< zeros fill it
+  std::array<int, 7> parameters;  ///< padded with zeros
 };
 constexpr std::array<MethodOfKey, 15> kMethods{{
     {1, 9807, {8801, 8802, 8805, 8806, 8807}},
@@ -130,7 +130,8 @@ constexpr std::array<MethodOfKey, 15> kMethods{{
     {10, 9820, {8801, 8802, 8806, 8807}},
     {11, 9822, {8821, 8822, 8823, 8824, 8826, 8827}},
     {15, 9810, {8801, 8802, 8805, 8806, 8807}},
-    {-15, 9829, {8832, 8833, 8806, 8807}},  // not centred on the pole: of true scale there
+    {-15, 9829, {8832, 8833, 8806, 8807}},  // with a latitude of true scale instead of an origin at
+                                            // the pole
     {16, 9809, {8801, 8802, 8805, 8806, 8807}},
     {18, 9806, {8801, 8802, 8806, 8807}},
     {27, 9808, {8801, 8802, 8805, 8806, 8807}},
@@ -138,7 +139,7 @@ constexpr std::array<MethodOfKey, 15> kMethods{{
     {9815, 9815, {8811, 8812, 8813, 8814, 8815, 8816, 8817}},
 }};
 
-/// Those that EPSG does not number, or not in every release: PROJ's names.
+/// Methods without an EPSG code, or without one in some releases, with their PROJ names.
 struct NamedMethod {
   int number;
   const char* name;
@@ -158,7 +159,7 @@ constexpr std::array<NamedMethod, 12> kNamedMethods{{
     {28, "cea"},
 }};
 
-/// Degrees, metres or a factor; nothing if no key has the role.
+/// Returns degrees, metres or a factor; nullopt if no key has the role.
 std::optional<double> value_of(const GeoKeyValues& keys, Role role, double degrees, double metres) {
   for (const RoleOfKey& row : kRoles) {
     if (row.role != role) continue;
@@ -172,7 +173,8 @@ std::optional<double> value_of(const GeoKeyValues& keys, Role role, double degre
   return std::nullopt;
 }
 
-/// "GCS Name = X|Datum = Y|Ellipsoid = Z|" as GDAL and others write citations.
+/// Returns a part of a citation "GCS Name = X|Datum = Y|Ellipsoid = Z|", as GDAL and others write
+/// it.
 std::string part_of(const std::string& citation, std::string_view part) {
   std::size_t at = citation.find(std::string(part) + " = ");
   if (at == citation.npos) return {};
@@ -187,8 +189,8 @@ ProjObject object_of_code(int code, PJ_CATEGORY category) {
   return object;
 }
 
-/// None for a CRS of another kind: PROJ identifies no projected CRS on, say, a geocentric one, but
-/// crashes.
+/// Returns null for a CRS of another kind, because PROJ crashes when it identifies a projected CRS
+/// on a geocentric one, for example.
 ProjObject geographic_of_code(int code) {
   ProjObject found = object_of_code(code, PJ_CATEGORY_CRS);
   if (found == nullptr) return nullptr;
@@ -202,7 +204,7 @@ ProjObject required(ProjObject object, const std::string& what) {
   return object;
 }
 
-/// Whether the numbers that a file has beside a datum's code are those of a system on that datum.
+/// Whether the parameters that a file gives with a datum's code match a system on that datum.
 bool agrees(const GeoKeyValues& keys, const PJ* base) {
   PJ_CONTEXT* const context = proj_context();
   const ProjObject ellipsoid(proj_get_ellipsoid(context, base));
@@ -228,7 +230,7 @@ ProjObject base_of(const GeoKeyValues& keys) {
   std::string name = part_of(citation, "GCS Name"), datum = part_of(citation, "Datum");
   if (name.empty()) name = citation;
   const double degrees = keys.degrees_per_unit();
-  // Old files number the datum and mean the system on it: 6326 is that of 4326.
+  // Old files give the code of a datum and mean the system on it, such as 6326 for 4326.
   const int datum_code = keys.known_code(2050);
   if (datum_code >= 6001 && datum_code < 6999 && degrees == 1) {
     ProjObject base = geographic_of_code(datum_code - 2000);
@@ -242,7 +244,7 @@ ProjObject base_of(const GeoKeyValues& keys) {
     } else if (const auto minor = keys.number(2058)) {
       inverse = *minor == major ? 0 : major / (major - *minor);
     } else {
-      fail_geo_keys("its ellipsoid has a size and no shape (GeoKeys 2058, 2059)");
+      fail_geo_keys("its ellipsoid has a size but no shape (GeoKeys 2058, 2059)");
     }
   } else if (const int ellipsoid = keys.known_code(2056); ellipsoid != 0) {
     const ProjObject known =
@@ -271,13 +273,13 @@ ProjObject base_of(const GeoKeyValues& keys) {
                   "its geographic CRS is impossible");
 }
 
-/// A bound CRS if there is a shift to WGS 84.
+/// Reads the shift to WGS 84, if there is one.
 void read_shift(const GeoKeyValues& keys, CrsDefinition& definition) {
   const stream::GeoKey* const shift = keys.find(2062);
   if (shift == nullptr) return;
   DatumShift values{};
   if (shift->values.size() != 3 && shift->values.size() != 7) {
-    fail_geo_keys("GeoKey 2062 is no shift");
+    fail_geo_keys("GeoKey 2062 is not a shift");
   }
   std::copy(shift->values.begin(), shift->values.end(), values.begin());
   for (const double value : values) {
@@ -336,8 +338,8 @@ ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres
   for (std::size_t i = 0; i < codes.size(); ++i) {
     const ParameterName& name = *parameter_of_code(method->parameters[i]);
     std::optional<double> value = is_role(name.role);
-    // Polar systems keep the latitude of true scale where others have that of the origin; the skew
-    // is the azimuth where nothing is said.
+    // Polar systems store the latitude of true scale in the key for the latitude of origin. The
+    // skew defaults to the azimuth.
     if (!value && name.code == 8832) value = latitude;
     if (!value && name.role == Role::skew) value = is_role(Role::azimuth);
     const ParameterKind kind = kind_of(name.role);
@@ -428,7 +430,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
     const double given = *value * (kind == ParameterKind::angle                 ? angle
                                    : kind == ParameterKind::length && unit != 0 ? unit
                                                                                 : 1.0);
-    // A key that the method does not know is left out; two parallels mean the same in either order.
+    // Keys that the method does not use are ignored; two parallels may be in either order.
     bool known = false, good = false;
     for (const ConversionParameter& parameter : meant) {
       if (!parameter.role || (*parameter.role != row.role &&
@@ -482,9 +484,9 @@ std::vector<stream::GeoKey> geo_keys_of(const CrsDefinition& definition) {
                           : std::string();
   };
   std::string wkt = written(PJ_WKT1_ESRI);
-  // ESRI's form has no axes, and its parameters are not those of every method.
+  // ESRI's form has no axes and does not support the parameters of every method.
   if (wkt.empty() || !mean_the_same(wkt, definition.wkt)) wkt = definition.wkt;
-  // GDAL looks for that citation where the model is nobody's.
+  // GDAL looks for this citation if the model is user-defined.
   return {number(1024, kUserDefined), number(3072, kUserDefined),
           stream::GeoKey{.key = 3073, .text = "ESRI PE String = " + wkt}};
 }

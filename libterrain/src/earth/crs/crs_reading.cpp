@@ -19,7 +19,7 @@ constexpr char kByCode[] = "name the system by its code: `crs` EPSG:n";
 
 struct Axis {
   std::string direction;
-  double unit = 1;  ///< radians or metres
+  double unit = 1;  ///< in radians or metres
 };
 
 std::vector<Axis> axes_of(const PJ* crs) {
@@ -53,8 +53,8 @@ int epsg_of(const PJ* object) {
   return definition.epsg();
 }
 
-/// The code of a geographic system without one, by the name of its datum, which files without codes
-/// write in many ways. The ellipsoid must be the code's.
+/// Returns the coded geographic system with the same datum name, which files without codes spell in
+/// many ways. The caller checks that the ellipsoid matches.
 ProjObject identified(const PJ* geographic) {
   PJ_CONTEXT* const context = proj_context();
   int* confidence = nullptr;
@@ -97,7 +97,7 @@ void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
   }
 }
 
-/// Without the third axis.
+/// Returns the CRS without its third axis.
 ProjObject flat(const PJ* crs) {
   return ProjObject(proj_crs_demote_to_2D(proj_context(), nullptr, crs));
 }
@@ -107,7 +107,7 @@ void read_base(const PJ* crs, CrsDefinition& definition) {
   const ProjObject geodetic(proj_crs_get_geodetic_crs(context, crs));
   ProjObject base = geodetic != nullptr ? flat(geodetic.get()) : nullptr;
   if (base == nullptr) {
-    throw CrsError("the CRS \"" + definition.name + "\" has no geographic one below it", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" has no base geographic CRS", kByCode);
   }
   definition.base_epsg = epsg_of(base.get());
   if (definition.base_epsg == 0) {
@@ -141,7 +141,7 @@ void read_projected(const PJ* crs, CrsDefinition& definition) {
   const auto points = [&axes](const char* a, const char* b) {
     return axes[0].direction == a && axes[1].direction == b;
   };
-  // Around a pole all directions are the same one.
+  // Around a pole, all axes of a coordinate system point in the same direction.
   const bool polar = known->method == ProjectionMethod::polar_stereographic_a ||
                      known->method == ProjectionMethod::polar_stereographic_b;
   if (!points("east", "north") && !points("north", "east") &&
@@ -152,7 +152,7 @@ void read_projected(const PJ* crs, CrsDefinition& definition) {
   definition.parameters = known->parameters;
 }
 
-/// What TOWGS84 or the bound CRS says.
+/// Reads the shift of TOWGS84 or of a bound CRS.
 void read_shift(const PJ* bound, CrsDefinition& definition) {
   PJ_CONTEXT* const context = proj_context();
   const ProjObject transformation(proj_crs_get_coordoperation(context, bound));
@@ -170,7 +170,7 @@ void read_shift(const PJ* bound, CrsDefinition& definition) {
       throw CrsError("the CRS \"" + definition.name + "\" has a shift to WGS 84 that is not finite",
                      kByCode);
     }
-    // WKT has the scale as 1 + it: what that costs in digits is given back.
+    // WKT stores the scale as 1 + the difference; rounding restores the digits lost by that.
     if (std::abs(value) < 1e5) value = std::round(value * 1e9) / 1e9;
   }
   definition.shift = shift;
@@ -229,8 +229,8 @@ void read_horizontal(const PJ* crs, CrsDefinition& definition) {
   if (!geographic) read_projected(plane.get(), definition);
 }
 
-/// Coordinates of some places in the area where the code is used, by both definitions; whether the
-/// numbers are the same to a tenth of a millimetre.
+/// Whether both definitions give the same coordinates, to a tenth of a millimetre, for some places
+/// in the area of use of the code.
 bool same_numbers(const CrsDefinition& a, const CrsDefinition& b, const PJ* code) {
   double west = 0, south = 0, east = 0, north = 0;
   if (proj_get_area_of_use(proj_context(), code, &west, &south, &east, &north, nullptr) == 0) {
@@ -306,17 +306,17 @@ void read_vertical_crs(const PJ* crs, CrsDefinition& definition) {
   const std::string name = text_of(proj_get_name(crs));
   const std::vector<Axis> axes = axes_of(crs);
   if (proj_get_type(crs) != PJ_TYPE_VERTICAL_CRS || axes.empty()) {
-    throw CrsError("the CRS \"" + name + "\" is not one of heights", kByCode);
+    throw CrsError("the CRS \"" + name + "\" is not a CRS of heights", kByCode);
   }
   if (axes[0].direction != "up") {
-    throw CrsError("the vertical CRS \"" + name + "\" counts depths downwards",
-                   "name one of heights, or say what heights refer to with `vertical`");
+    throw CrsError("the vertical CRS \"" + name + "\" measures depths downwards",
+                   "name a CRS of heights, or say what heights refer to with `vertical`");
   }
   definition.metres_per_height = metres_of(axes[0].unit);
   if (plain_name(name) == kUnknownHeights) return;
   definition.vertical_epsg = epsg_of(crs);
   definition.vertical_name = name;
-  // OGC's type 2002: above the ellipsoid.
+  // OGC's type 2002 means heights above the ellipsoid.
   const std::string wkt1 = text_of(proj_as_wkt(context, crs, PJ_WKT1_GDAL, nullptr));
   const bool ellipsoidal = wkt1.find(",2002") != std::string::npos ||
                            plain_name(name).find("ellipsoid") != std::string::npos;
@@ -331,7 +331,7 @@ CrsDefinition read_crs(const PJ* crs) {
     if (proj_get_type(crs) == PJ_TYPE_VERTICAL_CRS) {
       const std::string code = text_of(proj_get_id_code(crs, 0));
       throw CrsError("EPSG:" + code + " is a vertical CRS",
-                     "write it behind a horizontal one: EPSG:4326+" + code);
+                     "write it after a horizontal one: EPSG:4326+" + code);
     }
     read_horizontal(crs, definition);
     return definition;

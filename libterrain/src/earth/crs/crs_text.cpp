@@ -18,17 +18,17 @@
 namespace terrace::terrain {
 namespace {
 
-/// The most bytes that the text of a definition may have.
+/// The longest definition that is read, in bytes.
 constexpr std::size_t kMostCrsText = std::size_t{64} << 10;
 
-/// Codes that are not EPSG's but widespread.
+/// Widespread codes that are not in the EPSG dataset.
 int alias_of(int code) {
   constexpr std::array<int, 3> kWebMercator{900913, 102100, 102113};
   return std::find(kWebMercator.begin(), kWebMercator.end(), code) != kWebMercator.end() ? 3857
                                                                                          : code;
 }
 
-/// Throws: CrsError for text that is longer, has more parts or is nested more deeply than any
+/// Throws: CrsError for text that is longer, has more parts or is nested more deeply than any real
 /// definition. PROJ looks up many parts in its database, and its time and memory grow with the
 /// square of the depth.
 void check_extent(std::string_view text) {
@@ -55,7 +55,7 @@ void check_extent(std::string_view text) {
   }
 }
 
-/// The number behind "EPSG:", of which `rest` is what follows; 0 if there is none.
+/// Parses the number at the start of `rest` and removes it; 0 if there is no number.
 int leading_code(std::string_view& rest) {
   int value = 0;
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
@@ -64,7 +64,7 @@ int leading_code(std::string_view& rest) {
   return value;
 }
 
-/// "EPSG:n" or "EPSG:n+m"; nothing if the text is not that.
+/// Parses "EPSG:n" or "EPSG:n+m"; nullopt for other text.
 std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
   if (text.size() < 5 || plain_name(text.substr(0, 4)) != "epsg" || text[4] != ':') {
     return std::nullopt;
@@ -83,8 +83,8 @@ std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
   return definition;
 }
 
-/// "ESRI:54030", "OGC:CRS84", "urn:ogc:def:crs:EPSG::4326",
-/// "http://www.opengis.net/def/crs/EPSG/0/4326"; nullptr if the text is none of them.
+/// Parses "ESRI:54030", "OGC:CRS84", "urn:ogc:def:crs:EPSG::4326" or
+/// "http://www.opengis.net/def/crs/EPSG/0/4326"; null for other text.
 ProjObject crs_of_authority(const std::string& text) {
   if (text.starts_with("urn:")) {
     ProjObject object(proj_create(proj_context(), text.c_str()));
@@ -102,14 +102,14 @@ ProjObject crs_of_authority(const std::string& text) {
   if (colon == text.npos || colon == 0) return nullptr;
   std::string authority = text.substr(0, colon), code = text.substr(colon + 1);
   if (authority == "EPSGA") authority = "EPSG";
-  if (authority == "CRS") {  // as WMS has it
+  if (authority == "CRS") {  // WMS writes it this way
     authority = "OGC";
     code = "CRS" + code;
   }
   return proj_crs_of_code(authority, code);
 }
 
-/// The system of exactly that name (case aside). Throws: CrsError if several have it.
+/// Returns the system of exactly this name, ignoring case. Throws: CrsError if there are several.
 ProjObject crs_of_name(const std::string& text) {
   PJ_CONTEXT* const context = proj_context();
   const std::array<PJ_TYPE, 4> types{PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_GEOGRAPHIC_3D_CRS,
@@ -129,7 +129,7 @@ ProjObject crs_of_name(const std::string& text) {
     }
     const bool flat = proj_get_type(found.get()) != PJ_TYPE_GEOGRAPHIC_3D_CRS;
     const bool epsg = text_of(proj_get_id_auth_name(found.get(), 0)) == "EPSG";
-    // A system of two axes goes before the one with heights, EPSG's before others.
+    // A system of two axes takes precedence over one with heights, and EPSG's over others.
     if (!flat || !epsg) {
       if (only == nullptr) only = std::move(found);
       continue;
@@ -143,7 +143,7 @@ ProjObject crs_of_name(const std::string& text) {
   return only;
 }
 
-/// Without a byte order mark, and white space and zeros at both ends.
+/// Removes a byte order mark, and white space and zeros at both ends.
 std::string without_padding(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF", kPadding(" \t\r\n\0", 5);
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -152,8 +152,8 @@ std::string without_padding(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(kPadding) - first + 1));
 }
 
-/// True for WKT, with brackets or parentheses, PROJJSON and PROJ strings, which no name of a system
-/// or file looks like.
+/// Whether the text is WKT (with brackets or parentheses), PROJJSON or a PROJ string, which no name
+/// of a system or file looks like.
 bool is_formal(std::string_view text) {
   if (text.starts_with('+') || text.find_first_of("[{") != text.npos) return true;
   // "NAD83(HARN)" is a name.
@@ -162,13 +162,13 @@ bool is_formal(std::string_view text) {
   return next != text.npos && text[next] == '"';
 }
 
-/// A formal definition as PROJ takes it.
+/// Converts a formal definition to the form that PROJ reads.
 std::string proj_text(std::string text) {
   constexpr std::string_view kEsri = "ESRI::";
   if (text.starts_with(kEsri)) text.erase(0, kEsri.size());
   if (text.starts_with('+'))
     return text.find("+type=crs") == text.npos ? text + " +type=crs" : text;
-  // PROJ reads brackets alone where ISO 19162 allows parentheses too.
+  // PROJ reads only brackets, but ISO 19162 also allows parentheses.
   if (text.find_first_of("[({") < text.size() && text[text.find_first_of("[({")] == '(') {
     bool quoted = false;
     for (char& c : text) {
@@ -180,15 +180,15 @@ std::string proj_text(std::string text) {
   return text;
 }
 
-/// ArcInfo's form of a .prj file, older than WKT: lines of a key and a value. GTOPO30 and many
-/// ASCII grids have one.
+/// ArcInfo's .prj format, older than WKT: lines of a key and a value. GTOPO30 and many ASCII grids
+/// use it.
 constexpr std::string_view kArcInfoKey = "projection";
 
 bool is_arcinfo(std::string_view text) {
   return plain_name(text.substr(0, kArcInfoKey.size())) == kArcInfoKey;
 }
 
-/// Throws: CrsError for all but longitudes and latitudes in degrees, and UTM in metres.
+/// Throws: CrsError for anything but longitudes and latitudes in degrees, and UTM in metres.
 CrsDefinition definition_of_arcinfo(const std::string& text) {
   std::map<std::string, std::string> values;
   std::istringstream lines(text);
@@ -200,14 +200,14 @@ CrsDefinition definition_of_arcinfo(const std::string& text) {
   }
   struct Datum {
     const char* name;
-    int geographic, north, south;  ///< codes; those of UTM are of zone 0
+    int geographic, north, south;  ///< EPSG codes; the UTM codes are for zone 0
   };
   constexpr std::array<Datum, 4> kDatums{{{"wgs84", 4326, 32600, 32700},
                                           {"wgs72", 4322, 32200, 32300},
                                           {"nad83", 4269, 26900, 0},
                                           {"nad27", 4267, 26700, 0}}};
   const auto word = [&](const char* key) { return plain_name(values[key]); };
-  // What is no number is refused like a number that is not known.
+  // Text that is not a number becomes NaN, which is refused like an unknown number.
   const auto number = [&](const char* key) {
     const std::string& value = values[key];
     double parsed = 0;
@@ -230,15 +230,15 @@ CrsDefinition definition_of_arcinfo(const std::string& text) {
       return definition_of_epsg(first + static_cast<int>(zone));
     }
   }
-  throw CrsError("of ArcInfo's old form, only GEOGRAPHIC in DD and UTM in METERS are read",
+  throw CrsError("of ArcInfo's old format only GEOGRAPHIC in DD and UTM in METERS are supported",
                  "name the system by its code: `crs` EPSG:n");
 }
 
 }  // namespace
 
 void set_vertical_epsg(CrsDefinition& definition, int code) {
-  // GeoTIFF 1.0 numbered the heights of Newlyn, NGVD 29, NAVD 88, the Yellow Sea, the Baltic and
-  // the Caspian by their datums: laser scans name them so to this day.
+  // GeoTIFF 1.0 identified the heights of Newlyn, NGVD 29, NAVD 88, the Yellow Sea, the Baltic and
+  // the Caspian by their datums, and laser scans still do.
   constexpr std::array<int, 6> kOfDatums{5701, 5702, 5703, 5736, 5705, 5706};
   constexpr int kFirstDatum = 5101;
   if (code >= kFirstDatum && code < kFirstDatum + static_cast<int>(kOfDatums.size())) {
@@ -246,8 +246,8 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
   }
   const ProjObject vertical = proj_crs_of_code("EPSG", std::to_string(code));
   const PJ_TYPE type = vertical == nullptr ? PJ_TYPE_UNKNOWN : proj_get_type(vertical.get());
-  // GeoTIFF 1.0 numbered heights above ellipsoids so; 5030 is WGS 84's. GeoTIFF 1.1 names the
-  // geographic system whose third axis they are: 4979.
+  // GeoTIFF 1.0 used these codes for heights above ellipsoids; 5030 is WGS 84's. GeoTIFF 1.1 uses
+  // the geographic system with heights as third axis, such as 4979.
   constexpr int kFirstEllipsoid = 5001, kLastEllipsoid = 5033;
   if ((code >= kFirstEllipsoid && code <= kLastEllipsoid) || type == PJ_TYPE_GEOGRAPHIC_3D_CRS) {
     forget_heights(definition);
@@ -259,7 +259,7 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
   }
   if (type != PJ_TYPE_VERTICAL_CRS) {
     throw CrsError("the vertical CRS EPSG:" + std::to_string(code) + " is not known",
-                   "name one that is, or say what heights refer to with `vertical`");
+                   "name a known one, or say what heights refer to with `vertical`");
   }
   forget_heights(definition);
   read_vertical_crs(vertical.get(), definition);
@@ -296,7 +296,7 @@ std::string contents_of_file(const std::string& name) {
 
 CrsDefinition definition_of_contents(const std::string& text) {
   std::string plain = without_padding(text);
-  // Spellings of codes that PROJ does not read.
+  // Spellings of codes that PROJ does not support.
   constexpr std::string_view kInit = "+init=";
   if (plain.starts_with(kInit) && plain.find(' ') == plain.npos) plain.erase(0, kInit.size());
   if (plain == "WGS72") plain = "EPSG:4322";
@@ -332,7 +332,7 @@ CrsDefinition definition_of_text(const std::string& text) {
       return definition_of_contents(text);
     }
   } catch (const UnreadableCrs&) {
-    // Said below, with all that can be written.
+    // Reported below, together with all supported forms.
   }
   throw CrsError(
       "is not a CRS",
@@ -346,21 +346,21 @@ std::optional<stream::Crs> local_crs_named(const std::string& text) {
   } catch (const LocalCrs& local) {
     return local.crs();
   } catch (const CrsError&) {
-    // The caller reports it when it uses the text.
+    // The caller reports the error when it uses the text.
   }
   return std::nullopt;
 }
 
 namespace {
 
-/// As definition_of(). Throws: LocalCrs for a local or geocentric one.
+/// As definition_of(), but throws LocalCrs for a local or geocentric system.
 std::optional<CrsDefinition> definition_or_local(const stream::Crs& crs) {
   CrsDefinition definition;
   constexpr std::string_view kEsri = "ESRI PE String = ";
   const std::string wkt = !crs.wkt.empty()              ? crs.wkt
                           : crs.name.starts_with(kEsri) ? crs.name.substr(kEsri.size())
                                                         : std::string();
-  // Units alone are those of a local system, which has no place on the earth.
+  // Keys of units alone describe a local system, which has no place on the earth.
   constexpr std::array<int, 3> kUnits{2052, 2054, 3076};
   const bool has_keys =
       std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [&](const stream::GeoKey& key) {
@@ -413,7 +413,7 @@ std::optional<stream::Crs> local_crs_of(const stream::Crs& crs) {
   } catch (const LocalCrs& local) {
     return local.crs();
   } catch (const CrsError&) {
-    // The caller that needs the definition reports it.
+    // A caller that needs the definition reports the error.
   }
   return std::nullopt;
 }

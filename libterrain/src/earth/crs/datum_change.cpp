@@ -15,7 +15,7 @@ DatumChange::DatumChange(const CrsDefinition& from, const CrsDefinition& to,
                          const std::optional<GeographicArea>& area) {
   if (same_datum(from, to)) return;
   if (!from.shift && !to.shift && add_operation(from, to, area)) return;
-  // What is shifted is shifted to WGS 84; what lacks the grid of a direct way may have one there.
+  // A shift leads to WGS 84. If the direct operation lacks a grid, one by way of WGS 84 may exist.
   const CrsDefinition wgs84 = definition_of_epsg(4326);
   possible_ = from.shift || to.shift || !(same_datum(from, wgs84) || same_datum(wgs84, to));
   if (!possible_) return;

@@ -12,37 +12,37 @@
 
 namespace terrace::terrain {
 
-/// The way from one datum to another, for longitudes (from Greenwich) and latitudes in degrees: of
-/// the operations of PROJ's database the most accurate in an area whose grids are installed, one
-/// for the whole area. A shift that was said beside a system goes before them. Operations that
-/// ignore the difference between the datums ("ballpark") are never taken.
+/// The change from one datum to another, for longitudes (from Greenwich) and latitudes in degrees.
+/// Uses a single operation for the whole area: of those in PROJ's database with installed grids,
+/// the most accurate one there. A shift given with a system takes precedence. Operations that
+/// ignore the difference between the datums ("ballpark") are never used.
 ///
-/// Const members may be called by several threads at once.
+/// Several threads may call const members at once.
 class DatumChange {
  public:
-  /// area: where it is needed; without it, where both systems are used.
+  /// area: where the change is needed; by default, where both systems are used.
   DatumChange(const CrsDefinition& from, const CrsDefinition& to,
               const std::optional<GeographicArea>& area);
 
-  /// Whether there is a way at all.
+  /// Whether an operation exists.
   [[nodiscard]] bool possible() const { return possible_; }
-  /// Whether coordinates stay as they are.
+  /// Whether coordinates stay unchanged.
   [[nodiscard]] bool identity() const { return steps_.empty(); }
-  /// Metres; nothing if it is not known. 0 for one datum.
+  /// Accuracy in metres; nullopt if unknown, 0 within one datum.
   [[nodiscard]] std::optional<double> accuracy() const { return accuracy_; }
   [[nodiscard]] const std::string& name() const { return name_; }
-  /// Name, accuracy, and a better one that lacks a grid: "\"OSGB36 to WGS 84 (6)\" within 2 m;
-  /// ...".
+  /// Name, accuracy and, if one exists, a better operation that lacks a grid: "\"OSGB36 to WGS 84
+  /// (6)\" within 2 m; ...".
   [[nodiscard]] std::string description() const;
-  /// A better one that lacks a grid, with its accuracy and the grid; may be empty.
+  /// A better operation that lacks a grid, with its accuracy and the grid; may be empty.
   [[nodiscard]] const std::string& better() const { return better_; }
 
-  /// In place. Only if it is possible.
+  /// Convert in place. Require possible().
   void forward(std::span<Point2> places) const;
   void reverse(std::span<Point2> places) const;
 
  private:
-  /// Longitudes and latitudes as the operation takes and gives them.
+  /// How the operation represents longitudes and latitudes.
   struct Frame {
     double degrees_per_unit = 1, prime_meridian = 0;
   };
@@ -52,7 +52,7 @@ class DatumChange {
     bool inverse = false;
   };
   void add_shift(const CrsDefinition& system, bool inverse);
-  /// Whether there is one.
+  /// Adds an operation; returns false if there is none.
   bool add_operation(const CrsDefinition& from, const CrsDefinition& to,
                      const std::optional<GeographicArea>& area);
   void add_name(const std::string& name, double accuracy);

@@ -8,7 +8,7 @@ namespace {
 
 using List = ProjOwned<PJ_OBJ_LIST>;
 
-/// The candidates, best first.
+/// Returns the candidates, best first.
 List candidates(const PJ* from, const PJ* to, const std::optional<GeographicArea>& area) {
   PJ_CONTEXT* const context = proj_context();
   const ProjOwned<PJ_OPERATION_FACTORY_CONTEXT> factory(
@@ -33,7 +33,8 @@ ProjObject candidate(const List& list, int i) {
 
 int size_of(const List& list) { return list == nullptr ? 0 : proj_list_get_count(list.get()); }
 
-/// The first grid that is not installed; empty if all are, or if PROJ does not distribute it.
+/// Returns the first grid that is not installed; empty if all are, or if PROJ does not distribute
+/// it.
 std::string missing_grid(const PJ* operation) {
   PJ_CONTEXT* const context = proj_context();
   const int count = proj_coordoperation_get_grid_used_count(context, operation);
@@ -47,7 +48,7 @@ std::string missing_grid(const PJ* operation) {
   return {};
 }
 
-/// Whether the operation is meant for all of the area.
+/// Whether the operation is valid in the whole area.
 bool covers(const PJ* operation, const std::optional<GeographicArea>& area) {
   if (!area) return true;
   double west = 0, south = 0, east = 0, north = 0;
@@ -94,7 +95,7 @@ OperationChoice choose_operation(const PJ* from, const PJ* to,
   List list = candidates(from, to, area);
   choose(list, true, choice);
   if (!choice.found && area) {
-    // None is meant for the area: a grid has no values there, a formula has.
+    // No operation is meant for the area. A grid has no values there, but a formula does.
     list = candidates(from, to, std::nullopt);
     choose(list, false, choice);
     if (!choice.found) choose(list, true, choice);

@@ -9,24 +9,25 @@
 
 namespace terrace::terrain {
 
-/// An operation of PROJ's database between two systems.
+/// An operation from PROJ's database between two systems.
 struct OperationChoice {
   bool found = false;
   std::string name;
-  double accuracy = -1;  ///< metres; negative: unknown
+  double accuracy = -1;  ///< in metres; negative: unknown
   std::string pipeline;  ///< x before y
-  /// A more accurate one that lacks a grid: "\"...\" within 1 m lacks the grid ..."; else empty.
+  /// A more accurate operation that lacks a grid: "\"...\" within 1 m lacks the grid ..."; or
+  /// empty.
   std::string better;
 };
 
-/// The best whose grids are installed, for a whole area: what is meant for most of it, then the
-/// most accurate. Operations that ignore a difference between the systems ("ballpark") are never
-/// taken. area: without it, where both systems are used. Data beyond all areas of use get what is
-/// meant for the whole system.
+/// Returns the best operation with installed grids for a whole area: the one meant for most of the
+/// area, then the most accurate. Operations that ignore a difference between the systems
+/// ("ballpark") are never used. area: by default, where both systems are used. Data outside all
+/// areas of use get the operation for the whole system.
 OperationChoice choose_operation(const PJ* from, const PJ* to,
                                  const std::optional<GeographicArea>& area);
 
-/// "\"name\" within 2 m", without the accuracy if it is not known or 0.
+/// Returns "\"name\" within 2 m", without the accuracy if it is unknown or 0.
 std::string quoted_with_accuracy(const std::string& name, double accuracy);
 
 }  // namespace terrace::terrain

@@ -14,12 +14,12 @@ namespace {
 thread_local std::string complaint;
 thread_local std::string database_failure;
 
-/// True for what PROJ says of its database: of a failed read, or that it is not found.
+/// Whether PROJ's message is about its database: a failed read, or a missing file.
 bool is_of_database(std::string_view message) {
   return message.find("SQLite error") != message.npos || message.find("proj.db") != message.npos;
 }
 
-/// PROJ would write to standard error.
+/// Keeps the message, which PROJ would otherwise write to standard error.
 void keep_message(void*, int level, const char* message) {
   if (level != PJ_LOG_ERROR || message == nullptr) return;
   complaint = message;

@@ -5,11 +5,11 @@
 #include <string>
 
 #include <proj.h>
-// Building a CRS from its parts; stable since PROJ 6, GDAL uses it.
+// Needed to build a CRS from its parts; stable since PROJ 6, and GDAL uses it.
 #include <proj_experimental.h>
 
-/// PROJ's objects, as long as one function needs them: definitions are read from them into plain
-/// data. Coordinates go through ProjPipeline.
+/// PROJ's objects, owned by one function while it reads their definitions into plain data.
+/// ProjPipeline converts coordinates.
 
 namespace terrace::terrain {
 
@@ -24,30 +24,31 @@ template <class Thing>
 using ProjOwned = std::unique_ptr<Thing, ProjDestroy>;
 using ProjObject = ProjOwned<PJ>;
 
-/// PROJ's context of this thread, with its database open and the network off. Nothing made with it
-/// may leave the thread. Throws: CrsDatabaseError if there is no database, and as
+/// Returns PROJ's context of this thread, with its database open and the network off. Objects made
+/// with it must not leave the thread. Throws: CrsDatabaseError if there is no database, and as
 /// check_proj_database().
 PJ_CONTEXT* proj_context();
 
-/// To be called after what reads the database: PROJ returns the same for a failed read as for an
-/// unknown name. Throws: CrsDatabaseError if a read failed in this thread since the last call.
+/// Checks for a failed read of the database; call it after every function that reads it, because
+/// PROJ returns the same for a failed read as for an unknown name. Throws: CrsDatabaseError if a
+/// read failed in this thread since the last call.
 void check_proj_database();
 
-/// A context that never uses the network and keeps messages for proj_complaint().
+/// Returns a context that never uses the network and keeps messages for proj_complaint().
 PJ_CONTEXT* make_proj_context();
 
-/// What PROJ last complained about in this thread, since it was asked; may be empty.
+/// Returns and clears PROJ's last complaint in this thread; may be empty.
 std::string proj_complaint();
 
-/// The object of that code. nullptr if there is none. Throws: as proj_context.
+/// Returns the object of a code; null if there is none. Throws: as proj_context().
 ProjObject proj_crs_of_code(const std::string& authority, const std::string& code);
-/// From WKT of any version, PROJJSON or a PROJ string. nullptr if it is none of them.
+/// Reads WKT of any version, PROJJSON or a PROJ string; null for other text.
 ProjObject proj_crs_of_text(const std::string& text);
 
-/// WKT 2:2019 in one line; empty if the object cannot be written so.
+/// Returns WKT 2:2019 on one line; empty if the object cannot be expressed in it.
 std::string wkt_of(const PJ* object);
 
-/// "" instead of nullptr.
+/// Returns "" for nullptr.
 inline std::string text_of(const char* text) { return text == nullptr ? "" : text; }
 
 }  // namespace terrace::terrain

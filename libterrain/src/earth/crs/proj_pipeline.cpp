@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The operation with a context of its own, which moves between threads with it.
+/// The operation with its own context, which moves between threads with it.
 class Worker {
  public:
   explicit Worker(const std::string& definition)
@@ -39,7 +39,7 @@ class ProjPipeline::Pool {
     idle_.push_back(made());
   }
 
-  /// A worker for as long as this lives.
+  /// Borrows a worker for its lifetime.
   class Loan {
    public:
     explicit Loan(Pool& pool) : pool_(pool), worker_(pool.take()) {}
@@ -77,7 +77,7 @@ class ProjPipeline::Pool {
       }
     }
     std::unique_ptr<Worker> worker = made();
-    // Room for it is made now: giving it back must not throw.
+    // Reserves room now, because giving a worker back must not throw.
     const std::scoped_lock lock(mutex_);
     idle_.reserve(++workers_);
     return worker;
@@ -99,7 +99,7 @@ PJ_COORD moved(PJ* operation, PJ_DIRECTION direction, const Point2& place) {
   constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   constexpr PJ_COORD kNothing{{kNowhere, kNowhere, kNowhere, kNowhere}};
   if (!std::isfinite(place[0]) || !std::isfinite(place[1])) return kNothing;
-  // No time: what moves with the plates is taken at its own epoch.
+  // Without a time; coordinates that move with the plates are used at their own epoch.
   const PJ_COORD result =
       proj_trans(operation, direction, proj_coord(place[0], place[1], 0, HUGE_VAL));
   return std::isfinite(result.xyzt.x) && std::isfinite(result.xyzt.y) ? result : kNothing;

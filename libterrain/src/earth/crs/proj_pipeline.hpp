@@ -9,9 +9,9 @@
 
 namespace terrace::terrain {
 
-/// A coordinate operation that PROJ computes: x and y in, x and y out, in the units that its text
-/// says. Copies share one pool of PROJ's objects, of which each thread takes its own while it
-/// computes: const members may be called by several threads at once.
+/// A coordinate operation computed by PROJ: from x and y to x and y, in the units of its
+/// definition. Copies share a pool of PROJ's objects, and each thread uses its own object, so
+/// several threads may call const members at once.
 class ProjPipeline {
  public:
   /// definition: "+proj=pipeline ...". Throws: CrsError if PROJ cannot compute it.
@@ -19,10 +19,11 @@ class ProjPipeline {
 
   [[nodiscard]] const std::string& definition() const;
 
-  /// In place; NaN where there is no place. 0.6 (Krovak) to 4 million (LAEA) places per second.
+  /// Convert in place; NaN where a place has no image. 0.6 (Krovak) to 4 million (LAEA) places per
+  /// second.
   void forward(std::span<Point2> places) const;
   void reverse(std::span<Point2> places) const;
-  /// Adds to each height what becomes of the height 0 at its place; NaN if nothing. Sizes are
+  /// Adds the image of height 0 at each place to its height; NaN if it has none. Sizes must be
   /// equal.
   void add_heights(std::span<const Point2> places, std::span<double> heights) const;
 

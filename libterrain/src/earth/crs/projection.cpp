@@ -21,9 +21,9 @@ using Parameters = ProjectionParameters;
 
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
-/// A formula for one place, with false origin (metres) and central meridian (degrees), as a
-/// Projection: Formula has `Point2 forward(longitude difference, latitude) const` and
-/// `Point2 reverse(x, y) const`, which gives those.
+/// Applies the formula for one place to many, with false origin (metres) and central meridian
+/// (degrees). Formula has `Point2 forward(longitude difference, latitude) const` and `Point2
+/// reverse(x, y) const`, its inverse.
 template <class Formula>
 class ProjectionBatch final : public Projection {
  public:
@@ -59,7 +59,7 @@ class ProjectionBatch final : public Projection {
   double longitude_, east_, north_;
 };
 
-/// x, y of a place by one of GeographicLib's projections with a central meridian, and back.
+/// Converts a place to x, y with a projection of GeographicLib with a central meridian, and back.
 template <class Library>
 Point2 plane_of(const Library& library, double turn, double latitude) {
   Point2 plane{};
@@ -73,7 +73,7 @@ Point2 place_of(const Library& library, double x, double y) {
   return place;
 }
 
-/// Such a projection with y counted from `latitude`.
+/// Such a projection with y measured from `latitude`.
 template <class Library>
 class WithMeridian {
  public:
@@ -99,8 +99,8 @@ std::unique_ptr<const Projection> with_meridian(Library library, const Parameter
       WithMeridian<Library>(std::move(library), latitude), p);
 }
 
-/// Albers. Cones open to the south are computed in the mirror of the equator: the inverse of
-/// GeographicLib 2.1.2 gives their latitudes with the wrong sign.
+/// Albers. Cones open to the south are computed mirrored at the equator, because the inverse in
+/// GeographicLib 2.1.2 returns their latitudes with the wrong sign.
 class Albers {
  public:
   Albers(const Parameters& p, const Ellipsoid& ellipsoid)
@@ -122,9 +122,9 @@ class Albers {
   WithMeridian<GeographicLib::AlbersEqualArea> cone_;
 };
 
-/// Lambert's conformal conic, and Mercator's as the cone that is a cylinder. GeographicLib 2.1.2
-/// takes a pole for a place a little beside it, which a flat cone shows thousands of kilometres
-/// away: the apex is put where it belongs, and the other pole nowhere.
+/// Lambert's conformal conic, and Mercator as the cone that is a cylinder. GeographicLib 2.1.2
+/// treats a pole as a place slightly off it, which a flat cone maps thousands of kilometres away.
+/// So the apex is computed here, and the other pole has no image.
 class ConformalCone {
  public:
   ConformalCone(const GeographicLib::LambertConformalConic& library, const ProjectionParameters& p,
@@ -132,7 +132,7 @@ class ConformalCone {
       : library_(library) {
     for (const double parallel : {library.OriginLatitude(), p.parallel1, p.parallel2}) {
       if (std::abs(parallel) == 90) {
-        throw std::invalid_argument("a parallel of a conformal cone lies at a pole");
+        throw std::invalid_argument("a parallel of a conformal cone is at a pole");
       }
     }
     double x = 0, y = 0, turned = 0, scale = 0;
@@ -231,7 +231,7 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
     case ProjectionMethod::albers:
       return std::make_unique<ProjectionBatch<Albers>>(Albers(p, ellipsoid), p);
     case ProjectionMethod::mercator_a:
-      // A cone that touches at the equator.
+      // The cone that touches the equator, a cylinder.
       return conformal_cone(LambertConformalConic(a, f, 0, p.scale), p, 0);
     case ProjectionMethod::mercator_b: {
       double x = 0, y = 0, convergence = 0, scale = 1;
@@ -245,13 +245,13 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
     case ProjectionMethod::web_mercator:
       return std::make_unique<ProjectionBatch<WebMercator>>(WebMercator(a), p);
   }
-  throw std::invalid_argument("there is no such projection method");
+  throw std::invalid_argument("unknown projection method");
 }
 
 }  // namespace
 
 bool nearly_equal(const ProjectionParameters& one, const ProjectionParameters& other) {
-  // Two parallels mean the same in either order.
+  // Two parallels may be in either order.
   ProjectionParameters a = one, b = other;
   for (ProjectionParameters* const p : {&a, &b}) {
     if (p->parallel1 < p->parallel2) std::swap(p->parallel1, p->parallel2);
@@ -275,7 +275,7 @@ std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
   }
   for (const double latitude : {p.latitude, p.parallel1, p.parallel2}) {
     if (std::abs(latitude) > 90) {
-      throw std::invalid_argument("a latitude of its parameters lies beyond a pole");
+      throw std::invalid_argument("a latitude of its parameters is beyond a pole");
     }
   }
   if (!(p.scale > 0)) throw std::invalid_argument("its scale factor is not positive");

@@ -22,7 +22,7 @@ struct Ellipsoid {
   friend bool operator==(const Ellipsoid&, const Ellipsoid&) = default;
 };
 
-/// The methods that are computed by GeographicLib, each with its code in the EPSG dataset.
+/// The methods that GeographicLib computes, with their codes in the EPSG dataset.
 enum class ProjectionMethod : std::uint8_t {
   transverse_mercator,    ///< 9807
   lambert_1sp,            ///< 9801, conformal conic
@@ -35,10 +35,10 @@ enum class ProjectionMethod : std::uint8_t {
   mercator_b,             ///< 9805: parallel1 is the latitude of true scale
 };
 
-/// Degrees and metres. Which of them count depends on the method.
+/// In degrees and metres. The method determines which of them are used.
 struct ProjectionParameters {
-  double latitude = 0.0;   ///< of the (false) origin or centre
-  double longitude = 0.0;  ///< likewise; from the prime meridian of the system
+  double latitude = 0.0;   ///< of the (false) origin or the centre
+  double longitude = 0.0;  ///< of the same; from the system's prime meridian
   double scale = 1.0;
   double parallel1 = 0.0, parallel2 = 0.0;
   double false_easting = 0.0, false_northing = 0.0;
@@ -46,23 +46,25 @@ struct ProjectionParameters {
   friend bool operator==(const ProjectionParameters&, const ProjectionParameters&) = default;
 };
 
-/// Equal but for the last digits, as texts and units leave them: micrometres on the ground.
+/// Whether both are equal except for the last digits, which texts and units change: micrometres on
+/// the ground.
 bool nearly_equal(const ProjectionParameters& a, const ProjectionParameters& b);
 
-/// A projection. Const members may be called by several threads at once.
+/// A projection. Several threads may call const members at once.
 class Projection {
  public:
   virtual ~Projection() = default;
-  /// (longitude, latitude) to (x, y), in place. A place that the plane does not have (a pole of
-  /// Mercator's, the antipode of an azimuthal one, a latitude beyond 90, NaN) becomes NaN.
+  /// Converts (longitude, latitude) to (x, y), in place. A place without an image (a pole of
+  /// Mercator, the antipode of an azimuthal projection, a latitude beyond 90, NaN) becomes NaN.
   virtual void forward(std::span<Point2> places) const = 0;
-  /// (x, y) to (longitude in [-180, 180], latitude), in place; NaN where no place is shown.
+  /// Converts (x, y) to (longitude in [-180, 180], latitude), in place; NaN where (x, y) is not the
+  /// image of a place.
   virtual void reverse(std::span<Point2> places) const = 0;
 };
 
-/// By GeographicLib (a few nanometres); Web Mercator follows IOGP Publication 373-7-2, Geomatics
-/// Guidance Note 7 part 2 (2019). All invert each other within a micrometre in their area of use.
-/// Throws: std::invalid_argument for parameters that make no projection.
+/// Makes a projection computed by GeographicLib (to a few nanometres); Web Mercator follows IOGP
+/// Publication 373-7-2, Geomatics Guidance Note 7 part 2 (2019). Forward and reverse agree within a
+/// micrometre in the area of use. Throws: std::invalid_argument for invalid parameters.
 std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
                                                   const ProjectionParameters& parameters,
                                                   const Ellipsoid& ellipsoid);

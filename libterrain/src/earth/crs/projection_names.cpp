@@ -134,7 +134,8 @@ std::optional<KnownProjection> known_projection(const PJ* conversion) {
       if (member == nullptr) return std::nullopt;
       known.parameters.*member = parameter.value;
     }
-    // On another latitude than the equator's it is not said of which the scale is.
+    // At a latitude of origin off the equator the definition is ambiguous about where the scale
+    // applies.
     if (row.method == ProjectionMethod::mercator_a && known.parameters.latitude != 0) break;
     return known;
   }

@@ -12,7 +12,7 @@
 
 namespace terrace::terrain {
 
-/// What a parameter means, whatever the method calls it.
+/// The meaning of a parameter, whatever the method calls it.
 enum class ParameterRole : std::uint8_t {
   latitude,
   longitude,
@@ -32,31 +32,30 @@ struct ParameterName {
   ParameterRole role;
   const char* name;
 };
-/// nullptr if there is none.
+/// Returns nullptr for an unknown code.
 const ParameterName* parameter_of_code(int code);
 ParameterKind kind_of(ParameterRole role);
 
-/// A parameter of a conversion: degrees, metres or a factor. role: none if it has no code or name
-/// of the table.
+/// A parameter of a conversion, in degrees, metres or as a factor. role: nullopt if the table has
+/// neither its code nor its name.
 struct ConversionParameter {
   std::optional<ParameterRole> role;
   double value = 0;
 };
 std::vector<ConversionParameter> parameters_of(const PJ* conversion);
 
-/// The method of a conversion as GeographicLib has it, with its parameters; nothing if it is not
-/// one of them.
+/// The method of a conversion and its parameters, if GeographicLib supports it; nullopt otherwise.
 struct KnownProjection {
   ProjectionMethod method;
   ProjectionParameters parameters;
 };
 std::optional<KnownProjection> known_projection(const PJ* conversion);
 
-/// Lower case, letters and digits only: how names are compared.
+/// Lower case, letters and digits only: the form in which names are compared.
 std::string plain_name(std::string_view name);
 
-/// A factor to degrees or metres, cleaned of what rounded texts leave: 0.0174532925199433 radians
-/// stand for a degree.
+/// Clean a factor to degrees or metres of the rounding in texts: 0.0174532925199433 radians become
+/// exactly one degree.
 double degrees_of(double radians);
 double metres_of(double metres);
 
