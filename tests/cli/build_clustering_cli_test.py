@@ -109,7 +109,7 @@ class ClusteringOptionsTest(unittest.TestCase):
         with open(holes, 'w', encoding='ascii') as file:
             file.write('x,y,z,gloss\n' + ''.join('%d,%d,3,%s\n' % (k % 60, k // 60, 'nan' if k == 77 else k)
                                                  for k in range(3000)))
-        self.expect_error('"gloss" of a point is no finite number', 'build', holes, '-o', self.path('no.st'),
+        self.expect_error('"gloss" of a point is not finite', 'build', holes, '-o', self.path('no.st'),
                           '--channel', 'gloss:1', '--block', 1000)
         self.assertFalse(os.path.exists(self.path('no.st')))
         self.run_ok('build', holes, '-o', self.path('whole.st'), '--channel', 'gloss:1', '--block', 1000,

@@ -621,7 +621,7 @@ class GeodesyTest(unittest.TestCase):
                 with open(text, encoding='utf-8') as file:
                     self.assertEqual(len(file.read().splitlines()) - 1, len(expected))
         result = terrace('points', store, '--region', self.path('metres.geojson'), '-o', self.path('m.csv'))
-        self.assertIn('has no crs, and its places are taken in that of the data, EPSG:32632', result.stderr)
+        self.assertIn('has no crs, and its places are read in the CRS of the data, EPSG:32632', result.stderr)
         # What --region-crs says counts before what the file says.
         self.assertEqual({z for _, _, z in self.points(store, '--region', self.geojson('wrong.geojson', metres,
                                                        crs=crs('EPSG:4326')), '--region-crs', 'EPSG:32632')}, within)

@@ -255,7 +255,7 @@ class GridTest(unittest.TestCase):
         with open(self.path('a.png'), 'rb') as file:
             result = self.terrace('build', '-', '-o', self.path('pipe.terrace'), '--cell', 25, input=file.read())
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn(b'were set aside in a temporary file', result.stderr)
+        self.assertIn(b'were copied to a temporary file', result.stderr)
         self.same_store('a.terrace', 'pipe.terrace')
         with open(self.path('a.pgw'), 'w') as file:
             file.write('25\n0\n0\n-25\n500012.5\n5200737.5\n')

@@ -54,7 +54,7 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   schema.crs = crs.crs;
   schema.vertical = request.vertical.empty() ? name_of(crs.heights) : request.vertical;
   if (schema.vertical != name_of(crs.heights)) {
-    // What was said of the heights goes before what the file says of them.
+    // An explicit height option overrides the file.
     schema.crs.vertical_epsg = 0;
     if (crs.system) {
       CrsDefinition definition = crs.system->definition();
@@ -87,7 +87,7 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   return schema;
 }
 
-/// Where a source lies.
+/// The CRS of a source and its map to the ground.
 struct Located {
   Located(const stream::SourceInfo& info, const BuildRequest& request)
       : crs(crs_of_source(info, request.datum_shift)), ground(placement(info), request.z_weight) {}
@@ -103,22 +103,22 @@ struct Located {
   }
 };
 
-/// What a source takes, unless it says that it needs more. What --memory leaves over goes to the
-/// source as well, which keeps more files of a mosaic open by it.
+/// Memory for a source, unless it says that it needs more. The source also gets what is left of
+/// --memory, which lets it keep more files of a mosaic open.
 constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
 constexpr std::size_t kBlocksAhead = 4;
-/// Memory bound of a build, unless its context gives another.
+/// Memory limit of a build, unless its context sets another.
 constexpr std::uint64_t kMemory = std::uint64_t{256} << 20;
-/// Parts of points that are put in order ahead, of which each takes about 20 MiB.
+/// How many parts of points are sorted ahead; each uses about 20 MiB.
 constexpr unsigned kMostPartsAhead = 4;
 
-/// Bytes at the peak with so many threads, beside the source's: a generous estimate; a benchmark
-/// prints the true peak.
+/// Estimates peak memory with this many threads, excluding the source's. The estimate is generous;
+/// a benchmark prints the true peak.
 std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payload_size,
                                    std::uint64_t threads) {
   const std::uint64_t point = sizeof(stream::Point3) + payload_size;
-  // Blocks read ahead, being clustered or waiting their turn, one forming per level, with what is
-  // worked out per point beside them; and those that the store writer holds back to train its
+  // Counts the blocks read ahead, being clustered or waiting, and one forming per level, with
+  // temporary data per point; and those that the store writer holds back to train its compression
   // tables.
   const std::uint64_t blocks =
       (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
@@ -126,8 +126,8 @@ std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payl
   return (std::uint64_t{32} << 20) + blocks;
 }
 
-/// As many threads as were asked for and fit into --memory: their number changes no result.
-/// Throws: stream::Error if not even one does.
+/// Returns the number of threads: as many as requested and as fit into --memory. Results do not
+/// depend on it. Throws: stream::Error if not even one thread fits.
 unsigned threads_within_memory(const BuildRequest& request, const Context& context,
                                std::uint64_t memory_bytes, std::size_t payload_size,
                                std::uint64_t source_bytes, const stream::SourceInfo& info) {
@@ -152,7 +152,7 @@ unsigned threads_within_memory(const BuildRequest& request, const Context& conte
                      : "raise `memory_bytes`, or lower `block_points`"});
 }
 
-/// Height of a cell over its width on the ground, in the middle of the raster.
+/// Returns the ratio of a cell's height to its width on the ground, in the middle of the raster.
 double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
   stream::Box3 raster;
   raster.include(stream::Point3{0, 0, 0});
@@ -166,7 +166,7 @@ double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
 }
 
 /// Throws: stream::Error if cells of a raster, or steps of a cloud's coordinates, are too small or
-/// too large for their places to be told apart. The store of such a source could not be read.
+/// too large to be distinguished. The store of such a source could not be read.
 void check_cells(const stream::SourceInfo& info) {
   const std::array<double, 6>& m = info.world.xy;
   const double area = m[0] * m[4] - m[1] * m[3];
@@ -190,14 +190,14 @@ void check_cells(const stream::SourceInfo& info) {
       {.file = info.files.empty() ? std::string() : info.files.front(),
        .where = {},
        .cause = std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
-                " cannot be told apart: steps of " + plain_number(base::hypot(m[0], m[3])) + " x " +
-                plain_number(base::hypot(m[1], m[4])) + " from " + plain_number(m[2]) + ", " +
-                plain_number(m[5]),
+                " cannot be distinguished: steps of " + plain_number(base::hypot(m[0], m[3])) +
+                " x " + plain_number(base::hypot(m[1], m[4])) + " from " + plain_number(m[2]) +
+                ", " + plain_number(m[5]),
        .remedy =
            info.grid ? "correct the size of its cells" : "correct the scale of its coordinates"});
 }
 
-/// The first points of a source.
+/// Limits a source to its first points.
 class FirstPoints final : public stream::PointSource {
  public:
   FirstPoints(std::unique_ptr<stream::PointSource> source, std::uint64_t most)
@@ -219,7 +219,7 @@ class FirstPoints final : public stream::PointSource {
   std::uint64_t most_;
 };
 
-/// Lengths of the stored coordinates' units on the ground, heights weighted.
+/// Returns the lengths on the ground of the units of stored coordinates, with heights weighted.
 std::array<double, 3> unit_lengths(const GroundMap& map) {
   const auto length = [&map](std::size_t axis) {
     return base::hypot(base::hypot(map[axis], map[3 + axis]), map[6 + axis]);
@@ -227,18 +227,18 @@ std::array<double, 3> unit_lengths(const GroundMap& map) {
   return {length(0), length(1), length(2)};
 }
 
-/// What the user should know of the order in which the points came.
+/// Notes in what order the points arrived, if they were sorted.
 void tell_order(const stream::OrderedSource::Report& order, const std::filesystem::path& folder,
                 const Context& context) {
   if (!order.reordered) return;
   std::string line = "the points were put in spatial order";
   if (order.spread > 0) {
     line += ": as they came, blocks were " + readable_number(order.spread, 2) +
-            " times as wide as need be";
+            " times as wide as necessary";
   }
   if (order.temporary_bytes > 0) {
-    line += "; this took " + readable_bytes(order.temporary_bytes) + " of disk for a while in " +
-            folder.string();
+    line += "; this used " + readable_bytes(order.temporary_bytes) +
+            " of temporary disk space in " + folder.string();
   }
   context.say(line);
 }
@@ -249,7 +249,7 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
   const bool selected = !selection.where.empty() || selection.region;
   std::string cause, remedy;
   if (selected && (read.excluded > 0 || read.nodata == 0)) {
-    // Parts that the region does not meet are neither read nor counted.
+    // Parts outside the region are neither read nor counted.
     cause = "none of its " +
             (read.excluded > 0 ? std::to_string(read.excluded) + ' ' : std::string()) +
             "points is selected";
@@ -268,20 +268,21 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
                        .remedy = remedy});
 }
 
-/// Ends a build whose points are to be joined across the antimeridian.
+/// Ends a build that must join points across the antimeridian.
 struct AcrossAntimeridian {
   JoinedLongitudes::Joint joint;
 };
 
-/// Throws: AcrossAntimeridian if the input can be read again; else stream::Error.
+/// Throws: AcrossAntimeridian if the input can be read again; otherwise stream::Error.
 void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longitudes,
                      const Context& context) {
   const std::optional<JoinedLongitudes::Joint> joint = longitudes.joint();
   if (!joint || request.most_points > 0) return;
   if (request.entities != stream::Entities::points) {
-    // Their corners are in attributes.
-    context.say("the points " + joint->what +
-                ", and what connects them goes around the earth: count longitudes on beyond 180");
+    // Their corners are attributes, which cannot be shifted.
+    context.say(
+        "the points " + joint->what +
+        ", and what connects them goes around the earth: continue longitudes beyond 180");
     return;
   }
   if (!request.open &&
@@ -290,9 +291,9 @@ void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longit
     throw stream::Error(
         {.file = request.inputs.front(),
          .where = {},
-         .cause =
-             "its points " + joint->what + ", which is known at its end, and can be read only once",
-         .remedy = "name a file, or count longitudes from 0 to 360 or on beyond 180"});
+         .cause = "its points " + joint->what +
+                  ", which is found only at the end of the input, and it can be read only once",
+         .remedy = "name a file, or count longitudes from 0 to 360 or continue them beyond 180"});
   }
   throw AcrossAntimeridian{*joint};
 }
@@ -312,8 +313,8 @@ std::string name_of(cluster::Effort effort) {
 
 namespace {
 
-/// middle: of points that are joined across the antimeridian. Throws: AcrossAntimeridian without
-/// it if they must be.
+/// middle: given if points are to be joined across the antimeridian. Throws: AcrossAntimeridian if
+/// it is not given but needed.
 BuildOutcome build_once(const BuildRequest& request, const Context& context,
                         std::optional<double> middle) {
   const std::uint64_t memory_bytes = context.memory_or(kMemory);
@@ -343,8 +344,8 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
   }
   const stream::SourceInfo info = source->info();
   check_cells(info);
-  // Found by whoever asks first. PROJ takes tens of milliseconds to open its database, in which the
-  // first points are read.
+  // Computed on first use. PROJ takes tens of milliseconds to open its database; the first points
+  // are read meanwhile.
   const std::shared_future<Located> located =
       std::async(std::launch::deferred, [&info, &request] { return Located(info, request); });
   const ProgressReport report(context, "points");
@@ -356,7 +357,7 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
     reading_report->update(progress.points, progress.fraction);
   };
   const std::filesystem::path folder = std::filesystem::absolute(request.store).parent_path();
-  // Goes before what its thread calls.
+  // Must be destroyed before the objects that its thread calls.
   std::unique_ptr<stream::PointSource> points = std::move(source);
   stream::OrderedSource* in_order = nullptr;
   if (!info.grid) {
@@ -380,9 +381,10 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
     return threads_within_memory(request, context, memory_bytes, payload_size,
                                  std::max(kSourceMemory, points->reading_bytes()), info);
   };
-  // Checks memory before reading begins; the bytes that the store adds are known later.
+  // Checks memory before reading begins, without the bytes that the store adds, which are known
+  // later.
   static_cast<void>(threads_for(info.payload_size()));
-  // Starts now, except for rasters, which need their cell size first (see below).
+  // Start now, except for rasters, which need their cell size first (see below).
   points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
   const auto& [crs, ground] = located.get();
   BuildOutcome outcome;
@@ -390,7 +392,7 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
   const std::size_t payload_bytes = schema.payload_size();
   const unsigned threads = threads_for(payload_bytes);
   if (info.grid) {
-    // Tiles are to be square on the ground: only now is it known what a cell measures there.
+    // Tiles should be square on the ground, and the size of a cell there is known only now.
     points->refine(cell_aspect(ground, info),
                    memory_bytes - memory_beside_source(request, payload_bytes, threads));
   }
@@ -400,7 +402,7 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
   cluster::HierarchyOptions options = clustering_of(request, schema, ground);
   options.threads = threads;
   options.stop = context.stop;
-  // A full disk is told at once, even if the input's producer idles.
+  // Reports a full disk at once, even if the producer of the input is idle.
   options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);
 
@@ -411,7 +413,7 @@ BuildOutcome build_once(const BuildRequest& request, const Context& context,
   UndeclaredVoids voids(info);
   std::vector<std::byte> marked;
   stream::Progress so_far;
-  // The reading ends for two reasons: the context's, or a failure that push() tells.
+  // Reading stops for two reasons: the context requested it, or a failure that push() rethrows.
   const auto next = [&] {
     try {
       return points->next(block);
@@ -482,7 +484,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     const auto& [middle, what] = across.joint;
     const bool beyond = what.ends_with("antimeridian");
     context.say("the points " + what + ": they are read again and joined" +
-                (beyond ? ", with longitudes that go on beyond 180 degrees" : ""));
+                (beyond ? ", with longitudes that continue beyond 180 degrees" : ""));
     return build_once(request, context, middle);
   }
 }

@@ -17,7 +17,7 @@
 namespace terrace::terrain {
 namespace {
 
-// Regions are boxes in the CRS; the ground's frame may differ from block to block.
+// Regions are boxes in the CRS; the map to the ground may differ between blocks.
 void set_metric(const BuildRequest& request, const stream::Placement& info, const Ground& ground,
                 cluster::HierarchyOptions& options) {
   const MetricChoice& choice = request.metric;
@@ -25,7 +25,8 @@ void set_metric(const BuildRequest& request, const stream::Placement& info, cons
     options.metric = choice.on_ground({0, 0, 0}, cluster::kIdentityMap);
     return;
   }
-  // From the CRS by way of stored coordinates, which are columns and rows for a raster.
+  // Composes the maps from the CRS to stored coordinates (a raster's columns and rows) to the
+  // ground.
   const std::array<double, 6>& xy = info.world.xy;
   const stream::Channel& height = info.coordinates[2];
   options.metric_of = [&choice, &ground, xy, height](const base::Box3& bounds) {
@@ -40,7 +41,7 @@ void set_metric(const BuildRequest& request, const stream::Placement& info, cons
   };
 }
 
-// An attribute as an axis of distances.
+// An attribute that is an axis of distances.
 struct AttributeAxis {
   stream::Channel channel;
   std::size_t offset = 0;  // in a record
@@ -78,15 +79,15 @@ void set_channels(const BuildRequest& request, const stream::Schema& schema,
       if (std::isfinite(values[i])) continue;
       throw stream::Error({.file = file,
                            .where = {},
-                           .cause = "\"" + channel.name + "\" of a point is no finite number",
-                           .remedy = "leave such points out by a condition of `where`, or the "
+                           .cause = "\"" + channel.name + "\" of a point is not finite",
+                           .remedy = "leave such points out with `where`, or the "
                                      "attribute out of `channel`"});
     }
   };
 }
 
-/// As many places as there are in `places`, the first and last of `vertices` and others at equal
-/// distances along them, so that polylines of different numbers of vertices can be compared.
+/// Fills `places` with the first and last of `vertices` and others at equal distances between them,
+/// so that polylines with different numbers of vertices can be compared.
 void spread_along(std::span<const stream::Point3> vertices, std::span<stream::Point3> places) {
   std::array<double, stream::kPolylineVertices> along{};
   const std::size_t last = vertices.size() - 1;
@@ -124,8 +125,8 @@ void set_corners(const BuildRequest& request, const stream::Schema& schema,
   if (request.strategy != FacilityStrategy::automatic &&
       request.strategy != FacilityStrategy::full_scan &&
       request.strategy != FacilityStrategy::facilities) {
-    throw UsageError(entities + " have no " + cluster::name_of(request.strategy) +
-                     " search: theirs are automatic, full scan and facilities");
+    throw UsageError(entities + " do not support the " + cluster::name_of(request.strategy) +
+                     " search: choose automatic, full scan or facilities");
   }
   const CornerReader read(schema, request.entities, input_name(request));
   options.corners.count = read.most();
@@ -150,8 +151,9 @@ void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>&
   if (std::any_of(attributes.begin(), attributes.end(), same)) {
     throw stream::Error({.file = input_name(request),
                          .where = {},
-                         .cause = std::string("its points have an attribute \"") + kOutlierName +
-                                  "\" already, the name that `outlier_price` marks outliers by",
+                         .cause = std::string("its points already have an attribute \"") +
+                                  kOutlierName +
+                                  "\", the name that `outlier_price` marks outliers with",
                          .remedy = std::string("leave it out: `drop` ") + kOutlierName});
   }
   attributes.push_back({kOutlierName, stream::ScalarType::u8});

@@ -12,28 +12,29 @@
 #include "earth/ground.hpp"
 #include "terrace/terrain/build.hpp"
 
-/// How a build clusters its points: distances on the ground, attributes in them, outliers.
+/// Clustering in a build: distances on the ground, attributes as further axes, outliers.
 
 namespace terrace::terrain {
 
-/// The attribute that marks outliers: 1 for them, 0 for all others. It is the last.
+/// The attribute that marks outliers with 1 and all other points with 0. It is the last one.
 inline constexpr const char* kOutlierName = "outlier";
 
-/// The input in messages.
+/// The name of the input in messages.
 [[nodiscard]] inline std::string input_name(const BuildRequest& request) {
   return request.inputs.empty() ? "the source" : request.inputs.front();
 }
 
-/// Adds the mark of outliers to the attributes, if the request has a price for them.
-/// Throws: stream::Error if the source has an attribute of that name.
+/// Adds the outlier mark to the attributes, if the request has an outlier price. Throws:
+/// stream::Error if the source has an attribute with that name.
 void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>& attributes);
 
-/// `count` packed records with a further byte each, zero.
+/// Copies `count` packed records to `result`, each followed by a zero byte.
 void append_zero_byte(std::span<const std::byte> records, std::size_t record_bytes,
                       std::size_t count, std::vector<std::byte>& result);
 
-/// schema: with the mark. All three must outlive the options.
-/// Throws: stream::Error on an attribute that is not there, naming those that are.
+/// Returns the options of the clustering. schema: includes the outlier mark. All three arguments
+/// must outlive the options. Throws: stream::Error on a missing attribute, naming the existing
+/// ones.
 cluster::HierarchyOptions clustering_of(const BuildRequest& request, const stream::Schema& schema,
                                         const Ground& ground);
 

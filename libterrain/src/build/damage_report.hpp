@@ -17,14 +17,14 @@
 
 namespace terrace::terrain {
 
-/// Says that the input was set aside on disk, if it was.
+/// Notes that the input was spooled to disk, if it was.
 inline void tell_spooled(const stream::SourceInfo& info, const Context& context) {
   if (info.spooled_bytes == 0) return;
   context.say("the input cannot be read from a pipe or out of gzip: " +
-              readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
+              readable_bytes(info.spooled_bytes) + " were copied to a temporary file");
 }
 
-/// Collects the damaged parts of the input, which are left out, for a report at the end.
+/// Collects the damaged parts of the input, which are skipped, for a report at the end.
 class DamageReport {
  public:
   /// For SourceOptions::on_damage; the report must outlive the source.
@@ -34,7 +34,7 @@ class DamageReport {
       std::string line = parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
                          parts.cause + " (" + counted(points, "point") + " left out)";
       const std::lock_guard lock(mutex_);
-      // One of several files is opened twice: to check that they agree, and to read it.
+      // With several files, each is opened twice: to check that they agree, and to read it.
       if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
       ++parts_;
       if (lines_.size() < kMostLines) lines_.push_back(std::move(line));

@@ -25,7 +25,7 @@ void JoinedLongitudes::operator()(std::span<stream::Point3> stored) {
       const double longitude = p[0] * scale_ + offset_;
       const double turns = std::round((turned({longitude, 0})[0] - longitude) / 360);
       if (turns == 0) continue;
-      // Stored integers stay integers where their scale divides a turn, as decimal ones do.
+      // Keeps stored integers as integers if their scale divides a turn, as decimal scales do.
       const double step = 360 / scale_, whole = std::round(step);
       p[0] += turns * (std::abs(step - whole) < 1e-6 ? whole : step);
     }
@@ -36,14 +36,14 @@ void JoinedLongitudes::operator()(std::span<stream::Point3> stored) {
     least_ = std::min(least_, longitude);
     most_ = std::max(most_, longitude);
     const double degree = std::floor(longitude - 360 * std::floor(longitude / 360));
-    // NaN is in the first.
+    // NaN counts as the first degree.
     seen_[degree > 0 ? std::min(static_cast<std::size_t>(degree), kBins - 1) : 0] = true;
   }
 }
 
 std::optional<JoinedLongitudes::Joint> JoinedLongitudes::joint() const {
   if (!(most_ - least_ > 180 && most_ - least_ <= 720)) return std::nullopt;
-  // The widest gap, around the circle; a gap that goes on beyond the last degree counts once.
+  // Finds the widest gap around the circle; a gap that continues past the last degree counts once.
   std::size_t gap = 0, gap_end = 0, run = 0;
   for (std::size_t i = 0; i < 2 * kBins; ++i) {
     run = seen_[i % kBins] ? 0 : run + 1;

@@ -11,34 +11,33 @@
 
 namespace terrace::terrain {
 
-/// Finds points that are on both sides of the antimeridian (or of the meridian of 0 or 360, where
-/// longitudes are counted from 0), and joins them: longitudes go on beyond 180 degrees then, as
-/// those of rasters do.
+/// Finds points on both sides of the antimeridian (or of the meridian of 0 or 360, where longitudes
+/// are counted from 0), and joins them. Longitudes then continue beyond 180 degrees, as in rasters.
 class JoinedLongitudes {
  public:
-  /// middle: see Joint; nullopt: points stay as they are.
+  /// middle: from joint(); nullopt: points are left unchanged.
   JoinedLongitudes(const stream::Placement& placement, std::optional<double> middle);
 
-  /// Looks at stored points, and moves them by whole turns to half a turn on either side of the
-  /// middle.
+  /// Records the longitudes of stored points; with a middle, shifts them by whole turns to within
+  /// half a turn of it.
   void operator()(std::span<stream::Point3> stored);
 
-  /// Longitudes as they are joined: to half a turn on either side of the middle.
+  /// How to join longitudes: shift each to within half a turn of the middle.
   struct Joint {
     double middle = 0;
-    std::string what;  ///< "are on both sides of the antimeridian", or what else is wrong with them
+    std::string what;  ///< the reason: "are on both sides of the antimeridian" or similar
   };
-  /// The joint of the longitudes seen, if they span less than half the globe, but more than that as
-  /// they are written.
+  /// Returns the joint of the longitudes seen, if they span less than half the globe but more than
+  /// that in the numbers as written.
   [[nodiscard]] std::optional<Joint> joint() const;
 
  private:
   static constexpr std::size_t kBins = 360;
 
-  bool degrees_;  ///< x is a longitude
+  bool degrees_;  ///< whether x is a longitude
   double scale_, offset_;
   std::optional<double> middle_;
-  std::array<bool, kBins> seen_{};  ///< by the degree from 0
+  std::array<bool, kBins> seen_{};  ///< by degree, starting at 0
   double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
 };
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
-/// A member of the file that is being read, for messages.
+/// The file and the region being read, for messages.
 struct Place {
   const std::string& file;
   std::size_t region;
@@ -34,10 +34,11 @@ struct Place {
 };
 
 std::vector<double> numbers(const nlohmann::json& json, const char* name, const Place& place) {
-  if (!json.is_array()) place.fail(std::string("\"") + name + "\" is no list of numbers");
+  if (!json.is_array()) place.fail(std::string("\"") + name + "\" is not a list of numbers");
   std::vector<double> values;
   for (const nlohmann::json& value : json) {
-    if (!value.is_number()) place.fail(std::string("\"") + name + "\" holds what is no number");
+    if (!value.is_number())
+      place.fail(std::string("\"") + name + "\" has an entry that is not a number");
     values.push_back(value.get<double>());
   }
   return values;
@@ -61,31 +62,32 @@ cluster::LinearMap axes_of(const nlohmann::json& region, const Place& place) {
   if (region.contains("rotation")) {
     if (region.contains("angle")) place.fail("has both \"angle\" and \"rotation\"");
     const nlohmann::json& rows = region["rotation"];
-    if (!rows.is_array() || rows.size() != 3) place.fail("\"rotation\" is no list of three rows");
+    if (!rows.is_array() || rows.size() != 3)
+      place.fail("\"rotation\" is not a list of three rows");
     cluster::LinearMap axes{};
     for (std::size_t i = 0; i < 3; ++i) {
       const std::vector<double> row = numbers(rows[i], "rotation", place);
-      if (row.size() != 3) place.fail("a row of \"rotation\" has not three numbers");
+      if (row.size() != 3) place.fail("each row of \"rotation\" needs three numbers");
       for (std::size_t k = 0; k < 3; ++k) axes[3 * i + k] = row[k];
     }
     return axes;
   }
   double angle = 0.0;
   if (region.contains("angle")) {
-    if (!region["angle"].is_number()) place.fail("\"angle\" is no number of degrees");
+    if (!region["angle"].is_number()) place.fail("\"angle\" is not a number of degrees");
     angle = region["angle"].get<double>();
   }
-  // Not the library's own constructor by angle: its sine may differ in the last bit between
+  // Not the library's own constructor from an angle: its sine may differ in the last bit between
   // machines.
   const double s = base::sin_degrees(angle), c = base::cos_degrees(angle);
   return {c, s, 0, -s, c, 0, 0, 0, 1};
 }
 
 MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
-  if (!json.is_object()) place.fail("is no object");
+  if (!json.is_object()) place.fail("is not an object");
   for (const auto& [name, value] : json.items()) {
     if (name != "box" && name != "semi_axes" && name != "angle" && name != "rotation") {
-      place.fail("\"" + name + "\" is no member of a region");
+      place.fail("\"" + name + "\" is not a member of a region");
     }
   }
   if (!json.contains("semi_axes")) place.fail("has no \"semi_axes\"");
@@ -96,7 +98,7 @@ MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
   std::optional<stream::Box3> box;
   if (json.contains("box")) box = box_of(json["box"], place);
   for (const double length : lengths) {
-    // Distances are divided by it.
+    // Distances are divided by this length.
     if (length > 0 && std::isinf(1.0 / length)) place.fail("\"semi_axes\" are too small");
   }
   try {
@@ -150,7 +152,7 @@ MetricChoice MetricChoice::parse(const std::string& text) {
     choice.kind = Kind::minkowski;
     choice.p =
         rest == "inf" ? kUnbounded : parse_number(rest, "the exponent of `metric` minkowski");
-    if (!(choice.p > 0.0)) throw UsageError("`metric` minkowski:P needs a P above 0, or inf");
+    if (!(choice.p > 0.0)) throw UsageError("`metric` minkowski:P needs a positive P, or inf");
   } else if (name == "elliptical" && !rest.empty()) {
     choice.kind = Kind::elliptical;
     choice.regions = read_regions(rest);
@@ -162,7 +164,7 @@ MetricChoice MetricChoice::parse(const std::string& text) {
 }
 
 bool MetricChoice::has_boxes() const {
-  // What stands behind a region without a box counts nowhere.
+  // Regions after one without a box are never reached.
   return kind == Kind::elliptical && regions.front().box.has_value();
 }
 
@@ -173,7 +175,7 @@ std::string MetricChoice::canonical() const {
     nlohmann::ordered_json json = nlohmann::ordered_json::object();
     if (region.box) {
       const stream::Box3& box = *region.box;
-      // Boxes in the plane have no bounds in z, for which JSON has no number.
+      // Boxes in the plane are unbounded in z, and JSON cannot express infinity.
       json["box"] = std::isfinite(box.min[2])
                         ? std::vector<double>{box.min[0], box.min[1], box.min[2],
                                               box.max[0], box.max[1], box.max[2]}
@@ -198,7 +200,8 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
       break;
   }
   if (!has_boxes()) return regions.front().metric;
-  // Back from the ground to the CRS. Where heights do not count, all are taken for inside.
+  // The inverse map, from the ground to the CRS. Without a weight for heights, all heights are
+  // inside.
   const bool flat = map[8] == 0.0;
   const double area = map[0] * map[4] - map[1] * map[3];
   const cluster::EllipticalField::Frame frame{{map[4] / area, -map[1] / area, 0,  //
@@ -211,8 +214,8 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
     if (region.box) {
       for (std::size_t axis = 0; axis < (flat ? 2U : 3U); ++axis) {
         const double low = region.box->min[axis], high = region.box->max[axis];
-        // Boxes are closed: rounding on the way to the ground and back must not move a point on
-        // their sides out of them.
+        // Boxes are closed, so rounding on the way to the ground and back must not move points on
+        // their sides outside.
         constexpr double kRounding = 1e-14;
         const auto slack = [&](double side) {
           return std::isfinite(side) ? kRounding * (std::abs(side) + std::abs(origin[axis])) : 0.0;

@@ -10,11 +10,11 @@ namespace terrace::terrain {
 namespace {
 
 constexpr double kMost = 1e30;
-/// Values for no data that programs write, the greatest first: -9999 is Esri's, -10000 what black
-/// means in Mapbox's encoding, -32768 in SRTM's files and Terrarium's encoding.
+/// Nodata values that programs commonly write, the greatest first: -9999 is Esri's, -10000 is black
+/// in Mapbox's encoding, -32768 is used by SRTM files and Terrarium's encoding.
 constexpr std::array<double, 8> kUsualVoids{-9999,  -10000, -32767,  -32768,
                                             -99999, -99998, -999999, -2147483648.0};
-/// Regular heights are farther above a void than this, else it may be one of them.
+/// A common value counts as nodata only if all other heights exceed it by more than this.
 constexpr double kApart = 1000;
 
 }  // namespace
@@ -32,7 +32,7 @@ void UndeclaredVoids::add(const stream::PointBlock& block) {
       seen.value = point[2];
       continue;
     }
-    // A raster's value is its sample, before scale and offset.
+    // A raster declares the nodata value of its samples, before scale and offset.
     const auto* const usual =
         std::find_if(kUsualVoids.begin(), kUsualVoids.end(),
                      [&](double value) { return z == value || (info_.grid && point[2] == value); });

@@ -11,7 +11,7 @@
 
 namespace terrace::terrain {
 
-/// Numbered boxes in a tree, which is good where boxes that follow each other lie together.
+/// A tree of numbered boxes; efficient if consecutive boxes are near each other.
 class BoxTree {
  public:
   struct Item {
@@ -19,18 +19,19 @@ class BoxTree {
     std::uint32_t number = 0;
   };
 
-  /// The boxes to be, to be filled by the caller; build() must follow. Forgets the others.
+  /// Returns the list of boxes for the caller to fill; build() must follow. Clears the tree.
   std::vector<Item>& start() {
     items_.clear();
     nodes_.clear();
     return items_;
   }
-  /// O(n).
+  /// Builds the tree from the boxes. O(n).
   void build() {
     if (!items_.empty()) add(0, static_cast<std::uint32_t>(items_.size()));
   }
 
-  /// Calls visit(number) for each box for which may(box) is true, and that of all boxes around it.
+  /// Calls visit(number) for each box for which may(box) is true, as it must be for every box
+  /// around it.
   template <class May, class Visit>
   void visit(const May& may, const Visit& visit) const {
     for (std::size_t at = 0; at < nodes_.size();) {
@@ -52,14 +53,14 @@ class BoxTree {
 
  private:
   static constexpr std::uint32_t kItemsPerLeaf = 4;
-  /// What is below follows, up to `next`.
+  /// A node, followed by its descendants up to index `next`.
   struct Node {
     StoredBox box;
-    std::uint32_t begin = 0, end = 0;  ///< items of a leaf
+    std::uint32_t begin = 0, end = 0;  ///< range of items in a leaf
     std::uint32_t next = 0;
   };
 
-  /// Returns the box around the items.
+  /// Adds a subtree of items and returns the box around them.
   StoredBox add(std::uint32_t begin, std::uint32_t end) {
     constexpr double kFar = std::numeric_limits<double>::infinity();
     StoredBox box{{kFar, kFar}, {-kFar, -kFar}};

@@ -10,58 +10,57 @@
 
 #include "surface/store_window.hpp"
 
-/// Where a point would have to lie to change a Delaunay triangulation: closed circumcircles and
-/// half-planes, never smaller than they are, whatever doubles round. Tests are written so that what
-/// is not a number meets everything.
+/// Where a point would change a Delaunay triangulation: closed circumcircles and half-planes.
+/// Rounding only enlarges them, and tests are written so that NaN meets everything.
 
 namespace terrace::terrain {
 
-/// The closed half-plane to the right of a line from a to b, or a little more.
+/// The closed half-plane to the right of a line from a to b, or slightly more.
 struct HalfPlane {
   std::array<double, 2> a{}, b{};
 
   [[nodiscard]] bool meets(const StoredBox& box) const { return !(leftness(box) > 0); }
-  /// Whether hardly anything of the box lies in it. Boxes of stores are a little larger than what
-  /// they hold.
+  /// Whether hardly any of the box is in the half-plane. Boxes of stores are slightly larger than
+  /// their contents.
   [[nodiscard]] bool grazes(const StoredBox& box) const {
     const double across = std::abs(b[0] - a[0]) * (box.max[1] - box.min[1]) +
                           std::abs(b[1] - a[1]) * (box.max[0] - box.min[0]);
     return leftness(box) > -across / 64;
   }
-  /// How far left the rightmost corner of the box lies: above 0 only if it is left of the line for
-  /// certain. Proportional to the distance, for comparing.
+  /// How far left of the line the rightmost corner of the box is; positive only if it is certainly
+  /// left. Proportional to the distance, for comparisons.
   [[nodiscard]] double leftness(const StoredBox& box) const {
     const double ux = b[0] - a[0], uy = b[1] - a[1];
-    // The cross product of u and (p - a) is smallest in this corner.
+    // The cross product of u and (p - a) is smallest at this corner.
     const double px = (uy > 0 ? box.max[0] : box.min[0]) - a[0];
     const double py = (ux > 0 ? box.min[1] : box.max[1]) - a[1];
     const double first = ux * py, second = uy * px;
-    // Three roundings each, and one of the difference.
+    // Three roundings for each product, and one for the difference.
     constexpr double kEpsilon = 8 * std::numeric_limits<double>::epsilon();
     return first - second - kEpsilon * (std::abs(first) + std::abs(second)) - kTiny;
   }
 
  private:
-  /// More than products that underflow lose.
+  /// An upper bound of what underflow can lose.
   static constexpr double kTiny = 1e-300;
 };
 
-/// A region of the plane that holds the closed circumcircle of a triangle.
+/// A region of the plane that contains the closed circumcircle of a triangle.
 struct CircleCover {
   bool has_plane = false, has_disk = false;
   HalfPlane plane{};
   std::array<double, 2> near{};    ///< a corner
-  std::array<double, 2> centre{};  ///< seen from `near`
+  std::array<double, 2> centre{};  ///< relative to `near`
   double radius = 0;
 
-  /// The corners counter-clockwise.
+  /// The corners must be counter-clockwise.
   static CircleCover of_triangle(const std::array<double, 2>& a, const std::array<double, 2>& b,
                                  const std::array<double, 2>& c) {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double ux = b[0] - a[0], uy = b[1] - a[1], vx = c[0] - a[0], vy = c[1] - a[1];
     const double first = ux * vy, second = uy * vx;
     const double doubled = 2 * (first - second);
-    // Differences are right to half an epsilon, their products to two.
+    // Differences are accurate to half an epsilon, their products to two.
     const double doubt = 8 * kEpsilon * (std::abs(first) + std::abs(second));
     const double uu = ux * ux + uy * uy, vv = vx * vx + vy * vy;
     if (doubled > 1e3 * doubt && doubled > 1e-290 && doubled < 1e290) {
@@ -75,9 +74,9 @@ struct CircleCover {
           (std::abs(vy) + std::abs(vx)) * uu + (std::abs(uy) + std::abs(ux)) * vv;
       const double error =
           1.01 * (16 * kEpsilon * numerator + 2 * size * doubt) / doubled + 8 * kEpsilon * size;
-      // The corner lies on the circle, so an error of the centre is one of the radius too.
+      // The corner is on the circle, so an error of the centre is also one of the radius.
       cover.radius = size + 3 * error;
-      // Not much larger than it should be, or else a needle.
+      // If the cover is much larger than the circle, treat the triangle as a needle.
       if (error <= 0.01 * size) return cover;
     }
     return of_needle(a, b, c);
@@ -93,7 +92,7 @@ struct CircleCover {
   [[nodiscard]] bool meets(const StoredBox& box) const {
     return (has_disk && disk_meets(box)) || (has_plane && plane.meets(box));
   }
-  /// How little of a box lies in it: the smaller, the more. Only for choosing among boxes.
+  /// The less of a box is in the region, the larger the depth. Only for comparing boxes.
   [[nodiscard]] double depth(const StoredBox& box) const {
     if (has_plane) return plane.leftness(box);
     double sum = 0;
@@ -103,7 +102,7 @@ struct CircleCover {
     }
     return sum;
   }
-  /// Not above depth() of any point in the box, but for rounding.
+  /// A lower bound of depth() over all points in the box, up to rounding.
   [[nodiscard]] double least_depth(const StoredBox& box) const {
     if (has_plane) return plane.leftness(box);
     double sum = 0;
@@ -114,7 +113,7 @@ struct CircleCover {
     }
     return sum;
   }
-  /// Around the disk; everything where there is a half-plane.
+  /// Returns a box around the disk; everything if there is a half-plane.
   [[nodiscard]] StoredBox bounds() const {
     constexpr double kAll = std::numeric_limits<double>::infinity();
     if (has_plane || !(radius < kAll)) return {{-kAll, -kAll}, {kAll, kAll}};
@@ -130,8 +129,9 @@ struct CircleCover {
   }
 
  private:
-  /// Behind the longest side, ab, everything; before it a cap of the circle whose angle at c is at
-  /// least 60 degrees, so that no point of it is farther from the middle of ab than 0.87 of ab.
+  /// Covers everything behind the longest side, ab. In front of it, covers a cap of the circle: the
+  /// angle at c is at least 60 degrees, so all its points are within 0.87 times the length of ab of
+  /// the middle of ab.
   static CircleCover of_needle(std::array<double, 2> a, std::array<double, 2> b,
                                std::array<double, 2> c) {
     double size = 0;
@@ -144,7 +144,7 @@ struct CircleCover {
     };
     const double ab = square(a, b), bc = square(b, c), ca = square(c, a);
     if (bc >= ab && bc >= ca) {
-      std::swap(a, b);  // (a, b, c) to (b, c, a)
+      std::swap(a, b);  // from (a, b, c) to (b, c, a)
       std::swap(b, c);
     } else if (ca >= ab && ca >= bc) {
       std::swap(a, c);  // to (c, a, b)

@@ -4,7 +4,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Windows side by side share clusters of level 0 at their borders.
+/// Adjacent windows share clusters of level 0 at their borders.
 constexpr std::uint64_t kCacheBytes = std::uint64_t{2} << 20;
 
 }  // namespace
@@ -65,7 +65,7 @@ void ClusterFrontier::read_one(std::size_t at, const Take& take) {
 void ClusterFrontier::read_meeting(const StoredBox& box, const Take& take) {
   for (std::size_t at = 0; at < open_.size();) {
     if (open_[at].box.meets(box)) {
-      read_one(at, take);  // and what has come to this place is next
+      read_one(at, take);  // the entry that replaced it is next
     } else {
       ++at;
     }
@@ -73,7 +73,7 @@ void ClusterFrontier::read_meeting(const StoredBox& box, const Take& take) {
 }
 
 void ClusterFrontier::read(std::span<const std::uint32_t> chosen, const Take& take) {
-  // From behind: what moves into a gap was not chosen.
+  // In reverse, so that an entry that moves into a gap is not a chosen one.
   for (std::size_t k = chosen.size(); k-- > 0;) read_one(chosen[k], take);
 }
 

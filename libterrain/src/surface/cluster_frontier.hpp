@@ -14,29 +14,29 @@
 
 namespace terrace::terrain {
 
-/// The way down into a store's clusters, step by step: which have been read, and the boxes of all
-/// that have not. Where no box of open() reaches, no point is missing.
+/// An incremental descent into a store's clusters: which have been read, and the boxes of all that
+/// have not. Outside the boxes of open(), all points are known.
 class ClusterFrontier {
  public:
-  /// A cluster that was not read; its box holds all points below it too.
+  /// A cluster that has not been read; its box also contains all points below it.
   struct Open {
     StoredBox box;
-    std::uint32_t entry = 0;  ///< for ClusterFrontier
+    std::uint32_t entry = 0;  ///< index for ClusterFrontier
     std::uint8_t level = 0;
   };
-  /// Takes the members of a cluster.
+  /// Receives the members of a cluster.
   using Take = std::function<void(const stream::StoreQuery::Node& node)>;
 
-  /// level: the points of this level and above. The store must outlive this.
+  /// level: uses the points of this level and above. The store must outlive this object.
   ClusterFrontier(const stream::Store& store, unsigned level);
 
-  /// Forgets what was read and reads the root.
+  /// Clears the state and reads the root.
   void begin(const Take& take);
   [[nodiscard]] std::span<const Open> open() const { return open_; }
-  /// Reads what meets the box, and what meets it below that.
+  /// Reads all clusters that meet the box, and their descendants that do.
   void read_meeting(const StoredBox& box, const Take& take);
-  /// Reads some of open() without what is below. `chosen`: places in open(), ascending, all
-  /// different. open() is then another.
+  /// Reads some clusters of open() without their descendants. `chosen`: distinct indices in open(),
+  /// ascending. Changes open().
   void read(std::span<const std::uint32_t> chosen, const Take& take);
 
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -44,7 +44,7 @@ class ClusterFrontier {
   }
 
  private:
-  /// A cluster that a point heads. Those of one point stand in a row, the lowest level first.
+  /// A cluster headed by a point. Entries of one point are consecutive, the lowest level first.
   struct Entry {
     StoredBox box;
     std::uint64_t ordinal = 0;
@@ -52,8 +52,8 @@ class ClusterFrontier {
 
   void read_one(std::size_t at, const Take& take);
   void add_below(const stream::StoreQuery::Node& node);
-  /// Skips boxes that are one point: all below has the x,y of the head, which counts, but for
-  /// views. False if none is left.
+  /// Skips boxes of a single point: all points below have the x and y of the head, which is the one
+  /// that counts, except in views. Returns false if no box is left.
   bool settle(Open& open) const;
 
   stream::StoreQuery reader_;

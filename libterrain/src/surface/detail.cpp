@@ -53,10 +53,10 @@ void note_idle_focuses(const stream::Store& store, const Detail& detail, const C
 
 namespace {
 
-/// Points that are read, encoded, and so on at once.
+/// The number of points to read, encode and so on at once.
 constexpr std::uint64_t kPointsAtOnce = 16384;
 
-/// Walks down the levels and collects the clusters that the points on the way head. Unlike
+/// Descends the levels and collects the clusters headed by the points it meets. Unlike
 /// stream::StoreQuery it reads whole records, and wanted levels in file order.
 class Descent {
  public:
@@ -82,11 +82,11 @@ class Descent {
     }
   }
 
-  /// Where the descent begins: the root or the one cluster that is wanted.
+  /// The start of the descent: the root, or the one wanted cluster.
   [[nodiscard]] stream::ClusterId first() const { return first_; }
 
-  /// The first and the wanted clusters down to `lowest`; of level 0 those of which points may meet
-  /// the condition of a view.
+  /// Visits the first cluster and the wanted clusters down to `lowest`; at level 0 only those with
+  /// points that may meet the condition of a view.
   void run(unsigned lowest) {
     take(read_first());
     for (unsigned level = stream::level_of(first_); level-- > lowest;) {
@@ -98,12 +98,12 @@ class Descent {
     }
   }
 
-  /// A level that is wanted everywhere needs no list of its clusters.
+  /// Whether a level is wanted everywhere, so that no list of its clusters is needed.
   [[nodiscard]] bool whole(unsigned level) const {
     return level >= detail_.level && !detail_.region && !detail_.cluster;
   }
 
-  /// The wanted clusters among those that points met so far head on `level`, in order.
+  /// Visits the wanted clusters of `level` headed by points met so far, in order.
   template <class Found>
   void for_each_head(unsigned level, const Found& found) {
     for (const std::uint64_t ordinal : take_heads(level)) {
@@ -113,10 +113,10 @@ class Descent {
   }
 
  private:
-  /// What was read of some clusters.
+  /// The result of reading some clusters.
   struct Read {
     std::unique_ptr<WantedPart> part;
-    std::vector<std::vector<std::uint64_t>> heads;  // as heads_
+    std::vector<std::vector<std::uint64_t>> heads;  // as in Descent
     std::uint64_t members = 0;
   };
 
@@ -130,7 +130,7 @@ class Descent {
     const unsigned level = stream::level_of(id);
     const stream::Box3 box = world_box(placement_, record.summary.box);
     for (unsigned below = finest_; below < level; ++below) {
-      // What lies below this cluster lies in its box.
+      // Everything below this cluster is inside its box.
       if (whole(below) || !detail_.wants(below, box)) continue;
       for (std::size_t i = 0; i < points.size(); ++i) {
         to.heads[below].push_back(points.children[i * level + below]);
@@ -202,7 +202,7 @@ class Descent {
                for (std::size_t k = i * each; k < std::min(ordinals.size(), (i + 1) * each); ++k) {
                  const stream::ClusterId id = stream::cluster_id(level, ordinals[k]);
                  const auto record = wanted(id);
-                 // Those above are read in any case, for the clusters that they head.
+                 // Higher levels are always read, for the clusters that their points head.
                  if (!record || (level == 0 && !store_.may_match(id))) continue;
                  store_.read(id, points);
                  add(read, id, *record, points);
@@ -227,7 +227,7 @@ class Descent {
 
   [[nodiscard]] std::optional<stream::ClusterRecord> wanted(stream::ClusterId id) const {
     const unsigned level = stream::level_of(id);
-    // Most are far away, and so are their pages of the index.
+    // Most clusters are far away, and so are their index pages, so test coarser boxes first.
     if (!detail_.wants(level, world_box(placement_, store_.coarse_box(id)))) return {};
     if (!detail_.wants(level, world_box(placement_, store_.page_box(id)))) return {};
     const stream::ClusterRecord record = store_.record(id);
@@ -245,7 +245,7 @@ class Descent {
   std::vector<std::vector<std::uint64_t>> heads_;  // per level, ordinals met in higher levels
 };
 
-/// Shows clusters as they are read.
+/// Passes clusters on as they are read.
 class Shown final : public WantedPart {
  public:
   explicit Shown(const stream::Store::VisitCluster& visit) : visit_(visit) {}
@@ -340,7 +340,7 @@ void for_each_wanted_record(
   Descent descent(store, detail, make, 1);
   const unsigned finest = detail.finest();
   if (finest == stream::level_of(descent.first())) return descent.run(finest);
-  // The finest level's clusters need not be read to be counted.
+  // Counting does not require reading the clusters of the finest level.
   descent.run(finest + 1);
   if (descent.whole(finest)) {
     for (std::uint64_t c = 0; c < store.levels()[finest].clusters; ++c) {

@@ -15,7 +15,7 @@ struct GroundSlope::Table {
   static constexpr std::size_t kSide = 256;
 
   stream::Box3 bounds;
-  std::mutex mutex;  ///< of what makes maps
+  std::mutex mutex;  ///< for creating maps
   std::vector<std::atomic<const GroundMap*>> maps;
   std::deque<GroundMap> made;
 
@@ -84,7 +84,7 @@ double GroundSlope::metres(const Point2& a, const Point2& b) const {
 tri::Gradient GroundSlope::on_ground(const Point2& stored, const SurfacePoint& surface) const {
   if (!(surface.per_column == surface.per_column)) return {};
   const GroundMap m = map_at(stored);
-  // ground = A * stored, so the gradient goes by the inverse of A's transpose.
+  // ground = A * stored, so the gradient is transformed by the inverse of A's transpose.
   const double metres = m[8] / placement_.coordinates[2].scale;
   const double factor = metres / (m[0] * m[4] - m[1] * m[3]);
   return {(m[4] * surface.per_column - m[3] * surface.per_row) * factor,

@@ -7,21 +7,21 @@
 
 #include "terrace/terrain/heights.hpp"
 
-/// The surface of a raster: what lies between its samples.
+/// The surface of a raster between its samples.
 ///
 /// A square of four samples with data is split along the diagonal from (column + 1, row) to
-/// (column, row + 1), as the Delaunay triangulation of the lattice is (its ties are broken so, see
-/// terrace/tri/delaunay2.hpp): this is the very mesh that `terrace mesh` writes at level 0. Three
-/// samples with data are one triangle, whichever they are. Squares with fewer have no surface but
-/// that of the lattice edges between two samples with data, and of the samples themselves.
+/// (column, row + 1), as in the Delaunay triangulation of the lattice, which breaks ties that way
+/// (see terrace/tri/delaunay2.hpp). So this is exactly the mesh that `terrace mesh` writes at level
+/// 0. Any three samples with data form one triangle. A square with fewer has no surface except for
+/// lattice edges between two samples with data, and the samples themselves.
 
 namespace terrace::terrain {
 
-/// Heights of a window of the lattice by rows, NaN where there is none; NaN outside as well.
+/// Heights of a window of the lattice by rows; NaN where there is none, and outside the window.
 template <class T>
 struct LatticeView {
   const T* heights = nullptr;
-  std::int64_t column = 0, row = 0;    ///< of the first
+  std::int64_t column = 0, row = 0;    ///< of the first sample
   std::int64_t columns = 0, rows = 0;  ///< size
 
   [[nodiscard]] double at(std::int64_t c, std::int64_t r) const {
@@ -32,13 +32,13 @@ struct LatticeView {
   }
 };
 
-/// The four corners of a square: (column, row), one column on, one row on, both on.
+/// The four corners of a square: (column, row), then one column further, one row further, and both.
 struct LatticeSquare {
   double h00 = 0, h10 = 0, h01 = 0, h11 = 0;
 };
 
-/// The triangles of the square that hold (u, v) in [0, 1] x [0, 1], their borders included: at most
-/// two, and two only where u + v = 1.
+/// The triangles of the square that contain (u, v) in [0, 1] x [0, 1], borders included: at most
+/// two, and two only if u + v = 1.
 struct SquareTriangles {
   int count = 0;
   SurfacePoint first, second;
@@ -70,8 +70,8 @@ inline SquareTriangles triangles_at(const LatticeSquare& s, double u, double v) 
   return found;
 }
 
-/// On a lattice line or a diagonal: the height from the samples there alone, the gradient as the
-/// mean of the triangles that meet there.
+/// Evaluates on a lattice line or a diagonal: the height from the samples on it alone, the gradient
+/// as the mean over the triangles that meet there.
 /// view: like LatticeView, with at().
 template <class View>
 SurfacePoint linear_on_lines(const View& view, std::int64_t column, std::int64_t row, double u,
@@ -105,8 +105,8 @@ SurfacePoint linear_on_lines(const View& view, std::int64_t column, std::int64_t
   return result;
 }
 
-/// The linear surface at (x, y), columns and rows counted from the lattice's first sample. The
-/// view must reach one sample around the square of (x, y), as far as the raster does.
+/// Evaluates the linear surface at (x, y), in columns and rows from the lattice's first sample. The
+/// view must extend one sample around the square of (x, y), unless the raster ends there.
 template <class T>
 SurfacePoint linear_at(const LatticeView<T>& view, double x, double y) {
   const double left = std::floor(x), top = std::floor(y);

@@ -16,7 +16,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The place in stored coordinates and the metric that holds there.
+/// The place in stored coordinates, and the metric at it.
 struct Local {
   stream::Point3 place{};
   stream::LinearMap metric{};

@@ -15,13 +15,13 @@ namespace {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kPointsPerCell = 2;
-/// Points crowd if those that share a cell with one of them are so many on average.
+/// Points are crowded if a point shares its cell with this many on average.
 constexpr double kCrowd = 48;
-/// So many are sorted without more memory.
+/// Up to this many are sorted without extra memory.
 constexpr std::size_t kFewInCells = 16;
-/// That a thread decodes at a time.
+/// The number of clusters that a thread decodes at a time.
 constexpr std::uint64_t kClustersAtOnce = 256;
-/// Points sorted between two checks for a stop.
+/// Number of points sorted between two checks for a stop.
 constexpr std::size_t kBetweenChecks = std::size_t{1} << 20;
 
 }  // namespace
@@ -63,7 +63,7 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
 bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned threads) {
   clear();
   const stream::Channel& channel = store.schema().coordinates[2];
-  /// Clusters whose points come one after another from `begin` on.
+  /// Clusters with points stored consecutively from `begin` on.
   struct Piece {
     unsigned level = 0;
     std::uint64_t first = 0, end = 0;  ///< ordinals
@@ -107,7 +107,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
     }
     piece.points = at - piece.begin;
   });
-  // Closes the gaps that points leave which a view does not have.
+  // Close the gaps left by points that do not meet a view's condition.
   count = 0;
   for (const Piece& piece : pieces) {
     if (count < piece.begin) {
@@ -129,7 +129,7 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
   }
   const double width = box_.max[0] - box_.min[0], height = box_.max[1] - box_.min[1];
   const double cells = std::max(1.0, static_cast<double>(places.size()) / kPointsPerCell);
-  // As many columns as make the cells square.
+  // Choose the number of columns that makes the cells square.
   if (width > 0) {
     const double columns = height > 0 ? std::sqrt(cells) * std::sqrt(width / height) : cells;
     columns_ = static_cast<std::uint32_t>(std::clamp(columns, 1.0, cells));
@@ -138,13 +138,13 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
   for (std::size_t k = 0; k < 2; ++k) {
     const double size = box_.max[k] - box_.min[k], count = k == 0 ? columns_ : rows_;
     per_unit_[k] = size > 0 ? count / size : 0.0;
-    // So small a box that its cells are not to be told apart has one.
+    // A box too small to distinguish its cells gets one cell.
     if (!(per_unit_[k] < kFar)) per_unit_[k] = 0.0;
     cell_size_[k] = size / count;
   }
 
   begin_.assign(std::size_t{columns_} * rows_ + 1, 0);
-  // Each thread looks at all places and takes those of its band, in their order.
+  // Each thread scans all places and handles those in its band, in order.
   const auto in_bands = [&](const auto& take) {
     const std::uint32_t bands = std::clamp(threads, 1U, rows_);
     parallel_for(bands, threads, [&](std::size_t band) {
@@ -168,7 +168,7 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   places_ = large_array<Point2>(places.size());
   heights_ = large_array<double>(places.size());
-  // begin_[c] goes from the cell's begin to its end, which is where the next one begins.
+  // Advances begin_[c] from the cell's begin to its end, which is where the next one begins.
   in_bands([&](std::size_t at, std::size_t i) {
     places_[begin_[at]] = places[i];
     heights_[begin_[at]++] = heights[i];
@@ -202,7 +202,7 @@ void PointCells::drop_duplicates() {
     if (end - first > 1) {
       sorted.clear();
       for (std::uint32_t i = first; i < end; ++i) sorted.emplace_back(places_[i], heights_[i]);
-      // Stable: of equal ones the first stays so.
+      // A stable sort keeps the first of equal points first.
       const auto less = [](const auto& a, const auto& b) { return a.first < b.first; };
       if (sorted.size() > kFewInCells) {
         std::stable_sort(sorted.begin(), sorted.end(), less);
@@ -232,7 +232,7 @@ StoredBox PointCells::box_of(const Range& range) const {
                                  static_cast<double>(range.end_row)};
   StoredBox box;
   for (std::size_t k = 0; k < 2; ++k) {
-    // A cell more to each side, for rounding.
+    // Add a cell on each side, for rounding.
     const double slack = cell_size_[k] + 4 * std::numeric_limits<double>::epsilon() *
                                              (std::abs(box_.min[k]) + std::abs(box_.max[k]));
     box.min[k] = box_.min[k] + from[k] * cell_size_[k] - slack;

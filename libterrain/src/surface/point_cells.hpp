@@ -20,41 +20,43 @@
 
 namespace terrace::terrain {
 
-/// The points in a box of a store, sorted into the cells of a grid over it. Of points at one x,y
-/// the first in the order of StoreWindow::points() counts.
+/// The points in a box of a store, sorted into the cells of a grid. Of points at one x and y, keeps
+/// the first in the order of StoreWindow::points().
 class PointCells {
  public:
-  /// Peak bytes per point.
+  /// Peak memory in bytes per point.
   static constexpr std::uint64_t kBytesPerPoint = 58;
 
-  /// Replaces what is held by the points of `level` and above in the box. False if there are more
-  /// than most_points, or if they crowd in few of the cells and `may_crowd` is not set: nothing is
-  /// held then. 60 ns per point. Throws: stream::Error on a damaged store, stream::Stopped.
+  /// Loads the points of `level` and above in the box, replacing the contents. Returns false, with
+  /// no contents, if there are more than most_points, or if they are crowded into few cells and
+  /// `may_crowd` is not set. 60 ns per point. Throws: stream::Error on a damaged store,
+  /// stream::Stopped.
   bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
             std::size_t most_points, bool may_crowd);
-  /// The same for all points of a store, by several threads: each decodes clusters that follow each
-  /// other, and then sorts a band of rows. False if they crowd; they are held all the same. Throws
-  /// as above.
+  /// Loads all points of a store with several threads; each decodes consecutive clusters, then
+  /// sorts a band of rows. Returns false if the points are crowded, but keeps them. Throws: as
+  /// above.
   bool load_all(const stream::Store& store, unsigned level, unsigned threads);
   void clear();
 
-  /// All points in it are held. It reaches to infinity where the store has no points beyond.
+  /// The box in which all points are known; infinite in directions where the store has no more
+  /// points.
   [[nodiscard]] const StoredBox& known() const { return known_; }
   [[nodiscard]] bool knows(const Point2& place) const {
     return known_.contains({place[0], place[1], 0});
   }
-  /// Whether all points in a box are held.
+  /// Whether all points in a box are known.
   [[nodiscard]] bool knows(const StoredBox& box) const {
     return box.min[0] >= known_.min[0] && box.min[1] >= known_.min[1] &&
            box.max[0] <= known_.max[0] && box.max[1] <= known_.max[1];
   }
-  /// The height of a point that is held, in the store's vertical unit.
+  /// Returns the height of a known point, in the store's vertical unit.
   [[nodiscard]] double height(const Point2& point) const;
-  /// All that are held, by cells, and their heights.
+  /// All points ordered by cells, and their heights.
   [[nodiscard]] std::span<const Point2> places() const { return {places_.get(), begin_.back()}; }
   [[nodiscard]] std::span<const double> heights() const { return {heights_.get(), begin_.back()}; }
 
-  /// Cells in a rectangle of the grid.
+  /// A rectangle of cells of the grid.
   struct Range {
     std::uint32_t column = 0, row = 0, end_column = 0, end_row = 0;
     [[nodiscard]] std::size_t count() const {
@@ -65,23 +67,23 @@ class PointCells {
              other.end_row <= end_row;
     }
   };
-  /// Those with all points in a box, since index() ascends.
+  /// Returns the cells that contain all points in a box, since index() is ascending.
   [[nodiscard]] Range cells_of(const StoredBox& box) const {
     return {index(0, box.min[0], columns_), index(1, box.min[1], rows_),
             index(0, box.max[0], columns_) + 1, index(1, box.max[1], rows_) + 1};
   }
-  /// The cell of a place and as many around it as `reach` says.
+  /// Returns the cell of a place and the cells up to `reach` around it.
   [[nodiscard]] Range near(const Point2& place, std::uint32_t reach) const {
     const Range at = cells_of({place, place});
     return {at.column - std::min(at.column, reach), at.row - std::min(at.row, reach),
             std::min(at.end_column + reach, columns_), std::min(at.end_row + reach, rows_)};
   }
-  /// Whether a box has not many more cells than near(), or that has all.
+  /// True if the box covers few more cells than near(), or near() covers them all.
   [[nodiscard]] bool is_near(const StoredBox& box, std::uint32_t reach) const {
     const std::size_t side = 2 * std::size_t{reach} + 1;
     return cells_of(box).count() <= 2 * side * side || (reach >= columns_ && reach >= rows_);
   }
-  /// Calls visit(i) for places()[i] in these cells.
+  /// Calls visit(i) for each places()[i] in these cells.
   template <class Visit>
   void visit_indices(const Range& range, const Visit& visit) const {
     for (std::uint32_t row = range.row; row < range.end_row; ++row) {
@@ -94,7 +96,7 @@ class PointCells {
   void visit_cells(const Range& range, const Visit& visit) const {
     visit_indices(range, [&](std::uint32_t i) { visit(places_[i]); });
   }
-  /// The same without those of other cells.
+  /// The same, except for cells in `without`.
   template <class Visit>
   void visit_cells(const Range& range, const Range& without, const Visit& visit) const {
     for (std::uint32_t row = range.row; row < range.end_row; ++row) {
@@ -109,12 +111,12 @@ class PointCells {
       }
     }
   }
-  /// Calls visit(point) for all in the cover, which may shrink meanwhile, and some around, roughly
-  /// from near to far as seen from a place. Cells without points cost nothing, however many.
+  /// Calls visit(point) for all points in the cover, which may shrink meanwhile, and for some
+  /// others, roughly in order of distance from a place. Empty cells cost nothing, however many.
   template <class Visit>
   void in(const CircleCover& cover, const Point2& from, const Visit& visit) const {
     const Range range = cells_of(cover.bounds());
-    // Few cells are visited without asking.
+    // Visit a small number of cells without testing them.
     constexpr std::size_t kFewCells = 36;
     if (range.count() <= kFewCells) {
       visit_cells(range, visit);
@@ -122,28 +124,28 @@ class PointCells {
       visit_meeting(range, cover, cells_of({from, from}), visit);
     }
   }
-  /// The sides of a cell.
+  /// The width and height of a cell.
   [[nodiscard]] std::array<double, 2> cell_size() const { return cell_size_; }
 
  private:
   [[nodiscard]] std::uint32_t index(std::size_t axis, double stored, std::uint32_t count) const {
     const double at = (stored - box_.min[axis]) * per_unit_[axis];
-    // `!(at > 0)` also takes NaN.
+    // `!(at > 0)` is also true for NaN.
     if (!(at > 0)) return 0;
     return at < count ? static_cast<std::uint32_t>(at) : count - 1;
   }
   [[nodiscard]] std::size_t cell(const Point2& place) const {
     return std::size_t{index(1, place[1], rows_)} * columns_ + index(0, place[0], columns_);
   }
-  /// A box that holds the points in a range of cells.
+  /// Returns a box around the points in a range of cells.
   [[nodiscard]] StoredBox box_of(const Range& range) const;
-  /// Takes points of the box in the order of StoreWindow::points(). False: they crowd; then they
-  /// are held only if they may.
+  /// Sorts points of the box, given in the order of StoreWindow::points(). Returns false if they
+  /// are crowded; then they are kept only if `may_crowd` is set.
   bool sort(const stream::Store& store, const StoredBox& box, std::span<const Point2> places,
             std::span<const double> heights, bool may_crowd, unsigned threads);
   void drop_duplicates();
 
-  /// Whether there is a point in a range of cells.
+  /// Whether a range of cells contains a point.
   [[nodiscard]] bool has_points(const Range& range) const {
     const std::size_t side = std::size_t{columns_} + 1;
     const auto sum = [&](std::uint32_t column, std::uint32_t row) {
@@ -178,8 +180,8 @@ class PointCells {
   std::uint32_t columns_ = 1, rows_ = 1;
   LargeArray<Point2> places_;         ///< by cells, row by row
   LargeArray<double> heights_;        ///< of places_
-  std::vector<std::uint32_t> begin_;  ///< in places_, by cell; at last their number
-  /// Points in the cells left of and above each corner of the grid, row by row.
+  std::vector<std::uint32_t> begin_;  ///< indices in places_ by cell; last, the number of places
+  /// Number of points in the cells left of and above each corner of the grid, row by row.
   std::vector<std::uint32_t> sums_;
 };
 

@@ -19,7 +19,7 @@ PointHull::PointHull(const stream::Store& store, unsigned level) {
   query.descend(
       level,
       [&](unsigned, const stream::StoreQuery::Branch& branch) {
-        // The hull of so far is made anew as more points come, less and less often.
+        // Rebuild the hull as more points arrive, less and less often.
         if (added > made_of + made_of / 4) {
           set_corners(hull.corners());
           made_of = added;
@@ -50,14 +50,14 @@ PointHull::Found PointHull::find(const Point2& place) const {
   const auto begin = corners_.begin();
   const auto middle = begin + static_cast<std::ptrdiff_t>(greatest_);
   Found found{Side::kInside};
-  // Whether the place is not beyond the edge to corner `next`.
+  // Whether the place is not outside the edge that ends at corner `next`.
   const auto look_at = [&](std::size_t next) {
     const std::size_t count = corners_.size();
     const int side = tri::orientation(corners_[(next + count - 1) % count], corners_[next], place);
     if (side == 0) found = {Side::kBorder, next};
     return side >= 0;
   };
-  // The chain below from the least corner to the greatest, then the one above back again.
+  // The lower chain from the least corner to the greatest, then the upper chain back.
   if (place != *middle) {
     const auto after = std::upper_bound(begin, middle + 1, place);
     if (!look_at(static_cast<std::size_t>(after - begin))) return {};

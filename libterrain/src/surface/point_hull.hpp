@@ -12,36 +12,37 @@
 
 namespace terrace::terrain {
 
-/// The strictly convex hull in x,y of a store's points of a level and above, exactly. Const members
-/// may be called by several threads at once.
+/// The exact strictly convex hull, in x and y, of a store's points of a level and above. Several
+/// threads may call const members at once.
 class PointHull {
  public:
-  /// Reads the clusters that lie across the hull of those read before, coarse levels first: a few
-  /// per cent where points came in order. Throws: stream::Error on a damaged store,
-  /// stream::Stopped.
+  /// Reads the clusters that cross the hull of those read before, coarse levels first: a few per
+  /// cent if points arrived in order. Throws: stream::Error on a damaged store, stream::Stopped.
   PointHull(const stream::Store& store, unsigned level);
 
-  /// Counter-clockwise from the least corner in x, then y. Fewer than three: all points are equal
-  /// or on one line.
+  /// The corners, counter-clockwise from the least in x, then y. Fewer than three mean that all
+  /// points are equal or on one line.
   [[nodiscard]] std::span<const Point2> corners() const { return corners_; }
   [[nodiscard]] bool is_flat() const { return corners_.size() < 3; }
 
   enum class Side : std::uint8_t { kOutside, kBorder, kInside };
   struct Found {
     Side side = Side::kOutside;
-    /// On the border: the corner after the place, counter-clockwise, which is not the place.
+    /// For places on the border: the corner after the place, counter-clockwise, not equal to it.
     std::size_t next = 0;
   };
-  /// Exact; O(log corners). Requires a finite place, and that the hull is not flat.
+  /// Locates a place exactly, in O(log corners). Requires a finite place and a hull that is not
+  /// flat.
   [[nodiscard]] Found find(const Point2& place) const;
-  /// How far a place is outside, in the units of the points; 0 inside. O(corners) outside.
+  /// Returns the distance from a place outside to the hull, in the units of the points; 0 inside.
+  /// O(corners) outside.
   [[nodiscard]] double distance(const Point2& place) const;
 
  private:
   void set_corners(std::vector<Point2> corners);
 
   std::vector<Point2> corners_;
-  std::size_t greatest_ = 0;  ///< the greatest corner in x, then y
+  std::size_t greatest_ = 0;  ///< the index of the greatest corner in x, then y
 };
 
 }  // namespace terrace::terrain

@@ -8,7 +8,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Whether b, on one line with a and c, lies strictly between them.
+/// Whether b, which is collinear with a and c, is strictly between them.
 bool lies_between(const Point2& a, const Point2& b, const Point2& c) {
   return (a < b && b < c) || (c < b && b < a);
 }
@@ -22,7 +22,7 @@ void PointStar::start(const Point2& centre) {
   on_line_.clear();
 }
 
-/// Whether the way to a point is less than half a turn left of that to the first neighbour.
+/// Whether the direction to a point is less than half a turn left of that to the first neighbour.
 bool PointStar::is_early(const Point2& point) const {
   const Point2& first = spokes_.front().end;
   if (point == first) return true;
@@ -30,7 +30,7 @@ bool PointStar::is_early(const Point2& point) const {
   return side > 0 || (side == 0 && (point < centre_) == (first < centre_));
 }
 
-/// The last neighbour that is not left of the way to a point, counted from the first one.
+/// Returns the last neighbour not left of the direction to a point, counted from the first one.
 std::size_t PointStar::spoke_before(const Point2& point) const {
   const bool is_point_early = is_early(point);
   std::size_t before = 0, after = size();
@@ -46,12 +46,12 @@ std::size_t PointStar::spoke_before(const Point2& point) const {
   return before;
 }
 
-/// Sectors lie between the spoke of their number and the next one.
+/// A sector is between the spoke with its number and the next one.
 bool PointStar::is_in_conflict(std::size_t sector, const Point2& point) const {
   const std::size_t next = sector + 1 < spokes_.size() ? sector + 1 : 0;
   const Spoke &a = spokes_[sector], &b = spokes_[next];
   if (!a.is_outside && !b.is_outside) return tri::inside_circle(centre_, a.end, b.end, point);
-  // Beyond an edge of the hull, or between its ends.
+  // Tests beyond an edge of the hull, or between its ends.
   const Point2& end = a.is_outside ? b.end : a.end;
   const int side = tri::orientation(centre_, end, point);
   return (a.is_outside ? side < 0 : side > 0) || (side == 0 && lies_between(centre_, point, end));
@@ -72,7 +72,7 @@ void PointStar::offer(const Point2& point) {
     return on_line_.clear();
   }
   // If there is a conflict, there is one in the sector towards the point. Beyond the last neighbour
-  // of an open star that is one of two.
+  // of an open star that is one of two sectors.
   const std::size_t all = spokes_.size();
   std::size_t first = spoke_before(point);
   if (spokes_[first].end == point) return;
@@ -91,7 +91,7 @@ void PointStar::offer(const Point2& point) {
   replace(first, last, point);
 }
 
-/// The point takes the place of the spokes between these sectors.
+/// Replaces the spokes between these sectors by the point.
 void PointStar::replace(std::size_t first, std::size_t last, const Point2& point) {
   const std::size_t all = spokes_.size(), begin = (first + 1) % all;
   const std::size_t gone = (last + all - first) % all;

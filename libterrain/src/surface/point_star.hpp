@@ -10,12 +10,12 @@
 
 namespace terrace::terrain {
 
-/// The triangles round a point in the Delaunay triangulation of it and of points that are offered
+/// The triangles around a point in the Delaunay triangulation of it and of points that are offered
 /// one by one, in any order: exactly those of tri::Delaunay2, ties included.
 ///
-/// A point becomes a neighbour if it lies inside the circle of the triangle towards it, or outside
-/// the hull. The triangles that it replaces lie next to each other, so an offer costs O(log n) with
-/// n neighbours; an insertion moves some of them in memory.
+/// A point becomes a neighbour if it is inside the circle of the triangle towards it, or outside
+/// the hull. The triangles that it replaces are adjacent, so an offer costs O(log n) with n
+/// neighbours; an insertion moves some of them in memory.
 class PointStar {
  public:
   void start(const Point2& centre);
@@ -24,14 +24,14 @@ class PointStar {
 
   /// Whether a point at the centre itself was offered.
   [[nodiscard]] bool has_centre() const { return has_centre_; }
-  /// Whether there are triangles all round. If not, the centre is on the hull.
+  /// Whether there are triangles all around; if not, the centre is on the hull.
   [[nodiscard]] bool is_closed() const { return spokes_.size() > 2 && !is_open(); }
-  /// Neighbours, counter-clockwise; of an open star from the first to the last, the hull's. At most
-  /// one while all points are on one line.
+  /// Number of neighbours, counter-clockwise; in an open star they go from the first to the last,
+  /// both on the hull. At most one while all points are collinear.
   [[nodiscard]] std::size_t size() const { return spokes_.size() - (is_open() ? 1 : 0); }
   [[nodiscard]] const Point2& neighbour(std::size_t i) const { return spokes_[i].end; }
 
-  /// Triangle i has the centre, neighbour i and the next one.
+  /// Number of triangles. Triangle i has the centre, neighbour i and the next one as corners.
   [[nodiscard]] std::size_t triangles() const {
     return spokes_.size() < 3 ? 0 : size() - (is_open() ? 1 : 0);
   }
@@ -41,16 +41,16 @@ class PointStar {
   [[nodiscard]] CircleCover circle(std::size_t triangle) const {
     return CircleCover::of_triangle(centre_, neighbour(triangle), next_neighbour(triangle));
   }
-  /// A number that a triangle has until it is replaced, 0 at first.
+  /// A number that a triangle keeps until it is replaced; initially 0.
   [[nodiscard]] unsigned mark(std::size_t triangle) const { return spokes_[triangle].mark; }
   void set_mark(std::size_t triangle, std::uint8_t mark) { spokes_[triangle].mark = mark; }
 
  private:
-  /// Behind the last neighbour of an open star comes one that stands for the outside of the hull.
+  /// The last spoke of an open star represents the outside of the hull.
   struct Spoke {
     Point2 end{};
     bool is_outside = false;
-    std::uint8_t mark = 0;  ///< of the triangle between this and the next
+    std::uint8_t mark = 0;  ///< of the triangle between this spoke and the next
   };
 
   [[nodiscard]] bool is_open() const { return !spokes_.empty() && spokes_.back().is_outside; }
@@ -62,7 +62,7 @@ class PointStar {
   Point2 centre_{};
   bool has_centre_ = false;
   std::vector<Spoke> spokes_;
-  std::vector<Point2> on_line_;  ///< with the centre and the only neighbour so far
+  std::vector<Point2> on_line_;  ///< collinear with the centre and the only neighbour so far
 };
 
 }  // namespace terrace::terrain

@@ -15,13 +15,13 @@ namespace terrace::terrain {
 namespace {
 
 constexpr double kFarAway = std::numeric_limits<double>::infinity();
-/// More than a square of a distance is wrong by: differences, squares and their sum.
+/// Bounds the relative error of a squared distance: differences, squares and their sum.
 constexpr double kDoubt = 8 * std::numeric_limits<double>::epsilon();
-/// Cells around that are looked at without regard to the circle, at most.
+/// The most cells around a place that are searched regardless of the circle.
 constexpr std::uint32_t kFarthest = 8;
-/// Where circles have more cells they are searched one by one, as they shrink.
+/// Circles with more cells are searched one by one, as they shrink.
 constexpr std::size_t kManyCells = 128;
-/// Decoded clusters to keep, for circles that reach beyond what is loaded.
+/// Memory for decoded clusters, for circles that reach beyond the loaded points.
 constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
 
 CircleCover circle_of(const std::array<Point2, 3>& t) {
@@ -30,12 +30,12 @@ CircleCover circle_of(const std::array<Point2, 3>& t) {
 
 double square_of(double dx, double dy) { return dx * dx + dy * dy; }
 
-/// Not above the square of the distance of any point in the box.
+/// Returns a lower bound of the squared distance to any point in the box.
 double least_square(const StoredBox& box, const Point2& place) {
   const auto out = [&](std::size_t k) {
     return std::max({box.min[k] - place[k], place[k] - box.max[k], 0.0});
   };
-  // Infinite would mean that the box is not to be looked into.
+  // Infinity would mean that the box is skipped.
   return std::min(square_of(out(0), out(1)) * (1 - kDoubt), std::numeric_limits<double>::max());
 }
 
@@ -46,17 +46,17 @@ double greatest_square(const StoredBox& box, const Point2& place) {
   return square_of(out(0), out(1)) * (1 + kDoubt);
 }
 
-/// The disk around a place as far as a point, or a little more.
+/// Returns the disk around a place that reaches as far as a point, or slightly further.
 CircleCover disk(const Point2& place, double square) {
   CircleCover cover;
   cover.has_disk = true;
   cover.near = place;
-  constexpr double kVanished = 1e-145;  ///< more than lengths whose squares are zero
+  constexpr double kVanished = 1e-145;  ///< larger than lengths with a square of zero
   cover.radius = std::sqrt(square) * (1 + kDoubt) + kVanished;
   return cover;
 }
 
-/// Around them all.
+/// Returns a box around all covers.
 StoredBox bounds_of(std::span<const CircleCover> covers) {
   StoredBox all = covers[0].bounds();
   for (const CircleCover& cover : covers.subspan(1)) {
@@ -126,7 +126,7 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
       [&](const stream::Box3& whole) {
         ++looks;
         const StoredBox box = flat(whole);
-        // A box that is a single place adds nothing: its head is known.
+        // A box that is a single place adds nothing, because its head is known.
         if (box.min == box.max || cells_->knows(box)) return kFarAway;
         const auto meets = [&](const CircleCover& cover) { return cover.meets(box); };
         return std::any_of(covers.begin(), covers.end(), meets) ? least_square(box, from)
@@ -156,7 +156,7 @@ bool PointSurface::knows_border() {
 void PointSurface::find_triangle(const Target& target) {
   if (triangle_ && has(*triangle_, target)) return;
   triangle_.reset();  // in case reading fails
-  // The hull is a fan of triangles round its first corner.
+  // The hull is a fan of triangles around its first corner.
   const std::span<const Point2> hull = hull_.corners();
   std::size_t before = 1, after = hull.size() - 1;
   while (after - before > 1) {
@@ -170,7 +170,7 @@ void PointSurface::find_triangle(const Target& target) {
     if (!cover.meets(StoredBox{p, p})) return;
     if (p == t[0] || p == t[1] || p == t[2]) return;
     if (!tri::inside_circle(t[0], t[1], t[2], p)) return;
-    // The point and the corners part the triangle, or it and what lies between it and the point.
+    // The point and two corners replace the triangle on the target's side.
     std::array<int, 3> side{};
     for (std::size_t i = 0; i < 3; ++i) side[i] = side_of(p, t[i], target);
     for (std::size_t i = 0; i < 3; ++i) {
@@ -181,7 +181,7 @@ void PointSurface::find_triangle(const Target& target) {
       break;
     }
   };
-  // First as if there were no points but those around, until they leave a small circle.
+  // First uses only points nearby, until the circle is small.
   for (std::uint32_t reach = 1;; reach *= 2) {
     do {
       changed = false;
@@ -209,9 +209,9 @@ void PointSurface::find_triangle(const Target& target) {
   triangle_ = t;
 }
 
-/// Finds the triangle that the star has at the first neighbour whose circle was not searched, by
-/// the points in memory. That circle only becomes less on the side of the triangle. Points on the
-/// other side lie in the directions of other triangles, whose circles hold them as well.
+/// Finds, from the points in memory, the triangle at the first neighbour whose circle was not
+/// searched. That circle only shrinks on the side of the triangle. Points on its other side are in
+/// the directions of other triangles, whose circles contain them as well.
 void PointSurface::narrow_first(const Point2& centre) {
   std::size_t first = 0;
   while (star_.mark(first) != kNone) ++first;
@@ -239,7 +239,7 @@ void PointSurface::find_star(const Point2& centre) {
   };
   PointCells::Range seen, wanted;
   std::size_t cells = 0;
-  // The circles that points in memory may lie in yet.
+  // Finds the circles that may still contain points in memory.
   const auto find_open = [&] {
     covers_.clear();
     cells = 0;
@@ -279,7 +279,7 @@ void PointSurface::find_star(const Point2& centre) {
       for (std::size_t i = 0; i < star_.triangles(); ++i) {
         if (star_.mark(i) == kNone) star_.set_mark(i, kMemory);
       }
-      // Circles of new triangles lie in those of the old ones.
+      // The circles of new triangles are inside those of the old ones.
       if (wanted.count() <= cells) {
         cells_->visit_cells(wanted, seen, offer);
         seen = wanted;
@@ -373,7 +373,7 @@ SurfacePoint PointSurface::linear(const Point2& place) {
 }
 
 SurfacePoint PointSurface::natural_among(std::vector<Point2>& points, const Point2& place) {
-  // In an order of their own, for the last bits.
+  // A canonical order, so that the last bits are the same.
   std::sort(points.begin(), points.end());
   points.erase(std::unique(points.begin(), points.end()), points.end());
   tri::Delaunay2<double> few;
@@ -399,7 +399,7 @@ SurfacePoint PointSurface::natural(const Point2& place) {
     const Corners& t = *triangle_;
     points_.assign(t.begin(), t.end());
   }
-  // The neighbours that the place has, or would have as a point.
+  // The neighbours that the place has, or would have if it were a point.
   if (where == PointHull::Side::kInside || std::count(points_.begin(), points_.end(), place) > 0) {
     find_star(place);
     points_.clear();
@@ -412,12 +412,12 @@ SurfacePoint PointSurface::natural(const Point2& place) {
 Point2 PointSurface::nearest(const Point2& place) {
   Point2 best{};
   bool found = false;
-  double bound = kFarAway;  ///< the square of its distance, or a little more; it may overflow
+  double bound = kFarAway;  ///< the squared distance to best or slightly more; may overflow
   const auto offer = [&](const Point2& p) {
     const double square = square_of(p[0] - place[0], p[1] - place[1]);
     if (square > bound) return;
     if (found) {
-      // Doubles tell most of them apart.
+      // Doubles distinguish most points.
       const bool is_nearer = square * (1 + kDoubt) * (1 + kDoubt) < bound;
       if (!is_nearer) {
         const int order = tri::compare_distance(place, p, best);

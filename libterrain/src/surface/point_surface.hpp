@@ -23,29 +23,28 @@
 
 namespace terrace::terrain {
 
-/// The surface between the points of a level and above at single places: what the Delaunay
-/// triangulation of all of them has there, found without making it.
+/// The surface between the points of a level and above at single places. Gives the result of the
+/// Delaunay triangulation of all points without constructing it.
 ///
-/// The triangle above a place is the solution of a linear programme: of all planes through three
-/// lifted points that enclose the place, the one below all others. It is found by the simplex
-/// method: from any triangle with the place, a point inside its circle takes the place of a corner
-/// until there is none. The triangles round a place are found by offering it the points around, see
-/// PointStar. All decisions are exact, ties are broken as Delaunay2
-/// breaks them, so the triangles are those of the whole whatever is loaded.
+/// The triangle that contains a place is the solution of a linear programme: of all planes through
+/// three lifted points around the place, the lowest. The simplex method finds it: starting from any
+/// triangle with the place, a point inside its circle replaces a corner until no point is inside.
+/// The triangles around a place are found by offering points nearby to a PointStar. All decisions
+/// are exact, and ties are broken as in Delaunay2, so the triangles are those of the whole
+/// triangulation, whatever is loaded.
 ///
-/// Points come from the cells of a grid over what load() has read, and where a circle reaches
-/// beyond that from the store, by its clusters' boxes; where voids make that long, from the voids'
-/// border, see PointVoids. Places should come near each other: as a rule one lies in the triangle
-/// of the one before or close to it. About 1 us a place in a loaded box, half a millisecond
-/// elsewhere.
+/// Points come from the cells of a grid over what load() has read. Where a circle reaches further,
+/// they come from the store, by the boxes of its clusters, or, where voids make that slow, from the
+/// border of the voids, see PointVoids. Ask for places in an order that keeps neighbours together,
+/// because a place is usually in the triangle of the previous one or close to it. About 1 us per
+/// place in a loaded box, half a millisecond elsewhere.
 ///
 /// One object per thread; any number of them share a Store and a hull, which must outlive them. All
 /// functions throw stream::Error on a damaged store and stream::Stopped.
 class PointSurface {
  public:
-  /// Requires a hull that is not flat, of the same level. voids: shared by the surfaces of this
-  /// store and level, or none; memory_bytes: what finding their border may take, 0: as much as
-  /// there is.
+  /// Requires a hull of the same level that is not flat. voids: shared by the surfaces of this
+  /// store and level, or null. memory_bytes: limit for finding their border; 0: no limit.
   PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
                TooLong too_long = {}, std::shared_ptr<PointVoids> voids = nullptr,
                std::uint64_t memory_bytes = 0);
@@ -54,46 +53,45 @@ class PointSurface {
 
   /// See PointCells::load().
   bool load(const StoredBox& box, std::size_t most_points, bool may_crowd);
-  /// Takes the points of these cells from now on, which must outlive this.
+  /// Uses the points of these cells from now on; they must outlive this object.
   void share(const PointCells& cells) { cells_ = &cells; }
 
-  /// The linear surface. On an edge and on a point the height comes from the points there alone and
-  /// the gradient is the mean of the triangles that meet there. NaN outside the hull. Triangles
-  /// with too long an edge are left out; shorter edges and points that have no other have heights
-  /// but no gradients. Requires a finite place.
+  /// The linear surface. On an edge or a point, the height is computed from the points there alone,
+  /// and the gradient is the mean over the triangles that meet there. NaN outside the hull.
+  /// Triangles with too long an edge are left out; shorter edges and points that have no other
+  /// triangle have heights but no gradients. Requires a finite place.
   SurfacePoint linear(const Point2& place);
   /// By Sibson's natural neighbours, see tri::heights_at() and tri::gradients_at(). NaN outside the
   /// hull and where linear() has no height.
   SurfacePoint natural(const Point2& place);
-  /// The nearest point; of several equally near, the lexicographically smallest. Requires a finite
-  /// place.
+  /// Returns the nearest point, on ties the lexicographically smallest. Requires a finite place.
   Point2 nearest(const Point2& place);
-  /// The height of a point of the store, in its vertical unit.
+  /// Returns the height of a point of the store, in its vertical unit.
   double height(const Point2& point);
   /// The surface of linear() at the nearest point.
   SurfacePoint at_nearest(const Point2& place) { return at_point(nearest(place)); }
 
  private:
   using Corners = std::array<Point2, 3>;  ///< counter-clockwise
-  /// A place moved infinitesimally towards another one, and to the left of that way infinitely
-  /// less: so it lies on no line through two points.
+  /// A place moved infinitesimally towards another one, and infinitely less to the left of that
+  /// direction. So it is not on any line through two points.
   struct Target {
     Point2 place, towards;
   };
 
   static int side_of(const Point2& a, const Point2& b, const Target& target);
   [[nodiscard]] static bool has(const Corners& triangle, const Target& target);
-  /// Nothing outside the hull.
+  /// Returns nullopt outside the hull.
   std::optional<Target> target_of(const Point2& place, PointHull::Side& side) const;
-  /// Lets triangle_ be that of the target, which must be inside the hull.
+  /// Sets triangle_ to the triangle containing the target, which must be inside the hull.
   void find_triangle(const Target& target);
-  /// Lets star_ be that of a place among all points, which may be one of them. Requires that it is
-  /// not outside the hull.
+  /// Sets star_ to that of a place among all points, which may be one of them. Requires a place
+  /// that is not outside the hull.
   void find_star(const Point2& centre);
   void narrow_first(const Point2& centre);
-  /// Whether the border of the voids is known; finds it where that pays.
+  /// Whether the border of the voids is known; finds it if that pays off.
   bool knows_border();
-  /// Calls visit(point) at least for all points in the covers that are not held in memory.
+  /// Calls visit(point) at least for all points in the covers that are not in memory.
   template <class Visit>
   void read_in(std::span<const CircleCover> covers, const Point2& from, const Visit& visit);
 
@@ -114,7 +112,7 @@ class PointSurface {
 
   PointCells own_;
   const PointCells* cells_ = &own_;
-  std::optional<Corners> triangle_;  ///< one of the triangulation of all points
+  std::optional<Corners> triangle_;  ///< a triangle of the triangulation of all points
   PointStar star_;
   std::vector<CircleCover> covers_;
   std::vector<SurfaceTriangle> meeting_;

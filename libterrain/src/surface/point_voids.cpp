@@ -13,10 +13,11 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kPointsPerPart = std::size_t{1} << 16;
-/// Looking at a box costs about a fiftieth of triangulating a point; the border is found before as
-/// much was spent on looking.
+/// Looking at a box costs about a fiftieth of triangulating a point, so the border is found before
+/// looking has cost as much.
 constexpr std::uint64_t kLooksPerPoint = 16;
-/// Peak bytes of a border point: itself, then a vertex with two triangles and their boxes.
+/// Peak memory in bytes of a border point: itself, then a vertex with two triangles and their
+/// boxes.
 constexpr std::uint64_t kBytesPerBorderPoint = 320;
 constexpr std::uint64_t kShareOfMemory = 4;
 
@@ -55,7 +56,7 @@ bool PointVoids::find(PointWindow& window) {
     points_ += found.border.size();
     fits = fits && (memory == 0 || points_ <= memory / kShareOfMemory / kBytesPerBorderPoint);
     parts_[part] = std::move(found);
-    // The others must not wait for a part that is lacking.
+    // The other threads must not wait for a part that failed.
     if (error || !fits) state_ = State::kNone;
     changed_.notify_all();
     if (error) std::rethrow_exception(error);
@@ -63,7 +64,7 @@ bool PointVoids::find(PointWindow& window) {
   changed_.wait(lock, [&] { return at_work_ == 0 || state_ != State::kUnknown; });
   if (state_ == State::kUnknown) {
     triangulate();
-    // If all points are on one line, the border does not even tell who are neighbours.
+    // If all points are collinear, the border does not determine which points are neighbours.
     state_ = border_.triangle_count() > 0 ? State::kKnown : State::kNone;
   }
   return known();

@@ -15,19 +15,20 @@
 namespace terrace::terrain {
 namespace {
 
-/// Mean distances of points around the box.
+/// Width of the margin in mean distances of points around the box.
 constexpr double kMargin = 3;
-/// The margin is at most this share of the longer side.
+/// Limit of the margin as a share of the longer side.
 constexpr double kMostMargin = 0.05;
-/// Wider circles than so many medians, or than this share of the longer side, border voids.
+/// Circles border voids if they are wider than this many medians, or than this share of the longer
+/// side.
 constexpr double kWidest = 4, kMostWide = 1.0 / 16;
-/// Peak bytes per point that was read and lies around; a point that is inserted has its place,
-/// height and origin twice while it is, 20 for sorting and then 68 in the triangulation, states,
-/// a hint and a suspect's share.
+/// Peak memory in bytes per point that was read but is outside. An inserted point has its place,
+/// height and origin twice during insertion, 20 bytes for sorting and then 68 in the triangulation,
+/// states, a hint and a share of a suspect.
 constexpr std::uint64_t kBytesRead = 2 * 32;
-constexpr std::uint64_t kBytesBefore = std::uint64_t{8} << 20;  ///< what reads the store
-/// Memory of points that were taken is kept for those of the next window within this share of what
-/// is allowed: pages are expensive.
+constexpr std::uint64_t kBytesBefore = std::uint64_t{8} << 20;  ///< for reading the store
+/// Memory of taken points is kept for the next window up to this share of the allowed memory,
+/// because page faults are expensive.
 constexpr std::uint64_t kShareKept = 16;
 
 }  // namespace
@@ -213,7 +214,7 @@ void PointWindow::load(const StoredBox& box) {
   const auto load = [&] {
     begin(box);
     if (voids_->known()) return load_with_border();
-    // Triangles across the border need a few points more, which are cheaper in bulk.
+    // Triangles across the border need a few more points, which are cheaper in bulk.
     grow_inner(box.widened(margin()));
     if (places_.size() < kFirstPoints) take_nearest(kFirstPoints - places_.size());
     insert_taken();
@@ -255,7 +256,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
     const Point2 p = triangulation_.point(v);
     return box.contains({p[0], p[1], 0});
   };
-  // Where points are spread evenly, one circle in a thousand million is so wide.
+  // With evenly spread points, one circle in a thousand million is this wide.
   std::vector<double> radii;
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
     const CircleCover cover = circle(t);
@@ -268,7 +269,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
     const double side = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
     radius = std::min(kWidest * *middle, kMostWide * side);
   }
-  // A little more, for rounding.
+  // Slightly more, for rounding.
   const double reach = 2 * radius * (1 + 1e-6);
   grow_inner(box.widened(std::max(margin, reach)));
   insert_taken();

@@ -25,68 +25,69 @@
 
 namespace terrace::terrain {
 
-/// Whether a triangle, its corners counter-clockwise, meets a box: exact.
+/// Whether a triangle, with counter-clockwise corners, meets a box; exact.
 bool triangle_meets(const std::array<Point2, 3>& corner, const StoredBox& box);
 
-/// The Delaunay triangulation in x,y of all points of a level and above, part by part: exactly the
-/// triangles that the whole has. tri::Delaunay2 breaks ties by the points alone, so a triangle
-/// belongs to the whole if and only if it belongs to the triangulation of some of the points, among
-/// them all those in its closed circumcircle.
+/// Computes the Delaunay triangulation in x and y of all points of a level and above, window by
+/// window, with exactly the triangles of the whole triangulation. tri::Delaunay2 breaks ties by the
+/// points alone, so a triangle belongs to the whole if and only if it belongs to the triangulation
+/// of any subset that contains all points in its closed circumcircle.
 ///
-/// Coordinates are stored ones: x and y, or column and row of a raster's coarser levels.
+/// Coordinates are stored coordinates: x and y, or column and row of a raster's coarser levels.
 ///
-/// Points at equal x,y are one vertex. The first of them in the order of StoreWindow::points()
-/// (higher levels first, within a level by id) gives its height, whatever the window.
+/// Points at equal x and y are one vertex. The first of them in the order of StoreWindow::points()
+/// (higher levels first, within a level by id) determines its height in every window.
 ///
 /// One object per thread; any number of them share a Store.
 class PointWindow {
  public:
-  /// What load() throws where memory_bytes do not suffice. It says what would be needed.
+  /// Thrown by load() if memory_bytes do not suffice; says how much memory is needed.
   class NoRoom : public stream::Error {
     using Error::Error;
   };
-  /// Peak bytes per point of a window that is large beside its border.
+  /// Peak memory in bytes per point, for a window that is large compared with its border.
   static constexpr std::uint64_t kBytesPerPoint = 120;
 
-  /// memory_bytes: what one window may take; 0: as much as there is. voids: shared by windows of
-  /// this store and level; none: its own. The store must outlive this.
+  /// memory_bytes: limit for one window; 0: no limit. voids: shared by windows of this store and
+  /// level; null: its own. The store must outlive this object.
   PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes,
               std::shared_ptr<PointVoids> voids = nullptr);
   PointWindow(const PointWindow&) = delete;
   PointWindow& operator=(const PointWindow&) = delete;
 
-  /// Afterwards every triangle of the whole triangulation that meets the box, which is closed, is
-  /// in triangulation() and certain. There are others around, certain or not.
+  /// Loads a closed box. Afterwards every triangle of the whole triangulation that meets the box is
+  /// in triangulation() and certain. There are others around it, certain or not.
   ///
   /// Reads the clusters that meet the box and triangulates their points in the box in bulk, then
-  /// those in a border as wide as most circumcircles reach over it; then, while a triangle that
-  /// meets the box has a circumcircle, or a hull edge that the box sees from outside has a
-  /// half-plane, in which a point may be missing, adds one: of what was read, or else of the
-  /// clusters whose boxes it meets, coarse levels first, and the more at once the longer nothing is
-  /// found. So no width is guessed, and voids and hulls cost a few clusters of coarse levels more.
-  /// Where they cost too much, as along a swath that winds, their border is found once for all
-  /// windows, see PointVoids. About 0.4 us per point in the box. Clusters of unordered points
-  /// overlap, and all that meet the box are read, 30 ns per point: the larger the box, the less
-  /// they count. A box that holds the store has nothing to settle.
+  /// those in a border as wide as most circumcircles extend. Then it adds points as long as one may
+  /// be missing: in the circumcircle of a triangle that meets the box, or in the half-plane of a
+  /// hull edge that the box sees from outside. It takes a point that was read, otherwise it reads
+  /// the clusters whose boxes meet the circle or half-plane, coarse levels first, and more at a
+  /// time the longer nothing is found. So no width is guessed, and voids and hulls only cost a few
+  /// additional clusters of coarse levels. Where they cost too much, as along a winding swath,
+  /// their border is found once for all windows, see PointVoids. About 0.4 us per point in the box.
+  /// Clusters of unordered points overlap, and all that meet the box are read, at 30 ns per point;
+  /// the larger the box, the smaller their share. A box that contains the store needs no further
+  /// points.
   ///
-  /// Throws: NoRoom where memory_bytes do not suffice; stream::Error on a damaged store;
-  /// stream::Stopped. After that it can only be loaded again or destroyed.
+  /// Throws: NoRoom if memory_bytes do not suffice; stream::Error on a damaged store;
+  /// stream::Stopped. After an exception it can only be loaded again or destroyed.
   void load(const StoredBox& box);
-  /// For PointVoids: appends the points of the box of which not all triangles have circumcircles
-  /// that lie within the distance that it returns, each place once. Afterwards the window can only
-  /// be loaded or destroyed. Throws as load() does.
+  /// For PointVoids: appends the points of the box with a triangle whose circumcircle is not within
+  /// the returned distance, each place once. Afterwards the window can only be loaded or destroyed.
+  /// Throws: as load().
   double find_border(const StoredBox& box, std::vector<SurfaceCorner>& border);
   [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
 
-  /// As it was loaded last. Vertices have no other order or number than this one gives them.
+  /// The triangulation of the last load(). Vertices have no numbers except those in it.
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
-  /// Whether it is a triangle of the whole. Requires a living triangle.
+  /// Whether a triangle belongs to the whole triangulation. Requires a living triangle.
   [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
     return is_whole_ || state(triangle) == kCertain;
   }
   /// In the store's vertical unit (scale and offset of the channel applied).
   [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
-  /// By slot of vertex, as libtri wants them.
+  /// By vertex slot, as libtri requires.
   [[nodiscard]] const std::vector<double>& heights() const { return heights_; }
 
   [[nodiscard]] SurfaceCorner corner(tri::VertexId vertex) const;
@@ -95,61 +96,61 @@ class PointWindow {
 
   void set_limit(TooLong too_long) { too_long_ = std::move(too_long); }
 
-  /// The linear surface at a place of the box. On an edge and on a vertex the height comes from the
-  /// points there alone and the gradient is the mean of the triangles that meet there. NaN outside
-  /// the hull. While all points are on one line, or there is only one, the hull is the segment
-  /// between the outermost; there are heights but no gradients. With a limit, triangles beyond it
-  /// are left out; shorter edges and vertices that have no other have heights but no gradients.
-  /// The same bits whatever the window.
+  /// The linear surface at a place in the box. On an edge or a vertex, the height is computed from
+  /// the points there alone, and the gradient is the mean over the triangles that meet there. NaN
+  /// outside the hull. If all points are collinear, or there is only one, the hull is the segment
+  /// between the outermost points; it has heights but no gradients. With a limit, triangles beyond
+  /// it are left out; shorter edges and vertices that have no other triangle have heights but no
+  /// gradients. The same bits in every window.
   [[nodiscard]] SurfacePoint at(const Point2& place) const {
     tri::VertexId near = tri::kNoVertex;
     return at(place, near);
   }
-  /// The same, faster for places that are close to the one before: `near` is a vertex close to it,
-  /// or none, and becomes one close to this.
+  /// The same, faster for places close to the previous one: `near` is a vertex close to that, or
+  /// kNoVertex, and becomes one close to this place.
   SurfacePoint at(const Point2& place, tri::VertexId& near) const;
 
-  /// Whether two places are so close that a walk from one to the other is as short as from a hint.
+  /// Whether two places are so close that a walk between them is as short as from a hint.
   [[nodiscard]] bool are_close(const Point2& a, const Point2& b) const {
     return std::abs(a[0] - b[0]) * hint_scale_[0] < 1.0 &&
            std::abs(a[1] - b[1]) * hint_scale_[1] < 1.0;
   }
 
-  /// Whether a place lies inside an edge, exactly.
+  /// Whether a place is in the interior of an edge, exactly.
   [[nodiscard]] bool is_on_edge(const Point2& place) const;
 
  private:
   using Triangulation = tri::Delaunay2<double>;
-  /// Where a vertex comes from: the sequence of its cluster in read_, and its place in that.
+  /// The origin of a vertex: the index of its cluster in read_, and its own index in the cluster.
   struct Origin {
     std::uint32_t cluster = kNowhere, index = 0;
   };
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
-  /// Points to begin with, if need be from around inner_.
+  /// The minimum number of initial points, taken from around inner_ if necessary.
   static constexpr std::size_t kFirstPoints = 48;
-  /// What is kept of a point that is to be inserted.
+  /// Data of a point to be inserted.
   struct Taken {
     double height = 0;
     Origin origin;
   };
-  /// A point that was read and lies outside inner_; taken for inserting where its cluster is no
-  /// number.
+  /// A point that was read and is outside inner_; once taken for insertion, its cluster is
+  /// kNowhere.
   struct Pending {
     Triangulation::Point place{};
     double height = 0;
     Origin origin;
   };
-  /// Some of one cluster that lie together: pending_[begin] and the next ones; or, without any of
-  /// its own, those of the groups from the next one on up to `next`.
+  /// A group of nearby points of one cluster: pending_[begin] and the following; or, if it has no
+  /// points of its own, the groups that follow, up to `next`.
   struct Group {
     StoredBox box;
     std::size_t begin = 0, count = 0, next = 0;
   };
-  /// What lies outside inner_ of one cluster. What is not taken of it is parted into groups when
-  /// it is first looked into.
+  /// The points of one cluster outside inner_. Those not taken are divided into groups when they
+  /// are first searched.
   struct Outer {
     StoredBox box;
-    std::size_t begin = 0, count = 0;  ///< in pending_
+    std::size_t begin = 0, count = 0;  ///< range in pending_
     std::size_t first_group = 0, end_group = 0;
     bool is_parted = false;
   };
@@ -160,14 +161,14 @@ class PointWindow {
     tri::TriangleId triangle = tri::kNoTriangle;
     std::uint8_t edge = kNone;
   };
-  /// State of a triangle; the bits above tell which edges are certain to be on the hull.
+  /// State of a triangle; the higher bits say which edges are certainly on the hull.
   enum State : std::uint8_t { kCertain, kSuspect, kUnknown, kTriangleState = 3, kHullEdge = 4 };
   [[nodiscard]] std::uint8_t state(tri::TriangleId triangle) const {
     return states_[tri::slot(triangle)] & kTriangleState;
   }
 
   void clear();
-  /// Clears and reads what meets the box, of which inner_ holds all points.
+  /// Clears, then reads all clusters that meet the box; inner_ then contains all points of it.
   void begin(const StoredBox& box);
   void load_with_border();
   void take(const stream::StoreQuery::Node& node);
@@ -186,9 +187,10 @@ class PointWindow {
   void find_hull();
   void examine(tri::TriangleId triangle);
   void find_suspect_hull();
-  /// Lets inner_ hold most circles of suspects; false: there are few, or it would not help.
+  /// Enlarges inner_ to contain most circles of suspects; returns false if there are few or it
+  /// would not help.
   bool widen();
-  /// False: nothing is missing, or looking for it is taking too long.
+  /// Returns false if nothing is missing, or if looking for it takes too long.
   bool add_missing();
   bool read_missing();
   bool find_missing(const Suspect& suspect);
@@ -209,34 +211,34 @@ class PointWindow {
   double scale_, offset_;  ///< of heights
   TooLong too_long_;
   std::shared_ptr<PointVoids> voids_;
-  std::uint64_t looks_ = 0;  ///< not counted in voids_ yet
+  std::uint64_t looks_ = 0;  ///< not yet counted in voids_
   bool takes_too_long_ = false;
   ClusterFrontier frontier_;
-  StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
-  bool is_whole_ = false;      ///< all points of the store are inserted
+  StoredBox box_{}, inner_{};  ///< loaded; box with all points inserted
+  bool is_whole_ = false;      ///< whether all points of the store are inserted
   Triangulation triangulation_;
-  std::vector<double> heights_;               ///< by slot of vertex
-  std::vector<Origin> origins_;               ///< by slot of vertex
-  std::vector<std::uint8_t> states_;          ///< by slot of triangle, see State
-  std::vector<stream::ClusterId> read_;       ///< in their order
+  std::vector<double> heights_;               ///< by vertex slot
+  std::vector<Origin> origins_;               ///< by vertex slot
+  std::vector<std::uint8_t> states_;          ///< by triangle slot, see State
+  std::vector<stream::ClusterId> read_;       ///< in reading order
   std::vector<Triangulation::Point> places_;  ///< to be inserted
-  std::vector<Taken> taken_;                  ///< of places_
+  std::vector<Taken> taken_;                  ///< for places_
   std::vector<Pending> pending_;
   std::size_t left_ = 0;  ///< of pending_, not taken
   std::vector<Outer> outer_;
   std::vector<Group> groups_;
   std::vector<Triangulation::Insertion> inserted_;
-  std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
+  std::vector<Suspect> suspects_;  ///< hull edges follow the first suspect_triangles_
   std::size_t suspect_triangles_ = 0;
   std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
   std::vector<std::uint32_t> chosen_;
-  BoxTree outer_tree_, open_tree_;  ///< of outer_ that inner_ does not hold; of frontier_.open()
-  std::size_t read_in_trees_ = 0;   ///< so many were read when the trees were made
-  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< of pending_, or of clusters
+  BoxTree outer_tree_, open_tree_;  ///< outer_ outside inner_; frontier_.open()
+  std::size_t read_in_trees_ = 0;   ///< size of read_ when the trees were made
+  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< for pending_, or for clusters
   std::size_t clusters_at_once_ = 1;                         ///< for a suspect
   std::vector<double> reaches_;
   Triangulation::Changes changes_;
-  bool has_triangles_ = false;  ///< counting them goes round the hull
+  bool has_triangles_ = false;  ///< cached, because counting goes around the hull
   // A vertex near each cell of a grid over the box.
   std::vector<tri::VertexId> hints_;
   std::uint32_t hint_columns_ = 1, hint_rows_ = 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a window still lacks: see PointWindow::load().
+// Finds what a window still lacks: see PointWindow::load().
 #include <algorithm>
 #include <cstddef>
 #include <limits>
@@ -13,18 +13,20 @@
 namespace terrace::terrain {
 namespace {
 
-/// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
+/// Small, so that few points are tested that are not near a circle's border; but boxes cost time
+/// too.
 constexpr std::size_t kPointsPerGroup = 16;
-/// Share of the circles reaching over the border that a wider border is to hold.
+/// Share of the circles crossing the border that a wider border should contain.
 constexpr double kWidened = 0.95;
-/// Each widening is at most this share of the window's longer side.
+/// Limit of each widening as a share of the window's longer side.
 constexpr double kMostWidened = 0.03;
 constexpr unsigned kMostTimesWidened = 3;
-/// Clusters that are read at once for a suspect double after so many rounds, so many times.
+/// The number of clusters read together for a suspect doubles after this many rounds, at most this
+/// often.
 constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
-/// For these each point is looked for by itself.
+/// Up to this many suspects, each point is searched separately.
 constexpr std::size_t kFewSuspects = 12;
-/// Looks are counted for all windows together when there are so many.
+/// Looks are added to the count of all windows in batches of this size.
 constexpr std::uint64_t kLooksAtOnce = 1024;
 
 }  // namespace
@@ -67,7 +69,7 @@ void PointWindow::settle() {
   examine_all();
   for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) store_.check_stop();
   for (unsigned round = 1; add_missing(); ++round) {
-    // Where one cluster after another has nothing, more are read at once.
+    // Where clusters have no missing points, more of them are read together.
     clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMostDoublings);
     store_.check_stop();
     insert_taken();
@@ -86,7 +88,7 @@ void PointWindow::find_hull() {
     least = v;
     place = p;
   }
-  // Turns about a corner until there is the hull edge that begins there.
+  // Rotates around a corner until it finds the hull edge that begins there.
   tri::TriangleId t = triangulation_.triangle_at(least);
   tri::VertexId about = least;
   do {
@@ -106,9 +108,9 @@ void PointWindow::find_hull() {
 }
 
 void PointWindow::examine_all() {
-  // While inner_ holds all vertices, a circle that leaves it holds places outside the hull. The
-  // triangles whose circles hold one of them are joined to each other and to the hull across edges,
-  // as what an insertion there would remove. So the others are not looked at.
+  // While inner_ contains all vertices, a circle that leaves it contains places outside the hull.
+  // The triangles whose circles contain such a place are connected across edges to each other and
+  // to the hull, like those that an insertion there would remove. So the others need no test.
   states_.assign(triangulation_.triangle_slots(), kCertain);
   find_hull();
   std::vector<tri::TriangleId> reached = hull_;
@@ -183,7 +185,7 @@ bool PointWindow::widen() {
                   static_cast<std::ptrdiff_t>(kWidened * static_cast<double>(reaches_.size() - 1));
   std::nth_element(reaches_.begin(), at, reaches_.end());
   const double most = kMostWidened * std::max(box_.max[0] - box_.min[0], box_.max[1] - box_.min[1]);
-  // A little more, for rounding.
+  // Slightly more, for rounding.
   const double more = std::min(*at * (1 + 1e-6), most);
   if (!(more > 0)) return false;
   grow_inner(inner_.widened(more));
@@ -206,7 +208,7 @@ bool PointWindow::widen() {
 
 bool PointWindow::add_missing() {
   if (triangulation_.triangle_count() == 0) {
-    // Points on one line, or fewer than three: any other may make a triangle of them.
+    // With fewer than three points, or collinear points, any other point may form a triangle.
     while (true) {
       take_nearest(std::max<std::size_t>(64, triangulation_.vertex_count()));
       if (!places_.empty()) return true;
@@ -233,7 +235,7 @@ bool PointWindow::add_missing() {
       state = static_cast<std::uint8_t>(state | kHullEdge << suspect.edge);
     }
   }
-  // Clusters are read to look into them: what they hold is found in the next round.
+  // Clusters are only read now; their points are found in the next round.
   const bool has_read = read_missing();
   return has_read || !places_.empty();
 }
@@ -300,8 +302,8 @@ bool PointWindow::find_missing(const Suspect& suspect) {
     ++looks_;
     if (!bounds.meets(box) || !cover.meets(box)) return false;
     if (suspect.edge == Suspect::kNone) return true;
-    // On the line of an edge of the hull only what lies between its ends is missing: a straight
-    // border has many points on it.
+    // On the line of a hull edge, only points between its ends are missing; a straight border has
+    // many points on its line.
     const Point2 outermost{to[1] > from[1] ? box.max[0] : box.min[0],
                            to[0] > from[0] ? box.min[1] : box.max[1]};
     if (tri::orientation(from, to, outermost) < 0) return true;
@@ -309,13 +311,13 @@ bool PointWindow::find_missing(const Suspect& suspect) {
                      {std::max(from[0], to[0]), std::max(from[1], to[1])}}
         .meets(box);
   };
-  // Take the point farthest inside among those that were read: it leaves the smallest remainder.
+  // Take the innermost of the points that were read: it leaves the smallest remainder.
   std::size_t point = pending_.size();
   double depth = std::numeric_limits<double>::infinity();
   const auto look_at_point = [&](std::size_t at) {
     Pending& p = pending_[at];
-    if (p.origin.cluster == kNowhere) return;  // taken
-    // Twins of a corner may give it another height and change nothing else.
+    if (p.origin.cluster == kNowhere) return;  // already taken
+    // Twins of a corner may give it another height, but change nothing else.
     if (p.place == corner[0] || p.place == corner[1] || p.place == corner[2]) return take(p);
     const StoredBox box{p.place, p.place};
     const double d = cover.depth(box);
@@ -342,7 +344,8 @@ bool PointWindow::find_missing(const Suspect& suspect) {
     take(pending_[point]);
     return true;
   }
-  // Else of the clusters of the highest level that may hold some those where most does.
+  // Otherwise read clusters of the highest level that may contain some, those with most of the
+  // cover.
   const auto open = frontier_.open();
   unsigned level = 0;
   by_distance_.clear();
@@ -357,8 +360,8 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   const auto behind = by_distance_.begin() + static_cast<std::ptrdiff_t>(count);
   std::nth_element(by_distance_.begin(), behind - 1, by_distance_.end());
   const StoredBox& best = open[std::min_element(by_distance_.begin(), behind)->second].box;
-  // Hardly anything lies beyond an edge of the hull, but on its line: on a straight border, much.
-  // None of that makes the plane smaller, so all of it has to be looked into.
+  // Hardly any points are beyond an edge of the hull, but on a straight border many are on its
+  // line. They do not make the half-plane smaller, so all such clusters must be read.
   if (cover.has_plane && !cover.has_disk && cover.plane.grazes(best)) count = by_distance_.size();
   for (std::size_t i = 0; i < count; ++i) {
     chosen_.push_back(static_cast<std::uint32_t>(by_distance_[i].second));

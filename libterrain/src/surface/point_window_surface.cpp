@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lies between the points of a window.
+// The surface between the points of a window.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -33,7 +33,7 @@ void PointWindow::make_hints() {
     const Point2 p = triangulation_.point(v);
     if (box_.contains({p[0], p[1], 0})) hints_[hint_cell(p)] = v;
   }
-  // What has none takes that of the cell before.
+  // A cell without a hint gets that of the previous cell.
   tri::VertexId last = tri::kNoVertex;
   for (tri::VertexId& v : hints_) {
     if (v == tri::kNoVertex) v = last;
@@ -110,7 +110,7 @@ SurfacePoint PointWindow::at_vertex(tri::VertexId vertex, tri::TriangleId triang
     round.push_back(corners_with_heights(t));
     t = turn(t, 1);
   } while (t != triangle && t != tri::kNoTriangle);
-  if (t == tri::kNoTriangle) {  // met the hull: the other way for the rest
+  if (t == tri::kNoTriangle) {  // met the hull: go the other way for the rest
     for (t = turn(triangle, 2); t != tri::kNoTriangle; t = turn(t, 2)) {
       round.push_back(corners_with_heights(t));
     }

@@ -16,7 +16,7 @@
 namespace terrace::terrain {
 namespace {
 
-// Sums of heights and their weights; a mean where the weight is not 0.
+// Sums of heights and their weights; a mean exists where the weight is not 0.
 struct Sums {
   std::size_t columns = 0, rows = 0;
   std::vector<double> sum, weight;
@@ -31,7 +31,7 @@ Sums halved(const Sums& fine) {
     for (std::size_t column = 0; column < fine.columns; ++column) {
       const std::size_t from = row * fine.columns + column;
       if (fine.weight[from] == 0.0) continue;
-      // Every cell with data counts once, however much it holds: near heights weigh more then.
+      // Every cell with data counts once, regardless of its weight, so that near heights dominate.
       const std::size_t to = row / 2 * coarse.columns + column / 2;
       coarse.sum[to] += fine.sum[from] / fine.weight[from];
       coarse.weight[to] += 1.0;
@@ -57,14 +57,14 @@ double between(const std::vector<float>& heights, std::size_t columns, std::size
 constexpr std::uint64_t kMostCells = std::uint64_t{1} << 20;
 constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 23;
 
-/// The level and the cells that the means are taken of.
+/// The level to read, and the grid of means.
 struct Layout {
   Detail detail;
   std::array<double, 2> from{}, cell{1.0, 1.0};
   std::array<std::size_t, 2> size{1, 1};
 };
 
-/// Squares of samples. The points of level 1 are dense enough for a fill.
+/// Squares of samples. The points of level 1 are dense enough for filling.
 Layout of_raster(const stream::Store& store) {
   const std::array<std::uint64_t, 2> samples{store.schema().columns, store.schema().rows};
   std::uint64_t reduction = 1;
@@ -82,8 +82,8 @@ Layout of_raster(const stream::Store& store) {
   return layout;
 }
 
-/// The finest level that is not too large, and about a point to a cell, so that the surface fits to
-/// those at the border.
+/// The finest level that is not too large, and about one point per cell, so that the surface
+/// matches the points at the border.
 Layout of_points(const stream::Store& store) {
   Layout layout;
   unsigned& level = layout.detail.level;
@@ -106,8 +106,8 @@ Layout of_points(const stream::Store& store) {
   return layout;
 }
 
-/// The cell of a place; the last cell is closed. NaN, which a box too large for doubles gives, is
-/// in the last.
+/// Returns the cell of a place; the last cell is closed. NaN, which occurs for a box too large for
+/// doubles, is in the last cell.
 std::size_t cell_at(double place, std::size_t cells) {
   return place < static_cast<double>(cells - 1) ? static_cast<std::size_t>(place) : cells - 1;
 }
@@ -145,7 +145,7 @@ double FilledGrid::height(double x, double y) const {
 
 std::uint64_t FilledGrid::digest(const std::array<double, 2>& first,
                                  const std::array<double, 2>& last) const {
-  // The first and the last cell that between() takes.
+  // The first and last cells that between() uses.
   const auto cells = [&](std::size_t axis, std::size_t number) {
     const auto cell = [number](double place) {
       return static_cast<std::size_t>(
@@ -191,8 +191,8 @@ StoreFill::StoreFill(const stream::Store& store) {
                          .where = {},
                          .cause = raster ? "no sample has data, so nothing can be filled"
                                          : "no point has a height, so there is nothing to tile",
-                         .remedy = raster ? "look at the source's nodata value"
-                                          : "look at the source's third coordinate"});
+                         .remedy = raster ? "check the source's nodata value"
+                                          : "check the source's third coordinate"});
   }
   grid_.emplace(columns, rows, std::move(sum), std::move(weight));
 }

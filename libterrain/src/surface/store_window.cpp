@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMostSome = 12;
 
-/// Visits the clusters that hold the points of `level` and above in the box.
+/// Visits the clusters with points of `level` and above in the box.
 template <class Visit>
 void descend(stream::StoreQuery& query, const StoredBox& box, unsigned level, const Visit& visit) {
   query.descend(
@@ -36,7 +36,7 @@ std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const S
         return true;
       },
       [&](const stream::StoreQuery::Branch& cluster) {
-        // What lies below cannot widen the range.
+        // The clusters below cannot widen the range.
         const bool known = found.low <= cluster.box.min[2] && found.high >= cluster.box.max[2];
         return !(known && found.some.size() == kMostSome);
       });

@@ -14,7 +14,7 @@ namespace {
 
 bool before(const SurfaceCorner& a, const SurfaceCorner& b) { return a.place < b.place; }
 
-/// The same by numbers whose error is bounded, see weights_at().
+/// The same with bounded error, see weights_at().
 SurfacePoint on_needle(const SurfaceTriangle& corner, const Point2& place) {
   tri::Delaunay2<double> alone;
   std::vector<double> heights;
@@ -32,7 +32,7 @@ SurfacePoint on_needle(const SurfaceTriangle& corner, const Point2& place) {
 
 }  // namespace
 
-// The lexicographically smallest corner comes first, so that the bits are the triangle's own.
+// The lexicographically smallest corner comes first, so that a triangle always gives the same bits.
 SurfacePoint on_plane(SurfaceTriangle triangle, const Point2& place) {
   std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end(), before),
               triangle.end());
@@ -66,7 +66,7 @@ SurfacePoint where_triangles_meet(const Point2& place, double height,
   for (SurfaceTriangle& t : triangles) {
     std::rotate(t.begin(), std::min_element(t.begin(), t.end(), before), t.end());
   }
-  // They are added up in an order of their own.
+  // Add them in a canonical order.
   std::sort(triangles.begin(), triangles.end(),
             [](const SurfaceTriangle& s, const SurfaceTriangle& t) {
               for (std::size_t i = 0; i < 3; ++i) {

@@ -8,8 +8,7 @@
 #include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/region.hpp"
 
-/// The linear surface on the triangles of points: the same bits for the same points, in whatever
-/// order they come.
+/// The linear surface on triangles of points. The same points give the same bits, in any order.
 
 namespace terrace::terrain {
 
@@ -20,15 +19,15 @@ struct SurfaceCorner {
 };
 using SurfaceTriangle = std::array<SurfaceCorner, 3>;  ///< counter-clockwise
 
-/// Whether an edge between two places is so long that triangles with it are no surface.
+/// Whether an edge between two places is too long for its triangles to be part of the surface.
 using TooLong = std::function<bool(const Point2&, const Point2&)>;
 
-/// Inside a triangle, its border included.
+/// The surface inside a triangle, its border included.
 SurfacePoint on_plane(SurfaceTriangle triangle, const Point2& place);
-/// The height between the ends of an edge.
+/// Returns the height on an edge.
 double on_edge(SurfaceCorner a, SurfaceCorner b, const Point2& place);
-/// At a place where triangles meet: the height is given, the gradient is the mean of those of the
-/// triangles without too long an edge. Reorders them.
+/// The surface at a place where triangles meet: the height is given, and the gradient is the mean
+/// over the triangles without too long an edge. Reorders the triangles.
 SurfacePoint where_triangles_meet(const Point2& place, double height,
                                   std::span<SurfaceTriangle> triangles, const TooLong& too_long);
 

@@ -8,9 +8,9 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
-/// In a view, whose share of a level is not known, finer levels are read until there are so many.
+/// A view's share of a level is unknown, so it reads finer levels until it has this many points.
 constexpr std::size_t kFewestCounted = std::size_t{1} << 14;
-/// Halvings of the store's area. More come only where points lie on each other.
+/// Limit on halvings of the store's area; only coincident points need more.
 constexpr unsigned kDeepestTree = 48;
 
 }  // namespace

@@ -13,24 +13,23 @@
 
 namespace terrace::terrain {
 
-/// Parts a store's area into windows of about `points` points of a level and above: boxes, halved
-/// across until they hold so few. They depend on the points alone. The windows of a box that was
-/// halved have consecutive numbers, so a box may stand for them where more points are to be taken
-/// at once.
+/// Divides a store's area into windows of about `points` points of a level and above: boxes, halved
+/// until they contain few enough. They depend only on the points. The windows of a halved box have
+/// consecutive numbers, so a box may represent them where more points are processed together.
 ///
-/// Counts the points of a coarser level, as fine as 2^18 of them allow, and takes each for as many
-/// as come on one. O(n log n) of those; they are read once.
+/// Counts the points of a coarser level with at most 2^18 points, and scales the counts to the full
+/// number. O(n log n) in these points, which are read once.
 class WindowTree {
  public:
   /// A window, or a box that was halved into windows.
   struct Part {
     StoredBox box{};                 ///< stored coordinates, closed
-    double points = 0;               ///< about so many
-    std::size_t first = 0, end = 0;  ///< the windows in it
-    /// Parts by their number, both 0 for a window.
+    double points = 0;               ///< approximate number
+    std::size_t first = 0, end = 0;  ///< range of windows in it
+    /// Numbers of the two halves; both 0 for a window.
     std::uint32_t below = 0, above = 0;
-    std::uint32_t axis = 0;  ///< across which it is halved
-    double middle = 0;       ///< where
+    std::uint32_t axis = 0;  ///< the axis that is halved
+    double middle = 0;       ///< where it is halved
 
     [[nodiscard]] bool is_window() const { return below == 0; }
   };
@@ -39,16 +38,16 @@ class WindowTree {
   WindowTree(const stream::Store& store, unsigned level, std::size_t points);
 
   [[nodiscard]] std::size_t size() const { return windows_.size(); }
-  /// Stored coordinates, closed; together they are the store's bounds.
+  /// A closed box in stored coordinates; together they cover the store's bounds.
   [[nodiscard]] const StoredBox& box(std::size_t window) const {
     return parts_[windows_[window]].box;
   }
-  /// A window that holds the place; of a place outside one that is not far.
+  /// Returns a window that contains the place or, for a place outside, a nearby one.
   [[nodiscard]] std::size_t window_of(const Point2& place) const;
 
-  /// Number 0 is all of the store.
+  /// Part 0 is the whole store.
   [[nodiscard]] const Part& part(std::uint32_t number) const { return parts_[number]; }
-  /// The largest parts for which takes(part) is true, or that are windows, in order.
+  /// Visits the largest parts for which takes(part) is true or that are windows, in order.
   template <class Takes, class Visit>
   void for_each_part(const Takes& takes, const Visit& visit, std::uint32_t from = 0) const {
     const Part& part = parts_[from];
@@ -62,7 +61,7 @@ class WindowTree {
                       unsigned depth);
 
   std::vector<Part> parts_;
-  std::vector<std::uint32_t> windows_;  ///< their parts
+  std::vector<std::uint32_t> windows_;  ///< numbers of their parts
 };
 
 }  // namespace terrace::terrain

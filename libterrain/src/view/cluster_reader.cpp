@@ -10,9 +10,9 @@
 namespace terrace::terrain {
 namespace {
 
-/// Share of a frame's time that the calling thread spends looking for bytes that are missing.
+/// Share of a frame's time that the calling thread may spend looking for missing bytes.
 constexpr double kMissingShare = 0.25;
-/// More missing ranges are not looked for in a frame: requests for these take longer than it does.
+/// A frame stops looking after this many missing ranges; requesting them takes longer than a frame.
 constexpr std::size_t kMostMissing = 512;
 
 class FrameReader final : public ClusterReader {
@@ -35,7 +35,7 @@ class FrameReader final : public ClusterReader {
         continue;
       }
       const auto members = static_cast<std::size_t>(request.members);
-      // Above level 0 the records of the clusters below come with it, which takes far longer.
+      // Above level 0, reading includes the records of the clusters below, which takes far longer.
       const std::size_t kind = tri::level_of(request.cluster) > 0 ? 1 : 0;
       if (!meter_.has(members, kind) || missing_.size() >= kMostMissing) break;
       auto lacking = lacking_.find(request.cluster);
@@ -47,7 +47,7 @@ class FrameReader final : public ClusterReader {
         } catch (const stream::MissingBytes& missing) {
           lacking = lacking_.insert_or_assign(request.cluster, missing.ranges()).first;
         }
-        // An exception takes longer than anything else here.
+        // Exceptions take longer than anything else here.
         if (steady_seconds() > end) break;
       }
       missing_.insert(missing_.end(), lacking->second.begin(), lacking->second.end());
@@ -62,23 +62,22 @@ class FrameReader final : public ClusterReader {
  private:
   struct LackingPage {
     stream::ByteRange range;
-    std::uint64_t told = 0;  ///< in which frame it was added to missing_
+    std::uint64_t told = 0;  ///< the last frame that added it to missing_
   };
 
-  /// Whether bytes that were missing are there now. Without `given` they are looked for once a
-  /// frame.
+  /// Whether missing bytes have arrived. Without `given`, every frame tries to read them.
   [[nodiscard]] bool has_come(const stream::ByteRange& range) const {
     return given_ && given_(range);
   }
 
-  /// False once the time is over.
+  /// Returns false when the time is over.
   bool bring_record(tri::ClusterId id, double end, const GiveRecord& give_record) {
     const tri::ClusterId page = FramedSource::page_of(id);
     const bool same = page == page_;
     page_ = page;
     auto lacking = lacking_pages_.find(page);
     if (lacking == lacking_pages_.end() || has_come(lacking->second.range)) {
-      // The next ones of a page take next to no time.
+      // Further records of the same page take almost no time.
       if (!same && steady_seconds() > end) return false;
       try {
         give_record(id, source_.exact_record(id));
@@ -96,9 +95,9 @@ class FrameReader final : public ClusterReader {
 
   FramedSource& source_;
   std::function<bool(const stream::ByteRange&)> given_;
-  std::vector<tri::ViewRequest> wanted_;  ///< by the step before
+  std::vector<tri::ViewRequest> wanted_;  ///< by the previous step
   std::vector<stream::ByteRange> missing_;
-  /// What clusters lacked when they were last looked for.
+  /// The ranges that each cluster lacked in the last attempt to read it.
   std::unordered_map<tri::ClusterId, std::vector<stream::ByteRange>> lacking_;
   std::unordered_map<tri::ClusterId, LackingPage> lacking_pages_;
   std::uint64_t number_ = 0;  ///< of the frame

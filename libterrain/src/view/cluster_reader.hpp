@@ -15,15 +15,17 @@
 #include "terrace/terrain/store_view.hpp"
 #include "view/view_frame.hpp"
 
-/// Who reads the clusters of a view: the thread that draws, or one of its own.
+/// Readers of a view's clusters: in the drawing thread, or in a separate one.
 
 namespace terrace::terrain {
 
-/// The clusters of a store, members in stored coordinates or on a lattice, boxes in the view frame.
+/// The clusters of a store, with members in stored coordinates or on a lattice, and boxes in the
+/// view frame.
 class FramedSource final : public tri::ClusterSource {
  public:
-  /// Without a lattice (null) members are in stored coordinates. `bounds`: records whose bytes are
-  /// missing may be bounds (tri::ClusterRecord::kUnread). Keeps references.
+  /// Without a lattice (null), members are in stored coordinates. `bounds`: records with missing
+  /// bytes may be replaced by bounds (tri::ClusterRecord::kUnread). Keeps references to its
+  /// arguments.
   FramedSource(const stream::Store& store, const ViewFrame& frame, const ViewLattice* lattice,
                bool bounds)
       : store_(store), inner_(store), frame_(frame), lattice_(lattice), bounds_(bounds) {}
@@ -35,20 +37,20 @@ class FramedSource final : public tri::ClusterSource {
   tri::ClusterRecord record(tri::ClusterId id) override;
   tri::ClusterMembers read(tri::ClusterId id) override;
 
-  /// tri::load() and tri::load_root(). Throws: stream::MissingBytes that names all bytes that are
-  /// missing and can be told, not only the first.
+  /// As tri::load() and tri::load_root(). Throws: stream::MissingBytes that lists all missing bytes
+  /// that can be determined, not only the first.
   tri::GivenCluster load(const tri::ViewRequest& request);
   tri::GivenCluster load_root();
-  /// A record itself. Throws: stream::MissingBytes.
+  /// Reads the record itself. Throws: stream::MissingBytes.
   tri::ClusterRecord exact_record(tri::ClusterId id);
-  /// Clusters with the same number have their records in the same bytes.
+  /// Returns a number that clusters share if their records are in the same bytes.
   [[nodiscard]] static tri::ClusterId page_of(tri::ClusterId id) {
     constexpr std::uint64_t kClusters = 64;  // older stores have larger pages
     const std::uint64_t ordinal = tri::ordinal_of(id);
     return tri::cluster_id(tri::level_of(id), ordinal - ordinal % kClusters);
   }
 
-  /// What was read so far; may be asked while another thread reads.
+  /// The traffic until now; may be called while another thread reads.
   [[nodiscard]] ViewTraffic traffic() const { return {clusters_, points_, bytes_}; }
   [[nodiscard]] std::vector<std::uint64_t> counts() const;
 
@@ -60,14 +62,14 @@ class FramedSource final : public tri::ClusterSource {
   const ViewFrame& frame_;
   const ViewLattice* lattice_;
   bool bounds_;
-  std::vector<stream::Point3> nodes_;  ///< what the last read() shows, with a lattice
+  std::vector<stream::Point3> nodes_;  ///< result of the last read(), with a lattice
   /// The index pages and bytes that the cluster being loaded still lacks.
   std::vector<tri::ClusterId> missing_pages_;
   std::vector<stream::ByteRange> missing_;
   std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
 };
 
-/// Share of a frame's time that the calling thread spends bringing clusters.
+/// Share of a frame's time that the calling thread spends on bring().
 inline constexpr double kReadingShare = 0.4;
 
 double steady_seconds();
@@ -78,22 +80,22 @@ class ClusterReader {
   using GiveRecord = std::function<void(tri::ClusterId, const tri::ClusterRecord&)>;
 
   virtual ~ClusterReader() = default;
-  /// Before a step: gives what was asked for and is there, for about `seconds`. Throws what reading
-  /// threw.
+  /// Call before a step: passes on requested clusters that are available, for about `seconds`.
+  /// Rethrows what reading threw.
   virtual void bring(double seconds, const Give& give, const GiveRecord& give_record) = 0;
-  /// After it: what the step lacks, as in tri::ViewControl::Step.
+  /// Call after a step, with what the step lacks, as in tri::ViewControl::Step.
   virtual void ask(const std::vector<tri::ViewRequest>& wanted,
                    const std::vector<tri::ViewRequest>& requests,
                    const std::vector<tri::ClusterId>& withdrawn) = 0;
-  /// Bytes without which nothing more can be brought, the most important first.
+  /// The bytes that are needed to continue, the most important first.
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const { return {}; }
 };
 
-/// The calling thread, within the frame's time. Bytes that are missing are no fault of it; they are
-/// looked for again once they are `given`, or, if that is empty, in each frame.
+/// Makes a reader in the calling thread, within the frame's time. Missing bytes are not an error:
+/// it tries again once they are `given` or, if that is empty, in every frame.
 std::unique_ptr<ClusterReader> make_frame_reader(
     FramedSource& source, std::function<bool(const stream::ByteRange&)> given = {});
-/// A thread of its own.
+/// Makes a reader with its own thread.
 std::unique_ptr<ClusterReader> make_reading_thread(FramedSource& source);
 
 }  // namespace terrace::terrain

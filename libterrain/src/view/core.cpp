@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/view_impl.hpp"
 
-/// The part of the view that needs neither threads nor PROJ nor CGAL: it compiles for WebAssembly.
+/// The part of the view that needs neither threads nor PROJ nor CGAL, for WebAssembly.
 
 namespace terrace::terrain {
 

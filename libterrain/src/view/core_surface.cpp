@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/view_impl.hpp"
 
-/// Likewise for surfaces of scans, apart from core.cpp because they need the triangulation in
+/// The same for surfaces of scans; separate from core.cpp because they need the triangulation in
 /// space.
 
 namespace terrace::terrain {

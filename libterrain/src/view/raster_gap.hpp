@@ -10,14 +10,14 @@
 
 namespace terrace::terrain {
 
-/// Whether a triangle spans samples without data, in the Delaunay triangulation, without a metric,
-/// of some clusters of a raster: its corners are not neighbours in columns and rows, and its
-/// centroid is farther than a cell from the boxes of all clusters that are not expanded. A sample
-/// within a cell of the centroid is either in such a box or a vertex, so that a raster without gaps
-/// has no such triangle.
+/// Whether a triangle in the Delaunay triangulation (without a metric) of some clusters of a raster
+/// spans samples without data. Such a triangle's corners are not neighbours in columns and rows,
+/// and its centroid is farther than a cell from the boxes of all clusters that are not expanded. A
+/// sample within a cell of the centroid is either in such a box or a vertex, so a raster without
+/// gaps has no such triangle.
 ///
-/// far(cells): whether the columns and rows within a cell of a place, with heights {0, 0}, are free
-/// of such boxes.
+/// far(cells): whether no such box meets the columns and rows within a cell of a place, with
+/// heights {0, 0}.
 template <class Far>
 bool spans_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners, const Far& far) {
   stream::Box3 cells{{0, 0, 0}, {0, 0, 0}};
@@ -31,8 +31,8 @@ bool spans_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners, const 
   return !neighbours && far(cells);
 }
 
-/// Whether a store is a raster of which cells within its bounds have no data, or are left out by a
-/// view's condition.
+/// Whether a store is a raster with cells inside its bounds that have no data or that a view's
+/// condition excludes.
 inline bool has_gaps(const stream::Store& store) {
   if (!store.schema().grid || store.points() == 0) return false;
   if (store.condition() != nullptr) return true;

@@ -28,7 +28,7 @@ class ReadingThread final : public ClusterReader {
   ReadingThread(const ReadingThread&) = delete;
   ReadingThread& operator=(const ReadingThread&) = delete;
 
-  // Neither bring() nor ask() waits for the thread: where it holds the lock, the next frame tries
+  // Neither bring() nor ask() waits for the thread: if it holds the lock, the next frame tries
   // again.
   void bring(double seconds, const Give& give, const GiveRecord&) override {
     if (next_ == taken_.size()) {
@@ -84,16 +84,16 @@ class ReadingThread final : public ClusterReader {
 
   FramedSource& source_;
   std::vector<tri::GivenCluster> taken_;
-  std::size_t next_ = 0;                          ///< of taken_, to be given
-  std::vector<tri::ViewRequest> asked_;           ///< not in queue_ yet
-  std::unordered_set<tri::ClusterId> withdrawn_;  ///< may be in queue_ still
-  std::mutex mutex_;                              ///< of what follows
+  std::size_t next_ = 0;                          ///< the next of taken_ to pass on
+  std::vector<tri::ViewRequest> asked_;           ///< not yet in queue_
+  std::unordered_set<tri::ClusterId> withdrawn_;  ///< may still be in queue_
+  std::mutex mutex_;                              ///< for the members below
   std::condition_variable wake_;
   std::deque<tri::ViewRequest> queue_;
   std::vector<tri::GivenCluster> ready_;
   std::exception_ptr failure_;
   bool stop_ = false;
-  std::thread thread_;  ///< last: it uses all of these
+  std::thread thread_;  ///< last, because it uses all other members
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace terrace::terrain {
 bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
   const stream::StoreSchema& schema = store.schema();
   if (schema.grid || schema.crs.epsg != 0 || !schema.crs.wkt.empty()) return false;
-  // What stands for triangles or lines lies on no surface.
+  // Points that represent triangles or lines are not on a surface.
   for (const auto& [name, value] : schema.parameters) {
     if (name == "entities") return false;
   }

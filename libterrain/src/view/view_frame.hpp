@@ -11,14 +11,14 @@
 
 namespace terrace::terrain {
 
-/// From stored coordinates to metres around the middle of the store.
+/// Converts stored coordinates to metres around the middle of the store.
 class ViewFrame {
  public:
-  /// ground: from a step in stored coordinates to metres.
+  /// ground: maps a difference in stored coordinates to metres.
   ViewFrame(const stream::Store& store, const stream::LinearMap& ground) : map_(ground) {
     const stream::Box3& bounds = store.bounds();
     if (bounds.empty()) return;
-    // Heights count from 0 of the store's vertical unit, not from the sample 0.
+    // Heights start at 0 of the store's vertical unit, not at the sample 0.
     const stream::Channel& z = store.schema().coordinates[2];
     middle_ = {(bounds.min[0] + bounds.max[0]) / 2, (bounds.min[1] + bounds.max[1]) / 2,
                -z.offset / z.scale};
@@ -30,7 +30,7 @@ class ViewFrame {
             map_[3] * v[0] + map_[4] * v[1] + map_[5] * v[2],
             map_[6] * v[0] + map_[7] * v[1] + map_[8] * v[2]};
   }
-  /// Back to stored coordinates, up to rounding. The map must not be singular.
+  /// Converts back to stored coordinates, up to rounding. The map must not be singular.
   [[nodiscard]] stream::Point3 stored(const stream::Point3& p) const {
     const auto minor = [&](std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
       return map_[a] * map_[d] - map_[b] * map_[c];
@@ -63,8 +63,8 @@ class ViewFrame {
   stream::Point3 middle_{};
 };
 
-/// Integers in the view frame, for exact predicates in space: cells of a power of two metres, at
-/// most 2^29 of them along a side of the store's box.
+/// Integer coordinates in the view frame, for exact predicates in space. Cells are a power of two
+/// metres, at most 2^29 of them along a side of the store's box.
 class ViewLattice {
  public:
   ViewLattice(const stream::Store& store, const ViewFrame& frame) {
@@ -77,7 +77,7 @@ class ViewLattice {
     std::frexp(side, &exponent);
     cell_ = std::ldexp(1.0, std::max(exponent, -900) - 29);
   }
-  /// The nearest node, numbered from the low corner of the box.
+  /// Returns the nearest node, numbered from the low corner of the box.
   [[nodiscard]] stream::Point3 node(const stream::Point3& in_view_frame) const {
     stream::Point3 n;
     for (std::size_t k = 0; k < 3; ++k) {

@@ -15,7 +15,7 @@
 #include "view/raster_gap.hpp"
 #include "view/view_frame.hpp"
 
-/// The template of store_view.hpp, for those who instantiate it.
+/// Template definitions of store_view.hpp, for files that instantiate it.
 
 namespace terrace::terrain {
 
@@ -162,7 +162,7 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
       tri::Box3 near = impl_->frame.box_of({cells.min, cells.max});
       near.min[2] = -std::numeric_limits<double>::infinity();
       near.max[2] = std::numeric_limits<double>::infinity();
-      // Mostly it is one of those that the corners stand for.
+      // It is usually one of the clusters that the corners represent.
       for (const tri::VertexId corner : corners) {
         const auto record = control().stands_for(corner);
         if (record && record->box.intersects(near)) return false;

@@ -11,23 +11,23 @@
 
 namespace terrace::terrain {
 
-/// Counts heights that are probably values for no data that their file does not declare: those that
-/// no place has, such as -3.4e38, and usual ones, such as -9999, far from all other heights. They
-/// are kept, and a note says so.
+/// Counts heights that are probably nodata values that the file does not declare: impossible
+/// heights such as -3.4e38, and common nodata values such as -9999 far below all other heights.
+/// They are kept, and a note reports them.
 class UndeclaredVoids {
  public:
-  /// info: of the source, which must outlive this.
+  /// info: of the source; must outlive this object.
   explicit UndeclaredVoids(const stream::SourceInfo& info) : info_(info) {}
 
-  /// Heights of a block in stored coordinates. May be called by several threads.
+  /// Adds a block with heights in stored coordinates. Thread-safe.
   void add(const stream::PointBlock& block);
-  /// Empty if there are none.
+  /// Returns the note; empty if no such height was added.
   [[nodiscard]] std::string note() const;
 
  private:
   static constexpr std::size_t kUsual = 8;
   struct Seen {
-    std::uint64_t beyond = 0;  ///< heights that no place has
+    std::uint64_t beyond = 0;  ///< impossible heights
     double value = 0;          ///< one of them, stored
     std::array<std::uint64_t, kUsual> usual{};
     double least = 1e300;  ///< of all other heights
