@@ -40,7 +40,7 @@ ContourLines::Crossing ContourLines::crossing(std::int64_t level, const Corner& 
 }
 
 Point2 ContourLines::place(std::int64_t level, const Corner& a, const Corner& b) const {
-  // Always from the same end, so that both triangles at an edge find the same place.
+  // Start at the same end in both triangles at an edge, so that they compute the same place.
   const bool first = std::pair(a.row, a.column) < std::pair(b.row, b.column);
   const Corner &from = first ? a : b, &to = first ? b : a;
   const double t = contour_levels_.share(level, from.height, to.height);
@@ -101,7 +101,7 @@ void ContourLines::add(std::span<const double> heights, std::int64_t rows,
       const Corner c00 = corner(column, row), c10 = corner(column + 1, row),
                    c01 = corner(column, row + 1), c11 = corner(column + 1, row + 1);
       const auto data = [](const Corner& c) { return !std::isnan(c.height); };
-      // As lattice_surface.hpp has it.
+      // As in lattice_surface.hpp.
       if (data(c10) && data(c01)) {
         if (data(c00)) triangle(c00, c10, c01);
         if (data(c11)) triangle(c11, c01, c10);
@@ -112,7 +112,7 @@ void ContourLines::add(std::span<const double> heights, std::int64_t rows,
     }
   }
   row_ += rows - 1;
-  // Not after every band: the order of lines would depend on how many rows fit into memory.
+  // Not after every band, because the order of lines must not depend on available memory.
   if (row_ % kMostBandRows == 0) emit_whole(row_, false);
 }
 

@@ -12,33 +12,33 @@
 
 namespace terrace::terrain {
 
-/// Contour lines of the triangulated lattice (lattice_surface.hpp), in columns and rows, exactly
-/// (see ContourLevels). In a frame of columns to the right and rows upwards higher ground is on the
-/// left of a line. Lines end at the border of the window and at samples without data.
+/// Exact contour lines (see ContourLevels) of the triangulated lattice (lattice_surface.hpp), in
+/// columns and rows. With columns to the right and rows upwards, higher ground is on the left of a
+/// line. Lines end at the border of the window and at samples without data.
 ///
-/// The lattice comes in bands of rows from the first on; lines go on from band to band. Memory: the
-/// lines that are not at their ends.
+/// The lattice is passed in bands of rows, from the first on, and lines continue from band to band.
+/// Memory: the unfinished lines.
 class ContourLines {
  public:
-  /// Bands whose rows, less the first, are a part of so many give the lines in the same order.
+  /// Bands give the lines in the same order if their rows, except the first, are a divisor of this.
   static constexpr std::int64_t kMostBandRows = 256;
 
-  /// columns: of the lattice. emit: takes every line once it is whole, in an order that depends on
-  /// the lattice alone. Lines that shrink to a point are left out.
+  /// columns: of the lattice. emit: receives every line when it is complete, in an order that
+  /// depends only on the lattice. Lines that shrink to a point are left out.
   ContourLines(std::int64_t columns, double interval, std::function<void(ContourLine&&)> emit,
                OpenLineLimit limit = {}, unsigned threads = 1);
 
-  /// The next band: `rows` rows of heights (NaN: no data), of which the first is the last of the
-  /// band before. wanted: whether the square right of and below (column, row) of the lattice
-  /// counts; may be empty: all do.
+  /// Adds the next band: `rows` rows of heights (NaN: no data), the first of which is the last of
+  /// the previous band. wanted: whether to draw in the square right of and below (column, row) of
+  /// the lattice; empty: in all squares.
   void add(std::span<const double> heights, std::int64_t rows,
            const std::function<bool(std::int64_t column, std::int64_t row)>& wanted = {});
-  /// Emits what is still open: nothing follows.
+  /// Emits the lines that are still open. No bands may follow.
   void finish();
 
-  /// Points of lines that are not whole yet.
+  /// Number of points of incomplete lines.
   [[nodiscard]] std::uint64_t open_points() const { return joiner_.open_points(); }
-  /// Edges crossed by levels so far, each counted once per triangle at it.
+  /// Number of edges crossed by levels until now, each counted once per adjacent triangle.
   [[nodiscard]] std::uint64_t segments() const { return joiner_.segments(); }
 
  private:
@@ -54,7 +54,7 @@ class ContourLines {
   struct Corner {
     std::int64_t column = 0, row = 0;
     double height = 0;
-    std::int64_t level = 0;  ///< ContourLevels::at_or_above
+    std::int64_t level = 0;  ///< from ContourLevels::at_or_above()
   };
 
   [[nodiscard]] Crossing crossing(std::int64_t level, const Corner& a, const Corner& b) const;

@@ -12,20 +12,20 @@
 #include "terrace/terrain/contours.hpp"
 #include "terrace/terrain/region.hpp"
 
-/// What write_contours() is made of.
+/// The parts of write_contours().
 
 namespace terrace::terrain {
 
-/// What the lines are drawn of, and where they go.
+/// The source of the lines, and their destination.
 struct ContourParts {
   const stream::Store& store;
   const ContourRequest& request;
   unsigned threads = 1;
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
-  std::function<void(ContourLine&&)> emit;  ///< as ContourText::add() wants them
+  std::function<void(ContourLine&&)> emit;  ///< in the form that ContourText::add() expects
   OpenLineLimit limit;
   std::function<void(double share)> progress;
-  /// The parts in which points are triangulated; the order of the lines depends on it.
+  /// Points per triangulated part; the order of the lines depends on it.
   std::uint64_t points_per_part = std::uint64_t{1} << 16;
 };
 
@@ -34,9 +34,9 @@ void draw_lattice_contours(const ContourParts& parts);
 /// Draws the lines of points, or of a raster at a level above 0.
 void draw_point_contours(const ContourParts& parts);
 
-/// The box in stored coordinates around a region's box.
+/// Returns the box in stored coordinates around a region's box.
 StoredBox box_around(const Region& region, const GroundSlope& ground);
-/// Whether places in a box of stored coordinates lie in the region, at any height.
+/// Whether places in a box of stored coordinates are in the region, at any height.
 bool reaches_into(const StoredBox& box, const Region& region, const GroundSlope& ground);
 
 }  // namespace terrace::terrain

@@ -22,11 +22,10 @@ namespace {
 
 /// Nine decimals of a degree are a tenth of a millimetre.
 constexpr int kDecimals = 9, kOwnDecimals = 6;
-/// Points turned into text at a time.
+/// Number of points converted to text at a time.
 constexpr std::size_t kContourPoints = std::size_t{1} << 17;
 
-/// Cuts a line of longitudes that go on beyond 180 degrees into parts from -180 to 180 (RFC 7946,
-/// 3.1.9).
+/// Cuts a line with longitudes beyond 180 degrees into parts from -180 to 180 (RFC 7946, 3.1.9).
 std::vector<std::vector<Point2>> cut_at_antimeridian(std::span<const Point2> line) {
   std::vector<std::vector<Point2>> parts;
   double turn = 0;
@@ -106,7 +105,7 @@ void ContourText::append(std::string& text, const ContourLine& line,
   if (reverse_) std::reverse(places.begin(), places.end());
   if (geography_) {
     (*geography_)(places);
-    // Across the antimeridian longitudes go on; those of all lines begin on the same side.
+    // Longitudes continue across the antimeridian; all lines begin on the same side.
     double near = middle_;
     for (Point2& p : places) {
       p = WholeTurns(near, 360)(p);
@@ -147,7 +146,7 @@ void ContourText::append(std::string& text, const ContourLine& line,
 }
 
 void ContourText::flush() {
-  // Pieces of about equally many points.
+  // Pieces with about the same number of points.
   const std::size_t pieces = 4 * std::size_t{threads_};
   std::vector<std::size_t> begin{0};
   std::size_t points = 0;

@@ -21,15 +21,16 @@
 
 namespace terrace::terrain {
 
-/// Contour lines of a store as a GeoJSON FeatureCollection (RFC 7946), higher ground on the right.
+/// Writes contour lines of a store as a GeoJSON FeatureCollection (RFC 7946), higher ground on the
+/// right.
 class ContourText {
  public:
-  /// write: takes the text in large pieces. Throws: stream::Error if longitudes and latitudes are
-  /// wanted and the store has no CRS; add() and finish() also for a place without them.
+  /// write: receives the text in large pieces. Throws: stream::Error if longitudes and latitudes
+  /// are requested and the store has no CRS; add() and finish() also for a place without them.
   ContourText(const stream::Store& store, const ContourRequest& request, unsigned threads,
               std::function<void(std::string_view)> write);
 
-  /// line: in stored coordinates, higher ground on the left where the second one grows upwards.
+  /// line: in stored coordinates, with higher ground on the left if y points upwards.
   void add(ContourLine&& line);
   void finish();
   [[nodiscard]] const ContourOutcome& outcome() const { return outcome_; }
@@ -40,17 +41,17 @@ class ContourText {
 
   std::string file_, head_;
   GroundSlope ground_;
-  std::optional<BoxGeography> geography_;  ///< nothing: places stay in the store's CRS
-  double middle_ = 0;                      ///< longitude of the store's, NaN if it has none
+  std::optional<BoxGeography> geography_;  ///< nullopt: places stay in the store's CRS
+  double middle_ = 0;                      ///< longitude of the store's middle; NaN if it has none
   bool reverse_;                           ///< higher ground is on the left in the CRS
   ContourLevels levels_;
   unsigned threads_;
   std::function<void(std::string_view)> write_;
   FixedText number_;
   ContourOutcome outcome_;
-  std::vector<ContourLine> lines_;  ///< not written yet
-  std::size_t points_ = 0;          ///< of these
-  std::vector<std::string> texts_;  ///< of pieces; their memory is used again
+  std::vector<ContourLine> lines_;  ///< not yet written
+  std::size_t points_ = 0;          ///< of these lines
+  std::vector<std::string> texts_;  ///< of pieces; their memory is reused
   bool first_ = true;
 };
 

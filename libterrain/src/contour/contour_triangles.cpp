@@ -16,7 +16,7 @@ ContourTriangles::ContourTriangles(double interval, std::function<void(ContourLi
     : levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
 
 std::size_t ContourTriangles::Hash::operator()(const ContourCrossing& c) const {
-  // Adding 0 makes 0 of -0, which is equal to it.
+  // Adding 0 turns -0 into 0, which is equal to it.
   const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v + 0.0); };
   std::uint64_t hash = static_cast<std::uint64_t>(c.level) * 0x9E3779B97F4A7C15U;
   hash = std::rotl(hash ^ bits(c.a[0]), 29) * 0xBF58476D1CE4E5B9U;
@@ -76,7 +76,7 @@ void ContourTriangles::sort(std::span<Triangle> triangles) {
         t.begin(), t.end(), [](const Corner& a, const Corner& b) { return a.place < b.place; });
     std::rotate(t.begin(), smallest, t.end());
   }
-  // Triangles are large: most are told apart by their first corners.
+  // Triangles are large, so sort keys; most differ in their first corners.
   struct Key {
     Point2 first;
     std::uint32_t number;

@@ -14,42 +14,42 @@
 
 namespace terrace::terrain {
 
-/// Contour lines of a triangulation, in the coordinates of its vertices, exactly (see
-/// ContourLevels). Higher ground is on the left of a line where the second coordinate grows
-/// upwards. Lines end at hull edges and at triangles that are left out.
+/// Exact contour lines (see ContourLevels) of a triangulation, in the coordinates of its vertices.
+/// Higher ground is on the left of a line if the second coordinate points upwards. Lines end at
+/// hull edges and at triangles that are left out.
 ///
-/// The triangles come in parts: part 0, 1, ... in this order, each triangle in the first part that
-/// has one of its vertices, or at the end if no part has. So what lies at an edge is known when the
-/// first part of one of its ends is. Memory: the lines that are not at their ends.
+/// The triangles are passed in parts 0, 1, ... in this order: each triangle with the first part
+/// that has one of its vertices, or at the end if no part has. So the lines at an edge are complete
+/// when the first part of one of its ends is. Memory: the unfinished lines.
 class ContourTriangles {
  public:
   struct Corner {
     Point2 place{};
     double height = 0;
-    std::int64_t level = 0;  ///< ContourLevels::at_or_above
+    std::int64_t level = 0;  ///< from ContourLevels::at_or_above()
     std::uint32_t part = kNoContourPart;
   };
   using Triangle = std::array<Corner, 3>;  ///< counter-clockwise
 
-  /// emit: takes every line once it is whole, in an order that depends on that of the triangles
-  /// alone. Lines that shrink to a point are left out.
+  /// emit: receives every line when it is complete, in an order that depends only on the order of
+  /// the triangles. Lines that shrink to a point are left out.
   ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
                    OpenLineLimit limit = {});
 
-  /// The triangles of the next part; those that no level crosses may be left out.
+  /// Adds the triangles of the next part; triangles that no level crosses may be left out.
   void add(std::span<const Triangle> triangles);
-  /// The same, of the triangles sorted as sort() does.
+  /// The same for triangles sorted as in sort().
   void add(const PartLines& part);
-  /// Those of no part; nothing follows.
+  /// Adds the triangles that belong to no part; must be the last call.
   void finish(std::span<const Triangle> triangles = {});
 
-  /// The order in which the triangles of a part are to be added: such that it depends on their
-  /// places alone. Each triangle is turned so that its smallest corner comes first.
+  /// Sorts the triangles of a part into the order in which to add them, which depends only on their
+  /// places. Rotates each triangle so that its smallest corner is first.
   static void sort(std::span<Triangle> triangles);
 
-  /// Points of lines that are not whole yet.
+  /// Number of points of incomplete lines.
   [[nodiscard]] std::uint64_t open_points() const { return joiner_.open_points(); }
-  /// Edges crossed by levels so far, each counted once per triangle at it.
+  /// Number of edges crossed by levels until now, each counted once per adjacent triangle.
   [[nodiscard]] std::uint64_t segments() const { return joiner_.segments(); }
 
  private:

@@ -20,10 +20,10 @@
 namespace terrace::terrain {
 namespace {
 
-/// Bytes per point of an unfinished line (the vector doubles while it grows).
+/// Memory in bytes per point of an unfinished line (the vector doubles as it grows).
 constexpr std::uint64_t kContourBytesPerPoint = 48;
 constexpr double kMostLevels = 1e15;
-/// Lines of more levels than this would be drawn without end.
+/// Drawing more levels than this would practically never end.
 constexpr double kMostLevelsDrawn = 1e7;
 
 stream::Error failure(const stream::Store& store, const std::string& cause,
@@ -32,7 +32,7 @@ stream::Error failure(const stream::Store& store, const std::string& cause,
       {.file = store.path().string(), .where = {}, .cause = cause, .remedy = remedy});
 }
 
-/// Refuses an interval that is too small for the heights.
+/// Throws: stream::Error if the interval is too small for the heights.
 void check_levels(const stream::Store& store, const ContourRequest& request) {
   const stream::Channel& z = store.schema().coordinates[2];
   const auto level = [&](double raw) { return (raw * z.scale + z.offset) / request.interval; };
@@ -135,10 +135,10 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
                     [&] {
                       throw failure(
                           store,
-                          "contour lines that are not at their ends have more than " +
+                          "unfinished contour lines have more than " +
                               counted(memory / 3 / kContourBytesPerPoint, "point") +
                               ", too many for `memory_bytes`",
-                          "raise `memory_bytes` or `interval`, or take a smaller `region`");
+                          "raise `memory_bytes` or `interval`, or choose a smaller `region`");
                     },
                 .stop = context.stop},
       .progress = [&](double share) { report.update(text.outcome().lines, share); },

@@ -16,10 +16,10 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::int64_t kWindow = 512;
-/// Bytes per sample of a band: its height and its level.
+/// Memory in bytes per sample of a band: its height and its level.
 constexpr std::uint64_t kContourBytesPerSample = 16;
 
-/// The samples around the region.
+/// Returns the window of samples around the region.
 LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
                          const std::optional<Region>& region) {
   StoredBox box{{0, 0},
@@ -45,8 +45,8 @@ void draw_lattice_contours(const ContourParts& parts) {
   const ContourRequest& request = parts.request;
   if (request.max_edge) {
     throw UsageError(
-        "`max_edge` is for irregular points and coarser levels: the samples of a raster say "
-        "themselves where there is no data");
+        "`max_edge` is for irregular points and coarser levels: rasters mark missing data "
+        "explicitly");
   }
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);
@@ -89,7 +89,7 @@ void draw_lattice_contours(const ContourParts& parts) {
           const LatticeWindow window{lattice.column + column, lattice.row + row,
                                      std::min(kWindow, lattice.columns - column), rows};
           std::vector<double> part(window.size(), NAN);
-          // The squares of the samples at the window's sides reach half a cell out of it.
+          // The squares of the samples at the window's sides extend half a cell beyond it.
           const StoredBox around{
               {static_cast<double>(window.column - 1), static_cast<double>(window.row - 1)},
               {static_cast<double>(window.column + window.columns),

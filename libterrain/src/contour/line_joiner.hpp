@@ -19,43 +19,43 @@
 
 namespace terrace::terrain {
 
-/// A contour line; closed ones end where they begin.
+/// A contour line; closed lines end where they begin.
 struct ContourLine {
-  std::int64_t level = 0;  ///< its height is level times the interval
+  std::int64_t level = 0;  ///< the height is level times the interval
   bool closed = false;
   std::vector<Point2> points;
 };
 
 /// Limits that end the joining of lines early.
 struct OpenLineLimit {
-  /// Most points of lines that are not whole.
+  /// The most points of incomplete lines.
   std::uint64_t points = std::numeric_limits<std::uint64_t>::max();
-  std::function<void()> exceeded{};  ///< called beyond; must throw
+  std::function<void()> exceeded{};  ///< called above the limit; must throw
   std::stop_token stop{};            ///< ends with stream::Stopped
 };
 
-/// Segments of a line one after another. Segments have an order; a line that closes begins behind
-/// the last of its segments in that order.
+/// Consecutive segments of a line. Segments have an order; a closed line begins after the last of
+/// its segments in that order.
 template <class Crossing>
 struct LineStretch {
   Crossing from, to;
   std::span<const Point2> points;  ///< one more than segments
-  std::uint32_t number = 0;        ///< stretches by the first of their segments
-  std::size_t last = 0;            ///< which of the points the last segment leads to
+  std::uint32_t number = 0;        ///< stretches are numbered by their first segments
+  std::size_t last = 0;            ///< index of the point at which the last segment ends
 };
 
-/// Joins directed segments to lines. Crossing says where a segment begins or ends: a level (its
-/// member `level`) on an edge; at most one segment begins there and at most one ends. Lines come
-/// out in an order that depends on the order of the segments alone.
+/// Joins directed segments to lines. A Crossing is where a segment begins or ends: a level (its
+/// member `level`) on an edge. At most one segment begins there, and at most one ends. The order of
+/// the lines depends only on the order of the segments.
 ///
-/// Two hash look-ups per segment or stretch. Memory: the lines that are not whole.
+/// Two hash look-ups per segment or stretch. Memory: the incomplete lines.
 template <class Crossing, class Hash>
 class LineJoiner {
  public:
-  /// emit: takes every line once it is whole. Lines that shrink to a point are left out.
+  /// emit: receives every line when it is complete. Lines that shrink to a point are left out.
   explicit LineJoiner(std::function<void(ContourLine&&)> emit, OpenLineLimit limit = {})
       : emit_(std::move(emit)), limit_(std::move(limit)) {
-    // Places of points are numbers of 32 bits.
+    // Indices of points have 32 bits.
     limit_.points = std::min<std::uint64_t>(limit_.points, kNone - 4);
   }
 
@@ -65,9 +65,9 @@ class LineJoiner {
     end_of_stretches(1);
   }
 
-  /// The same as one by one adding the segments of some stretches, in their order. The stretches
-  /// must come in the order of their last segments, numbered from 0 on in that of their first;
-  /// end_of_stretches(how many) must follow.
+  /// Equivalent to adding the segments of some stretches one by one, in their order. Stretches must
+  /// come in the order of their last segments, and be numbered from 0 in the order of their first;
+  /// end_of_stretches(count) must follow.
   void add(const LineStretch<Crossing>& stretch) {
     const std::span<const Point2> points = stretch.points;
     segments_ += points.size() - 1;
@@ -125,7 +125,7 @@ class LineJoiner {
   }
   void end_of_stretches(std::size_t count) { next_number_ += count; }
 
-  /// A line that is whole and closed, in its place among the stretches.
+  /// Adds a complete closed line, in its place among the stretches.
   void pass_closed(std::int64_t level, std::span<const Point2> points) {
     segments_ += points.size() - 1;
     ContourLine result{level, true, {}};
@@ -134,7 +134,7 @@ class LineJoiner {
     if (result.points.size() > 1) emit_(std::move(result));
   }
 
-  /// Emits the lines of which no end goes on. O(n log n) with n lines that are not whole.
+  /// Emits the lines with no end that continues. O(n log n) with n incomplete lines.
   template <class GoesOn>
   void emit_whole(const GoesOn& goes_on) {
     std::vector<std::pair<std::uint64_t, std::uint32_t>> whole;
@@ -152,9 +152,9 @@ class LineJoiner {
     }
   }
 
-  /// Points of lines that are not whole yet.
+  /// Number of points of incomplete lines.
   [[nodiscard]] std::uint64_t open_points() const { return open_points_; }
-  /// Segments added so far.
+  /// Number of segments added until now.
   [[nodiscard]] std::uint64_t segments() const { return segments_; }
 
  private:
@@ -162,9 +162,9 @@ class LineJoiner {
   static constexpr std::uint32_t kBegin = 0, kEnd = 1;
   struct Line {
     Crossing begin, end;
-    std::uint64_t number = 0;  ///< lines are emitted by it
+    std::uint64_t number = 0;  ///< the order in which lines are emitted
     std::uint32_t first = 0, last = 0;
-    std::uint64_t count = 0;  ///< points; 0: the place is free, `first` is the next free one
+    std::uint64_t count = 0;  ///< number of points; 0: unused, and `first` is the next unused line
   };
   struct Point {
     Point2 place{};
@@ -173,7 +173,7 @@ class LineJoiner {
   /// An end of a line, in a table with linear probing.
   struct Slot {
     std::uint32_t hash = 0;
-    std::uint32_t end = kNone;  ///< a line's place << 1 | kBegin or kEnd; kNone: the slot is free
+    std::uint32_t end = kNone;  ///< a line's index << 1 | kBegin or kEnd; kNone: the slot is free
   };
 
   static std::uint32_t hash_of(const Crossing& crossing) {
@@ -184,7 +184,7 @@ class LineJoiner {
     return (end & 1U) == kBegin ? line.begin : line.end;
   }
 
-  /// Takes the line that begins (or ends) at a crossing out of the table; kNone if there is none.
+  /// Removes the line that begins (or ends) at a crossing from the table; kNone if there is none.
   std::uint32_t take(const Crossing& crossing, std::uint32_t hash, std::uint32_t side) {
     for (std::size_t at = hash & mask_; slots_[at].end != kNone; at = (at + 1) & mask_) {
       const std::uint32_t end = slots_[at].end;
@@ -196,7 +196,7 @@ class LineJoiner {
     return kNone;
   }
   void erase(std::size_t hole) {
-    // What follows moves up if it lies no nearer to its own place than to the hole.
+    // Entries that follow move up unless they are closer to their own slot than to the hole.
     for (std::size_t at = (hole + 1) & mask_; slots_[at].end != kNone; at = (at + 1) & mask_) {
       if (((at - slots_[at].hash) & mask_) < ((at - hole) & mask_)) continue;
       slots_[hole] = slots_[at];
@@ -263,10 +263,10 @@ class LineJoiner {
     open_points_ += points.size();
   }
 
-  /// Makes a line that ends where it begins do so at one of its points.
+  /// Rotates a closed line so that it begins and ends at the given point.
   void turn(Line& line, std::uint32_t point) {
     if (point == line.last) return;
-    // The first point, which the last one equals, becomes the last.
+    // The first point, which equals the last, becomes the last.
     const std::uint32_t dropped = line.first;
     points_[line.last].next = points_[dropped].next;
     line.first = point;
@@ -278,7 +278,7 @@ class LineJoiner {
     line.last = dropped;
   }
 
-  /// Its ends are not in the table any more.
+  /// Requires that its ends are no longer in the table.
   void emit(std::uint32_t number, bool closed) {
     const Line& line = lines_[number];
     open_points_ -= line.count;
@@ -299,9 +299,9 @@ class LineJoiner {
   OpenLineLimit limit_;
   std::uint64_t open_points_ = 0, segments_ = 0, next_number_ = 0;
   std::vector<Line> lines_;
-  std::vector<Point> points_;  ///< of each line linked from its first to its last
+  std::vector<Point> points_;  ///< linked from first to last in each line
   std::uint32_t free_line_ = kNone, free_point_ = kNone;
-  std::vector<Slot> slots_{16};  ///< a power of two, at most half full
+  std::vector<Slot> slots_{16};  ///< size is a power of two, at most half full
   std::size_t mask_ = 15, ends_ = 0;
 };
 

@@ -8,8 +8,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// Opposite to which corner the edge lies at which a level leaves a triangle (or enters it), by the
-/// levels at its corners; as ContourLevels::cross() has it.
+/// Returns the corner opposite to the edge at which a level leaves a triangle (or enters it), given
+/// the levels at its corners, as in ContourLevels::cross().
 std::size_t crossed_side(const std::array<std::int64_t, 3>& levels, std::int64_t level,
                          bool leaves) {
   const std::array<bool, 3> above{levels[0] > level, levels[1] > level, levels[2] > level};

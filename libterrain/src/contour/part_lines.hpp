@@ -13,14 +13,14 @@
 
 namespace terrace::terrain {
 
-/// The part number of vertices that lie in no part.
+/// The part number of vertices that are in no part.
 inline constexpr std::uint32_t kNoContourPart = 0xFFFFFFFFu;
 
 /// A level on the edge between two places.
 struct ContourCrossing {
   std::int64_t level = 0;
   Point2 a{}, b{};                      ///< a < b
-  std::uint32_t last = kNoContourPart;  ///< part in which a triangle at the edge may come
+  std::uint32_t last = kNoContourPart;  ///< the last part that may have a triangle at the edge
 
   ContourCrossing() = default;
   ContourCrossing(std::int64_t at, const Point2& p, const Point2& q, std::uint32_t part)
@@ -31,16 +31,16 @@ struct ContourCrossing {
 };
 
 /// The contour lines of one part of a triangulation (see ContourTriangles), cut where they leave
-/// it. Their segments have the order of the triangles as ContourTriangles::sort() has it, and in a
-/// triangle that of the levels.
+/// the part. Their segments have the order of the triangles as in ContourTriangles::sort(), and of
+/// the levels within a triangle.
 struct PartLines {
   static constexpr std::uint32_t kClosed = 0xFFFFFFFFu;
   struct Line {
     std::int64_t level = 0;
-    std::size_t begin = 0, end = 0;  ///< in points; a closed line ends where it begins
+    std::size_t begin = 0, end = 0;  ///< range of points; closed lines end where they begin
     std::uint32_t open = kClosed;    ///< or its number in `open`
   };
-  /// What a LineStretch has.
+  /// The members of a LineStretch.
   struct Open {
     ContourCrossing from, to;
     std::uint32_t number = 0;
@@ -54,8 +54,8 @@ struct PartLines {
 /// Follows the lines of parts from triangle to triangle.
 class PartTracer {
  public:
-  /// A triangulation and, by slots of vertices, heights, ContourLevels::at_or_above() them, and
-  /// parts. They must outlive the object.
+  /// A triangulation and, by vertex slot, heights, their ContourLevels::at_or_above(), and parts.
+  /// They must outlive the object.
   PartTracer(const ContourLevels& levels, const tri::Delaunay2<double>& triangulation,
              std::span<const double> heights, std::span<const std::int64_t> level_of,
              std::span<const std::uint32_t> part_of)
@@ -66,28 +66,29 @@ class PartTracer {
         part_of_(part_of),
         number_of_(triangulation.triangle_slots(), kNone) {}
 
-  /// The lines of a part: of these triangles, each crossed by a level. About 50 ns per segment.
+  /// Returns the lines of a part, given its triangles, each crossed by a level. About 50 ns per
+  /// segment.
   PartLines trace(std::span<const tri::TriangleId> triangles);
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   struct Entry {
     std::int64_t low = 0;        ///< the lowest level that crosses it
-    std::size_t first = 0;       ///< in done_, of its levels
+    std::size_t first = 0;       ///< index of its first level in done_
     std::uint32_t smallest = 0;  ///< corner
   };
-  /// The first and the last segment of a line by their triangles.
+  /// The first and the last segment of a line, by their triangles.
   struct Ends {
     std::uint32_t line = 0;
     std::int64_t level = 0;
     std::uint32_t first = 0, last = 0;   ///< entries
     Point2 first_place{}, last_place{};  ///< smallest corners of these
-    std::ptrdiff_t last_at = 0;          ///< of `last` from the start, forwards
+    std::ptrdiff_t last_at = 0;          ///< position of `last` from the start, forwards
   };
 
   void follow(std::uint32_t start, std::int64_t level, PartLines& lines);
-  /// Goes on from a segment until the line leaves the part or comes back to `start`, marks what it
-  /// meets and appends where the segments end. Returns whether it came back.
+  /// Continues from a segment until the line leaves the part or returns to `start`. Marks the
+  /// segments that it passes and appends their ends. Returns whether it came back to `start`.
   bool go(std::uint32_t start, std::int64_t level, bool forwards, Ends& ends,
           std::vector<Point2>& points, ContourCrossing& end);
   void count(std::uint32_t entry, std::ptrdiff_t at, Ends& ends) const;
@@ -101,10 +102,10 @@ class PartTracer {
   std::span<const double> heights_;
   std::span<const std::int64_t> level_of_;
   std::span<const std::uint32_t> part_of_;
-  std::vector<std::uint32_t> number_of_;  ///< by slot of triangle: its entry
+  std::vector<std::uint32_t> number_of_;  ///< index of the entry, by triangle slot
   std::span<const tri::TriangleId> triangles_;
-  std::vector<Entry> entries_;  ///< of triangles_
-  std::vector<bool> done_;      ///< segments
+  std::vector<Entry> entries_;  ///< for triangles_
+  std::vector<bool> done_;      ///< by segment
   std::vector<Ends> ends_;
   std::vector<Point2> forwards_, backwards_;
 };

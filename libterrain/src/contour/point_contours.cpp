@@ -23,25 +23,25 @@
 namespace terrace::terrain {
 namespace {
 
-/// A part triangulated; with less memory per thread, fewer threads work.
+/// Memory of one triangulated part; with less per thread, fewer threads are used.
 constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
-/// Several parts are triangulated at once, which costs less per point; a point counts for its share
-/// of the triangulation and of the triangles that wait until lines are drawn.
+/// Several parts are triangulated together, which costs less per point. A point's memory is its
+/// share of the triangulation and of the triangles that wait to be drawn.
 constexpr double kMostPointsAtOnce = 1U << 16;
-/// Peak bytes per point where all points are one part.
+/// Peak memory in bytes per point if all points are one part.
 constexpr std::uint64_t kBytesPerPointAlone = 1200;
 constexpr double kPartsPerThread = 4;
 constexpr double kBytesPerExpected = 3.0 * PointWindow::kBytesPerPoint + 3 * 240;
-/// Lines that wait to be drawn may have this share of a thread's memory; where levels are closer,
-/// triangles wait instead.
+/// Share of a thread's memory for lines that wait to be drawn; where levels are denser, triangles
+/// wait instead.
 constexpr std::uint64_t kShareOfLines = 8;
 constexpr std::uint64_t kBytesPerSegment = 64;
 
 using Triangle = ContourTriangles::Triangle;
 constexpr std::uint32_t kNoPart = kNoContourPart;
 
-/// The lines of each of some parts, or its triangles that levels cross; and such triangles as have
-/// no vertex in any part at work.
+/// The lines of each of some parts, or the triangles with levels in them; and crossed triangles
+/// that have no vertex in any active part.
 struct Crossed {
   std::vector<std::variant<PartLines, std::vector<Triangle>>> own;
   std::vector<Triangle> strange;
@@ -66,7 +66,7 @@ class PointContours {
         is_selective_(request_.max_edge || request_.region) {
     const stream::Box3& bounds = parts.store.bounds();
     bounds_ = {{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}};
-    // So that a triangle meets a box if its middle, which is rounded, lies there.
+    // Widened, so that a triangle whose rounded middle is in a box meets the box.
     const auto widened = [&](StoredBox box) {
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const double margin =
@@ -99,7 +99,7 @@ class PointContours {
                                     readable_bytes(kProcessBytes + 2 * least) +
                                     " of memory, `memory_bytes` allows " +
                                     readable_bytes(kProcessBytes + parts_.memory_bytes),
-                           .remedy = "raise `memory_bytes`, or take a coarser `level`"});
+                           .remedy = "raise `memory_bytes`, or choose a coarser `level`"});
     }
     const auto threads = static_cast<unsigned>(
         std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, parts_.threads));
@@ -133,7 +133,7 @@ class PointContours {
           for (const auto& part : triangles.own) {
             std::visit([&](const auto& of_part) { lines.add(of_part); }, part);
           }
-          // Several parts meet such a one.
+          // Several parts meet such a triangle.
           const auto middle =
               strange.insert(strange.end(), triangles.strange.begin(), triangles.strange.end());
           std::inplace_merge(strange.begin(), middle, strange.end(), places_less);
@@ -160,7 +160,7 @@ class PointContours {
     return request_.region->covers(ground_.world(middle));
   }
 
-  /// part.end if none is.
+  /// Returns part.end if none is active.
   [[nodiscard]] std::size_t first_at_work(const WindowTree::Part& part) const {
     std::size_t first = part.first;
     while (first < part.end && rank_[first] == kNoPart) ++first;
@@ -194,7 +194,7 @@ class PointContours {
       }
       return triangle;
     };
-    // The ranks of parts in a box follow each other.
+    // The parts in a box have consecutive ranks.
     const std::uint32_t first_rank = rank_[first_at_work(part)];
     std::uint32_t count = 0;
     for (std::size_t i = part.first; i < part.end; ++i) count += rank_[i] != kNoPart ? 1U : 0U;
@@ -236,10 +236,10 @@ class PointContours {
   ContourLevels levels_;
   WindowTree tree_;
   StoredBox bounds_;
-  std::vector<std::uint32_t> rank_;  ///< by part: which of those that meet the region it is
+  std::vector<std::uint32_t> rank_;  ///< by part: its number among the parts that meet the region
   std::uint32_t parts_at_work_ = 0;
-  bool is_selective_;                ///< not all triangles are wanted
-  std::uint64_t most_segments_ = 0;  ///< whose lines may wait, of parts triangulated at once
+  bool is_selective_;                ///< whether some triangles are not wanted
+  std::uint64_t most_segments_ = 0;  ///< limit of segments waiting in parts triangulated together
 };
 
 }  // namespace

@@ -11,12 +11,12 @@
 
 namespace terrace::terrain {
 
-/// Calls visit(t, place) wherever the way between two places of a raster's lattice crosses a
-/// column, a row or a diagonal, in order, 0 < t < 1: between them the linear surface is straight.
-/// The places are on the lines to the last bit.
+/// Calls visit(t, place) at each point, 0 < t < 1, where the segment between two places of a
+/// raster's lattice crosses a column, a row or a diagonal, in order. The linear surface is straight
+/// between these points. Each place is on its line to the last bit.
 template <class Visit>
 void for_lattice_crossings(const Point2& from, const Point2& to, const Visit& visit) {
-  // Columns, rows, and the diagonals, on which column plus row is whole.
+  // Columns, rows, and the diagonals, on which the sum of column and row is an integer.
   const std::array<double, 3> begin{from[0], from[1], from[0] + from[1]};
   const std::array<double, 3> end{to[0], to[1], to[0] + to[1]};
   std::array<double, 3> next{}, at{};
@@ -44,7 +44,7 @@ void for_lattice_crossings(const Point2& from, const Point2& to, const Visit& vi
       next[k] += begin[k] < end[k] ? 1 : -1;
       at[k] = t_of(k);
     }
-    // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
+    // Rounding may separate crossings where lines of the lattice meet; one row is enough.
     if (t - last <= 1e-12 && last > 0) continue;
     visit(t, place);
     last = t;

@@ -17,19 +17,19 @@
 namespace terrace::terrain {
 namespace {
 
-/// Places are answered tile by tile. A tile with few places is read in smaller pieces.
+/// Places are handled tile by tile. A tile with few places is read in smaller pieces.
 constexpr std::int64_t kTile = 256, kLatticePiece = 32;
 constexpr std::size_t kFew = 100;
 constexpr std::uint64_t kLatticeCacheBytes = std::uint64_t{4} << 20;
 /// Memory of a thread: two readers with their clusters, and the heights of a tile.
 constexpr std::uint64_t kWorkerBytes = std::uint64_t{20} << 20;
 
-/// Natural neighbours of a place in the unit lattice lie within two samples of its square, so a
-/// block of the lattice that is a little larger than the tile has them all.
+/// Natural neighbours of a place in the unit lattice are within two samples of its square, so a
+/// block of the lattice slightly larger than the tile contains them all.
 constexpr std::int64_t kNaturalTile = 56, kNaturalMargin = 4;
 constexpr std::int64_t kBlock = kNaturalTile + 2 * kNaturalMargin;
 
-/// Natural neighbours on a block of a raster: one triangulation serves for every place of it.
+/// Natural neighbours on a block of a raster. All places in the block share one triangulation.
 class NaturalBlock {
  public:
   NaturalBlock(std::int64_t columns, std::int64_t rows)
@@ -48,7 +48,7 @@ class NaturalBlock {
     const LatticeWindow window{begin(tile_column, raster.columns, columns_),
                                begin(tile_row, raster.rows, rows_), columns_, rows_};
     reader.heights(window, std::span(heights_).subspan(first_, window.size()));
-    // One by one: together, the way to a place and with it the last bit of its height would depend
+    // One by one: in a batch, the walk to a place, and so the last bit of its height, would depend
     // on the other places.
     for (const std::uint32_t i : numbers) {
       reader.query().store().check_stop();
@@ -70,18 +70,18 @@ class NaturalBlock {
   std::vector<double> heights_;
 };
 
-/// What one thread works with.
+/// The working data of one thread.
 template <class T>
 struct Worker {
-  StoreWindow reader;  ///< of whole tiles, which do not overlap
-  StoreWindow pieces;  ///< of small windows
+  StoreWindow reader;  ///< for whole tiles, which do not overlap
+  StoreWindow pieces;  ///< for small windows
   std::vector<T> heights{};
   std::optional<NaturalBlock> natural{};
 
   explicit Worker(const stream::Store& store) : reader(store), pieces(store, kLatticeCacheBytes) {}
 };
 
-/// T: what holds the heights exactly.
+/// T: the type that represents the heights exactly.
 template <class T>
 class LatticeSampler final : public HeightSampler {
  public:
@@ -111,12 +111,12 @@ class LatticeSampler final : public HeightSampler {
  private:
   struct Tile {
     std::uint64_t number = 0;
-    std::size_t begin = 0, end = 0;  ///< in order_
+    std::size_t begin = 0, end = 0;  ///< range in order_
   };
 
   [[nodiscard]] bool nearest() const { return options_.method == tri::Interpolation::kNearest; }
 
-  /// The square of samples that a place belongs to, or nothing where there cannot be a height.
+  /// Whether a place can have a height.
   [[nodiscard]] bool inside(const Point2& p) const {
     const double out = nearest() ? 0.5 : 0.0;
     const auto within = [out](double c, std::int64_t size) {
@@ -128,8 +128,8 @@ class LatticeSampler final : public HeightSampler {
     return std::max<std::int64_t>(0, static_cast<std::int64_t>(std::floor(coordinate)));
   }
 
-  /// Fills order_ with the numbers of the places inside, by tiles, and tiles_ with those that have
-  /// any. Within a tile the numbers ascend.
+  /// Fills order_ with the numbers of the places inside, by tiles, and tiles_ with the tiles that
+  /// have any. Within a tile the numbers are ascending.
   void sort_by_tile(std::span<const Point2> places) {
     const auto across = static_cast<std::uint64_t>((raster_.columns + tile_ - 1) / tile_);
     keyed_.clear();
@@ -143,7 +143,7 @@ class LatticeSampler final : public HeightSampler {
     order_.resize(keyed_.size());
     tiles_.clear();
     if (tiles <= 4 * places.size()) {
-      // By counting: several times faster than by comparing.
+      // Counting sort is several times faster than comparisons.
       std::vector<std::uint32_t> next(tiles + 1, 0);
       for (const auto& [tile, i] : keyed_) ++next[tile + 1];
       for (std::uint64_t tile = 0; tile < tiles; ++tile) {
@@ -186,7 +186,7 @@ class LatticeSampler final : public HeightSampler {
     }
   }
 
-  /// Reads what the places need, with one sample more around for gradients on samples.
+  /// Reads the samples for the places, and one more on each side for gradients on samples.
   void answer_window(Worker<T>& worker, StoreWindow& reader, std::span<const std::uint32_t> numbers,
                      std::span<const Point2> places, std::span<SurfacePoint> out) {
     std::int64_t left = raster_.columns, top = raster_.rows, right = 0, bottom = 0;
@@ -197,7 +197,7 @@ class LatticeSampler final : public HeightSampler {
       top = std::min(top, row);
       bottom = std::max(bottom, row);
     }
-    // Nearest may take the sample behind the square, and that one's gradient one more.
+    // Nearest may use the sample after the square, and its gradient one more.
     left = std::max<std::int64_t>(left - 1, 0);
     top = std::max<std::int64_t>(top - 1, 0);
     right = std::min(right + 2, raster_.columns - 1);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kLongestPlaceLine = std::size_t{1} << 20, kReadAtOnce = std::size_t{1} << 22;
 
-/// Takes the cell at the beginning of `rest`, and the separator behind it. Separators within double
+/// Removes the cell at the start of `rest` and the separator after it. Separators within double
 /// quotes belong to the cell.
 std::string_view take_text(std::string_view& rest, char separator) {
   bool quoted = false;
@@ -48,8 +48,8 @@ std::optional<double> number_in(std::string_view cell) {
   return number_from<double>(cell);
 }
 
-/// The columns of x and y by the names of a header; of several pairs the one whose names say it
-/// most directly, longitude and latitude before other words.
+/// Finds the columns of x and y by the names in a header. Among several pairs it prefers the most
+/// explicit names, and longitude and latitude over other words.
 std::optional<std::array<std::size_t, 2>> place_columns(
     const std::vector<std::string_view>& names) {
   for (std::size_t kind = 0; kind < stream::kAxisNameKinds; ++kind) {
@@ -117,7 +117,7 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
   } else {
     throw stream::Error({.file = file,
                          .where = {},
-                         .cause = "the first line has one column only",
+                         .cause = "the first line has only one column",
                          .remedy = "give x and y with a comma, a semicolon or a tab between them"});
   }
   const auto cells_of = [&layout](std::string_view line) {
@@ -211,7 +211,7 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
     if (!value) {
       throw stream::Error({.file = file,
                            .where = "line " + std::to_string(line_number),
-                           .cause = "'" + std::string(cell.substr(0, 40)) + "' is no coordinate",
+                           .cause = "'" + std::string(cell.substr(0, 40)) + "' is not a coordinate",
                            .remedy = cell.find(',') != cell.npos
                                          ? "write numbers with a decimal point"
                                          : "coordinates are plain numbers, in column " +
@@ -221,7 +221,7 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
     place[column == layout.x ? 0 : 1] = *value;
     ++cells;
   }
-  // A line that ends with the separator has an empty cell behind it.
+  // A line that ends with the separator has an empty cell after it.
   if (cells == 1 && !line.empty() && line.back() == layout.separator) {
     place[last == layout.x ? 0 : 1] = std::numeric_limits<double>::quiet_NaN();
     ++cells;

@@ -13,30 +13,30 @@
 
 #include "terrace/terrain/region.hpp"
 
-/// Tables of places as text, one a line: read in batches, each line kept as it is so that answers
-/// can be written behind it.
+/// Tables of places as text, one place per line. They are read in batches, and each line is kept
+/// unchanged so that answers can be appended to it.
 
 namespace terrace::terrain {
 
 /// The columns of x and y. If the first line is a header, or the comment before it has as many
-/// names, those that stream::axis_named() knows; otherwise the first two.
+/// names, they are the columns that stream::axis_named() recognises; otherwise the first two.
 struct PlaceLayout {
-  char separator = ',';  ///< or ';' or a tab: the first of these in the first line
+  char separator = ',';  ///< ',', ';' or a tab: the first of these in the first line
   std::size_t x = 0, y = 1;
-  bool header = false;             ///< the first line has names
-  std::vector<std::string> names;  ///< of the header, in lower case
+  bool header = false;             ///< whether the first line is a header
+  std::vector<std::string> names;  ///< from the header, in lower case
 
-  /// comment: the line before, without which `first_line` has no names. Throws: stream::Error,
-  /// naming `file`, for a line with fewer than two columns and for a header that names no x and y.
+  /// comment: the line before, used if `first_line` has no names. Throws: stream::Error, naming
+  /// `file`, for a line with fewer than two columns and for a header that does not name x and y.
   static PlaceLayout of(std::string_view first_line, const std::string& file,
                         std::string_view comment = {});
 };
 
-/// Lines without their ends, "\n" or "\r\n".
+/// Lines of text, some ended by "\n" and some by "\r\n"; line() returns them without their ends.
 struct PlaceBatch {
   std::string text;
-  std::vector<std::size_t> begins;  ///< of the lines in text; one more: the end
-  std::uint64_t first_line = 1;     ///< number of the first in the file
+  std::vector<std::size_t> begins;  ///< of the lines in text, followed by the end
+  std::uint64_t first_line = 1;     ///< number of the first line in the file
 
   [[nodiscard]] std::size_t size() const { return begins.empty() ? 0 : begins.size() - 1; }
   [[nodiscard]] std::string_view line(std::size_t i) const;
@@ -44,14 +44,14 @@ struct PlaceBatch {
 
 class PlaceFile {
  public:
-  /// path: "-" is standard input. stop: ends a wait for more of it.
-  /// Throws: stream::Error if the file cannot be read.
+  /// path: "-" is standard input. stop: interrupts waiting for input. Throws: stream::Error if the
+  /// file cannot be read.
   explicit PlaceFile(const std::string& path, std::stop_token stop = {});
 
-  /// The next whole lines, at most `most_lines` and about `most_bytes` of them; false at the end.
-  /// Throws: stream::Error on a line longer than a mebibyte, stream::Stopped.
+  /// Reads the next complete lines, at most `most_lines` and about `most_bytes` of them. Returns
+  /// false at the end. Throws: stream::Error on a line longer than a mebibyte, stream::Stopped.
   bool next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines);
-  /// As messages call it.
+  /// The name for messages.
   [[nodiscard]] const std::string& name() const { return input_.name(); }
 
  private:
@@ -59,15 +59,15 @@ class PlaceFile {
   std::uint64_t line_ = 1;
 };
 
-/// Whether a line is kept without an answer: it is empty, or a comment (#).
+/// Whether a line is copied without an answer, because it is empty or a comment (#).
 bool is_no_place(std::string_view line);
 
-/// The place in a line; NaN where a coordinate is empty or "nan".
-/// Throws: stream::Error naming file and line if there is no number where one should be.
+/// Parses the place in a line; NaN where a coordinate is empty or "nan". Throws: stream::Error
+/// naming file and line if a coordinate is not a number.
 Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
                 std::uint64_t line_number);
 
-/// Appends the line to `text`, in the columns of its place x and y instead.
+/// Appends the line to `text`, with x and y in the columns of its place.
 void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
                        std::string_view x, std::string_view y);
 

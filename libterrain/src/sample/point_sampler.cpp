@@ -24,37 +24,38 @@
 namespace terrace::terrain {
 namespace {
 
-/// Windows of the tree. What is loaded at once are as many of them as pay.
+/// Points per window of the tree. As many windows as pay off are loaded together.
 constexpr std::size_t kWindowPoints = 16384;
-/// Above this threads would wait for the last one.
+/// With more than this, threads would wait for the last one.
 constexpr double kMostPointsAtOnce = 1U << 21;
 constexpr double kPartsPerThread = 4;
-/// A place alone costs as much as to load so many points, and to read all clusters whose boxes hold
-/// it, which costs per point half of that.
+/// A single place costs as much as loading this many points. In addition it reads all clusters
+/// whose boxes contain it, which costs half as much per point.
 constexpr double kPointsPerPlace = 4000;
 constexpr double kReadShare = 0.5;
-/// Where places are too few, what lies around those that fall into a box so many times smaller
-/// than a window, to each side, is loaded.
+/// If places are sparse, they are grouped in boxes this many times smaller than a window along each
+/// axis, and the surroundings of each group are loaded.
 constexpr double kParts = 8;
-/// So many mean distances of points around a box are loaded too: hardly a circle reaches farther.
+/// Margin to load around a box, in mean distances of points; hardly any circle extends beyond it.
 constexpr double kSampleMargin = 8;
-/// It is at most this share of the longer side, or a window in a void would be loaded with all that
-/// lies for many windows around.
+/// Limit of the margin as a share of the longer side; otherwise a window in a void would load the
+/// points of many windows around it.
 constexpr double kMostSampleMargin = 0.125;
-/// What a thread may need: a window of usual size where points crowd.
+/// Memory that a thread may need: a window of usual size where points are crowded.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
-/// For reading, beside the points.
+/// Memory for reading, in addition to the points.
 constexpr std::uint64_t kReadBytes = std::uint64_t{12} << 20;
-/// Points may be half as many again as expected, and others are loaded around.
+/// Allows for half as many points again as expected, and for those loaded around.
 constexpr double kBytesPerExpected = 2.0 * PointCells::kBytesPerPoint;
 
-/// Along a curve through the box, so that the next place is near as a rule.
+/// Returns the position along a curve through the box, so that the next place is usually near.
 std::uint64_t place_on_curve(const StoredBox& box, const Point2& place) {
   std::uint64_t at = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const double size = box.max[k] - box.min[k];
     const double share = (place[k] - box.min[k]) / size;
-    // `share > 0` also excludes NaN, of boxes without a size or too large for a number.
+    // `share > 0` also excludes NaN, which occurs for boxes without a size or too large for a
+    // double.
     auto bits = static_cast<std::uint64_t>(share > 0 ? std::min(share, 1.0) * 65535 : 0.0);
     bits = (bits | bits << 8) & 0x00FF00FFU;
     bits = (bits | bits << 4) & 0x0F0F0F0FU;
@@ -65,7 +66,8 @@ std::uint64_t place_on_curve(const StoredBox& box, const Point2& place) {
   return at;
 }
 
-/// How many points the clusters have whose boxes hold a place: few where points came in order.
+/// Returns how many points the clusters have whose boxes contain a place: few if points arrived in
+/// order.
 double points_met_by_a_place(const stream::Store& store, unsigned level) {
   const auto area = [](const stream::Box3& box) {
     return (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]);
@@ -83,7 +85,7 @@ double points_met_by_a_place(const stream::Store& store, unsigned level) {
   return static_cast<double>(info.points) * sum / static_cast<double>(count) / whole;
 }
 
-/// The surface of points on one line, or of one point. They are all triangulated.
+/// Samples the surface of collinear points, or of a single point, by triangulating them all.
 void sample_line(const stream::Store& store, const SamplerOptions& options, const TooLong& too_long,
                  std::uint64_t memory_bytes, std::span<const Point2> places,
                  std::span<SurfacePoint> out) {
@@ -110,10 +112,10 @@ void sample_line(const stream::Store& store, const SamplerOptions& options, cons
   }
 }
 
-/// What one thread works with.
+/// The working data of one thread.
 struct CloudWorker {
   PointSurface surface;
-  std::vector<std::uint64_t> along{};  ///< places on a curve, and their numbers
+  std::vector<std::uint64_t> along{};  ///< positions on a curve, with numbers of places
   std::optional<StoredBox> loaded{};
 
   CloudWorker(const stream::Store& store, unsigned level, const PointHull& hull,
@@ -121,7 +123,8 @@ struct CloudWorker {
               std::uint64_t memory_bytes)
       : surface(store, level, hull, too_long, voids, memory_bytes) {}
 
-  /// Loads what lies in a box and `margin` around it, unless it is there. False: does not fit.
+  /// Loads the points in a box and `margin` around it, unless loaded. Returns false if they do not
+  /// fit.
   bool load(StoredBox box, double margin, std::size_t most_points, bool may_crowd) {
     for (std::size_t k = 0; k < 2; ++k) {
       box.min[k] -= margin;
@@ -204,7 +207,8 @@ class PointSampler final : public HeightSampler {
     return p[0] >= all.min[0] && p[0] <= all.max[0] && p[1] >= all.min[1] && p[1] <= all.max[1];
   }
 
-  /// Fills order_ with the numbers of the places that count, by windows, ascending within one.
+  /// Fills order_ with the numbers of the places that may have answers, by windows, ascending in
+  /// each.
   void sort_by_window(std::span<const Point2> places) {
     constexpr std::uint32_t kNone = 0xFFFFFFFF;
     keys_.assign(places.size(), kNone);
@@ -237,8 +241,8 @@ class PointSampler final : public HeightSampler {
     return static_cast<double>(places) * points_per_place_ >= part.points;
   }
 
-  /// Clusters that overlap would be read for many windows each, and circles in voids reach beyond
-  /// windows: rather once for all.
+  /// Loads all points once. Otherwise overlapping clusters would be read for many windows each, and
+  /// circles in voids extend beyond windows.
   void take_whole() {
     auto cells = std::make_unique<PointCells>();
     takes_whole_ = cells->load_all(store_, options_.level, static_cast<unsigned>(workers_.size()));
@@ -259,7 +263,7 @@ class PointSampler final : public HeightSampler {
       if (worker.load(box, margin, room_, part.is_window())) {
         return answer_along(worker, box, numbers, places, out);
       }
-      // Points may crowd just outside a window.
+      // Points may be crowded just outside a window.
       if (part.is_window()) {
         if (!worker.load(box, 0, room_, true)) throw_no_room(part);
         return answer_along(worker, box, numbers, places, out);
@@ -279,7 +283,7 @@ class PointSampler final : public HeightSampler {
     throw stream::Error({.file = store_.path().string(),
                          .where = {},
                          .cause = "more than " + counted(room_, "point") +
-                                  " lie close together, too many for `memory_bytes`",
+                                  " are close together, too many for `memory_bytes`",
                          .remedy = "give " + std::to_string((needed >> 20) + 1) +
                                    "M of memory or more, or a coarser `level`"});
   }
@@ -349,13 +353,13 @@ class PointSampler final : public HeightSampler {
   WindowTree tree_;
   TooLong too_long_;
   std::vector<std::unique_ptr<CloudWorker>> workers_;
-  std::size_t room_ = 0;         ///< points that a worker may hold
-  double most_points_ = 0;       ///< of a part that is loaded as a whole
-  double points_per_place_ = 0;  ///< for which it pays
-  bool takes_whole_ = false;     ///< if there are many places
+  std::size_t room_ = 0;         ///< the most points that a worker can hold
+  double most_points_ = 0;       ///< limit for a part that is loaded in one piece
+  double points_per_place_ = 0;  ///< points per place up to which that pays off
+  bool takes_whole_ = false;     ///< whether to load all points if there are many places
   std::unique_ptr<const PointCells> whole_;
   std::vector<std::uint32_t> keys_, order_;
-  std::vector<std::size_t> begin_;  ///< in order_, by window; at last its size
+  std::vector<std::size_t> begin_;  ///< in order_, by window; then its size
 };
 
 }  // namespace

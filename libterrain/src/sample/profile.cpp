@@ -28,7 +28,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kRowsAtOnce = 65536;
-/// More are refused: they would be written without end.
+/// Longer profiles are refused, because writing them would practically never end.
 constexpr double kMostRows = 1e9;
 
 Point2 between(const Point2& a, const Point2& b, double t) {
@@ -64,14 +64,14 @@ class ProfileRun {
         cross(a, b);
       }
     }
-    // The end of the line, unless a step has met it.
+    // The end of the line, unless a step coincides with it.
     if (request_.step && outcome_.metres > last_) add(line_.back(), outcome_.metres);
     flush();
     return outcome_;
   }
 
  private:
-  /// Refuses a profile of too many rows.
+  /// Throws: UsageError for a profile with too many rows.
   void check_rows() const {
     double rows = 0;
     for (std::size_t leg = 0; leg + 1 < line_.size(); ++leg) {
@@ -89,10 +89,10 @@ class ProfileRun {
                      counted(static_cast<std::uint64_t>(kMostRows), "row"));
   }
 
-  /// Every so many metres of the leg.
+  /// Adds a point every `step` metres of the leg.
   void walk(const Point2& a, const Point2& b) {
     const DecimalMultiples multiples(*request_.step);
-    // So short that neither the line's bend nor the map's changing scale shows.
+    // Pieces so short that neither the line's curvature nor the map's changing scale matters.
     const double pieces =
         std::clamp(distance_.pieces(a, b, std::min(1000.0, multiples.step() / 4)), 16.0, 1e9);
     Point2 from = a;
@@ -110,7 +110,7 @@ class ProfileRun {
     }
   }
 
-  /// At each crossing with the lattice.
+  /// Adds a point at each crossing with the lattice.
   void cross(const Point2& a, const Point2& b) {
     Point2 last = a;
     for_lattice_crossings(ground_.stored(a), ground_.stored(b),
@@ -125,7 +125,7 @@ class ProfileRun {
     add(b, outcome_.metres);
   }
 
-  /// At each crossing with an edge of the triangulation.
+  /// Adds a point at each crossing with an edge of the triangulation.
   void cross_triangles(const Point2& a, const Point2& b) {
     Point2 last = a;
     (*crossings_)(ground_.stored(a), ground_.stored(b), [&](const auto& crossing) {
@@ -139,7 +139,7 @@ class ProfileRun {
   }
 
   void add(const Point2& place, double metres) { add(place, metres, ground_.stored(place)); }
-  /// known: the linear surface's height there, where it was met anyhow.
+  /// known: the height of the linear surface there, if already computed.
   void add(const Point2& place, double metres, const Point2& stored, double known = NAN) {
     places_.push_back(place);
     metres_.push_back(metres);
@@ -155,7 +155,7 @@ class ProfileRun {
     const tri::Interpolation method = request_.sampler.method;
     if (method == tri::Interpolation::kLinear) {
       for (std::size_t i = 0; i < stored_.size(); ++i) {
-        if (!std::isnan(known_[i])) stored_[i] = {NAN, NAN};  // need not be asked
+        if (!std::isnan(known_[i])) stored_[i] = {NAN, NAN};  // already known
       }
     }
     sampler_->sample(stored_, surface_);
@@ -212,7 +212,7 @@ ProfileOutcome profile(const stream::Store& store, const ProfileRequest& given,
   if (request.to_line) request.to_line->reverse(request.line);
   if (request.line.size() < 2) throw UsageError("a profile needs a line of two places or more");
   for (const Point2& place : request.line) {
-    constexpr double kFarthest = 0x1p40;  // columns and rows must differ by 1 there
+    constexpr double kFarthest = 0x1p40;  // columns and rows this large still differ by 1
     for (const double c : stream::stored_place(store.schema(), place)) {
       if (!(std::abs(c) < kFarthest)) {
         throw UsageError("a place of the line is not finite or too far away");

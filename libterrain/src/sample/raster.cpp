@@ -35,26 +35,26 @@ stream::Placement placement_of(const RasterGrid& grid, const stream::StoreSchema
                                const stream::Crs& crs) {
   stream::Placement placement = schema;
   placement.world.xy = {grid.step_x, 0, grid.x, 0, grid.step_y, grid.y};
-  // Heights are scaled already.
+  // Heights are already scaled.
   placement.coordinates[2].scale = 1;
   placement.coordinates[2].offset = 0;
   placement.crs = crs;
-  // Heights keep the unit that they have next to the store's own x and y.
+  // Heights keep the unit that they have together with the store's own x and y.
   placement.coordinates[2].unit = Ground(schema).height_unit();
   return placement;
 }
 
-/// Slope, aspect or hillshade of the heights around a cell, see write_raster().
+/// Computes slope, aspect or hillshade from the heights around a cell, see write_raster().
 class RasterShader {
  public:
-  /// value: any but the height. crs: of the grid.
+  /// value: anything but the height. crs: of the grid.
   RasterShader(const RasterGrid& grid, const stream::StoreSchema& schema, const stream::Crs& crs,
                RasterValue value)
       : value_(value),
         ground_(placement_of(grid, schema, crs)),
         assumption_(Ground(schema).assumption()) {}
 
-  /// Metres per cell going east and north, and per unit of height, at a cell.
+  /// Metres per cell towards east and north, and metres per unit of height, at a cell.
   struct Scale {
     double east = 1, north = 1, up = 1;
   };
@@ -64,7 +64,7 @@ class RasterShader {
     return {map[0], -map[4], map[8]};
   }
 
-  /// z: the middle one of 3 x 3 heights by rows that are `stride` apart. NaN: no value.
+  /// z: the middle of 3 x 3 heights in rows `stride` apart. Returns NaN if there is no value.
   [[nodiscard]] double operator()(const double* z, std::ptrdiff_t stride, const Scale& s) const {
     const double *n = z - stride, *p = z + stride;
     const double gx =
@@ -74,13 +74,13 @@ class RasterShader {
     if (!(gx == gx && gy == gy && z[0] == z[0])) return NAN;
     if (value_ == RasterValue::slope) return tri::slope_degrees({gx, gy});
     if (value_ == RasterValue::aspect) return tri::aspect_degrees({gx, gy});
-    // Towards the light: half north-west, as high as far.
+    // Towards the light in the north-west, at an altitude of 45 degrees.
     const double light =
         (0.5 * gx - 0.5 * gy + std::numbers::sqrt2 / 2) / std::sqrt(1 + gx * gx + gy * gy);
     return light <= 0 ? 1 : 1 + 254 * light;
   }
 
-  /// What had to be assumed of units; empty if nothing.
+  /// The assumptions about units; may be empty.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
 
  private:
@@ -90,17 +90,17 @@ class RasterShader {
 };
 
 constexpr std::int64_t kRunTile = 256;
-/// Peak bytes per cell of the tiles at work: places twice, sorting, surface, heights.
+/// Peak memory in bytes per cell of the tiles in progress: places twice, sorting, surface, heights.
 constexpr std::uint64_t kBytesPerCell = 130;
 
-/// Most tiles along a side of what is sampled at a time.
+/// The most tiles along a side of the square that is sampled at once.
 constexpr std::int64_t kMostSide = 8;
 
 constexpr std::uint64_t bytes_of(std::int64_t side) {
   return static_cast<std::uint64_t>(side * side * kRunTile * kRunTile) * kBytesPerCell;
 }
 
-/// A tile by its column and row among the tiles.
+/// A tile's column and row among the tiles.
 struct TilePlace {
   std::int64_t column = 0, row = 0;
 };
@@ -112,8 +112,8 @@ constexpr std::int64_t power_of_two(std::int64_t at_least) {
 }
 
 /// Calls visit(corner) for the squares of `side` tiles in the square of `size` at `corner` that
-/// begin before `end`, quarter by quarter: so tiles come in the same order for any side, and those
-/// of near places near each other. Both sizes are powers of two.
+/// begin before `end`, quarter by quarter. So tiles come in the same order for any side, and nearby
+/// tiles are close to each other in that order. Both sizes are powers of two.
 template <class Visit>
 void for_each_square(TilePlace corner, std::int64_t size, std::int64_t side, TilePlace end,
                      const Visit& visit) {
@@ -126,7 +126,7 @@ void for_each_square(TilePlace corner, std::int64_t size, std::int64_t side, Til
   }
 }
 
-/// A CRS that is not known is written as the store has it.
+/// An unknown CRS is written as the store records it.
 stream::Crs crs_with_keys(const stream::Store& store) {
   const stream::Crs& recorded = store.schema().crs;
   if (recorded.epsg != 0) return recorded;
@@ -134,7 +134,7 @@ stream::Crs crs_with_keys(const stream::Store& store) {
     const std::optional<CrsDefinition> known = definition_of(recorded);
     if (known) return CoordinateSystem(*known).crs_with_keys();
   } catch (const CrsError&) {
-    // What needs places says what is wrong with it; heights do not.
+    // Only functions that need places report the error; heights do not need them.
   }
   return recorded;
 }
@@ -169,7 +169,7 @@ class RasterRun {
     options.tile = kRunTile;
     options.overviews = request_.value == RasterValue::aspect ? stream::GeoTiffOverviews::nearest
                                                               : stream::GeoTiffOverviews::average;
-    options.level = 6;  // overviews included as fast as the raster alone at 7, and hardly larger
+    options.level = 6;  // overviews included, as fast as level 7 without them, and hardly larger
     options.threads = context_.threads;
     options.replace = request_.replace;
     options.stop = context_.stop;
@@ -203,8 +203,8 @@ class RasterRun {
   }
 
  private:
-  /// Memory left after the table of the file's tiles. Throws: stream::Error if that is less than
-  /// the table.
+  /// Returns the memory left after the table of the file's tiles. Throws: stream::Error if that is
+  /// less than the table.
   [[nodiscard]] std::uint64_t room_beside_table(const stream::GeoTiffOptions& options) const {
     const std::uint64_t table = stream::geotiff_table_bytes(options);
     const std::uint64_t memory = working_memory(context_);
@@ -230,8 +230,8 @@ class RasterRun {
                : -9999;
   }
 
-  /// The surface at the cells of a square of tiles and, if slopes are made of it, one cell around,
-  /// by rows in heights_.
+  /// Samples the surface at the cells of a square of tiles and, for slopes, one cell around it, by
+  /// rows into heights_.
   void sample(TilePlace corner, std::int64_t side) {
     const std::int64_t around = request_.value == RasterValue::height ? 0 : 1;
     first_column_ = corner.column * kRunTile - around;
@@ -322,7 +322,7 @@ class RasterRun {
 
   const RasterRequest& request_;
   const Context& context_;
-  /// Whether cells may be outside the region. A box is grown to whole cells instead, unless the
+  /// Whether cells may be outside the region. A box is enlarged to whole cells instead, unless the
   /// grid is given.
   bool clips_ = request_.region && !(request_.region->polygons().empty() && request_.align.empty());
   RasterGrid grid_;
@@ -333,7 +333,7 @@ class RasterRun {
   double nodata_;
   RasterOutcome outcome_;
 
-  // The tiles at work.
+  // The tiles in progress.
   std::int64_t first_column_ = 0, first_row_ = 0;  ///< of heights_
   std::size_t width_ = 0;
   std::vector<Point2> places_;

@@ -29,7 +29,7 @@ namespace {
 
 constexpr double kMostGridCells = 2147483647.0;
 
-/// The area of a store's points in its CRS: of a raster with half a cell around the samples.
+/// Returns the area of a store's points in its CRS; for a raster, half a cell beyond the samples.
 stream::Box3 area_of(const stream::Store& store) {
   stream::Box3 stored = store.bounds();
   if (store.schema().grid) {
@@ -41,10 +41,10 @@ stream::Box3 area_of(const stream::Store& store) {
   return world_box(store.schema(), stored);
 }
 
-/// The box of the output's CRS around one of the store's CRS.
+/// Returns the box in the output's CRS around a box in the store's CRS.
 stream::Box3 converted(const stream::Box3& box, const Transformation& change,
                        const stream::Store& store) {
-  // The outline bends: so many points on each side.
+  // Sides may bend, so convert this many points of each.
   constexpr int kPoints = 256;
   std::vector<Point2> outline;
   for (int i = 0; i <= kPoints; ++i) {
@@ -66,8 +66,8 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
   if (result.empty()) {
     throw stream::Error({.file = store.path().string(),
                          .where = {},
-                         .cause = "the region has no place in " + change.to().title(),
-                         .remedy = "take another `to_crs` or a smaller `region`"});
+                         .cause = "the region has no image in " + change.to().title(),
+                         .remedy = "choose another `to_crs` or a smaller `region`"});
   }
   return result;
 }
@@ -77,7 +77,7 @@ std::uint64_t points_of(const stream::Store& store, unsigned level) {
   return stream::StoreQuery(store).count(store.bounds(), level);
 }
 
-/// To two digits.
+/// Rounds to two digits.
 double rounded_cell(double value) {
   std::array<char, 32> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
@@ -87,7 +87,7 @@ double rounded_cell(double value) {
   return result;
 }
 
-/// The distance between neighbouring points in units of the store's CRS.
+/// Returns the spacing of points in units of the store's CRS.
 double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned level) {
   const std::array<double, 6>& m = store.schema().world.xy;
   if (store.schema().grid && level == 0) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
@@ -104,16 +104,16 @@ std::uint32_t count_of(double cells) {
   return static_cast<std::uint32_t>(std::max(1.0, cells));
 }
 
-/// The cells between multiples of their size that hold a range.
+/// The cells, with borders at multiples of their size, that contain a range.
 struct CellRange {
   CellRange(double low, double high, double cell)
       : first(std::floor(low / cell + kRounding)), last(std::ceil(high / cell - kRounding)) {}
 
   [[nodiscard]] std::uint32_t count() const { return count_of(last - first); }
 
-  /// The share of a cell within which a range ends at a multiple.
+  /// Tolerance, as a share of a cell, for a range to end at a multiple.
   static constexpr double kRounding = 1e-6;
-  double first, last;  ///< multiples of the cell
+  double first, last;  ///< as multiples of the cell
 };
 
 }  // namespace
@@ -132,14 +132,14 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
   const std::array<double, 6>& m = info.world.xy;
   if (!info.grid) refuse("is not a raster, and has no grid to align with", "name a raster");
   if (m[1] != 0 || m[3] != 0) {
-    refuse("is rotated, and a GeoTIFF of ours is not", "align with a raster that is north up");
+    refuse("is rotated, which the output does not support", "align with a raster that is north up");
   }
   const std::optional<CoordinateSystem> theirs = crs_of_source(info).system;
   const std::optional<CoordinateSystem> own =
       CoordinateSystem::of(store.schema().crs, store.path().string());
   if (theirs && own && !theirs->same_places(*own)) {
     if (request.to && !request.to->to().same_places(*theirs)) {
-      throw UsageError("`align` takes the CRS of " + request.align + ", " + theirs->title() +
+      throw UsageError("`align` uses the CRS of " + request.align + ", " + theirs->title() +
                        ": leave `to_crs` out");
     }
     if (!request.to) {
@@ -147,9 +147,9 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
       if (!request.to->note().empty()) context.say(request.to->note());
     }
   } else if (request.to) {
-    throw UsageError("`align` takes the CRS of " + request.align + ": leave `to_crs` out");
+    throw UsageError("`align` uses the CRS of " + request.align + ": leave `to_crs` out");
   } else if (theirs.has_value() != own.has_value()) {
-    context.say(request.align + ": its grid is taken in the CRS of the store, because " +
+    context.say(request.align + ": its grid is read in the CRS of the store, because " +
                 (theirs ? "that of the store" : "its own") + " is not known");
   }
   return {.x = m[2],
@@ -178,7 +178,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   if (store.points() == 0 || !(met.min[0] <= met.max[0] && met.min[1] <= met.max[1])) {
     throw_none_inside(store);
   }
-  // Where the cells are given a condition does not change the grid.
+  // With a given cell size, a condition does not change the grid.
   stream::Box3 box = request.cell ? within_region(area_of(store.whole())) : met;
   const std::array<double, 6>& m = store.schema().world.xy;
   const bool straight = m[1] == 0 && m[3] == 0;
@@ -207,7 +207,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   double cell = request.cell.value_or(spacing_of(store, selected, level));
   if (request.to) {
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
-    // Both ways: the new CRS may be torn on one side.
+    // In both directions, because the new CRS may be discontinuous on one side.
     std::vector<Point2> steps{centre,
                               {centre[0] + cell, centre[1]},
                               {centre[0], centre[1] + cell},

@@ -9,17 +9,16 @@
 
 namespace terrace::terrain {
 
-/// Cells of a raster to be written: the centre of (0, 0), and steps per column and row.
+/// The cells of a raster to write: the centre of (0, 0), and steps per column and row.
 struct RasterGrid {
   double x = 0, y = 0, step_x = 1, step_y = -1;
   std::uint32_t columns = 0, rows = 0;
 };
 
-/// As write_raster() has it, with its errors.
+/// Returns the grid that write_raster() describes, and throws its errors.
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request);
 
-/// The grid of the raster that the request aligns with. Sets request.to if its CRS is not the
-/// store's.
+/// Returns the grid of the raster to align with. Sets request.to if its CRS is not the store's.
 RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request, const Context& context);
 
 }  // namespace terrace::terrain

@@ -20,13 +20,13 @@
 namespace terrace::terrain {
 namespace {
 
-/// Lines handled by a thread at a time.
+/// Lines that a thread handles at a time.
 constexpr std::size_t kLines = 8192;
-/// Peak bytes per line besides its text: places, sorting, surface, answer.
+/// Peak memory in bytes per line, excluding its text: places, sorting, surface, answer.
 constexpr std::uint64_t kBytesPerLine = 266;
 constexpr std::size_t kMostLines = std::size_t{1} << 21, kMostBytes = std::size_t{128} << 20;
 
-/// The numbers behind a line.
+/// The numbers to append to a line.
 class AnswerText {
  public:
   AnswerText(const stream::Store& store, char separator)
@@ -133,7 +133,7 @@ class Answers {
   }
 
  private:
-  /// The name of a column of answers: with a number if the places have one of that name.
+  /// Returns the name of an answer column, with a number if the places have a column of that name.
   [[nodiscard]] std::string unused_name(const std::string& name) const {
     const std::vector<std::string>& names = layout_->names;
     std::string unused = name;
@@ -143,7 +143,7 @@ class Answers {
     return unused;
   }
 
-  /// The line as it was, but for the place.
+  /// Appends the line unchanged, except for the place.
   void append_line(std::string& text, const PlaceBatch& batch, std::size_t i,
                    const PlaceConversions& conversions) const {
     const std::string_view line = batch.line(i);
@@ -154,7 +154,7 @@ class Answers {
       append_with_place(text, line, *layout_, degrees ? "longitude" : "x",
                         degrees ? "latitude" : "y");
     } else {
-      // A hundredth of a millimetre, or a tenth.
+      // Precision of a hundredth, or a tenth, of a millimetre.
       const FixedText number(conversions.writes_degrees ? 10 : 4);
       std::string x, y;
       number.append(x, written_[i][0]);
@@ -162,7 +162,7 @@ class Answers {
       append_with_place(text, line, *layout_, x, y);
     }
   }
-  /// The first line that is no comment says how all are to be read.
+  /// The first line that is not a comment determines how to read all lines.
   void find_layout(const PlaceBatch& batch) {
     std::string_view comment;
     for (std::size_t i = 0; !layout_ && i < batch.size(); ++i) {
@@ -188,7 +188,7 @@ class Answers {
   std::unique_ptr<HeightSampler> sampler_;
   GroundSlope ground_;
   std::optional<PlaceLayout> layout_;
-  std::uint64_t header_line_ = 0;  ///< none
+  std::uint64_t header_line_ = 0;  ///< 0: no header
   std::vector<Point2> places_, written_;
   std::vector<SurfacePoint> surface_;
   std::vector<std::string> texts_;

@@ -18,27 +18,27 @@ namespace terrace::terrain {
 
 struct SampleCounts {
   std::uint64_t points = 0;    ///< lines with a place
-  std::uint64_t answered = 0;  ///< of these, with a height
+  std::uint64_t answered = 0;  ///< lines with a height
 };
 
-/// From the coordinates of places to others, in place; on several threads at once.
+/// Conversions of coordinates, in place; several threads may call them at once.
 struct PlaceConversions {
-  std::function<void(std::span<Point2>)> to_store;    ///< none: they are in the store's CRS
-  std::function<void(std::span<Point2>)> to_written;  ///< none: lines keep their places
-  bool writes_degrees = false;                        ///< of to_written
-  /// The largest y where y is a latitude. A line with a larger one is an error, not off the data.
+  std::function<void(std::span<Point2>)> to_store;    ///< empty: places are in the store's CRS
+  std::function<void(std::span<Point2>)> to_written;  ///< empty: lines keep their places
+  bool writes_degrees = false;                        ///< whether to_written gives degrees
+  /// The largest valid y if y is a latitude. A larger one is an error instead of an empty answer.
   double most_latitude = std::numeric_limits<double>::infinity();
 };
 
-/// Answers every line of `places` by one: its own columns, then height, gradient (rise per run),
-/// slope (degrees) and aspect (degrees clockwise from north, downhill), empty where there is none.
-/// Empty lines and comments come back as they are; a line of names gets four more. Places that are
-/// written in another CRS stand in their columns, empty where they have none there, and the columns
-/// are called x and y, or longitude and latitude.
+/// Writes every line of `places` with its own columns, followed by height, gradient (rise per run),
+/// slope (degrees) and aspect (degrees clockwise from north, downhill), which are empty where there
+/// is no surface. Empty lines and comments are copied unchanged; a header gets four more names.
+/// Places written in another CRS replace the original ones in their columns, named x and y, or
+/// longitude and latitude; they are empty where they have no image.
 ///
-/// write: what takes the lines, in order, many at a time. Reports "points".
-/// Throws: stream::Error on bad lines, latitudes beyond a pole and a damaged store,
-/// stream::Stopped, what `write` throws.
+/// write: receives the lines in order, many at a time. Reports "points". Throws: stream::Error on
+/// invalid lines, latitudes beyond a pole and a damaged store; stream::Stopped; what `write`
+/// throws.
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
                            PlaceFile& places, const PlaceConversions& conversions,
                            const std::function<void(std::string_view)>& write,

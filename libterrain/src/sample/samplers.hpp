@@ -5,7 +5,7 @@
 
 #include "terrace/terrain/heights.hpp"
 
-/// What make_sampler() chooses from.
+/// The samplers that make_sampler() chooses from.
 
 namespace terrace::terrain {
 

@@ -20,10 +20,10 @@ namespace {
 using stream::Box3;
 using stream::Point3;
 
-/// What a raster's places need is little.
+/// Places on a raster need little data.
 constexpr std::uint64_t kAll = UINT64_MAX;
 
-/// Copies the attributes of a member, `bytes` of them.
+/// Copies the attributes of a member, `bytes` bytes.
 void copy_record(const stream::ClusterPoints& points, std::size_t member, std::size_t bytes,
                  std::vector<std::byte>& record) {
   record.resize(bytes);
@@ -35,7 +35,7 @@ struct Slab {
   Point3 normal{};
   double low = 0, high = 0;
 
-  /// True too for boxes that are no farther away than rounding may put them.
+  /// Also true for boxes that are outside only by rounding.
   [[nodiscard]] bool meets(const Box3& box) const {
     double middle = 0, half = 0, size = 0;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -52,8 +52,8 @@ struct Slab {
   }
 };
 
-/// The vector in stored coordinates whose product with a step there is that of `direction` with the
-/// step in metres.
+/// Returns the vector in stored coordinates whose product with a stored difference equals that of
+/// `direction` with the difference in metres.
 Point3 in_stored(const stream::LinearMap& ground, const Point3& direction) {
   Point3 result{};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -62,14 +62,15 @@ Point3 in_stored(const stream::LinearMap& ground, const Point3& direction) {
   return result;
 }
 
-/// A way over a raster's lattice.
+/// A line across a raster's lattice.
 struct Way {
   Point2 from{}, to{};
 
   [[nodiscard]] Point2 at(double t) const {
     return {from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])};
   }
-  /// The part from which the samples of the box are at most a cell away; begin > end: none.
+  /// Returns the part of the line at most a cell from samples of the box; begin > end if there is
+  /// none.
   [[nodiscard]] std::array<double, 2> part_near(const std::array<double, 2>& min,
                                                 const std::array<double, 2>& max) const {
     double begin = 0, end = 1;
@@ -88,13 +89,13 @@ struct Way {
 
 }  // namespace
 
-/// Samples of a raster, those that are known of it, with at() as LatticeView.
+/// The known samples of a raster, with at() as in LatticeView.
 class StoreProbe::SomeSamples {
  public:
   explicit SomeSamples(const stream::Channel& heights) : heights_(heights) {}
 
   void add(const Point3& p) { samples_.push_back({p[1], p[0], p[2]}); }
-  /// By a heap: half as fast as std::sort(), and a quarter of the code, which browsers download.
+  /// Heap sort is half as fast as std::sort() but a quarter of the code, which browsers download.
   void sort() {
     std::make_heap(samples_.begin(), samples_.end());
     std::sort_heap(samples_.begin(), samples_.end());
@@ -136,7 +137,7 @@ unsigned StoreProbe::descend(std::uint64_t most,
       return true;
     } catch (const stream::MissingBytes& lacked) {
       for (const stream::ByteRange& range : lacked.ranges()) {
-        // Records of one page lack the same bytes, and come one after the other.
+        // Records of one page lack the same bytes, and are consecutive.
         const auto last = missing.end() - std::min<std::ptrdiff_t>(16, std::ssize(missing));
         if (std::find(last, missing.end(), range) == missing.end()) missing.push_back(range);
       }
@@ -164,7 +165,7 @@ unsigned StoreProbe::descend(std::uint64_t most,
       if (!have([&] { store_.read(stream::cluster_id(level, ordinal), points_); })) continue;
       visit(points_);
       for (std::size_t i = 0; i < points_.children.size(); i += level) {
-        // What a point heads on a level is within what it heads on the level above.
+        // A point's cluster on one level is within its cluster on the level above.
         for (unsigned below = level; below-- > 0;) {
           const std::uint64_t child = points_.children[i + below];
           const stream::ClusterId id = stream::cluster_id(below, child);

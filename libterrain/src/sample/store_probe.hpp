@@ -14,16 +14,16 @@
 
 namespace terrace::terrain {
 
-/// Answers questions about single places of a store, whatever detail is drawn of it: for a viewer,
-/// whose surface is coarser than the store.
+/// Answers queries about single places of a store at full detail, for a viewer whose surface is
+/// coarser than the store.
 ///
 /// Bytes of the store may be missing (stream::GivenBytes). Then each function throws
-/// stream::MissingBytes, which names all bytes that it can tell it lacks and not only the first; it
-/// gives its answer once they are there. Answers depend on the store and the arguments alone. All
-/// throw stream::Error on damage. One object per thread.
+/// stream::MissingBytes, which lists all missing bytes that it can determine, not only the first;
+/// once they are available, it returns its answer. Answers depend only on the store and the
+/// arguments. All functions throw stream::Error on damage. One object per thread.
 class StoreProbe {
  public:
-  /// ground: the linear map from stored coordinates to metres. The store must outlive this.
+  /// ground: the linear map from stored coordinates to metres. The store must outlive this object.
   StoreProbe(const stream::Store& store, const stream::LinearMap& ground)
       : store_(store), frame_(store, ground) {}
 
@@ -31,29 +31,29 @@ class StoreProbe {
     stream::Point3 stored{};
     stream::Point3 place{};            ///< the same in metres, see ViewFrame
     std::vector<double> attributes{};  ///< stored values
-    unsigned level = 0;                ///< the points of it and above were looked at
+    unsigned level = 0;                ///< the level that was searched, with all levels above
   };
-  /// A place on the surface of a raster as HeightSampler has it at level 0, and the attributes of
-  /// the sample whose cell holds it; nothing where there is no surface.
+  /// Returns a place on the surface of a raster, as HeightSampler computes it at level 0, with the
+  /// attributes of the sample whose cell contains it; nullopt where there is no surface.
   std::optional<Found> on_raster(double column, double row);
-  /// The point nearest to a place (stored) of those within `reach` metres; of several the one of
-  /// smaller coordinates. Reads at most about kMostRead points: where there are more, those of a
+  /// Returns the point within `reach` metres that is nearest to a stored place; on ties, the one
+  /// with smaller coordinates. Reads at most about kMostRead points; if there are more, those of a
   /// coarser level.
   std::optional<Found> nearest(const stream::Point3& place, double reach);
 
   struct Profile {
-    /// Over ground, by the map to metres: perpendicular to the axis that is upward.
+    /// Length over ground, by the map to metres: perpendicular to the upward axis.
     double metres = 0;
-    /// The share of the way, 0 to 1, and the height there in the unit of the store. Of a raster its
-    /// surface, NaN where there is none; else points, in no order.
+    /// The position along the line, 0 to 1, and the height there in the unit of the store. For a
+    /// raster the heights of its surface, NaN where there is none; otherwise points, unordered.
     std::vector<std::array<double, 2>> points{};
-    unsigned level = 0;  ///< as above
+    unsigned level = 0;  ///< as in Found
     bool sampled =
-        false;  ///< of a raster, at places of equal distance, as the way crosses too many cells
+        false;  ///< a raster sampled at equal distances, because the line crosses too many cells
   };
-  /// The profile between two places (stored). Of a raster at every place where the way crosses a
-  /// column, a row or a diagonal, at most kMostCrossings; of points those of a strip, kStrip times
-  /// as wide as long. axis: the coordinate that is upward, 1 or 2; of rasters 2.
+  /// Returns the profile between two stored places. For a raster it has the places where the line
+  /// crosses a column, a row or a diagonal, at most kMostCrossings; for points, those in a strip of
+  /// width kStrip times its length. axis: the upward coordinate, 1 or 2; 2 for rasters.
   Profile profile(const stream::Point3& from, const stream::Point3& to, std::size_t axis);
 
   static constexpr std::uint64_t kMostRead = 1u << 18;
@@ -62,8 +62,8 @@ class StoreProbe {
  private:
   class SomeSamples;
 
-  /// Visits all clusters that may have points for which wants(box) is true,
-  /// from the root down, as long as these have at most `most` points; returns the level reached.
+  /// Visits all clusters that may have points with a box for which wants(box) is true, from the
+  /// root down, as long as these have at most `most` points. Returns the level reached.
   unsigned descend(std::uint64_t most, const std::function<bool(const stream::Box3&)>& wants,
                    const std::function<void(const stream::ClusterPoints&)>& visit);
   Profile of_raster(const stream::Point3& from, const stream::Point3& to);

@@ -14,17 +14,17 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kCrossingWindowPoints = 16384;
-/// A line is followed in pieces of this share of a window's size: boxes around slanting pieces hold
-/// more than the pieces.
+/// A line is followed in pieces of this share of a window's size, because boxes around slanting
+/// pieces cover more than the pieces.
 constexpr double kCrossingPiece = 0.5;
-/// Share of the way within which two crossings count as one, since rounding may part them.
+/// Share of the line within which two crossings are the same; rounding may separate them.
 constexpr double kSame = 1e-12;
 
 Point2 point_between(const Point2& a, const Point2& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
 }
 
-/// The part of the way that lies in the box, or a little more; begin > end: none.
+/// Returns the part of the line in the box, or slightly more; begin > end if there is none.
 std::array<double, 2> part_within(const StoredBox& box, const Point2& from, const Point2& to) {
   double begin = 0, end = 1;
   for (std::size_t k = 0; k < 2; ++k) {
@@ -64,7 +64,7 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
       const double size = box.max[k] - box.min[k], way = std::abs(to[k] - from[k]);
       if (size > 0 && way > 0) end = std::min(end, begin + kCrossingPiece * size / way);
     }
-    // Not so little that it comes to a stand.
+    // Large enough to make progress.
     end = std::max(end, begin + 1e-9);
     collect(from, to, begin, std::min(end, last), end >= last);
     for (const Crossing& one : found_) {
@@ -79,7 +79,7 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
 
 void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begin, double end,
                                bool is_last) {
-  // With what rounding may take for one of this piece.
+  // Includes crossings that rounding may move into this piece.
   const Point2 a = point_between(from, to, std::max(0.0, begin - 1e-9));
   const Point2 b = point_between(from, to, std::min(1.0, end + 1e-9));
   StoredBox box;

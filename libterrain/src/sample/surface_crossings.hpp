@@ -12,24 +12,24 @@
 
 namespace terrace::terrain {
 
-/// Where a line meets the edges of the triangulation of a store's points (see PointWindow): between
-/// two such places the linear surface is straight.
+/// Finds the places where a line crosses edges of the triangulation of a store's points (see
+/// PointWindow). The linear surface is straight between these places.
 class SurfaceCrossings {
  public:
   struct Crossing {
-    double t = 0;     ///< of the way, between 0 and 1
+    double t = 0;     ///< position along the line, between 0 and 1
     Point2 place{};   ///< stored
     double height{};  ///< of the linear surface; NaN on edges longer than SamplerOptions::max_edge
   };
 
-  /// The level, the memory and max_edge count. The store must outlive this.
+  /// Uses the level and max_edge of the options. The store must outlive this object.
   SurfaceCrossings(const stream::Store& store, const SamplerOptions& options,
                    std::uint64_t memory_bytes);
 
-  /// Calls visit for each crossing between `from` and `to` (stored), in their order, a vertex once;
-  /// those closer than 1e-12 of the way are one. Which sides of the line the ends of an edge lie on
-  /// is decided exactly, so none is missed. Windows of the store are read one after another along
-  /// the line. Throws: stream::Error, stream::Stopped.
+  /// Calls visit for each crossing between stored places `from` and `to`, in order, once per
+  /// vertex; crossings closer than 1e-12 of the line are one. Exact predicates decide on which side
+  /// of the line the ends of an edge are, so no crossing is missed. Reads windows of the store one
+  /// after another along the line. Throws: stream::Error, stream::Stopped.
   void operator()(const Point2& from, const Point2& to,
                   const std::function<void(const Crossing&)>& visit);
 

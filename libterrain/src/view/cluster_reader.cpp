@@ -62,7 +62,7 @@ class FrameReader final : public ClusterReader {
  private:
   struct LackingPage {
     stream::ByteRange range;
-    std::uint64_t told = 0;  ///< the last frame that added it to missing_
+    std::uint64_t listed = 0;  ///< the last frame that added it to missing_
   };
 
   /// Whether missing bytes have arrived. Without `given`, every frame tries to read them.
@@ -87,7 +87,7 @@ class FrameReader final : public ClusterReader {
             lacking_pages_.insert_or_assign(page, LackingPage{missing.ranges().front()}).first;
       }
     }
-    if (std::exchange(lacking->second.told, number_) != number_) {
+    if (std::exchange(lacking->second.listed, number_) != number_) {
       missing_.push_back(lacking->second.range);
     }
     return true;

@@ -18,7 +18,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// remedy: for a mesh that is to have fewer points than its border.
+/// remedy: for a mesh that should have fewer points than its border.
 BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
                           const BoundedMeshOptions& options, const char* remedy,
                           const std::stop_token& stop) {
@@ -26,7 +26,7 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
   BoundedMeshResult result;
   std::optional<MeshSpool> spool;
   const auto run = [&](double bound, std::uint64_t most) {
-    spool.reset();  // its files have the names of the next one's
+    spool.reset();  // its files have the same names as the next one's
     spool.emplace(options.path);
     result = mesher.run(bound, *spool, most);
     return static_cast<double>(result.vertices);

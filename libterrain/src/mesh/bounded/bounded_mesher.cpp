@@ -14,8 +14,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// A box around the samples that are meshed, in the CRS of the store: of a raster those next to the
-/// region, too.
+/// Returns a box around the meshed samples, in the CRS of the store; for a raster it includes the
+/// samples next to the region.
 stream::Box3 meshed_box(const stream::Store& store, const std::optional<Region>& region) {
   const stream::Placement& placement = store.schema();
   stream::Box3 stored = store.bounds();
@@ -24,7 +24,7 @@ stream::Box3 meshed_box(const stream::Store& store, const std::optional<Region>&
   const stream::Box3& inside = region->box();
   stream::Box3 box = inside;
   if (store.schema().grid) {
-    constexpr double kBeside = 2;  // cells
+    constexpr double kBeside = 2;  // in cells
     stream::Box3 wanted;
     for (unsigned corner = 0; corner < 4; ++corner) {
       const Point2 place = stored_place(placement, {((corner & 1) ? inside.max : inside.min)[0],

@@ -17,41 +17,41 @@
 
 namespace terrace::terrain {
 
-/// Targets for the error of a mesh such that, after the file's rounding, a reader sees no more than
-/// the bound. Heights are rounded by a known amount; rounded places add a little more, depending on
-/// the slope, and so do lines that are curves in the file. Both targets are the bound if the format
-/// is exact and the samples are not moved.
+/// Targets for the error of a mesh such that a reader of the file, after its rounding, sees at most
+/// the bound. Heights are rounded by a known amount. Rounded places add slightly more, depending on
+/// the slope, and so do lines that are curves in the file. Both targets equal the bound if the
+/// format is exact and the samples are not converted.
 struct Aim {
-  double first = 0.0;  ///< ignores rounded places: to be tried, and checked
-  double sure = 0.0;   ///< where the first misses the bound, or cannot be checked
-  double bound = 0.0;  ///< what readers may see: infinite if a number of points was asked for, not
-                       ///< a bound, and the two differ; what they do see is measured then
+  double first = 0.0;  ///< ignores rounded places: try it first, then check
+  double sure = 0.0;   ///< use it where the first misses the bound or cannot be checked
+  double bound = 0.0;  ///< limit for readers; infinite if a number of points was requested and the
+                       ///< format or conversion is not exact; the actual error is then measured
 };
 
-/// What was measured on the mesh of one window, as a reader of the file gets it back.
+/// Measurements of the mesh of one window, as a reader of the file decodes it.
 struct WindowMeasures {
   double max_error = 0.0, rms_error = 0.0;
-  std::uint64_t covered = 0;    ///< samples that lie on triangles
+  std::uint64_t covered = 0;    ///< samples on triangles
   std::uint64_t samples = 0;    ///< counted in this window
-  std::uint64_t uncovered = 0;  ///< of these, those that lie on no triangle of any window
+  std::uint64_t uncovered = 0;  ///< of these, those on no triangle of any window
   std::uint64_t duplicates = 0;
-  std::uint64_t work = 0;  ///< the window's part of the whole work
+  std::uint64_t work = 0;  ///< the window's share of the whole work
   double reading_seconds = 0.0, meshing_seconds = 0.0;
 };
 
-/// Meshes the samples of a store at one bound after another, window by window. Heights and errors
-/// are in the store's vertical unit.
+/// Meshes the samples of a store window by window, possibly for several bounds in turn. Heights and
+/// errors are in the store's vertical unit.
 class BoundedMesher {
  public:
   virtual ~BoundedMesher() = default;
   BoundedMesher(const BoundedMesher&) = delete;
   BoundedMesher& operator=(const BoundedMesher&) = delete;
 
-  /// Meshes into the spool. Stops early once there are more than `most_vertices`, with an
-  /// estimate of how many there would be. Throws: as write_bounded_mesh().
+  /// Meshes into the spool. Stops early with more than `most_vertices` vertices, and then estimates
+  /// their final number. Throws: as write_bounded_mesh().
   virtual BoundedMeshResult run(double max_error, MeshSpool& spool,
                                 std::uint64_t most_vertices) = 0;
-  /// A quick estimate of the vertices that a bound takes, from some windows. Requires
+  /// Estimates the number of vertices for a bound quickly, from some windows. Requires
   /// can_estimate().
   [[nodiscard]] virtual double estimate(double max_error) const = 0;
   [[nodiscard]] virtual bool can_estimate() const = 0;
@@ -62,20 +62,21 @@ class BoundedMesher {
   [[nodiscard]] const MeshCoordinates& coordinates() const { return coordinates_; }
 
  protected:
-  /// All must outlive it.
+  /// The arguments must outlive this object.
   BoundedMesher(const stream::Store& store, const BoundedMeshOptions& options,
                 const Context& context);
 
-  /// Throws: stream::Error if the file's format rounds too coarsely for the bound.
+  /// Throws: stream::Error if the rounding of the file's format is too coarse for the bound.
   [[nodiscard]] Aim aim_within(double bound) const;
-  /// How many threads the memory allows, with `each` bytes per window and `beside` bytes in all.
-  /// purpose: follows the needed memory in the error, as in " for 5 points at a time".
-  /// Throws: stream::Error if it does not suffice for one.
+  /// Returns how many threads the memory allows, with `each` bytes per window and `beside` bytes in
+  /// addition. purpose: follows the needed memory in the error, such as " for 5 points at a time".
+  /// Throws: stream::Error if memory does not suffice for one thread.
   [[nodiscard]] unsigned threads_within_memory(std::uint64_t each, std::uint64_t beside,
                                                const std::string& purpose = {}) const;
 
-  /// Makes windows by `threads` threads and joins them in order: make(worker, i) gives a window's
-  /// mesh, join(i, mesh) spools it and returns its WindowMeasures. total_work: of all windows.
+  /// Makes windows with `threads` threads and joins them in order: make(worker, i) returns a
+  /// window's mesh, join(i, mesh) spools it and returns its WindowMeasures. total_work: of all
+  /// windows.
   template <class Make, class Join>
   BoundedMeshResult run_windows(std::size_t windows, unsigned threads, std::uint64_t total_work,
                                 MeshSpool& spool, std::uint64_t most_vertices, const Make& make,

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kSpoolPiece = 65536;  // vertices or triangles at a time
 
-/// The name that the temporary files are derived from.
+/// The name that the names of the temporary files are derived from.
 std::filesystem::path spool_name(const std::string& path) {
   return path != "-" ? std::filesystem::path(path)
                      : std::filesystem::temp_directory_path() / "terrace-mesh";
@@ -33,8 +33,8 @@ void read_back(stream::AtomicFile& file, std::uint64_t count, const std::stop_to
     if (file.read_at(at * sizeof(T), bytes) != bytes.size()) {
       throw stream::Error({.file = file.target().string(),
                            .where = "byte " + std::to_string(at * sizeof(T)),
-                           .cause = "a temporary file lost its end while it was in use",
-                           .remedy = "look after the disk and run again"});
+                           .cause = "a temporary file was truncated while in use",
+                           .remedy = "check the disk and run again"});
     }
     take(std::span<const T>(piece));
   }

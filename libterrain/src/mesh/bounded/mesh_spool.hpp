@@ -12,17 +12,18 @@
 
 namespace terrace::terrain {
 
-/// Keeps a mesh that comes in pieces on disk, beside the file that it will become, until its counts
-/// are known and it can be written. The temporary files are removed with the object.
+/// Keeps a mesh that arrives in pieces on disk, next to the final file, until its counts are known
+/// and the file can be written. The temporary files are removed with the object.
 class MeshSpool {
  public:
-  /// path: of the mesh file; "-" keeps the pieces in the folder for temporary files.
+  /// path: the mesh file; for "-" the pieces are in the folder for temporary files.
   explicit MeshSpool(const std::string& path);
 
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
 
-  /// All throw stream::Error if the disk is full or the like. Vertices must be fewer than 2^32.
+  /// All throw stream::Error, for example if the disk is full. There must be fewer than 2^32
+  /// vertices.
   void add_vertex(const stream::Point3& position);
   void add_vertices(std::span<const stream::Point3> positions);
   void add_triangle(const stream::TriangleIndices& triangle);

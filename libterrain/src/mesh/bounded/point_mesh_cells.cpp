@@ -18,9 +18,9 @@
 namespace terrace::terrain {
 namespace {
 
-/// Cells are planned to be this full.
+/// Target for the fullness of cells.
 constexpr double kFullness = 0.88;
-/// How far, in shares of the samples of one cell, a line may be from where it divides best.
+/// Tolerance for the position of a line, as a share of the samples of one cell.
 constexpr double kSlack = 0.05;
 
 class Cutter {
@@ -39,8 +39,8 @@ class Cutter {
 
  private:
   struct Part {
-    std::size_t begin = 0, end = 0;  ///< of some_
-    double cells = 0.0;              ///< to divide it into; 0: not known
+    std::size_t begin = 0, end = 0;  ///< range in some_
+    double cells = 0.0;              ///< number of cells to divide it into; 0: unknown
     PlaneBox box;
   };
   struct Line {
@@ -126,8 +126,8 @@ std::optional<Cutter::Line> Cutter::line_along(const Part& part, unsigned axis, 
     std::nth_element(place(first_rank) + 1, place(last_rank), at.end());
   }
   std::sort(place(first_rank), place(last_rank) + 1);
-  // The widest gap; of a lattice's, which are all alike, the nearest. With all ranks allowed the
-  // nearest, however narrow.
+  // Prefer the widest gap; in a lattice, where all are equal, the nearest. If all ranks are
+  // allowed, take the nearest, however narrow.
   const bool any = slack >= 1.0;
   const double wanted = share * last;
   double best = 0.0, lower = 0.0, upper = 0.0;
@@ -145,7 +145,7 @@ std::optional<Cutter::Line> Cutter::line_along(const Part& part, unsigned axis, 
   if (!(best > 0.0)) return std::nullopt;
   double line = number_between(lower, upper);
   if (line == lower) {
-    // No number fits between: the line runs through samples, but not through all above it.
+    // There is no number between, so the line passes through samples; some must be above it.
     line = upper;
     const bool more = std::any_of(some_.begin() + static_cast<std::ptrdiff_t>(part.begin),
                                   some_.begin() + static_cast<std::ptrdiff_t>(part.end),
@@ -170,7 +170,7 @@ std::uint32_t Cutter::add_cell(const Part& part) {
 }
 
 constexpr std::size_t kBufferBytes = std::size_t{16} << 20;
-constexpr std::size_t kLeastChunk = 40, kMostChunk = 4096;  // points
+constexpr std::size_t kLeastChunk = 40, kMostChunk = 4096;  // in points
 
 std::filesystem::path place_for(const std::string& path) {
   if (path != "-") return path + ".samples";
@@ -178,10 +178,10 @@ std::filesystem::path place_for(const std::string& path) {
 }
 
 constexpr std::size_t kMostPlaces = std::size_t{1} << 20;
-/// The limit of tri::point_tin(); products of two are finite.
+/// The limit of tri::point_tin(); products of two such numbers are finite.
 constexpr double kLargest = 1e100;
 
-/// As for_each_wanted_place(), moved.
+/// As for_each_wanted_place(), with converted places.
 void for_each_sample(const stream::Store& store, const Detail& detail, unsigned threads,
                      const PlaceConversion& places,
                      const std::function<void(std::span<const stream::Point3>)>& show) {
@@ -271,7 +271,7 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& det
   for_each_sample(store, detail, threads, places, [&](std::span<const stream::Point3> samples) {
     for (const stream::Point3& p : samples) deal(cuts.cell_of({p[0], p[1]}), p);
   });
-  // The rest is kept without spare capacity; the file's buffer is flushed.
+  // Keep the rest without spare capacity, and flush the file's buffer.
   for (std::vector<stream::Point3>& rest : waiting_) rest.shrink_to_fit();
   file_.read_at(0, {});
 }
@@ -316,8 +316,8 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
     if (got != bytes.size()) {
       throw stream::Error({.file = file_.target().string(),
                            .where = "byte " + std::to_string(number * bytes.size()),
-                           .cause = "a temporary file lost its end while it was in use",
-                           .remedy = "look after the disk and run again"});
+                           .cause = "a temporary file was truncated while in use",
+                           .remedy = "check the disk and run again"});
     }
     take(chunk);
   }
@@ -333,7 +333,7 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
     if (!(std::abs(p[0]) < kLargest && std::abs(p[1]) < kLargest && std::abs(p[2]) < kLargest)) {
       throw stream::Error({.file = store.path().string(),
                            .where = {},
-                           .cause = "a point has a coordinate that is not finite or above 1e100",
+                           .cause = "a point has a coordinate that is not finite or exceeds 1e100",
                            .remedy = "leave it out of the store, or of the `region`"});
     }
     if (scan.samples % scan.period == 0) {

@@ -19,13 +19,14 @@
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/region.hpp"
 
-/// The samples of a region, scanned once and dealt to the cells of a kd-like cut of the plane.
+/// Scans the samples of a region and distributes them to the cells of a kd-like division of the
+/// plane.
 
 namespace terrace::terrain {
 
 inline constexpr std::uint32_t kNoNumber = std::numeric_limits<std::uint32_t>::max();
 
-/// A half-open rectangle of the plane: with its lower borders, without its upper ones. May be
+/// A half-open rectangle of the plane, with its lower borders but without its upper ones. May be
 /// infinite.
 struct PlaneBox {
   Point2 min{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
@@ -40,14 +41,14 @@ struct PlaneBox {
   }
 };
 
-/// The plane, cut by lines of equal x or y again and again until every cell has few samples.
+/// The plane, divided repeatedly by lines of equal x or y until every cell has few samples.
 struct PointMeshCuts {
-  /// A line, and the two sides of it.
+  /// A line and its two sides.
   struct Node {
     unsigned axis = 0;  ///< 0: a line of equal x
     double line = 0.0;
     std::array<std::uint32_t, 2> next{};      ///< nodes, or kCell + a cell
-    std::uint32_t first_cell = 0, cells = 0;  ///< of both
+    std::uint32_t first_cell = 0, cells = 0;  ///< of both sides
   };
   struct Cell {
     PlaneBox box;
@@ -57,7 +58,7 @@ struct PointMeshCuts {
   };
   static constexpr std::uint32_t kCell = 0x80000000U;
   std::vector<Node> nodes;
-  std::vector<Cell> cells;  ///< neighbours mostly near in order
+  std::vector<Cell> cells;  ///< neighbours are mostly close in this order
   std::uint32_t root = kCell;
 
   [[nodiscard]] std::uint32_t cell_of(const Point2& p) const {
@@ -70,16 +71,16 @@ struct PointMeshCuts {
   }
 };
 
-/// Cuts the plane into cells of slightly fewer than `most` samples, unless too many share a place.
-/// `some`: every `period`-th sample.
+/// Divides the plane into cells of slightly fewer than `most` samples, unless too many share a
+/// place. `some`: every `period`-th sample.
 ///
-/// Lines run between samples of `some` wherever there is room for a number, in the widest gap near
-/// the wanted one. Others may lie on a line: they belong to the cell above.
-/// Depends on the arguments alone. O(n log n) for n of `some`.
+/// Where possible, lines are between samples of `some`, in the widest gap near the ideal position.
+/// Other samples may be on a line; they belong to the cell above. Depends only on the arguments.
+/// O(n log n) for n samples in `some`.
 PointMeshCuts cut_for_point_mesh(std::vector<Point2> some, std::uint64_t period, std::size_t most);
 
-/// A number strictly between a and b of few binary digits, not close to either; a if there is none
-/// between. Requires a < b.
+/// Returns a number with few binary digits strictly between a and b, not close to either; a if
+/// there is none between. Requires a < b.
 double number_between(double a, double b);
 
 /// Samples in the CRS's coordinates.
@@ -97,35 +98,36 @@ struct MeshSamples {
   }
 };
 
-/// The height that stands for several samples at one place, as tri::point_tin() takes it. With
-/// kError that of the first, with kAll the middle of the lowest and the highest. heights: in order,
-/// not empty.
+/// Returns the height that represents several samples at one place, as in tri::point_tin(). With
+/// kError it is that of the first, with kAll the middle between the lowest and the highest.
+/// heights: in order, not empty.
 double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates);
 
-/// The places that several samples share.
+/// The places shared by several samples.
 struct SharedPlaces {
   std::uint64_t places = 0;
-  double range = 0.0;  ///< the largest difference of heights at one of them
+  double range = 0.0;  ///< largest difference of heights at a place
   Point2 widest{};     ///< the place with that difference
 
-  /// Adds those of more samples, none of which shares a place with earlier ones. O(n log n).
+  /// Adds the shared places of more samples, none of which shares a place with earlier samples. O(n
+  /// log n).
   void add(const MeshSamples& samples);
 };
 
-/// The samples of a region, dealt to the cells of the plane: on disk, beside the file that is made,
-/// as clusters may reach over many cells. The file is removed with the object. Several
+/// The samples of a region, distributed to the cells of the plane. They are kept in a file next to
+/// the output, as clusters may overlap many cells. The file is removed with the object. Several
 /// threads may read at once.
 class PointMeshSamples {
  public:
-  /// One pass over the store. path: of the mesh. places: to where samples are moved, as for
+  /// Makes one pass over the store. path: of the mesh. places: converts samples, as in
   /// scan_point_mesh(). Throws: stream::Error on a damaged store, or if the file cannot be written.
-  /// Memory: 16 MiB, and 4 bytes per 40 samples or more.
+  /// Memory: 16 MiB, plus 4 bytes per 40 samples or more.
   PointMeshSamples(const stream::Store& store, const Detail& detail, const PointMeshCuts& cuts,
                    const std::string& path, unsigned threads, const PlaceConversion& places = {});
 
   [[nodiscard]] std::size_t count(std::uint32_t first_cell, std::uint32_t cells) const;
-  /// Appends the samples of some cells that lie in the box, by cells, of each in the order of the
-  /// store: of its levels from the top down, in each by id.
+  /// Appends the samples of some cells that are in the box, cell by cell. Within a cell they are in
+  /// the order of the store: by level from the top down, in each level by id.
   void read(std::uint32_t first_cell, std::uint32_t cells, const PlaneBox& box, MeshSamples& out);
 
  private:
@@ -136,8 +138,9 @@ class PointMeshSamples {
   stream::AtomicFile file_;
   std::size_t chunk_points_;
   std::vector<std::size_t> counts_;
-  std::vector<std::vector<stream::Point3>> waiting_;  ///< until they make a chunk; then the rest
-  std::vector<std::vector<std::uint32_t>> chunks_;    ///< numbers, per cell
+  std::vector<std::vector<stream::Point3>> waiting_;  ///< samples that do not fill a chunk yet; in
+                                                      ///< the end, the rest
+  std::vector<std::vector<std::uint32_t>> chunks_;    ///< numbers of chunks, per cell
   std::uint32_t written_ = 0;
   std::mutex mutex_;
 };
@@ -146,16 +149,16 @@ class PointMeshSamples {
 struct PointMeshScan {
   std::uint64_t samples = 0;
   std::optional<MeshSamples> whole;  ///< all samples, if they are few
-  // Else:
+  // Otherwise:
   std::vector<Point2> some;  ///< every `period`-th place
   std::uint64_t period = 1;
-  std::vector<Point2> hull;  ///< as convex_hull() of all
+  std::vector<Point2> hull;  ///< convex_hull() of all samples
 };
 
-/// Reads all samples once, in the order of the store. few: how many at most are kept. places: to
-/// where samples are moved before anything else. Memory: of `few` samples, of up to a million
-/// places, and of the hull. Throws: stream::Error on a damaged store, and for a sample that has no
-/// place there.
+/// Reads all samples once, in the order of the store. few: the most samples to keep. places:
+/// converts samples before anything else. Memory: for `few` samples, up to a million places, and
+/// the hull. Throws: stream::Error on a damaged store, and for a sample without an image in the
+/// other CRS.
 PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few,
                               unsigned threads, const PlaceConversion& places = {});
 

@@ -21,10 +21,10 @@ namespace {
 
 /// A sample, its lists and the memory of removal; the mesh and its check.
 constexpr std::uint64_t kBytesPerPoint = 24 + 40 + 200;
-/// The same where few of many samples become vertices.
+/// The same if few of many samples become vertices.
 constexpr std::uint64_t kBytesPerSample = 80;
-/// Cells are joined into windows of at most this many vertices, so that those on the sides, which
-/// cannot be removed, are few among them; and of at most this many cells.
+/// Cells are joined into windows of at most this many vertices, so that few of them are on sides,
+/// where they cannot be removed; and of at most this many cells.
 constexpr double kPointsPerMeshWindow = 10000.0;
 constexpr double kMostMeshCells = 4.0;
 /// Memory for reading per thread, and for everything else.
@@ -33,17 +33,17 @@ constexpr std::uint64_t kBytesBeside = std::uint64_t{48} << 20;
 
 /// The middle's share of a cell's width and height: about an eighth of its area.
 constexpr double kMiddle = 0.35;
-/// With fewer samples there the whole cell is taken.
+/// With fewer samples in the middle, the whole cell is used.
 constexpr std::size_t kFewSamples = 500;
 
-/// Estimates how many vertices a mesh will have, from the samples in the middle of cells. May be
-/// used by several threads at once.
+/// Estimates how many vertices a mesh will have, from the samples in the middle of cells.
+/// Thread-safe.
 class PointMeshEstimate {
  public:
   PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples& samples,
                     tri::PointDuplicates duplicates);
 
-  /// Vertices of a cell's mesh by greedy insertion. max_error: in the unit of heights.
+  /// Number of vertices of a cell's mesh by greedy insertion. max_error: in the unit of heights.
   [[nodiscard]] double in_cell(std::uint32_t cell, double max_error) const;
   /// The average over all cells, estimated from four of them.
   [[nodiscard]] double per_cell(double max_error) const;
@@ -58,7 +58,7 @@ PointMeshEstimate::PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples
                                      tri::PointDuplicates duplicates)
     : cuts_(cuts), samples_(samples) {
   options_.quality = tri::TinQuality::kGreedy;
-  // They are refused elsewhere.
+  // Duplicates are refused elsewhere.
   options_.duplicates =
       duplicates == tri::PointDuplicates::kError ? tri::PointDuplicates::kFirst : duplicates;
 }
@@ -92,11 +92,11 @@ double PointMeshEstimate::per_cell(double max_error) const {
   return vertices / 4.0;
 }
 
-/// Makes one mesh of the meshes of a plan's windows. Memory: 4 bytes per knot and per vertex of the
+/// Joins the meshes of a plan's windows into one mesh. Memory: 4 bytes per knot, and per vertex on
 /// sides between windows that are in the mesh and windows that are not yet.
 class PointMeshJoiner {
  public:
-  /// Sides that no window needs any more are dropped.
+  /// Drops sides that no window needs any more.
   PointMeshJoiner(const PointMeshPlan& plan, PointMeshSides& sides, MeshSpool& spool);
 
   /// Adds window i; windows come in order.
@@ -235,7 +235,7 @@ PointMeshPlan PointMesher::plan_for(double max_error) const {
 
 BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpool& spool,
                                         std::uint64_t most_vertices) const {
-  if (!samples_) {  // on one line: no surface
+  if (!samples_) {  // collinear samples have no surface
     BoundedMeshResult result;
     result.samples = result.uncovered = scan_.samples;
     return result;
@@ -258,7 +258,7 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
 }
 
 double PointMesher::estimate(double max_error) const {
-  // Removal leaves less than two thirds of what insertion makes.
+  // Removal leaves less than two thirds of the vertices that insertion makes.
   const double left = options_.quality == tri::TinQuality::kGreedy ? 1.0 : 0.6;
   return left * PointMeshEstimate(cuts_, *samples_, options_.duplicates).per_cell(max_error) *
          static_cast<double>(cuts_.cells.size());
@@ -280,13 +280,13 @@ stream::Error PointMesher::shared_places_error() const {
       {.file = store_.path().string(),
        .where = {},
        .cause = counted(shared.places, "place", "has", "have") +
-                " several samples, whose heights differ by up to " +
+                " several samples with heights that differ by up to " +
                 readable_number(shared.range * metres_vertical()) + " m (at " +
                 plain_number(shared.widest[0]) + ", " + plain_number(shared.widest[1]) + ")",
        .remedy = options_.duplicates == tri::PointDuplicates::kAll
-                     ? "say with `duplicates` min, max, mean or first which of them counts, or ask "
-                       "for a larger `max_error`"
-                     : "say with `duplicates` which of them counts"});
+                     ? "set `duplicates` to min, max, mean or first to choose one, or allow "
+                       "a larger `max_error`"
+                     : "choose one with `duplicates`"});
 }
 
 BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,

@@ -14,8 +14,8 @@
 
 namespace terrace::terrain {
 
-/// Meshes the irregular samples of a store: as a whole where they are few, else dealt to the cells
-/// of a cut of the plane.
+/// Meshes the irregular samples of a store: in one piece if they are few, otherwise distributed to
+/// the cells of a division of the plane.
 class PointMesher final : public BoundedMesher {
  public:
   PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
@@ -28,13 +28,14 @@ class PointMesher final : public BoundedMesher {
  private:
   [[nodiscard]] bool single() const { return scan_.whole.has_value(); }
   [[nodiscard]] PointMeshOptions mesh_options(double max_error) const;
-  /// Why samples at one place are refused: how many places, and how far apart.
+  /// Describes the samples at one place: how many places there are, and how much the heights
+  /// differ.
   [[nodiscard]] stream::Error shared_places_error() const;
   BoundedMeshResult run_whole(const PointMeshOptions& options, MeshSpool& spool) const;
   BoundedMeshResult run_plan(const PointMeshOptions& options, MeshSpool& spool,
                              std::uint64_t most_vertices) const;
   [[nodiscard]] PointMeshPlan plan_for(double max_error) const;
-  /// With windows that need `each` bytes.
+  /// The number of threads for windows that need `each` bytes.
   [[nodiscard]] unsigned threads_for(std::uint64_t each, std::uint64_t points) const;
 
   PointMeshScan scan_;

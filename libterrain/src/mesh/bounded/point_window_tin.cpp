@@ -30,14 +30,14 @@ struct Along {
 /// A side of the frame on the hull.
 struct OuterSide {
   Point2 from{}, to{};
-  std::vector<Along> samples;  ///< on it, its ends not among them
+  std::vector<Along> samples;  ///< on it, excluding its ends
 
   [[nodiscard]] double least() const { return std::min(from[0], to[0]); }
   [[nodiscard]] double greatest() const { return std::max(from[0], to[0]); }
 };
 
-/// The outer sides of a frame, to find those that samples lie on: by x, apart those above the frame
-/// from those below.
+/// The outer sides of a frame, sorted by x to find the sides that samples are on; sides above the
+/// frame and sides below it are separate.
 class OuterSides {
  public:
   void add(const Point2& from, const Point2& to) {
@@ -52,7 +52,7 @@ class OuterSides {
   [[nodiscard]] bool empty() const {
     return chains_[0].empty() && chains_[1].empty() && chains_[2].empty() && chains_[3].empty();
   }
-  /// The side that a place lies on, ends included; nullptr if there is none.
+  /// Returns the side that a place is on, ends included; null if there is none.
   OuterSide* find(const Point2& p) {
     for (std::vector<OuterSide>& sides : chains_) {
       auto after = std::upper_bound(sides.begin(), sides.end(), p[0],
@@ -82,8 +82,8 @@ class OuterSides {
   std::array<std::vector<OuterSide>, 4> chains_;
 };
 
-/// The samples of `side` that have to be vertices, in order, each once. level: whether all samples
-/// of the window have one height.
+/// Returns the samples of `side` that must be vertices, in order, each once. level: whether all
+/// samples of the window have one height.
 std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to_height, bool level,
                                   const tri::PointTinOptions& options) {
   if (side.samples.empty()) return {};
@@ -95,7 +95,7 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
                    [](const Along& a, const Along& b) { return a.at < b.at; });
   std::vector<double> at{sign * side.from[axis]}, height{from_height}, group;
   std::vector<tri::Point3> places{{side.from[0], side.from[1], from_height}};
-  double apart = 0.0;  // the lowest and the highest of a place where all count, from their middle
+  double apart = 0.0;  // for kAll: the largest distance of a sample from the middle of its place
   for (std::size_t i = 0; i < side.samples.size(); ++i) {
     const Along& along = side.samples[i];
     group.push_back(along.sample[2]);
@@ -113,13 +113,13 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
   height.push_back(to_height);
   std::vector<tri::Point3> chosen;
   if (options.max_error > 0.0) {
-    // A little less, as others interpolate with other rounding.
+    // Slightly less, because other code interpolates with different rounding.
     const double bound = std::max(0.0, options.max_error - apart) * (1.0 - 0x1p-20);
     const std::vector<tri::LineVertex> line = tri::simplify_line(at, height, bound).vertices;
     for (std::size_t i = 1; i + 1 < line.size(); ++i) chosen.push_back(places[line[i].sample]);
     return chosen;
   }
-  // Samples that are not vertices would be off by a rounding error, unless all is level.
+  // Samples that are not vertices would be off by a rounding error, unless all heights are equal.
   if (!level) chosen.assign(places.begin() + 1, places.end());
   return chosen;
 }
@@ -131,14 +131,14 @@ bool on_border(const PlaneBox& box, const Point2& a, const Point2& b) {
   return false;
 }
 
-/// The errors of the mesh that a reader gets back from a format that rounds.
+/// Measures the mesh that a reader decodes from a format that rounds.
 tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
                                const PointWindowTin& tin, const stream::MeshRounding& rounding) {
   std::vector<tri::Point3> read;
   read.reserve(tin.vertices.size());
   for (const tri::Point3& p : tin.vertices) read.push_back(rounding(p));
-  // The window's straight sides move as a whole. Samples that they pass over belong to the
-  // neighbour then, whose surface is the same at the side.
+  // The window's straight sides move as a whole. Samples that they pass then belong to the
+  // neighbour, whose surface is the same at the side.
   const tri::Point3 low = rounding({box.min[0], box.min[1], 0.0});
   const tri::Point3 high = rounding({box.max[0], box.max[1], 0.0});
   MeshSamples moved = samples;
@@ -147,7 +147,7 @@ tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
   return tri::measure_surface(moved.x, moved.y, moved.z, read, tin.triangles);
 }
 
-/// Where several samples have one place, one of the height that counts.
+/// Keeps one sample per place, with the height that represents it.
 MeshSamples one_a_place(const MeshSamples& samples, tri::PointDuplicates duplicates) {
   std::vector<std::size_t> order(samples.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -168,7 +168,7 @@ MeshSamples one_a_place(const MeshSamples& samples, tri::PointDuplicates duplica
 }
 
 /// Removes the samples that the vertices of a frame represent; returns the number of their places.
-/// Interpolation at a vertex has a rounding error, which matters where no error is allowed.
+/// Interpolation at a vertex has a rounding error, which matters if no error is allowed.
 std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
                               tri::PointDuplicates duplicates, MeshSamples& samples) {
   std::map<Point2, std::vector<std::size_t>> at;
@@ -200,7 +200,8 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
   return places;
 }
 
-/// As mesh_samples(), to options.tin.max_error. may_miss: then the result may be beyond the bound.
+/// As mesh_samples(), with the target options.tin.max_error. may_miss: allows a result beyond the
+/// bound.
 PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
                            const PlaneBox& box, const PointMeshOptions& options,
                            const stream::MeshRounding& rounding, const std::string& source,
@@ -225,11 +226,11 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
     SharedPlaces shared;
     if (refuse) shared.add(samples);
     if (shared.places > 0) throw SamplesShareAPlace{};
-    fail(error.what(), "look at the store's points");
+    fail(error.what(), "check the store's points");
   }
   const bool all = options.tin.duplicates == tri::PointDuplicates::kAll;
   if (all && tin.duplicate_range > options.tin.max_error) throw SamplesShareAPlace{};
-  // Those taken out have no error.
+  // The removed samples have no error.
   tin.errors.rms *=
       std::sqrt(static_cast<double>(tin.errors.covered) /
                 std::max(1.0, static_cast<double>(tin.errors.covered + vertex_places)));
@@ -259,11 +260,11 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
   return out;
 }
 
-/// The border of a window, counter-clockwise: the vertices on its sides inside the hull, and along
-/// the hull the corners and those samples on it that the bound needs.
+/// The border of a window, counter-clockwise: the vertices on its sides inside the hull and, along
+/// the hull, the corners and the samples that the bound needs.
 struct PointMeshFrame {
   std::vector<tri::Point3> vertices;
-  std::vector<PointWindowTin::Shared> shared;  ///< in parallel
+  std::vector<PointWindowTin::Shared> shared;  ///< parallel to vertices
 };
 
 /// sides: the vertices of window.sides, in parallel.

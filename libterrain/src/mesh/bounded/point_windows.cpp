@@ -35,9 +35,9 @@ class Planner {
   struct Cut {
     unsigned axis = 0;
     double line = 0.0;
-    std::map<double, std::uint32_t> knots;  ///< by their place along the line
+    std::map<double, std::uint32_t> knots;  ///< by their position along the line
   };
-  /// The cuts at the lower and the upper border per axis.
+  /// The cuts at the lower and the upper border, per axis.
   using Borders = std::array<std::array<std::uint32_t, 2>, 2>;
   struct Part {
     PlaneBox box;
@@ -85,7 +85,7 @@ std::uint32_t Planner::add_cut(const Part& part, unsigned axis, double line) {
     const std::uint32_t ancestor = part.cuts[along][upper];
     const double crossing = (*ends)[upper];
     const auto at = [&](double t) { return along == 0 ? Point2{t, line} : Point2{line, t}; };
-    // Where rounding leaves the border no farther out than the crossing, they meet there.
+    // They meet at the border if rounding does not put it beyond the crossing.
     const bool meets =
         ancestor != kNoNumber && (upper != 0 ? border <= crossing : border >= crossing);
     const Point2 place = at(meets ? border : crossing);
@@ -145,7 +145,7 @@ void Planner::add_sides() {
       }
     }
   }
-  // The height of a knot of several sides comes from none of them.
+  // The height of a knot of several sides does not come from one of them.
   std::vector<unsigned> ends(plan_.knots.size(), 0);
   for (const PointMeshPlan::Side& side : plan_.sides) {
     for (const std::uint32_t knot : side.knots) {
@@ -157,24 +157,24 @@ void Planner::add_sides() {
 /// A height along a line.
 struct ProfilePlace {
   double at = 0.0, height = 0.0;
-  bool sample = false;  ///< whether a sample lies there
+  bool sample = false;  ///< whether a sample is there
 };
 
 /// The Delaunay triangulation of some samples as a surface.
 class LocalSurface {
  public:
-  /// duplicates: which of several samples at one place counts.
+  /// duplicates: which of several samples at one place to use.
   LocalSurface(const MeshSamples& samples, tri::PointDuplicates duplicates);
 
-  /// nullopt outside the samples' hull.
+  /// Returns nullopt outside the samples' hull.
   [[nodiscard]] std::optional<double> height(const Point2& place) const;
-  /// Where edges cross the line of `axis` = c (0: x, 1: y), ascending: between two such places the
-  /// surface is straight.
+  /// Returns where edges cross the line `axis` = c (0: x, 1: y), ascending. The surface is straight
+  /// between these places.
   [[nodiscard]] std::vector<ProfilePlace> profile(unsigned axis, double c) const;
 
  private:
   tri::Delaunay2<double> delaunay_;
-  std::vector<double> heights_;  ///< by slots of vertices
+  std::vector<double> heights_;  ///< by vertex slot
 };
 
 LocalSurface::LocalSurface(const MeshSamples& samples, tri::PointDuplicates duplicates) {
@@ -210,7 +210,7 @@ std::optional<double> LocalSurface::height(const Point2& place) const {
   const double px = place[0] - a[0], py = place[1] - a[1];
   const double area = bx * cy - by * cx;
   const double first = heights_[slot(corners[0])];
-  if (!(area > 0.0)) return first;  // thinner than doubles tell
+  if (!(area > 0.0)) return first;  // too thin for doubles
   const double u = std::clamp((px * cy - py * cx) / area, 0.0, 1.0);
   const double v = std::clamp((bx * py - by * px) / area, 0.0, 1.0);
   return first + u * (heights_[slot(corners[1])] - first) +
@@ -248,9 +248,9 @@ std::vector<ProfilePlace> LocalSurface::profile(unsigned axis, double c) const {
   return places;
 }
 
-/// Share of the bound that sides are settled to: the rest is left to the triangles at them.
+/// Share of the bound for sides; the rest is left for the triangles at them.
 constexpr double kPointSideShare = 0.9;
-/// How far samples that settle a side lie from it, in distances of neighbours.
+/// How far around a side samples are used, in distances of neighbours.
 constexpr double kReach = 3.0;
 /// With more samples than this around a knot the search ends.
 constexpr std::size_t kManySamples = 20000;
@@ -300,7 +300,7 @@ std::shared_ptr<const SideVertices> PointMeshSides::vertices(std::uint32_t side)
     const std::lock_guard lock(mutex_);
     if (known_[side]) return known_[side];
   }
-  // Two threads may both do it; they find the same.
+  // Two threads may compute it twice, with the same result.
   auto settled = std::make_shared<const SideVertices>(settle(plan_.sides[side]));
   const std::lock_guard lock(mutex_);
   if (!known_[side]) known_[side] = std::move(settled);
@@ -371,7 +371,7 @@ SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side) {
   const auto end_height = [&](std::size_t end) {
     const std::uint32_t knot = side.knots[end];
     if (plan_.knots[knot].at_hull) {
-      // Beyond the last samples: at their height.
+      // Beyond the last samples: use their height.
       if (!profile.empty()) return (end == 0 ? profile.front() : profile.back()).height;
       const auto height = nearest_height(near, plan_.knots[knot].place);
       if (height) return *height;

@@ -15,25 +15,25 @@
 #include "mesh/bounded/point_mesh_cells.hpp"
 #include "terrace/terrain/region.hpp"
 
-/// The windows that irregular samples are meshed in, and the vertices on their sides.
+/// The windows of irregular samples, and the vertices on their sides.
 
 namespace terrace::terrain {
 
-/// How the region of irregular samples, their convex hull, is cut into windows that are meshed one
-/// by one. Each is a cell, or several together that make a rectangle, cut with the hull: convex. No
-/// window reaches over a cut line, but one may end within another's side.
+/// The division of the region of irregular samples, their convex hull, into windows that are meshed
+/// one by one. A window is a cell, or several that form a rectangle, intersected with the hull, so
+/// it is convex. No window crosses a cut line, but one may end within another's side.
 struct PointMeshPlan {
-  /// Where a cut line ends, at the hull or at another cut line.
+  /// The end of a cut line, at the hull or at another cut line.
   struct Knot {
     Point2 place{};
     bool at_hull = false;
   };
-  /// A stretch of a cut line between two knots, with one window on either side.
+  /// A part of a cut line between two knots, with one window on each side.
   struct Side {
-    unsigned axis = 0;  ///< 0: of points of equal x
+    unsigned axis = 0;  ///< 0: points of equal x
     double line = 0.0;
     std::array<std::uint32_t, 2> knots{};    ///< the lower first
-    std::array<std::uint32_t, 2> windows{};  ///< that of smaller coordinates first
+    std::array<std::uint32_t, 2> windows{};  ///< the one with smaller coordinates first
   };
   struct Window {
     PlaneBox box;
@@ -48,29 +48,29 @@ struct PointMeshPlan {
   std::vector<Window> windows;  ///< in the order of their cells
 };
 
-/// hull: of all samples, with an area. together(first, cells): whether these cells, which are all
-/// of one node, shall be one window.
+/// hull: of all samples, with positive area. together(first, cells): whether these cells, all of
+/// one node, should be one window.
 PointMeshPlan plan_point_mesh(
     const PointMeshCuts& cuts, std::span<const Point2> hull,
     const std::function<bool(std::uint32_t first, std::uint32_t cells)>& together);
 
-/// A vertex on a side: its place along it and its height.
+/// A vertex on a side: its position along it and its height.
 struct SideVertex {
   double at = 0.0, height = 0.0;
 };
 using SideVertices = std::vector<SideVertex>;
 
-/// The vertices on the sides of the windows, settled before the windows are meshed: the Delaunay
-/// triangulation of the samples close to a side, cut along it, within a share of the bound. It
-/// depends on these samples alone, so both windows at a side have the same vertices there. May be
-/// used by several threads at once.
+/// The vertices on the sides of windows, computed before the windows are meshed: the Delaunay
+/// triangulation of the samples close to a side, intersected with it, within a share of the bound.
+/// It depends only on these samples, so both windows at a side have the same vertices there.
+/// Thread-safe.
 class PointMeshSides {
  public:
   /// max_error: of the mesh, in the unit of heights.
   PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
                  tri::PointDuplicates duplicates, double max_error);
 
-  /// The vertices of a side, its knots included, ascending. Kept until drop().
+  /// Returns the vertices of a side, its knots included, ascending. Kept until drop().
   std::shared_ptr<const SideVertices> vertices(std::uint32_t side);
   void drop(std::uint32_t side);
 

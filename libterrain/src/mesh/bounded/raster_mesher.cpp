@@ -21,23 +21,24 @@
 namespace terrace::terrain {
 namespace {
 
-/// Cells of a window each way: the smallest, and the largest that a small mesh makes of it.
+/// Smallest and largest size of a window along each axis, in cells; the largest is for small
+/// meshes.
 constexpr std::int64_t kWindowCells = 512, kWidestCells = 2048;
-/// Vertices that a window should have, so that those on its sides, which cannot be removed, are
-/// few among them.
+/// Target for the vertices per window, so that few of them are on sides, where they cannot be
+/// removed.
 constexpr double kVerticesPerWindow = 3000.0;
-/// Cells, each way, of the windows that estimates are made from.
+/// Size along each axis, in cells, of the windows that estimates are made from.
 constexpr std::int64_t kSampleCells = 256;
-/// What a thread needs at worst: a window of kWindowCells with every sample a vertex, or one of
-/// kWidestCells with few, and the results that wait.
+/// Worst case per thread: a window of kWindowCells with every sample a vertex, or one of
+/// kWidestCells with few, and the waiting results.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{112} << 20;
 constexpr std::uint64_t kRasterBytesBeside = std::uint64_t{48} << 20;
 constexpr std::uint64_t kFillBytes = std::uint64_t{32} << 20;
-/// Cells by which an edge that is straight in the file may leave the samples along it: less than
-/// half, so that no sample beside a window's side comes to its other side.
+/// Limit, in cells, for the distance of an edge that is straight in the file from the samples along
+/// it: less than half, so that no sample next to a window's side moves to the other side of it.
 constexpr double kMostBend = 0.125;
 
-/// How large windows should be, from the vertices per sample of greedy insertion.
+/// Returns the size of windows, from the vertices per sample of greedy insertion.
 std::int64_t window_cells(double per_sample) {
   std::int64_t cells = kWindowCells;
   while (per_sample * static_cast<double>(cells * cells) < kVerticesPerWindow &&
@@ -47,9 +48,9 @@ std::int64_t window_cells(double per_sample) {
   return cells;
 }
 
-/// The samples of a raster store that a region needs: those inside and the next ones outside, so
-/// that every triangle of neighbouring samples that reaches inside has its corners. All of them
-/// without a region; empty where the region misses the raster.
+/// Returns the samples of a raster store that a region needs: those inside and the next ones
+/// outside, so that every triangle of neighbouring samples that reaches inside has its corners.
+/// Without a region, returns all samples; empty if the region misses the raster.
 LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>& region) {
   const stream::StoreSchema& schema = store.schema();
   assert(schema.grid);
@@ -74,7 +75,7 @@ LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>
   };
   const std::int64_t c0 = first(box.min[0], columns), c1 = last(box.max[0], columns);
   const std::int64_t r0 = first(box.min[1], rows), r1 = last(box.max[1], rows);
-  // More than a sample outside: nothing of it is inside.
+  // If it is more than a sample outside, nothing of it is inside.
   const bool missed = box.empty() || box.max[0] < 0.0 || box.max[1] < 0.0 ||
                       box.min[0] > static_cast<double>(columns - 1) ||
                       box.min[1] > static_cast<double>(rows - 1) || c1 < c0 || r1 < r0;
@@ -90,12 +91,12 @@ std::vector<std::int64_t> cut(std::int64_t first, std::int64_t samples, std::int
   return sides;
 }
 
-/// A rectangle of samples cut into windows that share their sides: the last column of one is the
-/// first of the next.
+/// A rectangle of samples divided into windows that share their sides: the last column of one is
+/// the first of the next.
 class LatticePlan {
  public:
-  /// whole: at least 1 sample each way. cells: how many cells a window should have each way;
-  /// windows are equal to within one cell and have at most 1.5 times as many.
+  /// whole: at least 1 sample along each axis. cells: the target size of a window along each axis;
+  /// windows are equal to within one cell and at most 1.5 times as large.
   LatticePlan(const LatticeWindow& whole, std::int64_t cells);
 
   [[nodiscard]] const LatticeWindow& whole() const { return whole_; }
@@ -125,9 +126,9 @@ LatticeWindow LatticePlan::window(std::size_t i) const {
 
 constexpr std::uint32_t kNoVertex = std::numeric_limits<std::uint32_t>::max();
 
-/// Makes one mesh of the meshes of a plan's windows: a vertex on a side of several of them becomes
-/// one vertex. Memory: 4 bytes per column of the raster, samples on sides beside cells without
-/// data, and the spool.
+/// Joins the meshes of a plan's windows into one mesh, in which a vertex on a side of several
+/// windows is one vertex. Memory: 4 bytes per column of the raster, samples on sides next to cells
+/// without data, and the spool.
 class WindowJoiner {
  public:
   WindowJoiner(const LatticePlan& plan, MeshSpool& spool);
@@ -136,18 +137,18 @@ class WindowJoiner {
   WindowMeasures add(std::size_t i, WindowTin&& tin);
 
  private:
-  /// Samples on the sides and inside of this window that lie on no triangle, once all windows that
-  /// share them have been added.
+  /// Returns the number of samples on the sides and inside of this window that are on no triangle.
+  /// A shared sample counts once all windows that share it have been added.
   std::uint64_t uncovered(const WindowTin& tin);
   [[nodiscard]] std::uint32_t* shared(const WindowTin& tin, const tri::GridVertex& vertex);
 
   const LatticePlan& plan_;
   MeshSpool& spool_;
-  // Numbers of the vertices on the lines of sides above and below the row of windows at hand, and
+  // Numbers of the vertices on the lines of sides above and below the current row of windows, and
   // on the left and right side of the window.
   std::vector<std::uint32_t> above_, below_, left_, right_;
-  /// By row and column, how many windows do not cover a sample on their sides: it is uncovered if
-  /// none of those that share it does.
+  /// By row and column, the number of windows that do not cover a sample on their sides. It is
+  /// uncovered if all the windows that share it do not cover it.
   std::map<std::pair<std::int64_t, std::int64_t>, unsigned> on_sides_;
 };
 
@@ -158,8 +159,8 @@ WindowJoiner::WindowJoiner(const LatticePlan& plan, MeshSpool& spool)
       below_(above_) {}
 
 std::uint32_t* WindowJoiner::shared(const WindowTin& tin, const tri::GridVertex& vertex) {
-  // A corner belongs to two sides; the line above or below knows it whatever its window, the sides
-  // to the left and right only if it lies between.
+  // A corner belongs to two sides. The line above or below contains it in any case, the left or
+  // right side only if it is in between.
   const std::int64_t column = tin.window.column - plan_.whole().column + vertex.column;
   if (vertex.row == 0) return &above_[static_cast<std::size_t>(column)];
   if (vertex.row + 1 == tin.window.rows) return &below_[static_cast<std::size_t>(column)];
@@ -211,7 +212,7 @@ WindowMeasures WindowJoiner::add(std::size_t i, WindowTin&& tin) {
   }
   right_.assign(rows, kNoVertex);
 
-  // Vertices that are there already make room for those behind them.
+  // Vertices that already exist make room for those after them.
   std::vector<std::uint32_t> numbers;
   numbers.reserve(tin.vertices.size());
   const auto first = static_cast<std::uint32_t>(spool_.vertices());
@@ -241,12 +242,12 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
     : BoundedMesher(store, options, context), whole_(lattice_of(store, options.region)) {
   if (whole_.columns < 2 || whole_.rows < 2) {
     if (options.region) {
-      throw UsageError("`region`: nothing of it is on the raster of the store");
+      throw UsageError("`region`: it does not meet the raster of the store");
     }
     throw stream::Error({.file = store.path().string(),
                          .where = {},
                          .cause = "the raster is one line of samples, so it has no triangles",
-                         .remedy = "take a profile or its points instead of a mesh"});
+                         .remedy = "use a profile or its points instead of a mesh"});
   }
   const bool interpolates = options.fill == Fill::interpolate;
   threads_ = threads_within_memory(
@@ -257,7 +258,7 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
 }
 
 std::int64_t RasterMesher::straight_cells() const {
-  constexpr int kPlaces = 8;  // each way
+  constexpr int kPlaces = 8;  // along each axis
   constexpr std::array<Point2, 4> kWays{{{1, 0}, {0, 1}, {1, 1}, {1, -1}}};
   const double half = 0.5 * static_cast<double>(std::min<std::int64_t>(
                                 kWindowCells, std::max(whole_.columns, whole_.rows) - 1));
@@ -281,14 +282,14 @@ std::int64_t RasterMesher::straight_cells() const {
         const double cells = 2.0 * half * base::hypot(way[0], way[1]);
         const double off = base::hypot(0.5 * (a[0] + b[0]) - m[0], 0.5 * (a[1] + b[1]) - m[1]);
         const double length = base::hypot(b[0] - a[0], b[1] - a[1]);
-        // A sample without a position there is refused when it becomes a vertex.
+        // A sample without an image there is refused when it becomes a vertex.
         if (!std::isfinite(off) || !(length > 0.0)) continue;
-        // In cells along this way, and as if it were no longer than along a row.
+        // In cells along this direction, scaled to the length along a row.
         bend = std::max(bend, off / (length / cells) / (way[0] * way[0] + way[1] * way[1]));
       }
     }
   }
-  // Bends grow as the square of the length; the longest is the diagonal of the largest window.
+  // Bends grow as the square of the length; the longest edge is the diagonal of the largest window.
   constexpr double kLongest = 1.5 * 1.4143;
   const double cells = 2.0 * half * std::sqrt(kMostBend / std::max(bend, 1e-9)) / kLongest;
   return static_cast<std::int64_t>(std::clamp(cells, 1.0, static_cast<double>(kWidestCells)));

@@ -16,23 +16,23 @@
 
 namespace terrace::terrain {
 
-/// Meshes a raster store. Windows share their sides, on which the vertices depend on the samples
-/// there alone.
+/// Meshes a raster store. Windows share their sides, and the vertices on a side depend only on the
+/// samples there.
 class RasterMesher final : public BoundedMesher {
  public:
-  /// Throws: stream::Error if the memory does not suffice, UsageError.
+  /// Throws: stream::Error if memory does not suffice, UsageError.
   RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
                const Context& context);
 
   BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices) override;
   [[nodiscard]] double estimate(double max_error) const override;
-  /// True if the sampled windows are a small part of all.
+  /// Whether the sampled windows are a small part of all.
   [[nodiscard]] bool can_estimate() const override;
 
  private:
   [[nodiscard]] WindowTinOptions window_options(double max_error) const;
   [[nodiscard]] std::vector<std::unique_ptr<WindowMesher>> meshers(double max_error) const;
-  /// Measured on some windows; depends on data and bound alone.
+  /// Measured on some windows; depends only on data and bound.
   struct Sample {
     double vertices_per_sample = 0.0;
     double reading_seconds = 0.0, meshing_seconds = 0.0;
@@ -40,12 +40,13 @@ class RasterMesher final : public BoundedMesher {
   [[nodiscard]] Sample sample(double max_error, tri::TinQuality quality, std::size_t across,
                               std::size_t down) const;
 
-  /// How many cells a window may have each way, so that a straight edge in the file is within
-  /// kMostBend of the samples along it. Requires places that have an effect.
+  /// Returns the largest size of a window along each axis, in cells, at which a straight edge in
+  /// the file is within kMostBend of the samples along it. Requires a conversion.
   [[nodiscard]] std::int64_t straight_cells() const;
 
   LatticeWindow whole_;
-  std::int64_t most_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, each way
+  std::int64_t most_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, along each
+                                                                        ///< axis
   unsigned threads_ = 1;
   std::shared_ptr<const StoreFill> fill_;
 };

@@ -46,8 +46,8 @@ void order_by_use(WindowTin& tin) {
   tin.positions = std::move(positions);
 }
 
-/// What doubles may make of an error of 0 in these triangles: their gradients are sums of products
-/// over the area, and rise over the box of the triangle.
+/// Bounds the rounding of an error of 0 in these triangles: their gradients are sums of products
+/// divided by the area, multiplied by the size of the triangle's box.
 double rounding_of_errors(const WindowTin& tin) {
   double most = 0.0;
   for (const auto& [i, j, k] : tin.triangles) {
@@ -71,7 +71,7 @@ double twice_area(std::span<const tri::Point3> points, const std::array<std::uin
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/// Swaps an edge of each triangle that is not counter-clockwise, so that it is. Returns whether all
+/// Makes triangles counter-clockwise by swapping an edge of each that is not. Returns whether all
 /// are.
 bool turn_back(std::span<const tri::Point3> points,
                std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -111,7 +111,7 @@ bool turn_back(std::span<const tri::Point3> points,
 
 }  // namespace
 
-/// The samples of a window and of the lines around it, as far as the raster has them.
+/// The samples of a window and of the lines around it, as far as the raster extends.
 template <class T>
 struct WindowMesher::Samples {
   std::int64_t columns = 0, rows = 0;  ///< of the window
@@ -221,7 +221,7 @@ void WindowMesher::measure_as_read(
     const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double)>& measure) const {
   const stream::Point3& moved = rounding_.largest();
   const bool exact = moved == stream::Point3{};
-  const bool moves = options_.places.has_effect();  // what becomes of them there is measured later
+  const bool moves = options_.places.has_effect();  // the converted mesh is measured later
   std::vector<tri::Point3> read;
   read.reserve(tin.vertices.size());
   for (std::size_t i = 0; i < tin.vertices.size(); ++i) {
@@ -249,8 +249,8 @@ void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) cons
   options_.places(std::span<stream::Point3>(read));
   for (tri::Point3& p : read) p = rounding_(p);
   if (!turn_back(read, tin.triangles)) {
-    fail(tin, "triangles would be turned over by the way to the other CRS",
-         "write the mesh in the store's CRS, or take another `to_crs`");
+    fail(tin, "triangles would be inverted in the other CRS",
+         "write the mesh in the store's CRS, or choose another `to_crs`");
   }
   std::vector<stream::Point3> moved;
   moved.reserve(samples.heights.size());
@@ -270,8 +270,8 @@ void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) cons
     for (const stream::Point3& p : moved) values->push_back(p[static_cast<std::size_t>(axis)]);
   }
   const tri::TinErrors errors = tri::measure_surface(x, y, z, read, tin.triangles);
-  // A sample that is beside the mesh now was on one of its sides. The next window measures it, or
-  // it is at the border: there it counts on the side, as on the lattice.
+  // A sample that is now next to the mesh was on one of its sides. The next window measures it, or
+  // it is at the border, where it counts on the side, as on the lattice.
   if (errors.uncovered == 0) tin.check.max_error = 0.0;
   tin.check.max_error = std::max(tin.check.max_error, errors.largest);
   if (errors.covered > 0) tin.check.rms_error = errors.rms;
@@ -349,7 +349,7 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
                                 static_cast<std::uint32_t>(window.rows), samples.heights};
   tri::GridTinOptions options = options_.tin;
   options.quality = quality;
-  options.measure = false;  // what was written is checked instead
+  options.measure = false;  // the decoded mesh is checked instead
   const auto mesh_to = [&](double aim) {
     options.max_error = aim;
     tri::GridTin tin = tri::grid_tin<T>(grid, sides, options);
@@ -376,7 +376,7 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
       mesh_to(share * options_.aim);
     }
     require_sound(out);
-    // Samples in the region lie on triangles that reach into it, which are kept.
+    // Samples in the region are on triangles that reach into it, which are kept.
     for (const std::uint32_t at : out.check.uncovered_at) {
       if (in_region(window, at % window.columns, at / window.columns,
                     static_cast<double>(samples.heights[at]))) {

@@ -18,35 +18,35 @@
 
 namespace terrace::terrain {
 
-/// How the windows of a raster are meshed. Heights in the store's vertical unit.
+/// How to mesh the windows of a raster. Heights are in the store's vertical unit.
 struct WindowTinOptions {
-  double bound = 0.0;  ///< what readers of the file may see
-  /// The targets of Aim: sides are meshed to the second, smaller one, and so is the inside of a
-  /// window where the first misses the bound.
+  double bound = 0.0;  ///< limit for readers of the file
+  /// The targets of Aim. Sides are meshed to the second, smaller one, as is the inside of a window
+  /// where the first misses the bound.
   double first_aim = 0.0, aim = 0.0;
   tri::GridTinOptions tin;
-  LatticeWindow whole;  ///< of which the windows are parts
-  /// With a region the meshes have only the triangles that reach into it.
+  LatticeWindow whole;  ///< the window that contains all others
+  /// With a region, meshes only have the triangles that reach into it.
   std::optional<Region> region;
-  /// To the CRS of the file.
+  /// Converts to the CRS of the file.
   PlaceConversion places;
-  /// The height that a sample without data gets; empty: it stays without data.
+  /// Returns the height of a sample without data; empty: it stays without data.
   std::function<double(std::int64_t column, std::int64_t row)> fill;
 };
 
-/// The mesh of one window. Vertices are in the order in which the triangles use them first.
+/// The mesh of one window. Vertices are in the order in which triangles first use them.
 struct WindowTin {
   LatticeWindow window;
-  std::vector<tri::GridVertex> vertices;  ///< columns and rows count from the window's first
+  std::vector<tri::GridVertex> vertices;  ///< columns and rows relative to the window
   std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS of the file
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  /// Measured on the mesh that a reader gets back; coverage is determined on the lattice.
+  /// Measured on the mesh as a reader decodes it; coverage is determined on the lattice.
   tri::GridTinCheck check;
-  /// Samples with data, before filling and inside the region; those on the first row and column
-  /// count in the previous window.
+  /// Number of samples with data, before filling and inside the region; those on the first row and
+  /// column count in the previous window.
   std::uint64_t samples = 0;
-  /// Numbers in the window of such samples, those on the first row and column included, that lie on
-  /// no triangle of this window.
+  /// Indices in the window of such samples, including the first row and column, that are on no
+  /// triangle of this window.
   std::vector<std::uint32_t> uncovered;
   double reading_seconds = 0.0, meshing_seconds = 0.0;
 };
@@ -62,11 +62,11 @@ class WindowMesher {
   WindowMesher(const stream::Store& store, WindowTinOptions options,
                const stream::MeshRounding& rounding);
 
-  /// The vertices on a side depend on the samples on it and next to it alone, so two windows that
-  /// share it have the same vertices there.
-  /// Throws: stream::Error on a damaged store, and where the rounded positions break the bound.
+  /// Meshes a window. The vertices on a side depend only on the samples on it and next to it, so
+  /// two windows that share it have the same vertices there. Throws: stream::Error on a damaged
+  /// store, and if rounded positions break the bound.
   WindowTin mesh(const LatticeWindow& window);
-  /// How many vertices it has, unchecked, and how long that took.
+  /// Returns the number of vertices, unchecked, and the time to compute it.
   WindowCount count(const LatticeWindow& window, tri::TinQuality quality);
 
  private:
@@ -76,7 +76,7 @@ class WindowMesher {
   Samples<T> read(const LatticeWindow& window);
   template <class T>
   WindowTin mesh_as(const LatticeWindow& window, tri::TinQuality quality, bool checked);
-  /// Whether a sample of the window lies in the region, if there is one.
+  /// Whether a sample of the window is in the region, if there is one.
   [[nodiscard]] bool in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
                                double height) const;
   /// In the CRS of the store.
@@ -84,14 +84,14 @@ class WindowMesher {
   void measure_as_read(WindowTin& tin,
                        const std::function<tri::GridTinCheck(std::span<const tri::Point3>,
                                                              double tolerance)>& measure) const;
-  /// Measures a sound mesh of the lattice where the file has it, and swaps edges where thin
-  /// triangles would be turned over there.
+  /// Measures a valid mesh of the lattice at its converted positions, and swaps edges of thin
+  /// triangles that would be inverted there.
   template <class T>
   void measure_moved(const Samples<T>& samples, WindowTin& tin) const;
   /// Throws: stream::Error.
   [[noreturn]] void fail(const WindowTin& tin, const std::string& cause,
                          const std::string& remedy) const;
-  /// Throws: stream::Error if a reader of the file would see more than the bound, or a hole.
+  /// Throws: stream::Error if a reader of the file would see an error beyond the bound, or a hole.
   void require_sound(const WindowTin& tin) const;
   void require_no_holes(const WindowTin& tin) const;
 
