@@ -134,7 +134,7 @@ TEST_F(TileLayerFile, AFolderWithoutTilesIsNotTakenForASetThatIsNotFinished) {
       check_tiles({.folder = folder});
       ADD_FAILURE() << "no error for " << folder;
     } catch (const stream::Error& error) {
-      EXPECT_EQ(error.parts().cause, "holds no set of tiles");
+      EXPECT_EQ(error.parts().cause, "contains no tile set");
     }
   }
 }

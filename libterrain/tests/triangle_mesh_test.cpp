@@ -99,8 +99,9 @@ TEST(MeshCoordinates, NotesNameTheRemedy) {
   const stream::Box3 south{{170, -45, 0}, {171, -44, 4000}}, globe{{-180, -90, 0}, {180, 90, 1}};
   EXPECT_NE(note("m.obj", units_of(4326, "degree"), south).find("`to_crs` EPSG:32759 for metres"),
             std::string::npos);
-  EXPECT_NE(note("m.glb", units_of(4326, "degree"), globe).find("`to_crs` EPSG:n, is truer"),
-            std::string::npos);
+  EXPECT_NE(
+      note("m.glb", units_of(4326, "degree"), globe).find("`to_crs` EPSG:n, is more accurate"),
+      std::string::npos);
   EXPECT_EQ(note("m.ply", units_of(32632, "metre"), {{0, 5e6, 0}, {1e5, 5.1e6, 0}}), "");
   EXPECT_EQ(note("m.ply", units_of(0, "foot", "foot"), south), "");
   EXPECT_NE(note("m.ply", units_of(0, "foot", "metre"), south).find("x and y are feet and heights"),

@@ -208,9 +208,9 @@ class VerifyTest(TileTestCase):
         shutil.copy(os.path.join(self.dir, '0/0/0.terrain'), os.path.join(stray, '7.terrain'))
         shutil.copy(os.path.join(self.dir, '0/0/0.terrain'), os.path.join(stray, '07.terrain'))
         open(os.path.join(stray, '.8.terrain.tmp'), 'w').close()
-        problems = self.found('/'.join(map(str, key)) + '.terrain: layer.json names this tile',
-                              '9/0/7.terrain: a tile that layer.json does not name',
-                              '9/0/07.terrain: a tile at a place',
+        problems = self.found('/'.join(map(str, key)) + '.terrain: layer.json lists this tile',
+                              '9/0/7.terrain: a tile that layer.json does not list',
+                              '9/0/07.terrain: its path does not name a tile',
                               also=('9/0/7.terrain: ',))
         self.assertGreaterEqual(len(problems), 3)
         # What a killed run was writing is beside the set.
@@ -243,7 +243,7 @@ class VerifyTest(TileTestCase):
             json.dump(layer, file)
         words = [p['what'] for p in self.verify('damaged')['problems']]
         self.assertTrue(any('claims 2,305,843,009,213,693,952 tiles' in word for word in words))
-        self.assertTrue(any('more tiles are named and not there' in word for word in words))
+        self.assertTrue(any('more listed tiles do not exist' in word for word in words))
         for key, value in (('bounds', [20, 46, 10, 47]), ('available', [[], []]),
                            ('available', [layer['available'][0] * 2] + layer['available'][1:10]),
                            ('extensions', [])):
@@ -272,7 +272,7 @@ class VerifyTest(TileTestCase):
         self.assertEqual(turned, 2)
         self.change(key, data)
         problems = self.found('not counter-clockwise', 'times the area',
-                              'two triangles on one side', also=('one triangle only',))
+                              'two triangles on one side', also=('only one triangle',))
         places = {p['what'].split()[0]: p['offset'] for p in problems}
         self.assertEqual(places['triangle'], first)
 
@@ -290,7 +290,7 @@ class VerifyTest(TileTestCase):
         u[vertex] -= 1
         self.change(key, self.columns(tile, u=u))
         self.found('list of vertices on the east side', 'vertices at other places',
-                   'times the area', 'one triangle only')
+                   'times the area', 'only one triangle')
 
     def test_shifted_heights(self):
         key = self.inner_tile()
@@ -325,7 +325,7 @@ class VerifyTest(TileTestCase):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         for at, code, value, text in (
-                (0, '<d', tile.centre[0] + 1e6, 'the centre lies outside'),
+                (0, '<d', tile.centre[0] + 1e6, 'the centre is outside'),
                 (24, '<f', tile.high + 1, 'lowest and highest'),
                 (28, '<f', tile.high + 900, 'differ by up to'),
                 (24, '<f', tile.low - 1, 'differ by up to'),

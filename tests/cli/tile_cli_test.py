@@ -304,7 +304,7 @@ class TileTest(TileTestCase):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('deep'), '--vertical',
                          'ellipsoidal', '--zoom', '10-10')
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('zoom 9 shows every sample', result.stderr)
+        self.assertIn('zoom 9 already shows every sample', result.stderr)
         self.assertEqual(self.verify('deep', '--store', self.stores['degrees'], '--vertical',
                                      'ellipsoidal')['problems'], [])
 
@@ -312,7 +312,7 @@ class TileTest(TileTestCase):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('tiny'), '--vertical',
                          'ellipsoidal', '--zoom', '9-9', '--max-error', '1e-6')
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('less than what the 15 bits', result.stderr)
+        self.assertIn('finer than the 15 bits', result.stderr)
         self.assertEqual(self.verify('tiny', '--store', self.stores['degrees'], '--vertical',
                                      'ellipsoidal')['problems'], [])
 

@@ -187,9 +187,10 @@ TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
       write_bounded_mesh(store, options(1.0, window), common(2));
       FAIL();
     } catch (const stream::Error& error) {
-      EXPECT_NE(error.parts().cause.find("3 places have several samples with heights that differ by "
-                                         "up to 12.5 m"),
-                std::string::npos)
+      EXPECT_NE(
+          error.parts().cause.find("3 places have several samples with heights that differ by "
+                                   "up to 12.5 m"),
+          std::string::npos)
           << error.what();
       EXPECT_NE(error.parts().remedy.find("`duplicates`"), std::string::npos);
     }

@@ -21,7 +21,7 @@ namespace {
 
 struct Piece {
   std::uint32_t line = 0, part = 0;
-  std::uint32_t begin = 0;  ///< of the vertices as they were read
+  std::uint32_t begin = 0;  ///< index of the first vertex in reading order
   std::uint8_t count = 0, dimensions = 0;
 };
 
@@ -30,7 +30,7 @@ constexpr std::size_t bytes_per_piece(std::size_t most_vertices) {
   return sizeof(Piece) + sizeof(LineSet::Line) + 2 * most_vertices * sizeof(stream::Point3);
 }
 
-/// Where the columns are that every line has.
+/// The offsets of the columns that every line has.
 struct LineColumns {
   std::size_t line, part, dimensions;
 
@@ -72,7 +72,7 @@ bool holds_lines(const stream::StoreSchema& schema) {
 
 LineSet detail_lines(const stream::Store& given, const Detail& detail, const Context& context) {
   const stream::Store store = given.with_stop(context.stop);
-  if (!holds_lines(store.schema())) throw UsageError(store.path().string() + " holds no lines");
+  if (!holds_lines(store.schema())) throw UsageError(store.path().string() + " contains no lines");
   const LineColumns columns(store);
   const bool segments = entities_of(store.schema()) == stream::Entities::segments;
   std::vector<Piece> pieces;
@@ -117,8 +117,9 @@ void write_geojson(const LineSet& lines, const stream::Crs& crs,
   constexpr std::size_t kAtOnce = std::size_t{1} << 20;
   const bool known = crs != stream::Crs{};
   if (known && crs.epsg == 0) {
-    throw UsageError("GeoJSON names where it lies by an EPSG code, which the CRS of these lines " +
-                     std::string("does not have; with `to_crs` EPSG:4326 it needs none"));
+    throw UsageError(
+        "GeoJSON names its CRS by an EPSG code, which the CRS of these lines does not have; pass "
+        "`to_crs` EPSG:4326, which needs none");
   }
   std::string text = std::string(kLinesHead) + geojson_crs_member(crs) + "\"features\":[";
   for (std::size_t i = 0; i < lines.lines.size(); ++i) {

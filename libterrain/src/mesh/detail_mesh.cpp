@@ -36,8 +36,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// A store from one cluster on, which stands where the root stands otherwise; its representative is
-/// its last member.
+/// A part of a store with a cluster in place of the root; the representative of the cluster is its
+/// last member.
 class ClusterTop final : public tri::ClusterSource {
  public:
   ClusterTop(const stream::Store& store, stream::ClusterId cluster)
@@ -66,11 +66,12 @@ class ClusterTop final : public tri::ClusterSource {
   stream::ClusterPoints points_;
 };
 
-/// Peak bytes per vertex: the triangulation and its bulk build, the model's bookkeeping, and the
-/// mesh that comes out (vertex, level, two triangles).
+/// Peak memory in bytes per vertex: the triangulation and its bulk construction, the model's
+/// bookkeeping, and the resulting mesh (vertex, level, two triangles).
 constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
 
-/// The box in stored coordinates around a box in the CRS. Heights are left free where `world` is.
+/// Returns the box in stored coordinates around a box in the CRS. Heights stay unbounded where
+/// `world` is.
 tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& world) {
   stream::Box3 stored;
   for (unsigned corner = 0; corner < 4; ++corner) {
@@ -81,7 +82,7 @@ tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& wor
   const stream::Channel& z = placement.coordinates[2];
   double low = (world.min[2] - z.offset) / z.scale, high = (world.max[2] - z.offset) / z.scale;
   if (low > high) std::swap(low, high);
-  // The division rounds: one part in 2^40 outward, so that no point at the border is lost.
+  // The division rounds, so move the box outward by one part in 2^40 to keep points on its border.
   const auto outward = [](double value, double sign) {
     return value + sign * (std::abs(value) * 0x1p-40 + 0x1p-40);
   };
@@ -89,7 +90,7 @@ tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& wor
           {outward(stored.max[0], 1), outward(stored.max[1], 1), outward(high, 1)}};
 }
 
-/// Triangles that reach out of a polygon have corners in the clusters beside it.
+/// Triangles that reach out of a polygon have corners in the clusters next to it.
 Detail with_margin(const stream::Store& store, Detail detail, const stream::Placement& placement) {
   const stream::Box3 all = world_box(placement, store.whole().bounds());
   const auto clusters =
@@ -118,10 +119,10 @@ tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement&
   return stored;
 }
 
-/// The triangles of a field of metrics.
+/// Memory in bytes for the triangles of a field of metrics.
 constexpr std::uint64_t kBytesToFlip = 120;
 
-/// Refuses what cannot fit.
+/// Throws: stream::Error if the mesh cannot fit in memory.
 void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
                   std::uint64_t more_per_vertex) {
   const std::uint64_t points = wanted_points(store, detail);
@@ -138,7 +139,7 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
                        .remedy = "take a coarser `level` or a smaller `region`"});
 }
 
-/// The metric in the coordinates of the triangulation.
+/// Returns the metric in the coordinates of the triangulation.
 tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& store,
                            const stream::Placement& placement) {
   const std::array<double, 6>& m = placement.world.xy;
@@ -159,7 +160,8 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
         box.max[axis] = around.max[axis] = stored.max[axis];
       }
     }
-    // From stored coordinates to the ground, then by the ellipse to the unit circle.
+    // Composes the map from stored coordinates to the ground with the ellipse's map to the unit
+    // circle.
     const GroundMap on_ground = ground.map(around);
     const cluster::LinearMap& ellipse = region.metric.map();
     std::array<double, 9> map{};
@@ -175,7 +177,7 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
   return tri::MetricField2(std::move(regions));
 }
 
-/// The clusters of a raster that a mesh of this detail does not open.
+/// The clusters of a raster that stay collapsed in a mesh of this detail.
 class CollapsedClusters {
  public:
   CollapsedClusters(const stream::Store& store, const Detail& detail) {
@@ -199,8 +201,8 @@ class CollapsedClusters {
         });
     boxes_.build();
   }
-  /// An item and its share of the tree for each vertex that heads a cluster: all but those of level
-  /// 0, of which clusters have ten and more.
+  /// Memory for an item and its share of the tree for each vertex that heads a cluster: all but
+  /// those of level 0, which are at least nine in ten.
   [[nodiscard]] static std::uint64_t bytes_per_vertex(const Detail& detail) {
     constexpr std::uint64_t kBytes = 2 * sizeof(BoxTree::Item);
     return detail.finest() == 0 ? kBytes / 10 : kBytes;
@@ -218,7 +220,8 @@ class CollapsedClusters {
   BoxTree boxes_;
 };
 
-/// `heights`: by slot in real units; empty: the model's. collapsed: null if there are no gaps.
+/// `heights`: by vertex slot in real units; empty: the model's. collapsed: null if there are no
+/// gaps.
 template <class Model>
 TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placement,
                            const std::optional<Region>& region, const std::vector<double>& heights,
@@ -251,10 +254,10 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
     mesh.positions.reserve(triangulation.vertex_count());
     mesh.levels.reserve(triangulation.vertex_count());
     mesh.triangles.reserve(triangulation.triangle_count());
-    // Points without a triangle (fewer than three, or all on one line) are written all the same.
+    // Points without a triangle (fewer than three, or all collinear) are written nevertheless.
     for (const tri::VertexId v : triangulation.all_vertices()) number_of(v);
   }
-  // The rule for gaps is one for Delaunay triangles, so it comes before the metric.
+  // The rule for gaps holds for Delaunay triangles, so apply it before the metric.
   const auto has_data = [&](tri::TriangleId t) {
     const auto corners = triangulation.vertices(t);
     const auto place = [&](std::size_t i) { return triangulation.point(corners[i]); };
@@ -320,7 +323,7 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
 /// Three corners, their places in order, and the mesh.
 constexpr std::size_t kBytesPerTriangle = 3 * (24 + 4 + 4 + 24) + 12;
 
-/// Makes one vertex of corners that are equal to the last bit, numbered as they first appear.
+/// Merges corners that are equal to the last bit into one vertex, numbered by first appearance.
 TriangleMesh welded(std::vector<stream::Point3> corners) {
   const auto bits = [&](std::uint32_t i) {
     return std::bit_cast<std::array<std::uint64_t, 3>>(corners[i]);
@@ -331,7 +334,7 @@ TriangleMesh welded(std::vector<stream::Point3> corners) {
     const auto x = bits(a), y = bits(b);
     return x < y || (x == y && a < b);
   });
-  std::vector<std::uint32_t> first(corners.size());  // the first corner that is equal to each
+  std::vector<std::uint32_t> first(corners.size());  // the first corner equal to each corner
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool same = i > 0 && bits(order[i]) == bits(order[i - 1]);
     first[order[i]] = same ? first[order[i - 1]] : order[i];
@@ -339,7 +342,7 @@ TriangleMesh welded(std::vector<stream::Point3> corners) {
   order = {};
 
   TriangleMesh mesh;
-  std::vector<std::uint32_t>& number = first;  // in place: each refers to itself or further back
+  std::vector<std::uint32_t>& number = first;  // in place: each refers to itself or an earlier one
   for (std::uint32_t i = 0; i < corners.size(); ++i) {
     if (first[i] == i) {
       number[i] = static_cast<std::uint32_t>(mesh.positions.size());
@@ -355,8 +358,8 @@ TriangleMesh welded(std::vector<stream::Point3> corners) {
   return mesh;
 }
 
-/// detail_mesh() of a store of triangles. Throws: stream::Error on a damaged store, or when the
-/// triangles would not fit into memory_bytes, saying what they need.
+/// Implements detail_mesh() for a store of triangles. Throws: stream::Error on a damaged store, or
+/// if the triangles do not fit in memory_bytes (the message says how much they need).
 TriangleMesh detail_triangles(const stream::Store& store, const Detail& detail,
                               std::uint64_t memory_bytes) {
   std::vector<stream::Point3> corners;
@@ -379,8 +382,8 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   if (entities_of(store.schema()) == stream::Entities::triangles) {
     if (kind != MetricChoice::Kind::euclidean || options.heights.any()) {
       throw UsageError(
-          "the triangles of a store come as they were read: without `metric`, smoothing "
-          "and overlays");
+          "triangles of a store are written as they were read: leave out `metric`, "
+          "smoothing and overlays");
     }
     return detail_triangles(store, detail, context.memory_or(0));
   }
@@ -389,7 +392,7 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
                      options.metric.text);
   }
   if (detail.cluster && options.heights.any()) {
-    throw UsageError("`cluster`: without smoothing and overlays");
+    throw UsageError("`cluster` excludes smoothing and overlays");
   }
   const Detail wide = with_margin(store, detail, store.schema());
   check_memory(store, wide, context.memory_or(0),
@@ -407,7 +410,7 @@ TriangleMesh detail_points(const stream::Store& store, const Detail& detail) {
   TriangleMesh cloud;
   stream::PointBlock block;
   stream::Schema columns = store.schema();
-  // Levels are the store's, and numbers of points those of the file that it was built from.
+  // Levels come from the store here, and numbers of points refer to the original file.
   for (stream::Channel& attribute : columns.attributes) {
     if (attribute.name == "level" || attribute.name == "representative") attribute.name.clear();
   }
@@ -459,11 +462,11 @@ stream::Overlay open_height_overlay(const std::string& path, const stream::Store
   stream::Overlay overlay = stream::Overlay::open(path, store);
   const std::string& heights = store.schema().coordinates[2].name;
   if (overlay.channel() != heights) {
-    throw stream::Error({.file = path,
-                         .where = {},
-                         .cause = "has other values of '" + overlay.channel() +
-                                  "', not of the heights '" + heights + "'",
-                         .remedy = "name an overlay that terrace mesh has written"});
+    throw stream::Error(
+        {.file = path,
+         .where = {},
+         .cause = "has values of '" + overlay.channel() + "', not of the heights '" + heights + "'",
+         .remedy = "name an overlay written by terrace mesh"});
   }
   return overlay;
 }

@@ -10,19 +10,19 @@
 namespace terrace::terrain {
 namespace {
 
-/// The wanted points of some clusters, on their way to a file.
+/// The wanted points of some clusters, encoded for a file.
 class WrittenPart final : public WantedPart {
  public:
-  /// What all parts have in common.
+  /// The data that all parts share.
   struct Job {
     const stream::Store& store;
     WantedPoints wanted;
     const PlaceConversion& places;
     stream::PointWriter& writer;
     const Context& context;
-    stream::Overlay* overlay = nullptr;      ///< for one thread
-    std::uint64_t replaced = 0;              ///< heights from the overlay
-    std::vector<stream::PointBlock> blocks;  ///< memory of each thread
+    stream::Overlay* overlay = nullptr;      ///< requires a single thread
+    std::uint64_t replaced = 0;              ///< number of heights from the overlay
+    std::vector<stream::PointBlock> blocks;  ///< reused by each thread
   };
 
   WrittenPart(Job& job, unsigned worker) : job_(job), block_(job.blocks[worker]) { block_.clear(); }
@@ -57,7 +57,7 @@ class WrittenPart final : public WantedPart {
 
  private:
   Job& job_;
-  stream::PointBlock& block_;  ///< of this part until end()
+  stream::PointBlock& block_;  ///< used until end()
   stream::PointWriter::EncodedPtr encoded_;
 };
 

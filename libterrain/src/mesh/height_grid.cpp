@@ -56,7 +56,7 @@ TriangleMesh HeightGrid::mesh() const {
   const auto filled = sums_.size() - static_cast<std::size_t>(std::ranges::count(counts_, 0U));
   mesh.positions.reserve(filled);
   mesh.triangles.reserve(2 * filled);
-  // The place of an averaged square is its middle.
+  // An averaged square is placed at its centre.
   const double shift = 0.5 * static_cast<double>(reduction_ - 1);
   for (std::uint64_t row = 0; row < rows_; ++row) {
     for (std::uint64_t column = 0; column < columns_; ++column) {
@@ -71,7 +71,7 @@ TriangleMesh HeightGrid::mesh() const {
   for (std::uint64_t row = 0; row + 1 < rows_; ++row) {
     for (std::uint64_t column = 0; column + 1 < columns_; ++column) {
       const std::size_t place = row * columns_ + column;
-      // Around the square; leaving out any corner leaves one triangle.
+      // Around the square; omitting any one corner leaves one triangle.
       const std::array<std::uint32_t, 4> around{
           vertex[place], vertex[place + 1], vertex[place + columns_ + 1], vertex[place + columns_]};
       const auto missing = std::count(around.begin(), around.end(), kNone);

@@ -12,24 +12,24 @@
 
 namespace terrace::terrain {
 
-/// The cells of a raster, squares of them averaged into one: a mesh of a raster of any size in
-/// little memory, for pictures.
+/// A raster with squares of cells averaged into one: a mesh of a raster of any size in little
+/// memory, for pictures.
 class HeightGrid {
  public:
-  /// The smallest reduction with which columns x rows are at most `most_cells`.
+  /// Uses the smallest reduction that leaves at most `most_cells` of columns x rows cells.
   HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells);
 
-  /// Adds a cell: stored coordinates (column, row, raw sample). Order does not matter. Cells
-  /// outside are ignored.
+  /// Adds a cell in stored coordinates (column, row, raw sample), in any order. Ignores cells
+  /// outside.
   void add(const stream::Point3& cell);
 
-  /// How many cells of that are left.
+  /// Returns the number of cells after the reduction.
   static std::uint64_t cells(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells);
 
   [[nodiscard]] std::uint64_t reduction() const { return reduction_; }
 
-  /// Two triangles per square of four cells with data, three cells one. Positions are stored
-  /// coordinates.
+  /// Returns a mesh with two triangles for a square of four cells with data, and one for three
+  /// cells. Positions are stored coordinates.
   [[nodiscard]] TriangleMesh mesh() const;
 
  private:
@@ -40,7 +40,7 @@ class HeightGrid {
   std::vector<std::uint32_t> counts_;
 };
 
-/// The same of all cells of a raster's store. Throws: stream::Error, stream::Stopped, what
+/// Returns this mesh of all cells of a raster store. Throws: stream::Error, stream::Stopped, what
 /// context.progress throws.
 TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
                             const Context& context);

@@ -14,8 +14,8 @@
 
 namespace terrace::terrain {
 
-/// The triangulation of those points of a view that are in the wanted clusters and meet its
-/// condition, read like a tri::Multiresolution2, which has all points of its clusters.
+/// The triangulation of the points in wanted clusters that meet a view's condition. Has the
+/// interface of a tri::Multiresolution2, which would contain all points of its clusters.
 template <class Coord>
 class MatchingPoints {
  public:
@@ -38,7 +38,7 @@ class MatchingPoints {
     const std::vector<tri::VertexId> vertices = triangulation_.build(places);
     triangulation_.set_check_stop({});
     vertices_.resize(triangulation_.vertex_slots());
-    // The first of several points at one place stands for them, so it comes last.
+    // In reverse, so that the first of several points at one place wins.
     for (std::size_t i = points.size(); i-- > 0;) vertices_[tri::slot(vertices[i])] = points[i];
   }
 
@@ -56,7 +56,7 @@ class MatchingPoints {
   };
 
   tri::Delaunay2<Coord> triangulation_;
-  std::vector<Vertex> vertices_;  ///< by slot
+  std::vector<Vertex> vertices_;  ///< by vertex slot
 };
 
 }  // namespace terrace::terrain

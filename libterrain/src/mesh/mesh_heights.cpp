@@ -9,7 +9,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// A vertex by the name of its point.
+/// A vertex with the id of its point.
 struct Named {
   tri::PointId point;
   tri::VertexId vertex = tri::kNoVertex;
@@ -19,7 +19,7 @@ stream::ClusterId stored_id(tri::ClusterId id) {
   return stream::cluster_id(tri::level_of(id), tri::ordinal_of(id));
 }
 
-/// All vertices in the order of overlays.
+/// Returns all vertices in the order of overlays.
 template <class Model>
 std::vector<Named> by_point(const Model& model) {
   std::vector<Named> named;
@@ -32,7 +32,7 @@ std::vector<Named> by_point(const Model& model) {
   return named;
 }
 
-/// Calls change(vertex, value) for the vertices that the overlay has.
+/// Calls change(vertex, value) for the vertices in the overlay.
 template <class Change>
 void apply_changes(stream::Overlay& overlay, const std::vector<Named>& vertices, Change&& change) {
   std::span<const stream::OverlayValue> values;
@@ -50,7 +50,7 @@ void apply_changes(stream::Overlay& overlay, const std::vector<Named>& vertices,
   }
 }
 
-/// The root mean square of the height differences along all edges.
+/// Returns the root mean square of the height differences along all edges.
 template <class Coord>
 double rms_step(const tri::Delaunay2<Coord>& triangulation, const std::vector<double>& heights) {
   double sum = 0.0, edges = 0.0;
@@ -65,7 +65,7 @@ double rms_step(const tri::Delaunay2<Coord>& triangulation, const std::vector<do
   return edges > 0.0 ? std::sqrt(sum / edges) : 0.0;
 }
 
-/// Heights of the store, before and after the change.
+/// Returns the smoothed heights, in stored units like the given ones.
 template <class Model>
 std::vector<tri::HeightChange> smoothed(const Model& model, const stream::Placement& placement,
                                         const std::optional<Region>& region,
@@ -85,7 +85,7 @@ std::vector<tri::HeightChange> smoothed(const Model& model, const stream::Placem
     }
   }
   if (options.edge_height == 0.0) options.edge_height = 4.0 * rms_step(triangulation, heights);
-  // Without any step there is nothing to smooth.
+  // Without height differences there is nothing to smooth.
   if (options.edge_height == 0.0) return {};
   return tri::smooth(triangulation, heights, inside, options);
 }
@@ -94,7 +94,7 @@ std::vector<tri::HeightChange> smoothed(const Model& model, const stream::Placem
 
 std::uint64_t height_bytes_per_vertex(const HeightOptions& options) {
   std::uint64_t bytes = options.any() ? 8 : 0;
-  // Heights of two steps, what changed, the vertices, and 16 bytes per edge end.
+  // Heights of two steps, the changes, the vertices, and 16 bytes per edge end.
   if (options.smoothing) bytes += 3 * 8 + 16 + 4 + 6 * 16;
   if (options.overlay != nullptr || options.save != nullptr) bytes += sizeof(Named);
   return bytes;
@@ -106,7 +106,8 @@ std::vector<double> changed_heights(const Model& model, const stream::Placement&
                                     const HeightOptions& options) {
   const auto& triangulation = model.triangulation();
   const stream::Channel& z = placement.coordinates[2];
-  // As in world_point(): heights that an overlay does not change stay the same to the last bit.
+  // As in world_point(), so that heights that an overlay does not change stay the same to the last
+  // bit.
   const auto real = [&](double height) { return height * z.scale + z.offset; };
   std::vector<double> heights(triangulation.vertex_slots(), 0.0);
   for (const tri::VertexId v : triangulation.all_vertices()) {

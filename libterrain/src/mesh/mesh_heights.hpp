@@ -13,13 +13,13 @@
 
 namespace terrace::terrain {
 
-/// Peak bytes per vertex that changing heights takes, beside the mesh.
+/// Peak memory in bytes per vertex for changing heights, in addition to the mesh.
 std::uint64_t height_bytes_per_vertex(const HeightOptions& options);
 
-/// The heights in real units by the slot of the vertex. Of points with equal x and y only the one
-/// that stands for the vertex counts. Model: tri::Multiresolution2 or MatchingPoints. Throws:
-/// stream::Error on a damaged overlay, or where it cannot be written; std::invalid_argument where
-/// smoothing leaves the range of doubles.
+/// Returns the heights in real units by vertex slot. Of points with equal x and y, only the one
+/// that represents the vertex is used. Model: tri::Multiresolution2 or MatchingPoints. Throws:
+/// stream::Error on a damaged overlay, or if one cannot be written; std::invalid_argument if
+/// smoothing exceeds the range of doubles.
 template <class Model>
 std::vector<double> changed_heights(const Model& model, const stream::Placement& placement,
                                     const std::optional<Region>& region,

@@ -17,13 +17,13 @@
 namespace terrace::terrain {
 namespace {
 
-/// Peak bytes per point: tetrahedra and their vertices, the shape, positions in the CRS and on the
-/// ground, and the surface.
+/// Peak memory in bytes per point: tetrahedra and their vertices, the shape, positions in the CRS
+/// and on the ground, and the surface.
 constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
-/// The tetrahedra in another order, spheres and statements of the poles rule, in place of the
+/// For the poles rule: the tetrahedra in another order, spheres and their labels, instead of the
 /// surface.
 constexpr std::uint64_t kPolesBytesPerPoint = 660;
-/// What the program and the reading of the store take.
+/// Memory of the program and for reading the store.
 constexpr std::uint64_t kSurfaceBytesBeside = std::uint64_t{48} << 20;
 
 void check_surface_memory(const stream::Store& store, const Detail& detail,
@@ -36,15 +36,15 @@ void check_surface_memory(const stream::Store& store, const Detail& detail,
                        .cause = "a surface of " + counted(points, "point") + " needs " +
                                 readable_bytes(needed) + ", `memory_bytes` allows " +
                                 readable_bytes(memory_bytes),
-                       .remedy = "take a coarser `level` or a smaller `region`"});
+                       .remedy = "choose a coarser `level` or a smaller `region`"});
 }
 
-/// Metres about the middle of the positions.
+/// Returns metres about the middle of the positions.
 std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positions,
                                       const stream::StoreSchema& schema) {
   stream::Box3 box;
   for (const stream::Point3& p : positions) box.include(p);
-  // The positions are in the CRS already.
+  // The positions are already in the CRS.
   stream::Placement placement = schema;
   placement.world = {};
   for (stream::Channel& channel : placement.coordinates) channel.scale = 1, channel.offset = 0;
@@ -61,7 +61,7 @@ std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positio
   return ground;
 }
 
-/// Back from metres about the middle of `positions` to the CRS.
+/// Converts back from metres about the middle of `positions` to the CRS.
 std::vector<stream::Point3> from_ground(const std::vector<tri::Point3>& ground,
                                         const std::vector<stream::Point3>& positions,
                                         const stream::StoreSchema& schema) {
@@ -84,8 +84,8 @@ std::vector<stream::Point3> from_ground(const std::vector<tri::Point3>& ground,
   return places;
 }
 
-/// See ScanSurface::spanned. What is off a line or a plane by less than 1e-12 of its length is so
-/// by rounding.
+/// See ScanSurface::spanned. A distance from a line or a plane of less than 1e-12 of its length is
+/// rounding.
 unsigned dimensions_of(const std::vector<stream::Point3>& points) {
   const auto between = [](const stream::Point3& a, const stream::Point3& b) {
     return stream::Point3{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
@@ -136,7 +136,7 @@ void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::Resto
   out.measures = tri::measure(surface.surface);
   set_parts(shape.parts(triangulation, surface), out);
   out.samples_off = triangulation.vertex_count() - surface.vertices.size();
-  // The first of several equal points stands for all.
+  // The first of several equal points represents them all.
   constexpr auto kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> number(triangulation.vertex_slots(), kUnused);
   for (std::size_t i = 0; i < vertices.size(); ++i) {

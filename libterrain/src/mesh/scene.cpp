@@ -68,7 +68,7 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   for (std::size_t i = 0; i < areas.size(); ++i) {
     const auto& t = mesh.triangles[i];
     const double after = before + areas[i];
-    // Places that fill a triangle evenly (M. Roberts's sequence of two dimensions).
+    // Distributes places evenly in a triangle (M. Roberts's sequence in two dimensions).
     for (std::size_t k = shown.size(); (static_cast<double>(k) + 0.5) * each < after; ++k) {
       double u = std::fmod(static_cast<double>(k) * 0.7548776662466927, 1.0);
       double v = std::fmod(static_cast<double>(k) * 0.5698402909980532, 1.0);
@@ -83,11 +83,10 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   return shown;
 }
 
-/// By cells of space with points: of the surface that the points lie on, about four in each where
-/// they are fewest.
+/// Samples by cells of space with points; where points are fewest, a cell has about four.
 std::vector<double> heights_by_cells(const TriangleMesh& cloud,
                                      const std::vector<double>& heights) {
-  constexpr double kMostCells = 64;  // on a side
+  constexpr double kMostCells = 64;  // along a side
   std::array<std::size_t, 256> groups{};
   for (const std::uint8_t left_out : cloud.left_out) ++groups[left_out];
   const std::size_t coarsest =

@@ -21,7 +21,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The number of the first attribute with one of these names.
+/// Returns the index of the first attribute with one of these names.
 std::optional<std::size_t> attribute(const stream::Schema& schema,
                                      std::initializer_list<const char*> names) {
   for (std::size_t i = 0; i < schema.attributes.size(); ++i) {
@@ -38,7 +38,7 @@ T clamped(double value) {
   return static_cast<T>(std::isnan(value) ? 0 : std::clamp(value, low, high));
 }
 
-/// The projection that suits a place of longitude and latitude in degrees.
+/// Returns a suitable projection for a place of longitude and latitude in degrees.
 std::string projection_at(double longitude, double latitude) {
   if (latitude > 84) return "EPSG:5041";
   if (latitude < -80) return "EPSG:5042";
@@ -47,7 +47,7 @@ std::string projection_at(double longitude, double latitude) {
   return "EPSG:" + std::to_string((latitude < 0 ? 32700 : 32600) + static_cast<int>(zone));
 }
 
-/// As mesh_coordinates() has them, and as the note describes them.
+/// The facts that mesh_coordinates() and the note are based on.
 struct Coordinates {
   Coordinates(const MeshUnits& units, const stream::Box3& bounds) : crs(units.crs) {
     stream::Placement placement;
@@ -64,15 +64,15 @@ struct Coordinates {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       middle[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
     }
-    // Without a place it is that of the unit alone.
+    // Without a place, this is the unit alone.
     const GroundMap unit = ground.map({}), there = ground.map(bounds);
     metres = {unit[0], unit[4], unit[8]};
     width = bounds.max[0] - bounds.min[0];
-    // Maps stretch lengths by a few percent where they are used.
+    // In their areas of use, maps stretch lengths by a few percent.
     constexpr double kStretched = 0.1;
     const double east = there[0] / unit[0], north = there[4] / unit[4];
     const bool stretched = std::abs(east - 1) > kStretched || std::abs(north - 1) > kStretched;
-    // Nor does a map that is far from its centre keep right angles.
+    // Far from its centre a map does not preserve right angles either.
     const bool straight = std::abs(there[1]) <= kStretched * std::min(there[0], there[4]);
     degrees = !ground.same_everywhere() && !ground.projected() && north > 10000;  // metres
     // Numbers beyond the poles are not latitudes.
@@ -101,7 +101,7 @@ struct Coordinates {
     return degrees ? "degrees" : metres[0] == 1 ? "metres" : "feet";
   }
   [[nodiscard]] std::string projection() const {
-    // In degrees, not grads, and not so wide that it stretches lengths itself.
+    // In degrees, not grads, and narrow enough that the projection does not stretch lengths itself.
     const bool common = metres[1] > 1.05e5 && metres[1] < 1.2e5 && width < 12;
     return degrees && common ? " " + projection_at(middle[0], middle[1]) : " EPSG:n";
   }
@@ -113,7 +113,7 @@ struct Coordinates {
   std::string height_unit;
   bool known = false;  ///< of x and y
   bool local = false, degrees = false;
-  double widest_error = 0;  ///< of lengths from west to east, as a share
+  double widest_error = 0;  ///< relative error of lengths from west to east
 };
 
 std::string note_in_metres(const Coordinates& here) {
@@ -135,10 +135,10 @@ std::string note_in_metres(const Coordinates& here) {
                      readable_number(here.middle[0], 10) + ", " +
                      readable_number(here.middle[1], 10) + name;
   if (here.widest_error >= 0.001) {
-    note += "; lengths from west to east are true there and off by up to " +
+    note += "; lengths from west to east are exact there and off by up to " +
             readable_number(100 * here.widest_error, 2) + " % at the border";
     if (here.widest_error >= 0.01) {
-      note += " (a projection, as `to_crs`" + here.projection() + ", is truer)";
+      note += " (a projection, as `to_crs`" + here.projection() + ", is more accurate)";
     }
   }
   return note + here.heights_too() + "; asset.extras says how to get the coordinates back";
@@ -154,7 +154,7 @@ std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
                                : "metres of a map that stretches lengths to " +
                                      readable_number(1 / here.metres[0]) + " times";
   return "x and y are " + what + " and heights " + plural_unit(heights) +
-         ", which most programs take for one unit; pass `to_crs`" + here.projection() +
+         ", which most programs read as one unit; pass `to_crs`" + here.projection() +
          " for metres, or write GLB, which is in metres";
 }
 
@@ -164,7 +164,7 @@ MeshUnits::MeshUnits(const stream::Store& store, const PlaceConversion& places)
     : crs(store.schema().crs), height_unit(store.schema().coordinates[2].unit) {
   const std::optional<stream::Crs> other = places.crs();
   if (!other) return;
-  // Heights stay as they are, in whatever unit they have next to the store's own x and y.
+  // Heights do not change; they keep the unit that they have with the store's own x and y.
   height_unit = Ground(store.schema()).height_unit();
   const stream::Crs own = std::exchange(crs, *other);
   crs.vertical_epsg = own.vertical_epsg;
@@ -207,7 +207,7 @@ void append_points(TriangleMesh& mesh, const stream::Schema& schema,
     };
     if (red && green && blue) {
       const auto share = [&](std::size_t column) {
-        // The type tells 16-bit colours apart; floats range from 0 to 255.
+        // The type identifies 16-bit colours; floats range from 0 to 255.
         const bool wide = schema.attributes[column].type == stream::ScalarType::u16;
         return clamped<std::uint16_t>(wide ? value(column) : value(column) * 257);
       };
@@ -218,7 +218,7 @@ void append_points(TriangleMesh& mesh, const stream::Schema& schema,
                               static_cast<float>(value(*nz))});
     }
     if (group) mesh.classes.push_back(clamped<std::int32_t>(value(*group)));
-    // The column holds the number of the point that represents this one's cluster.
+    // The column contains the number of the point that represents this point's cluster.
     if (representative && value(*representative) == static_cast<double>(before + i)) {
       mesh.representatives.push_back(static_cast<std::uint32_t>(before + i));
     }

@@ -12,7 +12,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Legacy VTK files are big-endian.
+/// Appends a value in big-endian order, as legacy VTK files require.
 template <class T>
 void append(std::string& bytes, T value) {
   char raw[sizeof value];

@@ -11,8 +11,9 @@
 
 namespace terrace::terrain {
 
-/// Writes tetrahedra as a legacy VTK file, binary, an unstructured grid with a "level" per point.
-/// The file appears whole. levels: as many as positions. Throws: stream::Error, stream::Stopped.
+/// Writes tetrahedra as a binary legacy VTK file: an unstructured grid with a "level" per point.
+/// The file is either complete or absent. levels: one per position. Throws: stream::Error,
+/// stream::Stopped.
 void write_vtk(const std::string& path, std::span<const stream::Point3> positions,
                std::span<const std::uint8_t> levels,
                std::span<const std::array<std::uint32_t, 4>> tetrahedra,

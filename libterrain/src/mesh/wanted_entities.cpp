@@ -20,7 +20,7 @@ void for_each_wanted_entity(
   const stream::StoreSchema& schema = store.schema();
   const stream::Entities entities = entities_of(schema);
   const CornerReader read(schema, entities, store.path().string());
-  // Numbers of corners are 32 bits wide.
+  // Numbers of corners have 32 bits.
   const std::uint64_t most = std::min<std::uint64_t>(
       memory_bytes / bytes_each, std::numeric_limits<std::uint32_t>::max() / read.most() - 1);
   const std::size_t record_bytes = schema.payload_size();
@@ -33,11 +33,11 @@ void for_each_wanted_entity(
         if (visited++ >= most) {
           throw stream::Error({.file = store.path().string(),
                                .where = {},
-                               .cause = "more than the " + std::to_string(most) + " " +
-                                        std::string(stream::name_of(entities)) +
+                               .cause = "the detail wants more than the " + std::to_string(most) +
+                                        " " + std::string(stream::name_of(entities)) +
                                         " that fit into `memory_bytes` " +
-                                        std::to_string(memory_bytes >> 20) + "M are wanted",
-                               .remedy = "take a coarser `level` or a smaller `region`"});
+                                        std::to_string(memory_bytes >> 20) + "M",
+                               .remedy = "choose a coarser `level` or a smaller `region`"});
         }
         const auto record = std::span(points.payload).subspan(i * record_bytes, record_bytes);
         corners[0] = points.positions[i];

@@ -12,10 +12,11 @@
 
 namespace terrace::terrain {
 
-/// Visits the entities of a store that `detail` wants, clusters in the order of for_each_wanted():
-/// the record of each, and its corners in the CRS, bit for bit where the store's coordinates are
-/// the CRS's. The first corner is the place of an entity. Throws: stream::Error on a damaged store,
-/// and when there are more than fit into memory_bytes at bytes_each.
+/// Visits the entities of a store that `detail` wants, clusters in the order of for_each_wanted().
+/// Passes the record of each entity and its corners in the CRS, bit for bit if the store's
+/// coordinates are those of the CRS. An entity is located at its first corner. Throws:
+/// stream::Error on a damaged store, and if there are more entities than fit in memory_bytes at
+/// bytes_each.
 void for_each_wanted_entity(
     const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
     std::size_t bytes_each,

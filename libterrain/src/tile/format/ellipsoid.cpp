@@ -16,14 +16,14 @@ stream::Point3 scaled(const stream::Point3& p) {
   return {p[0] / kEquatorialRadius, p[1] / kEquatorialRadius, p[2] / kPolarRadius};
 }
 
-// Where no point on the line will do, this many radii out.
+// Used if no point on the line qualifies: this many radii out.
 constexpr double kNeverHidden = 1e6;
 
-// How far out along `direction` the point must lie for one point, in radii.
+// Returns how far out along `direction` the occlusion point of one point is, in radii.
 double magnitude(const stream::Point3& direction, const stream::Point3& point) {
   const stream::Point3 p = scaled(point);
   const double square = dot(p, p);
-  // A point below the ellipsoid is taken as lying on it: it is hidden earlier.
+  // A point below the ellipsoid is moved onto it, where it is hidden earlier.
   const double length = std::sqrt(std::max(1.0, square));
   const double cos_alpha = std::min(1.0, dot(direction, p) / std::sqrt(square));
   const double sin_alpha = std::sqrt(std::max(0.0, 1.0 - cos_alpha * cos_alpha));

@@ -18,7 +18,7 @@ float from_byte(std::uint8_t code) { return static_cast<float>(code) / 255.0F * 
 
 }  // namespace
 
-// The octahedron |x| + |y| + |z| = 1 seen from +z, its lower half folded out over the corners.
+// The octahedron |x| + |y| + |z| = 1 seen from +z, with its lower half folded out over the corners.
 std::array<std::uint8_t, 2> oct_encode(const std::array<float, 3>& direction) {
   const float sum = std::abs(direction[0]) + std::abs(direction[1]) + std::abs(direction[2]);
   float x = direction[0] / sum, y = direction[1] / sum;

@@ -4,15 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 
-/// What the writer and the reader of tiles must agree on.
+/// Constants that the writer and the reader of tiles share.
 
 namespace terrace::terrain {
 
 enum class TileExtension : std::uint8_t { oct_normals = 1, water_mask = 2, metadata = 4 };
 
-/// With more vertices, indices have 32 bits.
+/// With more vertices than this, indices have 32 bits.
 inline constexpr std::size_t kMostShortVertices = 65536;
-/// Cells of a water mask that is not uniform.
+/// Number of cells in a water mask that is not uniform.
 inline constexpr std::size_t kWaterCells = std::size_t{256} * 256;
 
 }  // namespace terrace::terrain

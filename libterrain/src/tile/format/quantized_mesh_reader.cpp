@@ -22,9 +22,9 @@ class Reader {
     throw stream::Error({.file = name_,
                          .where = "byte " + std::to_string(at_),
                          .cause = what,
-                         .remedy = "the tile is damaged: make it anew"});
+                         .remedy = "the tile is damaged: make it again"});
   }
-  // Before anything is allocated for it.
+  // Call before allocating memory for the values.
   void need(std::uint64_t count, std::size_t size, const char* what) const {
     if (count > left() / size) {
       fail(std::to_string(count) + " " + what + " of " + counted(size, "byte") + ", but only " +
@@ -120,7 +120,7 @@ void read_extension(Reader& in, TileMesh& mesh) {
   in.need(length, 1, "bytes of an extension");
   switch (static_cast<TileExtension>(id)) {
     case TileExtension::oct_normals:
-      if (!mesh.normals.empty()) in.fail("normals a second time");
+      if (!mesh.normals.empty()) in.fail("duplicate normals");
       if (length != 2 * mesh.size()) in.fail("normals for another number of vertices");
       for (std::size_t i = 0; i < mesh.size(); ++i) {
         const auto code = in.get<std::array<std::uint8_t, 2>>("normal");
@@ -128,9 +128,9 @@ void read_extension(Reader& in, TileMesh& mesh) {
       }
       return;
     case TileExtension::water_mask:
-      if (!mesh.water.empty()) in.fail("a water mask a second time");
+      if (!mesh.water.empty()) in.fail("duplicate water mask");
       if (length != 1 && length != kWaterCells)
-        in.fail("a water mask of neither 1 nor 65536 bytes");
+        in.fail("a water mask that has neither 1 nor 65536 bytes");
       for (std::size_t i = 0; i < length; ++i) {
         mesh.water.push_back(in.get<std::uint8_t>("water mask"));
       }
@@ -138,14 +138,14 @@ void read_extension(Reader& in, TileMesh& mesh) {
     case TileExtension::metadata: {
       const auto size = in.get<std::uint32_t>("length of the metadata");
       if (length < sizeof(size) || size != length - sizeof(size)) {
-        in.fail("metadata of a length that its extension does not have");
+        in.fail("metadata and its extension have different lengths");
       }
       const auto text = in.take(size);
       mesh.metadata.assign(reinterpret_cast<const char*>(text.data()), text.size());
       return;
     }
     default:
-      // Readers skip what they do not know.
+      // Readers skip unknown extensions.
       in.take(length);
   }
 }

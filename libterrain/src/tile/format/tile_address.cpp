@@ -13,12 +13,12 @@
 namespace terrace::terrain {
 namespace {
 
-// The last tile along an axis that begins before `place` (counted in tiles from the first).
+// Returns the last tile along an axis that begins before `place` (in tiles from the first).
 std::uint32_t clamp_index(double place, std::uint32_t count) {
   return static_cast<std::uint32_t>(std::clamp(place, 0.0, static_cast<double>(count - 1)));
 }
 
-// First and last index of the tiles between two places on an axis.
+// Returns the first and last index of the tiles between two places on an axis.
 std::pair<std::uint32_t, std::uint32_t> span_of(double from, double to, std::uint32_t count) {
   const double first = std::floor(from);
   const double last = std::max(first, std::ceil(to) - 1.0);
@@ -51,8 +51,8 @@ std::optional<TileAddress> parse_tile_path(const std::string& path) {
 }
 
 GeographicBox box_of(const TileAddress& tile) {
-  // 180 / 2^zoom has few bits, so that products with the index are exact: the borders that
-  // neighbours share are the same numbers on every zoom.
+  // 180 / 2^zoom has few bits, so products with the index are exact, and the borders shared by
+  // neighbours are the same numbers at every zoom.
   const double width = 180.0 / static_cast<double>(tile_rows(tile.zoom));
   return {.west = -180.0 + width * tile.x,
           .south = -90.0 + width * tile.y,

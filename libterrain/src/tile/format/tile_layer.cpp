@@ -17,10 +17,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The library would convert numbers of any kind and size.
+/// Checks the number, because the library would convert numbers of any kind and size.
 std::uint32_t count_from(const Json& json) {
   if (!json.is_number_unsigned() || json.get<std::uint64_t>() > UINT32_MAX) {
-    throw std::runtime_error(json.dump() + " where a whole number from 0 up is due");
+    throw std::runtime_error(json.dump() + " where a non-negative integer is expected");
   }
   return json.get<std::uint32_t>();
 }
@@ -73,7 +73,7 @@ TileLayer layer_from(const Json& json) {
 std::vector<TileRange> ranges_of(const std::vector<TileAddress>& tiles) {
   std::vector<TileRange> open, done;
   for (std::size_t i = 0; i < tiles.size();) {
-    // The runs of one row; a run continues a rectangle that ends in the row below.
+    // Find the runs of one row; a run extends a rectangle that ends in the row below.
     const std::uint32_t y = tiles[i].y;
     std::vector<TileRange> row;
     for (; i < tiles.size() && tiles[i].y == y; ++i) {
@@ -127,14 +127,14 @@ std::string layer_json(const TileLayer& layer) {
       {"minzoom", layer.first_zoom},
       {"maxzoom", layer.last_zoom},
       {"available", std::move(available)},
-      // Readers skip keys that they do not know.
+      // Readers skip unknown keys.
       {"terrace",
        {{"mark", kWriterMark},
         {"maxErrors", layer.max_errors},
         {"fingerprint", layer.fingerprint}}},
   };
-  // Without it CesiumJS fails at every tile with metadata; with it, it goes by the tiles alone:
-  // each lists what is one zoom below.
+  // Without this key CesiumJS fails at every tile with metadata. With it, CesiumJS uses only the
+  // metadata of tiles, each of which lists the tiles one zoom below.
   if (std::ranges::find(layer.extensions, "metadata") != layer.extensions.end()) {
     json["metadataAvailability"] = 1;
   }
@@ -142,7 +142,7 @@ std::string layer_json(const TileLayer& layer) {
 }
 
 TileLayer read_layer(const std::string& path) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;  // of a fragmented coverage
+  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;  // for a fragmented coverage
   const auto json = json_of_file(path, kMostBytes, "make the tiles again");
   if (!json) {
     throw stream::Error({.file = path,
@@ -156,7 +156,7 @@ TileLayer read_layer(const std::string& path) {
     throw stream::Error(
         {.file = path,
          .where = {},
-         .cause = std::string("describes no tile set that can be read here: ") + error.what(),
+         .cause = std::string("does not describe a supported tile set: ") + error.what(),
          .remedy = "make the tiles again"});
   }
 }

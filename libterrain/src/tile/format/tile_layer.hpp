@@ -13,24 +13,24 @@ struct TileLayer {
   std::string name;
   GeographicBox bounds;
   unsigned first_zoom = 0, last_zoom = 0;
-  /// Extensions that every tile has: "octvertexnormals", "watermask", "metadata".
+  /// The extensions that every tile has: "octvertexnormals", "watermask", "metadata".
   std::vector<std::string> extensions;
   /// The existing tiles per zoom, from 0 on.
   std::vector<std::vector<TileRange>> available;
-  /// The error bound of a zoom in metres, per zoom from 0 on; 0 for zooms without tiles.
+  /// The error bound in metres, per zoom from 0 on; 0 for zooms without tiles.
   std::vector<double> max_errors;
-  /// Identifies the store and the options: two runs with equal text make equal tiles.
+  /// Identifies the store and the options: two runs with equal fingerprints make equal tiles.
   std::string fingerprint;
 };
 
-/// The largest rectangles of present tiles, found row by row: covers exactly the given ones.
-/// tiles: of one zoom, sorted by y, then x, without repetition.
+/// Merges tiles into large rectangles, row by row, that cover exactly the given tiles. tiles: of
+/// one zoom, sorted by y, then x, without duplicates.
 std::vector<TileRange> ranges_of(const std::vector<TileAddress>& tiles);
 
-/// The text of layer.json, in the order in which its keys are documented.
+/// Returns the text of layer.json, with keys in documented order.
 std::string layer_json(const TileLayer& layer);
 
-/// Reads it back. Throws: stream::Error naming the file and what is missing or wrong.
+/// Reads layer.json. Throws: stream::Error naming the file and what is missing or wrong.
 TileLayer read_layer(const std::string& path);
 
 }  // namespace terrace::terrain

@@ -27,7 +27,7 @@ CloudSamples::CloudSamples(const stream::Store& store, const StoredPlaces& place
     places.to_geographic(globe);
     vertical.convert(globe, heights);
     for (std::size_t k = 0; k < count; ++k) {
-      // What has no place on the globe, or no height, lies in no box.
+      // NaN for a point without a place or height on the globe, so that it is in no box.
       const bool there = std::isfinite(heights[k]);
       samples_[begin + k] = {there ? globe[k][0] : NAN, there ? globe[k][1] : NAN, heights[k]};
     }

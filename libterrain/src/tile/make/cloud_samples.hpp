@@ -13,9 +13,9 @@
 
 namespace terrace::terrain {
 
-/// The samples of a cloud that fits into memory, placed on the globe once: tiles of every zoom ask
-/// for all of them. Of points at one x, y the first in the order of StoreWindow::points() counts.
-/// Const members may be called by several threads at once.
+/// The samples of a cloud that fits in memory, placed on the globe once, because tiles of every
+/// zoom need all of them. Of points at one x and y, uses the first in the order of
+/// StoreWindow::points(). Several threads may call const members at once.
 class CloudSamples {
  public:
   static constexpr std::uint64_t kBytesPerPoint = PointCells::kBytesPerPoint;
@@ -24,12 +24,12 @@ class CloudSamples {
   CloudSamples(const stream::Store& store, const StoredPlaces& places,
                const EllipsoidalHeights& vertical, unsigned threads);
 
-  /// As they are stored.
+  /// The samples in stored coordinates.
   [[nodiscard]] const PointCells& cells() const { return cells_; }
-  /// Whether they crowd in few of the cells.
+  /// Whether the samples are crowded into few cells.
   [[nodiscard]] bool crowd() const { return crowd_; }
 
-  /// Adds those in `box` of the points in `window` (stored coordinates).
+  /// Adds the points of `window` (stored coordinates) that are in `box`.
   void add(const StoredBox& window, const GeographicBox& box, SurfaceSamples& out) const;
 
  private:

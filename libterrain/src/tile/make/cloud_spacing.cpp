@@ -18,17 +18,17 @@ namespace {
 constexpr std::uint64_t kSeeds = 32;
 constexpr double kMostPointsAround = 3000;
 constexpr unsigned kRank = 8;
-/// In a view: boxes grow until there are so many points around.
+/// In a view, boxes grow until they contain this many points.
 constexpr std::size_t kFewestPointsAround = 200;
 
-/// A point, and a box around points near it.
+/// A point, and a box around nearby points.
 struct Seed {
   stream::Point3 at;
   StoredBox box;
 };
 
-/// Seeds from clusters of level 0, evenly over the store, or from its points if it is one block.
-/// Those of a view are points of it.
+/// Picks seeds from clusters of level 0, evenly over the store, or from its points if it is a
+/// single block. Seeds of a view are points of the view.
 std::vector<Seed> some_seeds(const stream::Store& store, const StoredPlaces& places) {
   std::vector<Seed> seeds;
   stream::ClusterPoints points;
@@ -70,7 +70,7 @@ StoredBox grown(StoredBox box) {
   return box;
 }
 
-/// The box, larger on all sides, even if it has no size.
+/// Returns the box enlarged on all sides, even if it has no size.
 StoredBox widened(StoredBox box, const stream::Box3& store) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double more =
@@ -85,7 +85,7 @@ bool holds(const StoredBox& outer, const stream::Box3& inner) {
   return outer.contains(inner.min) && outer.contains(inner.max);
 }
 
-/// The seed's box, or a smaller one around the seed that has not too many points near it.
+/// Returns the seed's box, or a smaller one around the seed with few enough points near it.
 StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
   constexpr unsigned kHalvings = 60;
   StoredBox box = seed.box;
@@ -101,7 +101,7 @@ StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
   return box;
 }
 
-/// The different places of a store, in degrees of latitude.
+/// Returns the distinct places of a store, in degrees of latitude.
 std::vector<stream::Point3> on_the_ground(const WindowPoints& points, const StoredPlaces& places,
                                           std::vector<Point2>& stored) {
   stored.clear();
@@ -115,7 +115,7 @@ std::vector<stream::Point3> on_the_ground(const WindowPoints& points, const Stor
   for (std::size_t i = 0; i < on_globe.size(); ++i) {
     const Point2& p = on_globe[i];
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) continue;
-    // In one turn, so that neighbours across the line of 180 degrees are that.
+    // Within one turn, so that neighbours across the antimeridian stay neighbours.
     const double east = wrapped_longitude(p[0] - on_globe.front()[0]);
     ground.push_back({east * base::cos_degrees(p[1]), p[1], 0.0});
     stored[kept++] = stored[i];
@@ -135,7 +135,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
     StoredBox box = box_of(seed, reader.query()), around = grown(box);
     if (reader.query().estimate(tall(around), kMostPointsAround) > kMostPointsAround) continue;
     reader.points(around, points);
-    // A view may have few where the store has many.
+    // A view may have few points where the store has many.
     while (store.condition() != nullptr && points.positions.size() < kFewestPointsAround &&
            !holds(around, store.bounds())) {
       box = widened(box, store.bounds());
@@ -146,7 +146,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
     if (ground.size() < 2) continue;
     const auto rank = static_cast<unsigned>(std::min<std::size_t>(kRank, ground.size() - 1));
     const std::vector<float> found = neighbour_distances(ground, rank, 1);
-    // So many points lie in a circle of the distance.
+    // A circle of this radius contains `rank` points.
     const auto share = static_cast<float>(std::sqrt(std::numbers::pi / rank));
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (found[i] > 0.0F && box.contains({stored[i][0], stored[i][1], 0.0})) {

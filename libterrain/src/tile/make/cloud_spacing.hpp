@@ -7,10 +7,10 @@
 
 namespace terrace::terrain {
 
-/// How far apart the points of a store are where most of them lie, in degrees of latitude: the
-/// distance on a square lattice of the density around the median point. From the points in and
-/// around 32 clusters; of points at one x, y one counts. Where all have one place, that of two
-/// zooms of tiles: 180 / 64. Throws: stream::Error on a damaged store.
+/// Returns the typical spacing of a store's points in degrees of latitude: the spacing of a square
+/// lattice with the density around the median point. Estimated from the points in and around 32
+/// clusters; points at one x and y count once. If all are at one place, returns 180 / 64. Throws:
+/// stream::Error on a damaged store.
 double cloud_spacing(const stream::Store& store, const StoredPlaces& places);
 
 }  // namespace terrace::terrain

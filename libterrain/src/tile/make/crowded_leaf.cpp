@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Parts of a unit, each way.
+/// Number of parts of a unit, along each axis.
 constexpr double kPartsOfUnit = 4.0;
 constexpr unsigned kRounds = 8;
 
@@ -52,7 +52,7 @@ class Extremes {
       const Sample sample{places.u[i], places.v[i], places.height[i]};
       Sample& low = lowest_[row * columns_ + column];
       Sample& high = highest_[row * columns_ + column];
-      // Among equal heights the place decides, so that the order of samples does not matter.
+      // Ties in height are broken by place, so that the order of samples does not matter.
       const auto less = [](const Sample& a, const Sample& b) {
         return std::tie(a.height, a.u, a.v) < std::tie(b.height, b.u, b.v);
       };
@@ -117,7 +117,7 @@ tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
     if (all.covered > 0) all.rms = std::sqrt(squares / static_cast<double>(all.covered));
     tin.errors = all;
     if (all.largest < before) best = std::move(tin);
-    // What more samples do not better is due to the lattice of places and heights.
+    // An error that more samples do not reduce is due to the resolution of places and heights.
     if (all.largest <= options.max_error || !(all.largest < before)) break;
     before = all.largest;
   }

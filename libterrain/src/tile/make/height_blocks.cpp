@@ -16,12 +16,12 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;
-/// That a thread reads at a time.
+/// The number of clusters that a thread reads at a time.
 constexpr std::uint64_t kClustersAtOnce = 64;
 constexpr std::size_t kMutexes = 64;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Outward, where a float cannot hold the height.
+// Round outward if a float cannot represent the height.
 float rounded_down(double height) {
   const auto near = static_cast<float>(height);
   return static_cast<double>(near) > height ? std::nextafter(near, -kInfinity) : near;
@@ -74,7 +74,7 @@ HeightBlocks::HeightBlocks(const stream::Store& store, unsigned threads)
 void HeightBlocks::add(const stream::Channel& channel, const stream::ClusterPoints& cluster,
                        std::span<std::mutex> mutexes) {
   const auto shift = std::countr_zero(static_cast<std::uint64_t>(side_));
-  // What lies in one block, as the samples before the next ones of another block do.
+  // Accumulates a run of samples in one block.
   std::int64_t x = -1, y = -1;
   Block range{kInfinity, -kInfinity};
   std::uint64_t digest = 0;
@@ -85,7 +85,7 @@ void HeightBlocks::add(const stream::Channel& channel, const stream::ClusterPoin
     const std::lock_guard lock(mutexes[static_cast<std::size_t>(y) % mutexes.size()]);
     blocks_[at].low = std::min(blocks_[at].low, range.low);
     blocks_[at].high = std::max(blocks_[at].high, range.high);
-    // A sum: samples come in the order of their clusters.
+    // A sum, because samples come in the order of their clusters.
     digests_[at] += digest;
     samples_[at] += samples;
   };
@@ -161,7 +161,7 @@ std::optional<LatticeWindow> HeightBlocks::some_block_within(const LatticeWindow
   };
   const std::int64_t right = window.column + window.columns, bottom = window.row + window.rows;
   const std::int64_t x0 = up(window.column), y0 = up(window.row);
-  // From the middle on: those are the least likely to lie at the border.
+  // Start in the middle, where blocks are least likely to be at the border.
   const std::int64_t x1 = std::min((right - x0 * side_) / side_ + x0, across_);
   const std::int64_t y1 = std::min((bottom - y0 * side_) / side_ + y0, down_);
   const std::int64_t width = x1 - x0, height = y1 - y0;

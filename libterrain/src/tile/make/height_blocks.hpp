@@ -14,8 +14,8 @@
 
 namespace terrace::terrain {
 
-/// Lowest and highest samples of the square blocks of a raster, so that what cannot matter need not
-/// be read, and a hash of each, so that tiles of unchanged blocks are kept.
+/// The lowest and highest samples of square blocks of a raster, so that irrelevant parts need not
+/// be read, and a hash of each block, so that tiles of unchanged blocks are kept.
 class HeightBlocks {
  public:
   /// Reads the store once, with all threads. Memory: 20 bytes per block, at most 20 MiB. Throws:
@@ -25,14 +25,14 @@ class HeightBlocks {
   struct Range {
     double low = 0.0, high = 0.0;  ///< in the vertical unit of the store
   };
-  /// Over the blocks that meet the window; nullopt if no sample in them has data.
+  /// The range over the blocks that meet the window; nullopt if no sample in them has data.
   [[nodiscard]] std::optional<Range> range(const LatticeWindow& window) const;
 
-  /// A block that has data and lies in the window, if there is one: its lattice rectangle.
+  /// Returns the lattice rectangle of a block with data inside the window, if there is one.
   [[nodiscard]] std::optional<LatticeWindow> some_block_within(const LatticeWindow& window) const;
 
-  /// A hash of the samples, with their places, of all blocks that meet the window. It does not
-  /// depend on how the store clusters them.
+  /// A hash of the samples and their places in all blocks that meet the window. It does not depend
+  /// on how the store clusters them.
   [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
 
   /// Whether every block that meets the window has all its samples.
@@ -55,7 +55,7 @@ class HeightBlocks {
   struct Blocks {
     std::int64_t x0, y0, x1, y1;  // half open
   };
-  /// Those that meet a window.
+  /// Returns the blocks that meet a window.
   [[nodiscard]] Blocks blocks_of(const LatticeWindow& window) const;
   [[nodiscard]] bool is_complete(std::int64_t x, std::int64_t y) const {
     return samples_[static_cast<std::size_t>(y * across_ + x)] == rectangle(x, y).size();
@@ -71,11 +71,11 @@ class HeightBlocks {
     return blocks_[static_cast<std::size_t>(y * across_ + x)];
   }
 
-  std::int64_t side_ = 16;  ///< samples
+  std::int64_t side_ = 16;  ///< in samples
   std::int64_t columns_ = 0, rows_ = 0, across_ = 0, down_ = 0;
   std::vector<Block> blocks_;
   std::vector<std::uint64_t> digests_;  ///< of blocks, sums over their samples
-  std::vector<std::uint32_t> samples_;  ///< how many of a block have data
+  std::vector<std::uint32_t> samples_;  ///< number of samples with data per block
 };
 
 }  // namespace terrace::terrain

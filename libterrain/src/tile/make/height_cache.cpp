@@ -28,7 +28,7 @@ HeightCache::Squares::iterator HeightCache::use(StoreWindow& reader, std::int64_
     }
     read_.wait(lock);
   }
-  // The one not used for longest lends its memory.
+  // Reuse the memory of the least recently used square.
   Squares::iterator square = squares_.end();
   if (squares_.size() >= most_) {
     const auto unused = [](const Square& other) { return other.users == 0; };
@@ -56,7 +56,7 @@ HeightCache::Squares::iterator HeightCache::use(StoreWindow& reader, std::int64_
       reader.heights(window, std::span<double>(square->doubles));
     }
   } catch (...) {
-    // Damage leaves nothing behind; who waits reads it and fails by itself.
+    // Removes the square, so that waiting threads read it again and fail themselves.
     lock.lock();
     by_number_.erase(number);
     squares_.erase(square);

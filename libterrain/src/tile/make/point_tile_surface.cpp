@@ -14,13 +14,13 @@
 namespace terrace::terrain {
 namespace {
 
-/// Samples that are taken at once, at most.
+/// The most samples to take at once.
 constexpr double kMostSamples = 1U << 18;
-/// Degrees: in a box so narrow more points are as good as one place, and cutting it does not help.
+/// In degrees: a box this narrow is as good as one place, and dividing it does not help.
 constexpr double kNarrowest = 1e-9;
-/// Points that are triangulated at once where places ask for it, at most.
+/// The most points to triangulate at once if places need them.
 constexpr double kMostTogether = 1U << 15;
-/// Boxes of which it is remembered whether they are crowded.
+/// The number of boxes to remember as crowded or not.
 constexpr std::size_t kMostRemembered = 1U << 14;
 
 StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32_t> part) {
@@ -84,7 +84,7 @@ void PointTileSurface::expect(const GeographicBox& box) {
 
 bool PointTileSurface::crowded(const GeographicBox& box) {
   if (box.east - box.west < kNarrowest || box.north - box.south < kNarrowest) return false;
-  // Leaves beside each other ask the same of their sides.
+  // Adjacent leaves ask for the same sides.
   if (crowded_.size() > kMostRemembered) crowded_.clear();
   const std::array<double, 4> key{box.west, box.south, box.east, box.north};
   if (const auto known = crowded_.find(key); known != crowded_.end()) return known->second;
@@ -149,7 +149,7 @@ void PointTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Point2 p = places[i];
     const double height = points_.positions[i][2] * channel.scale + channel.offset;
-    // Comparisons with NaN are false: it is outside.
+    // Comparisons with NaN are false, so it is outside.
     const bool inside = p[0] >= box.west && p[0] <= box.east && p[1] >= box.south &&
                         p[1] <= box.north && std::isfinite(height);
     if (!inside) continue;
@@ -218,7 +218,7 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
       const auto split = std::stable_partition(
           part.begin(), part.end(), [&](std::uint32_t i) { return stored[i][axis] < middle; });
       const auto first = static_cast<std::size_t>(split - part.begin());
-      // Numbers with no other between them are two places.
+      // Two places may have no number between them.
       if (first == 0 || first == part.size()) {
         for (std::uint32_t& i : part) part_heights(stored, std::span(&i, 1), out);
         return;
@@ -227,7 +227,7 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
       part_heights(stored, part.subspan(first), out);
       return;
     }
-    held_.reset();  // if reading fails nothing is held
+    held_.reset();  // so that nothing is held if reading fails
     window_.load(*wanted);
     held_ = wanted;
   }
@@ -247,7 +247,7 @@ void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span
     return;
   }
   if (cloud_.whole) {
-    // Places come along sides: each is a few triangles from the one before, unless it is far away.
+    // Places come along sides, each usually a few triangles from the previous one.
     tri::VertexId near = tri::kNoVertex;
     Point2 before{};
     for (const std::uint32_t i : within) {
@@ -268,7 +268,7 @@ void PointTileSurface::heights(std::span<const double> longitude, std::span<cons
   cloud_.places.to_stored(stored);
   surface_heights(stored, out);
   for (std::size_t i = 0; i < places.size(); ++i) {
-    // The line of 180 degrees has two numbers, and tiles on both sides of it.
+    // The meridian of 180 degrees has two numbers, and tiles on both sides.
     if (places[i][0] == 180.0) places[i][0] = -180.0;
     if (std::isnan(out[i]) && !cloud_.flat_fill && cloud_.hull.distance(stored[i]) <= cloud_.rim) {
       out[i] = cloud_.fill.height(stored[i][0], stored[i][1]);
@@ -289,7 +289,7 @@ void PointTileSurface::water(std::span<const double> longitude, std::span<const 
   cloud_.places.to_stored(stored);
   std::vector<double> heights(stored.size());
   surface_heights(stored, heights);
-  // What lies between three points of one height may be rounded.
+  // Values between three points of equal height may be rounded.
   const double level = *cloud_.water_height, slack = 1e-9 * std::max(1.0, std::abs(level));
   for (std::size_t i = 0; i < out.size(); ++i) {
     out[i] = std::abs(heights[i] - level) <= slack ? 1 : 0;

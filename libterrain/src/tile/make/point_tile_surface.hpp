@@ -23,28 +23,28 @@
 
 namespace terrace::terrain {
 
-/// What all threads share of a store of irregular points that is tiled.
+/// The data that all threads share when tiling a store of irregular points.
 struct TiledCloud : TiledStore {
-  /// Memory that a thread may use for the triangles of a part.
+  /// Memory limit of a thread for the triangles of a part.
   std::uint64_t window_bytes = 0;
   PointHull hull;
-  double rim = 0;  ///< see rim_of_outline()
-  /// All, if they fit into memory; else each thread reads those of a part at a time.
+  double rim = 0;  ///< from rim_of_outline()
+  /// All samples if they fit in memory; otherwise each thread reads those of a part at a time.
   std::unique_ptr<const CloudSamples> samples{};
-  /// All triangles, for samples that crowd, if they fit as well.
+  /// The whole triangulation, for crowded samples, if it fits as well.
   std::unique_ptr<const PointWindow> whole{};
   /// Shared by the windows of all threads.
   std::shared_ptr<PointVoids> voids{};
 
-  /// Reads a level of the store, and a few clusters; all of it where it fits into whole_bytes.
+  /// Reads a level of the store and a few clusters, or the whole store if it fits in whole_bytes.
   /// Throws: stream::Error if no place of it has a longitude and latitude.
   TiledCloud(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
              std::uint64_t window_bytes, std::uint64_t whole_bytes, unsigned threads);
 };
 
-/// The surface of a store of irregular points: linear in the triangles of the Delaunay
-/// triangulation of all of them by stored x, y, filled beyond their hull. Of points at one x, y the
-/// first in the order of StoreWindow::points() counts, and the others are not samples.
+/// The surface of a store of irregular points: linear on the triangles of their Delaunay
+/// triangulation in stored x and y, and filled beyond the hull. Of points at one x and y, only the
+/// first in the order of StoreWindow::points() is a sample.
 class PointTileSurface final : public TileSurface {
  public:
   explicit PointTileSurface(const TiledCloud& cloud);
@@ -62,36 +62,37 @@ class PointTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
-  /// Depends on the whole store: a point changes the triangles around it, and the hull far away.
+  /// Depends on the whole store: a point changes the triangles around it, and possibly a distant
+  /// hull.
   std::uint64_t digest(const GeographicBox& box) override;
 
  private:
-  /// Windows of the store for the box that was asked for last.
+  /// Returns windows of the store for the most recently requested box.
   const std::vector<StoredBox>& windows(const GeographicBox& box);
-  /// In the store's vertical unit, by the stored places; NaN beyond the hull.
+  /// Computes heights in the store's vertical unit at stored places; NaN beyond the hull.
   void surface_heights(std::span<const Point2> stored, std::span<double> out);
   void part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
                     std::span<double> out);
   bool holds(const StoredBox& box) const;
   bool counts_as_crowded(const GeographicBox& box);
-  /// About the number of points in the window, see stream::StoreQuery::estimate().
+  /// Approximate number of points in the window, see stream::StoreQuery::estimate().
   double estimate(const StoredBox& window, double limit) {
     return reader_.query().estimate(tall(window), limit);
   }
-  /// Leaves the first of points at one x, y, in their order.
+  /// Keeps only the first of points at one x and y, in order.
   void drop_duplicates();
 
   const TiledCloud& cloud_;
   StoreWindow reader_;
-  /// Between all samples, if they are in memory and do not crowd, nor lie on one line.
+  /// Used if all samples are in memory and neither crowded nor collinear.
   std::optional<PointSurface> surface_;
   PointWindow window_;                        ///< of a part
-  std::optional<StoredBox> held_, expected_;  ///< what the window holds, and is to hold
+  std::optional<StoredBox> held_, expected_;  ///< the box in the window, and the one it should hold
   std::optional<GeographicBox> asked_;
   std::vector<StoredBox> windows_;
   WindowPoints points_;
   std::vector<std::uint32_t> slots_;
-  std::map<std::array<double, 4>, bool> crowded_;  ///< what is known of boxes
+  std::map<std::array<double, 4>, bool> crowded_;  ///< known results of crowded()
 };
 
 }  // namespace terrace::terrain

@@ -14,16 +14,16 @@
 namespace terrace::terrain {
 namespace {
 
-/// Clusters that a surface keeps.
+/// Memory for decoded clusters of a surface.
 constexpr std::uint64_t kDecodedBytes = std::uint64_t{8} << 20;
 
-/// The places along one axis of a window that lie in a range.
+/// The places along one axis of a window that are in a range.
 struct Part {
   std::size_t first = 0, count = 0;
   bool descending = false;
 };
 
-/// nullopt if they are not consecutive and monotone.
+/// Returns nullopt if they are not consecutive and monotone.
 std::optional<Part> part_between(std::span<const double> places, double low, double high) {
   Part part;
   while (part.first < places.size() && !(places[part.first] >= low && places[part.first] <= high)) {
@@ -45,7 +45,7 @@ std::optional<Part> part_between(std::span<const double> places, double low, dou
   return part;
 }
 
-/// The part's places ascending.
+/// Copies the part's places in ascending order.
 void take(std::span<const double> places, const Part& part, std::vector<double>& out) {
   const std::span<const double> own = places.subspan(part.first, part.count);
   out.assign(own.begin(), own.end());
@@ -62,7 +62,7 @@ RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
   const bool holds = column >= 0 && row >= 0 && column + window.columns <= held_.columns &&
                      row + window.rows <= held_.rows;
   if (holds) return {heights_.data() + row * held_.columns + column, held_.columns};
-  held_ = {};  // if reading fails nothing is held
+  held_ = {};  // so that nothing is held if reading fails
   heights_.resize(window.size());
   raster_.height_cache.heights(reader_, window, heights_);
   held_ = window;
@@ -77,7 +77,7 @@ const LatticeWindow& RasterTileSurface::window_around(const GeographicBox& box) 
 void RasterTileSurface::expect(const GeographicBox& box) {
   LatticeWindow window = window_around(box);
   if (window.size() == 0) return;
-  // What lies around places on the box's sides, outside the raster too.
+  // Include the surroundings of places on the box's sides, also outside the raster.
   window = {window.column - 3, window.row - 3, window.columns + 6, window.rows + 6};
   view(window);
 }
@@ -106,7 +106,7 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
   const auto range = raster_.blocks.range(window);
   if (!range) return std::nullopt;
   HeightRange out = above_ellipsoid(*range, raster_.flat_fill.has_value());
-  // A block of the lattice all of whose corners are inside.
+  // A block of the lattice with all corners inside.
   if (const auto block = raster_.blocks.some_block_within(window)) {
     std::array<Point2, 4> corners;
     for (unsigned k = 0; k < 4; ++k) {
@@ -136,22 +136,22 @@ std::optional<HeightRange> RasterTileSurface::surface_range(const GeographicBox&
       if (const auto range = raster_.blocks.range(window)) return above_ellipsoid(*range, false);
     }
   }
-  // Fill is between the heights of samples, but these may be anywhere.
+  // Fill is between the heights of samples, but those may be anywhere.
   return above_ellipsoid(raster_.everywhere, true);
 }
 
 template <class Visit>
 void RasterTileSurface::visit_places(std::span<const double> longitude,
                                      std::span<const double> latitude, const Visit& visit) {
-  constexpr std::int64_t kBlock = 128;           // places are taken block by block of the lattice
-  constexpr std::int64_t kMostInWindow = 32768;  // of a window that is read for a run of them,
-  constexpr std::int64_t kMostForEach = 64;      // and for each place in it
+  constexpr std::int64_t kBlock = 128;           // places are handled block by block of the lattice
+  constexpr std::int64_t kMostInWindow = 32768;  // limit of a window for a run of places,
+  constexpr std::int64_t kMostForEach = 64;      // and per place in the run
   std::vector<Point2> places(longitude.size());
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = {longitude[i], latitude[i]};
   raster_.places.to_stored(places);
   const auto [last_column, last_row] = raster_.places.stored_bounds().max;
   // Places outside are moved to one sample from the lattice, where it is filled, and those beyond
-  // the rim of the outline to two.
+  // the rim of the outline to two samples.
   for (Point2& p : places) {
     const double outside = std::max({-p[0], -p[1], p[0] - last_column, p[1] - last_row});
     const double most = outside > raster_.rim ? 2.0 : 1.0;
@@ -164,7 +164,7 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
                      static_cast<std::int64_t>(std::floor(places[i][0])) / kBlock};
   };
   const auto before = [&](std::uint32_t a, std::uint32_t b) { return block(a) < block(b); };
-  // Sides come in order already.
+  // Places on sides are already in order.
   if (!std::is_sorted(order.begin(), order.end(), before)) {
     std::stable_sort(order.begin(), order.end(), before);
   }
@@ -203,13 +203,13 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
 void RasterTileSurface::heights(std::span<const double> longitude, std::span<const double> latitude,
                                 std::span<double> out) {
   const double metres = raster_.vertical.metres_per_unit();
-  // Heights of samples in metres, and how much of the geoid each needs: flat fill is above the
-  // ellipsoid already.
+  // Heights of samples in metres, and how much of the geoid each needs: flat fill is already
+  // relative to the ellipsoid.
   geoid_shares_.assign(out.size(), 1.0);
   visit_places(longitude, latitude,
                [&](std::size_t i, const Point2& p, const double* at, std::int64_t stride) {
                  const double fx = p[0] - std::floor(p[0]), fy = p[1] - std::floor(p[1]);
-                 // A sample that has no weight need not be there.
+                 // A sample without weight need not exist.
                  const auto weighed = [](double weight, double height) {
                    return weight > 0.0 ? weight * height : 0.0;
                  };
@@ -218,8 +218,8 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
                      weighed(fy * (1.0 - fx), at[stride]) + weighed(fy * fx, at[stride + 1]);
                  out[i] = height * metres;
                  if (!std::isnan(height)) return;
-                 // Missing samples are filled one by one: the surface goes through the existing
-                 // ones.
+                 // Missing samples are filled one by one, so that the surface passes through the
+                 // existing ones.
                  out[i] = geoid_shares_[i] = 0.0;
                  for (unsigned k = 0; k < 4; ++k) {
                    const unsigned right = k & 1, down = k >> 1;
@@ -268,7 +268,7 @@ void RasterTileSurface::grid(const GeographicBox& box, const LatticeWindow& wind
   for (std::size_t i = 0; i < out.height.size(); ++i) {
     const double longitude = wrapped_longitude(out.longitude[i]), latitude = out.latitude[i];
     out.longitude[i] = longitude;
-    // Comparisons that NaN fails: it is outside.
+    // Comparisons with NaN are false, so it is outside.
     const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
                         latitude <= box.north;
     const double height = view.first[static_cast<std::int64_t>(i / out.columns) * view.stride +

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
-/// Memory: 12 MiB, and 8 bytes per sample of the largest box that was asked for, 24 for samples().
+/// Memory: 12 MiB, and 8 bytes per sample of the largest requested box, 24 for samples().
 class RasterTileSurface : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
@@ -35,10 +35,10 @@ class RasterTileSurface : public TileSurface {
 
  private:
   [[nodiscard]] HeightRange above_ellipsoid(const HeightBlocks::Range& range, bool filled) const;
-  /// That of the raster. Range, expectation and part of a leaf ask for the same one, and finding it
-  /// may take hundreds of conversions.
+  /// The raster's window around a box, cached: range, expectation and part of a leaf use the same
+  /// one, and computing it may take hundreds of conversions.
   const LatticeWindow& window_around(const GeographicBox& box);
-  /// False where the samples are not in rows along parallels.
+  /// Returns false if the samples are not in rows along parallels.
   bool rows(const GeographicBox& box, SurfaceRows& out);
   void grid(const GeographicBox& box, const LatticeWindow& window, SurfaceGrid& out);
   /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)
@@ -46,7 +46,7 @@ class RasterTileSurface : public TileSurface {
   template <class Visit>
   void visit_places(std::span<const double> longitude, std::span<const double> latitude,
                     const Visit& visit);
-  /// The heights of a window: from the held one, or read.
+  /// The heights of a window: part of the held one, or read.
   struct View {
     const double* first = nullptr;
     std::int64_t stride = 0;
@@ -55,10 +55,10 @@ class RasterTileSurface : public TileSurface {
 
   const TiledRaster& raster_;
   StoreWindow reader_;
-  std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the latest
+  std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the most recent
   LatticeWindow held_{};
   std::vector<double> heights_;  ///< of the held window
-  std::vector<Point2> places_;   ///< where the geoid is asked for
+  std::vector<Point2> places_;   ///< places to evaluate the geoid at
   std::vector<double> geoid_shares_;
   std::vector<std::size_t> filled_;  ///< samples of a grid that get the flat fill
   SurfaceGrid grid_;

@@ -14,10 +14,10 @@ namespace {
 
 /// Largest error of an interpolated place, in samples, at the places where it is checked.
 constexpr double kTolerance = 0.005;
-/// Cells along a part of a mask: smaller ones are placed one by one, larger ones are cut unless
-/// they are all the same.
+/// Sizes of a part of a mask, in cells: smaller parts are converted cell by cell, larger ones are
+/// divided unless they are uniform.
 constexpr std::size_t kSmallestHeight = 8, kLargestHeight = 64;
-/// Samples that are read at once, unless a cell alone needs more.
+/// The most samples to read at once, unless a single cell needs more.
 constexpr std::size_t kMostWaterSamples = 65536;
 
 /// Parameters at which a quadratic through values at 0, 1/2 and 1 is farthest from a cubic.
@@ -28,12 +28,12 @@ struct WaterPart {
   std::size_t column, row, columns, rows;
 };
 
-/// The polynomial of second degree in both directions through 3 x 3 values: row k of the
-/// coefficients has those of t^k, in powers of s along the row.
+/// The polynomial of second degree in both directions through 3 x 3 values. Row k of the
+/// coefficients contains those of t^k, in powers of s along the row.
 struct QuadraticPatch {
   std::array<std::array<double, 3>, 3> coefficients{};
 
-  /// Values at 0, 1/2 and 1 each way, row by row.
+  /// values: at 0, 1/2 and 1 along each axis, row by row.
   explicit QuadraticPatch(const std::array<double, 9>& values) {
     const auto through = [](double a, double b, double c) {
       return std::array{a, 4.0 * b - 3.0 * a - c, 2.0 * (a - 2.0 * b + c)};
@@ -47,7 +47,7 @@ struct QuadraticPatch {
       for (std::size_t k = 0; k < 3; ++k) coefficients[k][m] = down[k];
     }
   }
-  /// Coefficients along the row at t.
+  /// The coefficients along the row at t.
   [[nodiscard]] std::array<double, 3> at_row(double t) const {
     std::array<double, 3> row{};
     for (std::size_t m = 0; m < 3; ++m) {
@@ -75,13 +75,13 @@ class WaterMask {
         out_(out) {}
 
   void fill(const WaterPart& part);
-  /// Cell by cell.
+  /// Fills the part cell by cell.
   void fill_exactly(const WaterPart& part);
 
  private:
-  /// Whether all cells whose places lie between these are the same; sets them then.
+  /// Whether all cells with places between these are equal; if so, sets them.
   bool is_uniform(const WaterPart& part, std::span<const Point2> nodes);
-  /// The samples nearest to the places of a part, row by row.
+  /// Rounds the places of a part to the nearest samples, row by row, and reads those.
   void look(const WaterPart& part, std::span<Point2> places);
   void read(const WaterPart& part, std::span<const Point2> places, std::size_t stride);
   void set(const WaterPart& part, bool wet) {
@@ -113,7 +113,7 @@ bool WaterMask<View>::is_uniform(const WaterPart& part, std::span<const Point2> 
     const double last = static_cast<double>(count) + 1.0;
     return static_cast<std::int64_t>(std::ceil(std::clamp(at + margin, -2.0, last)));
   };
-  // A sample more, and what bulges between the places.
+  // Add a sample, and the possible bulge between the places.
   const double across = 1.0 + (high[0] - low[0]) / 8.0, down = 1.0 + (high[1] - low[1]) / 8.0;
   const std::int64_t left = from(low[0], across), top = from(low[1], down);
   const std::int64_t right = to(high[0], across, schema.columns);
@@ -188,7 +188,7 @@ void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
   const double right = static_cast<double>(schema.columns);
   const double bottom = static_cast<double>(schema.rows);
   for (Point2& p : places) {
-    // Far places are moved to just outside the raster's border, where nothing is.
+    // Far places are moved to just outside the raster's border, where there is no data.
     p = {std::clamp(std::floor(p[0] + 0.5), -1.0, right),
          std::clamp(std::floor(p[1] + 0.5), -1.0, bottom)};
   }
@@ -270,7 +270,7 @@ bool even(std::span<const double> places, std::size_t step) {
   return true;
 }
 
-/// The number of places in the first row of a regular grid; 0 if it is not one.
+/// Returns the number of places in the first row of a regular grid; 0 if it is not one.
 std::size_t columns_of(std::span<const double> longitude, std::span<const double> latitude) {
   std::size_t columns = 0;
   while (columns < latitude.size() && latitude[columns] == latitude[0]) ++columns;

@@ -12,7 +12,7 @@ bool meet(const GeographicBox& a, const GeographicBox& b) {
   return a.west <= b.east && b.west <= a.east && a.south <= b.north && b.south <= a.north;
 }
 
-/// Leaves those that no other part of `whole` has.
+/// Removes the samples that another part of `whole` has as well.
 void drop_elsewhere(const GeographicBox& part, const GeographicBox& whole,
                     SurfaceSamples& samples) {
   std::size_t kept = 0;
@@ -45,7 +45,7 @@ bool may_have_samples(const GeographicBox& box, TileSurface& surface) {
 }
 
 bool is_to_be_cut(const GeographicBox& box, TileSurface& surface) {
-  // A little more, for leaves of tiles are rounded to units.
+  // Slightly more, because leaves of tiles are rounded to units.
   return box.east - box.west > 1.01 * surface.widest_part() || surface.crowded(box);
 }
 
@@ -74,7 +74,7 @@ std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom,
     context.check_stop();
     const TileAddress tile = open.back();
     open.pop_back();
-    // Borders belong to one tile here, so that what lies on them alone makes none.
+    // Here borders belong to one tile, so that samples on them alone do not make a tile.
     const TileRange wanted = tiles_in(surface.bounds(), tile.zoom);
     const bool inside =
         tile.x >= wanted.x0 && tile.x <= wanted.x1 && tile.y >= wanted.y0 && tile.y <= wanted.y1;

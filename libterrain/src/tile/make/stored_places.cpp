@@ -19,14 +19,14 @@ constexpr double kFarPlace = std::numeric_limits<double>::infinity();
 /// Generous bounds on the error of converting a place there and back, with a datum shift.
 constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
-/// Steps across a box in which its image is looked at.
+/// Number of steps across a box in which its image is sampled.
 constexpr unsigned kPlaceSteps = 24;
-/// Fewer steps do across boxes up to this size (degrees), where second differences bound the bulge;
-/// and across those up to the other one if that is below what the many steps would allow.
+/// Fewer steps suffice for boxes up to this size (degrees), where second differences bound the
+/// bulge; and for boxes up to the other size if that bound is below what many steps would allow.
 constexpr double kSmall = 1.0, kMayBeSmooth = 8.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
-/// The length of a patch whose polynomials stand for a projection, and their largest error in
+/// The size of a patch with polynomials in place of a projection, and their largest error in
 /// metres.
 constexpr double kPatchDegrees = 0.18;
 constexpr double kPlaneTolerance = 1e-5;
@@ -44,7 +44,7 @@ Point2 between(const Point2& low, const Point2& high, unsigned i, unsigned j, un
   return {low[0] + (high[0] - low[0]) * i / steps, low[1] + (high[1] - low[1]) * j / steps};
 }
 
-/// Places of a box, by rows, a number of steps apart each way.
+/// Places in a box, by rows, a number of steps apart along each axis.
 struct PlaceGrid {
   Point2 low, high;
   std::array<unsigned, 2> steps;
@@ -59,8 +59,8 @@ struct PlaceGrid {
     }
     return places;
   }
-  /// The largest second difference of a coordinate of the converted places; infinite if one has
-  /// none. Between places a quadratic function deviates from a line by an eighth of it.
+  /// Returns the largest second difference of a coordinate of the converted places; infinite if one
+  /// has no image. Between places, a quadratic function deviates from a line by an eighth of it.
   [[nodiscard]] double second_difference(std::span<const Point2> made, std::size_t axis) const {
     double largest = 0.0;
     const auto look = [&](std::size_t at, std::size_t step) {
@@ -80,7 +80,8 @@ struct PlaceGrid {
   }
 };
 
-/// Bounds of the points; of a raster all of its lattice, for it is filled where it has no data.
+/// The bounds of the points; for a raster, of its whole lattice, because it is filled where it has
+/// no data.
 StoredBox stored_box(const stream::Store& store) {
   const stream::StoreSchema& schema = store.schema();
   if (!schema.grid) return flat(store.bounds());
@@ -123,7 +124,7 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
 void StoredPlaces::fit_polynomials(const stream::Store& store) {
   world_bounds_ = world_box(store.schema(), {{stored_.min[0], stored_.min[1], 0.0},
                                              {stored_.max[0], stored_.max[1], 0.0}});
-  // Samples of rasters are placed window by window.
+  // Samples of rasters are converted window by window.
   if (!store.schema().grid) geography_.emplace(crs_, world_bounds_);
   const Point2 size{world_bounds_.max[0] - world_bounds_.min[0],
                     world_bounds_.max[1] - world_bounds_.min[1]};
@@ -142,7 +143,7 @@ void StoredPlaces::fit_polynomials(const stream::Store& store) {
 }
 
 void StoredPlaces::from_geographic(std::span<Point2> places) const {
-  std::size_t exact = 0;  // the places before that are done; those from here on are not
+  std::size_t exact = 0;  // the places before this index are done
   for (std::size_t i = 0; i < places.size(); ++i) {
     Point2 place = places[i];
     if (!plane_.convert(place)) continue;
@@ -185,7 +186,7 @@ void StoredPlaces::find_bounds(const std::string& file, bool is_lattice) {
       const auto step_to = [&](const Point2& next, double& shortest) {
         if (!std::isfinite(next[0])) return;
         const double wide = std::abs(next[0] - p[0]);
-        // Neighbours more than half of the globe apart: the antimeridian lies between them.
+        // Neighbours more than half of the globe apart have the antimeridian between them.
         if (wide > 180.0) {
           crosses = true;
           return;
@@ -204,9 +205,9 @@ void StoredPlaces::find_bounds(const std::string& file, bool is_lattice) {
         {.file = file,
          .where = {},
          .cause = "cannot be converted to longitude and latitude with " + crs_.title(),
-         .remedy = "build the store anew with the right `crs`"});
+         .remedy = "rebuild the store with the right `crs`"});
   }
-  // Between the places looked at, the border of a projected box may bulge by part of a step.
+  // Between the sampled places, the border of a projected box may bulge by part of a step.
   if (!crs_.is_geographic()) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double bulge = std::min(0.5 * step[axis], 1.0) + kMarginDegrees;
@@ -241,7 +242,7 @@ double StoredPlaces::in_turn(double longitude) const {
 }
 
 std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
-  // Only where the points are: far from them a projection may have no places.
+  // Only where the points are, because far away a projection may be undefined.
   const Point2 low{std::max(box.west, bounds_.west), std::max(box.south, bounds_.south)};
   const Point2 high{std::min(box.east, bounds_.east), std::min(box.north, bounds_.north)};
   std::vector<StoredBox> windows;
@@ -256,7 +257,7 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
     windows.push_back(around);
   };
   if (crs_.is_geographic()) {
-    // Those that may reach the store. Of one that goes around again and again the first will do.
+    // The turns that may reach the store. If it goes around several times, the first ones suffice.
     constexpr int kMostTurns = 5;
     const double first = std::floor(first_longitude_ / turn_ - 0.5),
                  last = std::ceil(last_longitude_ / turn_ + 0.5);
@@ -279,7 +280,7 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   const double longest = std::max(size[0], size[1]);
   for (const bool few : {true, false}) {
     if (few && longest > kMayBeSmooth) continue;
-    // Steps of about one length, and two at least, between which there is a second difference.
+    // Steps of similar length, and at least two, so that there is a second difference.
     const auto steps = [&](double length) {
       if (length == 0.0) return 1U;
       const double share = std::ceil((few ? kSmallSteps : kPlaceSteps) * length / longest);
@@ -294,7 +295,7 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
       if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, p);
     }
     const Point2 range{around.max[0] - around.min[0], around.max[1] - around.min[1]};
-    // What bulges between the places looked at.
+    // Allow for the bulge between the sampled places.
     Point2 bulge{range[0] / kPlaceSteps, range[1] / kPlaceSteps};
     if (few) {
       const double most = longest <= kSmall ? kFarPlace : std::max(bulge[0], bulge[1]);
@@ -328,10 +329,10 @@ void StoredPlaces::to_geographic(std::span<Point2> places) const {
 }
 
 void StoredPlaces::to_stored(std::span<Point2> places) const {
-  // For places that have none in the store's CRS: beyond every outline and its rim.
+  // For places without an image in the store's CRS: beyond every outline and its rim.
   constexpr double kFarAway = 1e9;
   for (Point2& p : places) {
-    // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
+    // The meridian of 180 degrees has two numbers; use one, as tiles on both sides request it.
     const double turned = wrapped_longitude(p[0]);
     p = {turned == 180.0 ? -180.0 : turned, std::clamp(p[1], -90.0, 90.0)};
   }

@@ -17,11 +17,11 @@
 
 namespace terrace::terrain {
 
-/// The same longitude in [-180, 180].
+/// Returns the same longitude in [-180, 180].
 double wrapped_longitude(double longitude);
 
-/// Where a store lies on the globe: its points, or the whole lattice of a raster. Const members may
-/// be called by several threads at once.
+/// The location of a store on the globe: of its points, or of the whole lattice of a raster.
+/// Several threads may call const members at once.
 class StoredPlaces {
  public:
   /// Throws: stream::Error if no place of the store has a longitude and latitude.
@@ -30,44 +30,44 @@ class StoredPlaces {
   [[nodiscard]] const CoordinateSystem& crs() const { return crs_; }
   /// The bounds of all points, or of the lattice, in stored coordinates.
   [[nodiscard]] const StoredBox& stored_bounds() const { return stored_; }
-  /// Around all of them on the globe, a little larger where the store is projected.
+  /// A box around all of them on the globe, slightly larger if the store is projected.
   [[nodiscard]] const GeographicBox& bounds() const { return bounds_; }
-  /// West and east end of a store in degrees, in its own unit and turn: may be beyond the
+  /// The west and east end of a store in degrees, in its own unit and turn; they may be beyond the
   /// antimeridian.
   [[nodiscard]] std::array<double, 2> longitudes() const {
     return {first_longitude_, last_longitude_};
   }
 
-  /// Whether the store is projected and goes on beyond the edge of its map.
+  /// Whether the store is projected and continues beyond the edge of its map.
   [[nodiscard]] bool goes_around() const { return goes_around_; }
 
-  /// For rasters: the least distance of neighbouring samples in degrees along a parallel or
-  /// meridian, estimated at the corners of 64 x 64 parts.
+  /// For rasters: the smallest spacing of samples in degrees along a parallel or meridian,
+  /// estimated at the corners of 64 x 64 parts.
   [[nodiscard]] double lattice_spacing() const;
 
-  /// The boxes of stored coordinates that contain all points of a geographic box: none if it does
-  /// not meet bounds(), two where a store in degrees goes around the globe.
+  /// Returns the boxes of stored coordinates that contain all points of a geographic box: none if
+  /// it does not meet bounds(), two if a store in degrees goes around the globe.
   [[nodiscard]] std::vector<StoredBox> windows(const GeographicBox& box) const;
 
-  /// Stored x, y to longitude in [-180, 180] and latitude, in place; NaN where there is none. Of
-  /// irregular points by BoxGeography, within its tolerance.
+  /// Converts stored x, y to longitude in [-180, 180] and latitude, in place; NaN where there is
+  /// none. Irregular points use BoxGeography, within its tolerance.
   void to_geographic(std::span<Point2> places) const;
-  /// Longitude and latitude to stored x, y, in place. -180 and 180 give the same. Places that
-  /// have none get a corner outside stored_bounds(). Of projected stores by polynomials, within a
-  /// hundredth of a millimetre.
+  /// Converts longitude and latitude to stored x, y, in place. -180 and 180 give the same result.
+  /// Places without an image become a corner outside stored_bounds(). Projected stores use
+  /// polynomials, within a hundredth of a millimetre.
   void to_stored(std::span<Point2> places) const;
 
  private:
   void find_bounds(const std::string& file, bool is_lattice);
   void fit_polynomials(const stream::Store& store);
-  /// Longitude and latitude to world x, y, in place.
+  /// Converts longitude and latitude to world x, y, in place.
   void from_geographic(std::span<Point2> places) const;
   [[nodiscard]] Point2 world(const Point2& stored) const;
   [[nodiscard]] double in_turn(double longitude) const;
 
   CoordinateSystem crs_;
-  std::optional<BoxGeography> geography_;  ///< of irregular points
-  GeographyPatches plane_;  ///< to world x, y as shares of world_bounds_; of projected stores
+  std::optional<BoxGeography> geography_;  ///< for irregular points
+  GeographyPatches plane_;                 ///< to shares of world_bounds_; for projected stores
   stream::Box3 world_bounds_{};
   stream::Placement placement_;
   StoredBox stored_;
@@ -75,9 +75,9 @@ class StoredPlaces {
   /// For a store in degrees, or beyond the edge of a map: its range of x, and a full turn.
   double first_longitude_ = 0.0, last_longitude_ = 0.0, turn_ = 360.0;
   bool goes_around_ = false;
-  Point2 margin_{};  ///< stored: more than the error of converting there and back
-  /// Degrees, along a parallel or meridian: the shortest step of the grid that bounds are found by,
-  /// along each stored axis.
+  Point2 margin_{};  ///< stored; larger than the error of converting there and back
+  /// In degrees along a parallel or meridian: the shortest step of the grid that determines the
+  /// bounds, along each stored axis.
   Point2 shortest_steps_{std::numeric_limits<double>::infinity(),
                          std::numeric_limits<double>::infinity()};
 };

@@ -19,7 +19,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// A mesh in units of the tile and steps of height, put together from leaves.
+/// A mesh in units of the tile and steps of height, assembled from leaves.
 struct Pieces {
   std::vector<TileSideVertex> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -36,7 +36,7 @@ struct Pieces {
   }
 };
 
-/// The error of a leaf whose samples have heights in `range`, if none becomes a vertex.
+/// Returns the error of a leaf with samples in `range`, if no sample becomes a vertex.
 double flat_error(const std::vector<TileSideVertex>& frame, double step, const HeightRange& range) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const TileSideVertex& vertex : frame) {
@@ -47,7 +47,8 @@ double flat_error(const std::vector<TileSideVertex>& frame, double step, const H
   return std::max(range.high - low, high - range.low);
 }
 
-/// Degrees along one axis to units of the tile; rounding takes no sample out of the leaf.
+/// Converts degrees along one axis to units of the tile; rounding never moves a sample out of the
+/// leaf.
 struct LeafUnits {
   double from = 0.0, units = 0.0;
   double low = 0.0, high = 0.0;  ///< the leaf's sides
@@ -58,7 +59,7 @@ struct LeafUnits {
   void convert(std::vector<double>& degrees) const {
     for (double& place : degrees) place = at(place);
   }
-  /// Also for places without a height, which may lie outside the tile and are not clamped.
+  /// Also converts places without a height, which may be outside the tile and are not clamped.
   void convert(std::vector<double>& degrees, std::span<const double> heights) const {
     for (std::size_t i = 0; i < degrees.size(); ++i) {
       degrees[i] = std::isnan(heights[i]) ? (degrees[i] - from) * units : at(degrees[i]);
@@ -98,7 +99,8 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   auto& samples = std::get<SurfaceSamples>(part);
   across.convert(samples.longitude);
   down.convert(samples.latitude);
-  // Places that are one on the globe, as at 180 degrees: the same whatever their order.
+  // Different places may be one on the globe, as at 180 degrees; the highest makes the result
+  // independent of their order.
   tri::PointTinOptions highest = options;
   highest.duplicates = tri::PointDuplicates::kMax;
   return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, highest);
@@ -112,7 +114,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
     if (error <= plan.max_error && (range->certain || pieces.has_data)) {
-      // Any triangles are within the bound: nothing needs to be read.
+      // Any triangles are within the bound, so nothing needs to be read.
       pieces.max_error = std::max(pieces.max_error, error);
       pieces.has_data = true;
     } else {
@@ -150,15 +152,16 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   }
 }
 
-/// Heights as 15-bit numbers from the lowest to the highest, which clients cull by. What neighbours
-/// share they decode to within half of such a number each. Returns how far a vertex moves at most.
+/// Sets heights as 15-bit numbers from the lowest to the highest, which clients use for culling.
+/// Two neighbours decode a shared height to within half of such a number each. Returns the largest
+/// change of a vertex.
 double set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
   std::int64_t lowest = pieces.vertices.front().height, highest = lowest;
   for (const TileSideVertex& vertex : pieces.vertices) {
     lowest = std::min(lowest, vertex.height);
     highest = std::max(highest, vertex.height);
   }
-  // As floats both ends must be exact.
+  // Both ends must be exact as floats.
   constexpr std::int64_t kExactAsFloat = std::int64_t{1} << 24;
   const std::int64_t range = highest - lowest;
   if (range > kTileUnits || lowest < -kExactAsFloat || highest > kExactAsFloat) {
@@ -199,7 +202,7 @@ TileHeader header_of(const TileAddress& tile, const TileMesh& mesh) {
   return header;
 }
 
-/// The source's own normals, from its slope over about a 256th of the tile, but not less than a
+/// Sets the source's own normals, from its slope over about a 256th of the tile, but at least a
 /// sample.
 void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
   const GeographicBox box = box_of(tile);
@@ -208,7 +211,7 @@ void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) 
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const double lon = longitude_at(tile, mesh.u[i]), lat = latitude_at(tile, mesh.v[i]);
     longitude.insert(longitude.end(), {lon - reach, lon + reach, lon, lon});
-    // Beyond a pole there is no geoid.
+    // There is no geoid beyond a pole.
     latitude.insert(latitude.end(),
                     {lat, lat, std::max(lat - reach, -90.0), std::min(lat + reach, 90.0)});
   }
@@ -217,7 +220,7 @@ void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) 
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const double lon = longitude[4 * i + 2], lat = latitude[4 * i];
     const MetresPerDegree metres = metres_per_degree(lat);
-    // At the poles all meridians meet.
+    // All meridians meet at the poles.
     const double east = metres.longitude < 1.0 ? 0.0
                                                : (heights[4 * i + 1] - heights[4 * i]) /
                                                      (2.0 * reach * metres.longitude);
@@ -262,7 +265,7 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
   TileSides sides(tile, plan, surface, shared);
   for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
     const auto range = surface.range(box_of(tile, leaf));
-    // Where heights differ by less than the bound, usually only the sides are read.
+    // If heights differ by less than the bound, usually only the sides are read.
     if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));
     mesh_leaf(tile, leaf, plan, surface, options.quality, sides.around(leaf), pieces);
   }

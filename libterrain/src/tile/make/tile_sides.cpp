@@ -14,17 +14,17 @@
 namespace terrace::terrain {
 namespace {
 
-/// A leaf has at least this many units each way.
+/// A leaf has at least this many units along each axis.
 constexpr unsigned kDeepestLeaf = 8;
-/// Places at which a side of one leaf is looked at, at most.
+/// The most places at which a side of a leaf is sampled.
 constexpr double kMostSidePlaces = 4096.0;
-/// Share of the bound that sides are settled to. Samples so close to a side that no vertex fits
-/// between have what the side has.
+/// Share of the bound for sides. Samples so close to a side that no vertex fits in between have the
+/// error of the side.
 constexpr double kSideShare = 0.75;
-/// That SharedSides keeps twice, at 16 bytes each.
+/// Vertices that SharedSides keeps twice, at 16 bytes each.
 constexpr std::size_t kMostSideVertices = std::size_t{1} << 16;
 
-/// The width of a tile's part at a depth; exact.
+/// Returns the width of a tile's part at a depth; exact.
 double width_at(unsigned zoom, unsigned depth) {
   return std::ldexp(180.0, -static_cast<int>(zoom + depth));
 }
@@ -38,15 +38,15 @@ bool boxes_meet(const GeographicBox& a, const GeographicBox& b) {
 ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface) {
   ZoomPlan plan;
   plan.zoom = zoom;
-  // All heights of a tile must fit into 32767 steps, and be exact as floats. A step is never below
-  // half a millimetre.
+  // All heights of a tile must fit in 32767 steps and be exact as floats. A step is at least half a
+  // millimetre.
   plan.height_step = 0x1p-11;
   while (plan.height_step * (kTileUnits - 2) < range) plan.height_step *= 2.0;
-  // A tile's own range is divided into 32767 parts, of which vertices take the nearest: they move
-  // by half a step at most.
+  // A tile's own range is divided into 32767 parts, and vertices are rounded to the nearest, so
+  // they move by at most half a step.
   plan.max_error = std::max(max_error - 0.5 * plan.height_step, 0.5 * max_error);
-  // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
-  // expects of the zoom.
+  // A chord of angle a is at most R a^2 / 8 below its arc: half of the error that clients expect at
+  // the zoom.
   plan.longest_edge =
       std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / base::kRadiansPerDegree;
   plan.widest_leaf = surface.widest_part();
@@ -137,11 +137,11 @@ std::optional<SharedSides::Key> TileSides::shared_key(const Side& side) const {
 
 bool TileSides::is_cut(const Side& side) const {
   if (side.depth == kDeepestLeaf) return false;
-  // A leaf beside the side lies within its length on either side of it, and is cut if this is: so
-  // the side is cut wherever a leaf of its length is.
+  // A leaf next to the side is within its length on either side of it, and is divided if this is
+  // true. So the side is divided wherever a leaf of its length is.
   const double width = width_at(tile_.zoom, side.depth);
   if (width > plan_.longest_edge) return true;
-  // A little more than the length: units are rounded.
+  // Slightly more than the length, because units are rounded.
   if (width > plan_.widest_leaf && is_near_data(side, 1.01 * width)) return true;
   return is_crowded(side);
 }
@@ -150,7 +150,7 @@ bool TileSides::is_crowded(const Side& side) const {
   const std::uint32_t parts = 1U << side.depth;
   const std::uint32_t columns = tile_columns(tile_.zoom), rows = tile_rows(tile_.zoom);
   for (const bool before : {true, false}) {
-    // By the numbers that the leaf's own tile has.
+    // With the numbers in the leaf's own tile.
     TileAddress tile = tile_;
     TileLeaf leaf{side.depth, side.k, side.k};
     std::uint32_t& across = side.along_parallel ? leaf.y : leaf.x;
@@ -181,7 +181,7 @@ bool TileSides::is_near_data(const Side& side, double reach) const {
   } else {
     const double longitude = longitude_at(tile_, line);
     box = {longitude - reach, latitude_at(tile_, from), longitude + reach, latitude_at(tile_, to)};
-    // The line of 180 degrees has two numbers, and tiles on both sides of it.
+    // The meridian of 180 degrees has two numbers, and tiles on both sides.
     if (std::abs(longitude) == 180.0) {
       const GeographicBox other{-longitude - reach, box.south, -longitude + reach, box.north};
       if (boxes_meet(other, data_)) return true;
@@ -222,8 +222,8 @@ std::vector<TileSideVertex> TileSides::settle(const Side& side) {
   const std::uint32_t to = leaf_unit(side.k + 1, side.depth);
   const std::uint32_t across = leaf_unit(side.line, side.depth);
 
-  // Two places per sample, at equal distances; away from all samples, and where heights are nearly
-  // equal, the ends will do.
+  // Two places per sample, at equal distances. Away from all samples, and where heights are nearly
+  // equal, the ends suffice.
   const double length = width_at(tile_.zoom, side.depth);
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const bool looked_at =
@@ -251,7 +251,7 @@ std::vector<TileSideVertex> TileSides::settle(const Side& side) {
   surface_.heights(longitude, latitude, height);
   for (const auto& [at, between] : samples) {
     const auto place = std::lower_bound(t.begin(), t.end(), at) - t.begin();
-    // In the middle, so that none is farther off than it must be.
+    // The middle, to minimise the largest distance.
     height[static_cast<std::size_t>(place)] = between.low + 0.5 * (between.high - between.low);
   }
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
@@ -298,8 +298,8 @@ std::vector<TileSideVertex> TileSides::around(const TileLeaf& leaf) {
 }
 
 void TileSides::Samples::add(double height, double units) {
-  // Those that round to the side's own places cannot become vertices elsewhere, so they count
-  // first.
+  // Samples that round to the side's own places cannot become vertices elsewhere, so they take
+  // precedence.
   const bool on_side = units <= 0.5;
   if (!any || (on_side && !on)) {
     *this = {height, height, true, on_side};
@@ -313,8 +313,8 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
                                             std::vector<double>& longitude,
                                             std::vector<double>& latitude) {
   SamplesAt found;
-  // Tiles on both sides of 180 degrees do not see the same samples, unless both ask for those of
-  // both.
+  // Tiles on both sides of 180 degrees see different samples, unless both request those of both
+  // sides.
   const bool on_180 = !side.along_parallel && std::abs(longitude.front()) == 180.0;
   if (on_180 && !surface_.sides_take_samples()) return found;
   const double unit = tile_width(tile_.zoom) / kTileUnits;
@@ -329,7 +329,7 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
       const double east = on_180 ? (180.0 - std::abs(near->longitude[i])) / unit
                                  : (near->longitude[i] - longitude[0]) / unit;
       const double north = (near->latitude[i] - latitude[0]) / unit;
-      // A vertex can stand at whole numbers only.
+      // Vertices can only be at integers.
       const double whole = from + std::round(side.along_parallel ? east : north);
       if (!(whole > from && whole < to)) continue;
       t.push_back(whole);
@@ -361,7 +361,7 @@ std::optional<SurfaceSamples> TileSides::samples_near(const GeographicBox& box) 
     all.height.insert(all.height.end(), some.height.begin(), some.height.end());
     return true;
   };
-  // Beyond the line of 180 degrees the globe goes on from the other end, for both tiles beside it.
+  // Beyond 180 degrees the globe continues at the other end, for tiles on both sides.
   const bool beyond_east = box.east > 180.0, beyond_west = box.west < -180.0;
   const double reach = beyond_east ? box.east - 180.0 : -180.0 - box.west;
   bool taken = false;

@@ -18,35 +18,36 @@
 
 namespace terrace::terrain {
 
-/// What all tiles of a zoom have in common.
+/// The parameters that all tiles of a zoom share.
 struct ZoomPlan {
   unsigned zoom = 0;
-  double max_error = 0.0;     ///< metres, less what the tile's encoding may add
-  double height_step = 0.0;   ///< a power of two: heights of vertices are multiples of it
-  double longest_edge = 0.0;  ///< degrees: longer ones would cut off too much of the Earth's curve
-  double widest_leaf = 0.0;   ///< degrees: wider parts of a tile with samples are cut in four
+  double max_error = 0.0;     ///< in metres, minus what the tile's encoding may add
+  double height_step = 0.0;   ///< a power of two; heights of vertices are multiples of it
+  double longest_edge = 0.0;  ///< in degrees; longer ones would cut off too much of the Earth's
+                              ///< curve
+  double widest_leaf = 0.0;   ///< in degrees; wider parts of a tile with samples are quartered
 };
-/// surface: for the distance of its samples. range: of heights within any tile of the zoom.
+/// surface: for the spacing of its samples. range: of heights within any tile of the zoom.
 ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface);
 
-/// A square part of a tile, 1 / 2^depth of it wide. Place x, y counts such parts from the tile's
-/// south-west corner.
+/// A square part of a tile with a width of 1 / 2^depth of it. x and y count such parts from the
+/// tile's south-west corner.
 struct TileLeaf {
   unsigned depth = 0;
   std::uint32_t x = 0, y = 0;
 };
-/// Units of the tile's lattice at k / 2^depth of its width.
+/// Returns the units of the tile's lattice at k / 2^depth of its width.
 std::uint32_t leaf_unit(std::uint32_t k, unsigned depth);
-/// Degrees; exact.
+/// In degrees; exact.
 double tile_width(unsigned zoom);
-/// The meridian and the parallel at `units` of a tile's lattice. On a border they are the same
-/// numbers for both tiles.
+/// Return the meridian and the parallel at `units` of a tile's lattice. On a border they are the
+/// same numbers for both tiles.
 double longitude_at(const TileAddress& tile, double units);
 double latitude_at(const TileAddress& tile, double units);
 GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf);
 
-/// The parts that a tile is meshed in, so that no edge is too long and no part has too many
-/// samples. The smallest may have.
+/// Returns the parts in which a tile is meshed, so that no edge is too long and no part has too
+/// many samples, except possibly the smallest parts.
 std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
                                 TileSurface& surface);
 
@@ -56,12 +57,12 @@ struct TileSideVertex {
   std::int64_t height = 0;
 };
 
-/// Sides that lie on the borders of a zoom's tiles, for the tile beyond: those found last are kept.
-/// May be used by several threads at once.
+/// A cache of sides on the borders of a zoom's tiles, for the tile beyond: keeps the most recent.
+/// Thread-safe.
 class SharedSides {
  public:
-  /// A side: from part k to k + 1 of the 2^depth that each tile has, along a line between two rows
-  /// or columns of tiles. The vertices' coordinate across the side has no meaning.
+  /// A side: from part k to k + 1 of the 2^depth parts of each tile, along a line between two rows
+  /// or columns of tiles. The vertices' coordinate across the side is meaningless.
   struct Key {
     bool along_parallel = false;
     unsigned depth = 0;
@@ -78,34 +79,35 @@ class SharedSides {
   using Sides = std::map<Key, std::vector<TileSideVertex>>;
   mutable std::mutex mutex_;
   Sides recent_, older_;
-  std::size_t vertices_ = 0;  ///< of recent_
+  std::size_t vertices_ = 0;  ///< in recent_
 };
 
-/// Finds the vertices on the sides of a tile's leaves. They depend on the zoom's plan and on the
-/// surface along the side alone, not on the tile or leaf that asks: what neighbours share is equal,
-/// and leaves of different size fit together, because a side is cut wherever a leaf beside it is.
+/// Computes the vertices on the sides of a tile's leaves. They depend only on the zoom's plan and
+/// on the surface along the side, not on the tile or leaf that requests them. So shared sides are
+/// equal, and leaves of different sizes match, because a side is divided wherever a leaf next to it
+/// is.
 class TileSides {
  public:
   /// shared: of the zoom; may be null.
   TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
             SharedSides* shared = nullptr);
 
-  /// Counter-clockwise from the south-west corner, each vertex once.
+  /// Returns the vertices counter-clockwise from the south-west corner, each once.
   std::vector<TileSideVertex> around(const TileLeaf& leaf);
 
  private:
   /// A side: from place k to k + 1 of 2^depth along `line` of 2^depth.
   struct Side {
-    bool along_parallel = false;  ///< from west to east; else from south to north
+    bool along_parallel = false;  ///< from west to east; otherwise from south to north
     unsigned depth = 0;
     std::uint32_t line = 0, k = 0;
   };
   const std::vector<TileSideVertex>& vertices(const Side& side);
-  /// nullopt unless the side is on the tile's border.
+  /// Returns nullopt unless the side is on the tile's border.
   [[nodiscard]] std::optional<SharedSides::Key> shared_key(const Side& side) const;
   std::vector<TileSideVertex> settle(const Side& side);
-  /// Lowest and highest samples within a unit of a place on a side: of those within half a unit, if
-  /// there are some.
+  /// The lowest and highest samples within a unit of a place on a side; if any are within half a
+  /// unit, only of those.
   struct Samples {
     double low = 0.0, high = 0.0;
     bool any = false, on = false;
@@ -113,21 +115,21 @@ class TileSides {
     void add(double height, double units);
   };
   using SamplesAt = std::map<double, Samples>;
-  /// Adds to the places at which a side is looked at those of samples that lie on it, and returns
-  /// their heights if the surface wants sides to go through them.
+  /// Adds the places of samples on a side to the places at which it is sampled. Returns the heights
+  /// of these samples if the surface needs sides to pass through them.
   SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
                         std::vector<double>& latitude);
-  /// Samples in a box around places on a side or at its end, the same for all tiles there; nullopt
-  /// if they may be too many.
+  /// Returns the samples in a box around places on a side or at its end, the same for all tiles
+  /// there; nullopt if there may be too many.
   std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
-  /// The samples at the end of a side: the same for all sides and tiles that meet there.
+  /// Returns the samples at the end of a side, the same for all sides and tiles that meet there.
   std::optional<Samples> samples_at_corner(double longitude, double latitude);
-  /// What both tiles beside a side know of it: its ends, and a unit to either side.
+  /// Returns what both tiles at a side can see of it: its ends, and a unit to either side.
   [[nodiscard]] GeographicBox band_around(const Side& side) const;
-  /// Whether heights in a band differ by so little that the ends of the side will do.
+  /// Whether heights in a band differ by so little that the ends of the side suffice.
   [[nodiscard]] bool is_flat(const GeographicBox& band) const;
   [[nodiscard]] bool is_cut(const Side& side) const;
-  /// Whether a leaf beside a side has too many samples; the same for both tiles.
+  /// Whether a leaf next to a side has too many samples; the same for both tiles.
   [[nodiscard]] bool is_crowded(const Side& side) const;
   /// Whether there may be samples within `reach` (degrees) of a side; the same for both tiles.
   [[nodiscard]] bool is_near_data(const Side& side, double reach) const;

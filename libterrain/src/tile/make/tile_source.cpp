@@ -21,12 +21,12 @@ namespace {
 
 /// Memory of a thread: the samples of a leaf or of a part of a tile, their mesh and its caches.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
-/// Fill and blocks of the store, and the lists of tiles.
+/// Memory of the store's fill and blocks, and of the lists of tiles.
 constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
 /// The least memory for the triangles of a part.
 constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
 
-/// Metres above or below the ellipsoid.
+/// In metres above or below the ellipsoid.
 constexpr double kFarthest = 1e7;
 
 template <class Tiled, class Surface>
@@ -37,7 +37,7 @@ class SourceOf final : public TileSource {
       surfaces_.push_back(std::make_unique<Surface>(*tiled_));
     }
   }
-  // They refer to what this class holds.
+  // The surfaces refer to members of this class.
   ~SourceOf() override { surfaces_.clear(); }
   SourceOf(const SourceOf&) = delete;
   SourceOf& operator=(const SourceOf&) = delete;
@@ -46,20 +46,20 @@ class SourceOf final : public TileSource {
   std::unique_ptr<Tiled> tiled_;
 };
 
-/// Metres above the ellipsoid; nullopt: heights are interpolated from those around.
+/// In metres above the ellipsoid; nullopt: heights are interpolated from surrounding heights.
 std::optional<double> flat_height(const stream::Store& store, const TilesRequest& request,
                                   double metres_per_unit) {
   if (request.fill == Fill::none) throw UsageError("`fill` none: globes have no holes");
   if (request.fill == Fill::interpolate) return std::nullopt;
   if (request.flat_height && !(std::abs(*request.flat_height) <= kFarthest)) {
-    throw UsageError("`fill` flat: beyond 10,000 km there is no place on a globe");
+    throw UsageError("`fill` flat: heights beyond 10,000 km are not on a globe");
   }
   const stream::Channel& z = store.schema().coordinates[2];
   const double lowest = (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
   return request.flat_height.value_or(lowest);
 }
 
-/// metres: of a unit of the store's heights.
+/// metres: per unit of the store's heights.
 void check_heights(const stream::Store& store, double metres) {
   const stream::Channel& z = store.schema().coordinates[2];
   for (const stream::Point3& end : {store.bounds().min, store.bounds().max}) {
@@ -68,8 +68,8 @@ void check_heights(const stream::Store& store, double metres) {
     throw stream::Error({.file = store.path().string(),
                          .where = {},
                          .cause = "has heights of " + plain_number(height) +
-                                  " m: beyond 10,000 km there is no place on a globe",
-                         .remedy = "look at the unit and the nodata value of the source, or leave "
+                                  " m: heights beyond 10,000 km are not on a globe",
+                         .remedy = "check the unit and the nodata value of the source, or leave "
                                    "wrong heights out: `where` 'z < 9000'"});
   }
 }

@@ -20,11 +20,11 @@ struct TileResources {
   unsigned threads = 1;
 };
 
-/// As the context allows. path: named in errors. Throws: stream::Error if not even one thread has
-/// the memory that it needs.
+/// Returns the resources that the context allows. path: named in errors. Throws: stream::Error if
+/// not even one thread has enough memory.
 TileResources tile_resources(const Context& context, const std::string& path);
 
-/// The surfaces of a store, one per thread, and what they share.
+/// The surfaces of a store, one per thread, and the data that they share.
 class TileSource {
  public:
   virtual ~TileSource() = default;
@@ -36,9 +36,10 @@ class TileSource {
   std::vector<std::unique_ptr<TileSurface>> surfaces_;
 };
 
-/// The source for a raster or for irregular points. Reads the store once or twice.
-/// Throws: UsageError for options that make no sense or not for this kind of store; stream::Error
-/// if no place of it has a longitude and latitude, or on a damaged one; stream::Stopped.
+/// Opens the source for a raster or for irregular points. Reads the store once or twice. Throws:
+/// UsageError for invalid options, or options that do not apply to this kind of store;
+/// stream::Error if no place of the store has a longitude and latitude, or if it is damaged;
+/// stream::Stopped.
 std::unique_ptr<TileSource> open_tile_source(const stream::Store& store,
                                              const TilesRequest& request,
                                              const TileResources& resources,

@@ -17,7 +17,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The same store, if it can be tiled.
+/// Returns the same store, if it can be tiled.
 const stream::Store& checked(const stream::Store& store) {
   if (store.schema().columns >= 2 && store.schema().rows >= 2) return store;
   throw stream::Error({.file = store.path().string(),
@@ -26,13 +26,13 @@ const stream::Store& checked(const stream::Store& store) {
                        .remedy = {}});
 }
 
-/// A projected raster's places are looked at in so many steps along a box. Wider boxes than this
-/// (degrees) may hold places outside the raster that its projection tears apart.
+/// Number of steps along a box in which a projected raster's places are sampled. Boxes wider than
+/// this (degrees) may have places outside the raster where its projection is discontinuous.
 constexpr unsigned kDigestSteps = 8;
 constexpr double kSmooth = 1.0;
-/// Samples around a place: those it lies between, and what rounding moves.
+/// Samples around a place: those that it is between, plus a margin for rounding.
 constexpr double kDigestMargin = 2.0;
-/// Bytes of heights that are kept.
+/// Memory in bytes of cached heights per thread.
 constexpr std::uint64_t kHeightsOfThread = std::uint64_t{24} << 20;
 
 void add_raster(const TiledRaster& raster, Digest& digest) {
@@ -50,15 +50,15 @@ void add_raster(const TiledRaster& raster, Digest& digest) {
   raster.add_to(digest);
 }
 
-/// The samples of a window that is not empty.
+/// Returns the box of a non-empty window of samples.
 StoredBox box_of(const LatticeWindow& window) {
   return {{static_cast<double>(window.column), static_cast<double>(window.row)},
           {static_cast<double>(window.column + window.columns - 1),
            static_cast<double>(window.row + window.rows - 1)}};
 }
 
-/// Adds the part of the outline that decides about places in and around a box: the same wherever
-/// else the outline changes.
+/// Adds the part of the outline that affects places in and around a box. It does not change if the
+/// outline changes elsewhere.
 void add_outline(const PointHull& hull, const StoredBox& box, double rim, Digest& digest) {
   digest.add(rim);
   const double around = rim + 2.5;
@@ -96,7 +96,7 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
     digest.add(raster.fill.digest(box_of(block)));
     filled = true;
   });
-  // What hangs over the raster's borders.
+  // The parts beyond the raster's borders.
   const stream::StoreSchema& schema = raster.store.schema();
   const auto columns = static_cast<std::int64_t>(schema.columns);
   const auto rows = static_cast<std::int64_t>(schema.rows);
@@ -115,8 +115,8 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
   add_outline(raster.hull, box_of(window), raster.rim, digest);
 }
 
-/// The lattice around places of it, two samples over its borders at most: what lies beyond is asked
-/// there. Some part of the raster is always in it.
+/// Returns the lattice around places, at most two samples beyond its borders, where places further
+/// away are evaluated. It always includes a part of the raster.
 LatticeWindow window_of(const TiledRaster& raster, const stream::Box3& around, double margin) {
   const stream::StoreSchema& schema = raster.store.schema();
   LatticeWindow window;
@@ -140,13 +140,14 @@ void add_everything(const TiledRaster& raster, Digest& digest) {
   add_window(raster, {-2, -2, columns + 4, rows + 4}, digest);
 }
 
-/// Places of the box in the raster's CRS, in `steps` each way; empty if some has no place there.
+/// Returns places of the box in the raster's CRS, `steps` steps along each axis; empty if one has
+/// no image.
 std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& box, unsigned steps) {
   std::vector<Point2> places;
   for (unsigned j = 0; j <= steps; ++j) {
     for (unsigned i = 0; i <= steps; ++i) {
       double longitude = box.west + (box.east - box.west) * i / steps;
-      // A raster in degrees may be in any turn; projections take the first.
+      // A raster in degrees may be in any turn; projections require the first.
       if (!raster.places.crs().is_geographic()) longitude = std::remainder(longitude, 360.0);
       const double latitude = box.south + (box.north - box.south) * j / steps;
       places.push_back({longitude, std::clamp(latitude, -90.0, 90.0)});
@@ -159,7 +160,7 @@ std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& bo
   return good ? places : std::vector<Point2>{};
 }
 
-/// In degrees, places are looked up in the turn nearest to the raster's own longitudes.
+/// In degrees, uses the turn nearest to the raster's own longitudes.
 void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double margin,
                       Digest& digest) {
   const auto [first, last] = raster.places.longitudes();
@@ -190,7 +191,7 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
       hull(tiled, 0) {
   const auto columns = static_cast<std::int64_t>(tiled.schema().columns);
   const auto rows = static_cast<std::int64_t>(tiled.schema().rows);
-  // TiledStore has seen a sample with data.
+  // TiledStore has found a sample with data.
   everywhere = blocks.range({0, 0, columns, rows}).value();
   const std::array<double, 6>& world = tiled.schema().world.xy;
   const CoordinateSystem& crs = places.crs();
@@ -249,7 +250,7 @@ std::uint64_t TiledRaster::digest(const GeographicBox& box) const {
   }
   stream::Box3 around;
   for (const Point2& p : looked_at) around.include(stream::Point3{p[0], p[1], 0.0});
-  // What bulges between the places looked at.
+  // Allow for the bulge between the sampled places.
   const auto bulge = [&](std::size_t axis) {
     return straight ? 0.0 : (around.max[axis] - around.min[axis]) / steps;
   };

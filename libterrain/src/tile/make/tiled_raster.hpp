@@ -14,15 +14,15 @@
 
 namespace terrace::terrain {
 
-/// What all threads share of a raster store that is tiled.
+/// The data that all threads share when tiling a raster store.
 struct TiledRaster : TiledStore {
   GridGeography geography;
   HeightBlocks blocks;
   mutable HeightCache height_cache;  ///< 24 MiB per thread
   HeightBlocks::Range everywhere;    ///< of all samples
   PointHull hull;                    ///< of the samples with data, in columns and rows
-  double rim = 0;                    ///< see rim_of_outline()
-  /// Columns run along meridians, rows along parallels, at equal distances.
+  double rim = 0;                    ///< from rim_of_outline()
+  /// Whether columns are along meridians and rows along parallels, equally spaced.
   bool upright = false;
 
   /// Reads the store twice. Throws: stream::Error if no place of it has a longitude and latitude.
@@ -30,20 +30,20 @@ struct TiledRaster : TiledStore {
               unsigned threads);
 
   /// Whether a place of the lattice without a sample is within the outline of those with data: in
-  /// their hull or so near that it belongs to the cells around them, as half a cell beyond the last
-  /// row does, and the gap between the ends of a raster around the globe.
+  /// their hull, or so near that it belongs to the cells around them, such as half a cell beyond
+  /// the last row and the gap between the ends of a raster around the globe.
   [[nodiscard]] bool is_within_outline(double column, double row) const;
 
-  /// The window of the lattice that has all samples in the box; empty if there is none.
+  /// Returns the window of the lattice with all samples in the box; empty if there is none.
   [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;
 
-  /// TileSurface::digest of a raster: of its lattice, its CRS and how it is filled; of the samples
-  /// in the blocks of the lattice that the box may need; and, where samples of these are missing or
-  /// the box hangs over the raster, of what fills it there. It depends on the samples and not on
-  /// how the store clusters them, but for the fill, which is made of the store's level 1. The rule
-  /// on what a box may need is the same as for reading it, with a margin; where it cannot be told
-  /// (wide boxes of projected rasters that reach beyond the raster) it is everything. Cost: a few
-  /// nanoseconds per block and per cell of the fill.
+  /// Implements TileSurface::digest() for a raster. Hashes its lattice, its CRS and how it is
+  /// filled; the samples in the blocks of the lattice that the box may need; and, if some of these
+  /// are missing or the box extends beyond the raster, the fill there. Depends on the samples, not
+  /// on how the store clusters them, except for the fill, which is made from the store's level 1.
+  /// The rule for what a box may need is the same as for reading it, with a margin; if that cannot
+  /// be determined (wide boxes of projected rasters that extend beyond the raster), everything is
+  /// hashed. Cost: a few nanoseconds per block and per cell of the fill.
   [[nodiscard]] std::uint64_t digest(const GeographicBox& box) const;
 };
 

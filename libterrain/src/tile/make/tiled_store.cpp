@@ -21,7 +21,7 @@ double TiledStore::rim_of_outline() const {
   const double share = unit > 0.0 ? fall / (8 * unit) : 0.0;
   const double rim = schema.grid ? std::max(1.5, share) : share;
   if (!(rim > 0.0) || !std::isfinite(rim)) return 0.0;
-  // A power of four, so that tiles are rarely made again when other heights change.
+  // A power of four, so that tiles rarely have to be rebuilt when other heights change.
   int exponent = 0;
   const double mantissa = std::frexp(rim, &exponent);
   if (mantissa == 0.5) --exponent;

@@ -15,21 +15,22 @@
 
 namespace terrace::terrain {
 
-/// What all threads share of a store that is tiled, whether a raster or irregular points.
+/// The data that all threads share when tiling a store, be it a raster or irregular points.
 struct TiledStore {
   stream::Store store;
   StoredPlaces places;
   EllipsoidalHeights vertical;
   StoreFill fill;
-  double spacing = 0.0;  ///< see TileSurface::spacing()
-  /// The height in metres where there are no samples; nullopt interpolates those around, as far as
-  /// the outline of all samples goes.
+  double spacing = 0.0;  ///< from TileSurface::spacing()
+  /// The height in metres where there are no samples; nullopt: interpolated from surrounding
+  /// samples, within the outline of all samples.
   std::optional<double> flat_fill{};
-  /// The height in metres beyond the outline: no land is invented there.
+  /// The height in metres beyond the outline, where no land is invented.
   [[nodiscard]] double height_beyond() const { return flat_fill.value_or(0.0); }
-  /// How far heights go on beyond the outline, in stored units: an eighth to a half of the height
-  /// by which the surface falls there, a power of four, and at least one and a half cells of a
-  /// raster. Tiles round places, and no sample at the outline may come to be beyond it.
+  /// How far heights continue beyond the outline, in stored units: an eighth to a half of the
+  /// height by which the surface falls there, rounded to a power of four, and at least one and a
+  /// half cells of a raster. Tiles round places, and a sample on the outline must not end up beyond
+  /// it.
   [[nodiscard]] double rim_of_outline() const;
   /// Water is where the surface has this height (in the store's unit); nullopt: where a raster has
   /// no data.
@@ -40,7 +41,7 @@ struct TiledStore {
   TiledStore(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights)
       : store(tiled), places(tiled, std::move(system)), vertical(std::move(heights)), fill(tiled) {}
 
-  /// Adds what the heights of all samples depend on besides the samples.
+  /// Adds everything that the heights of all samples depend on, in addition to the samples.
   void add_to(Digest& digest) const {
     vertical.add_to(digest);
     for (const std::optional<double>& option : {flat_fill, water_height}) {

@@ -75,7 +75,7 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
   std::error_code error;
   std::filesystem::create_directories(target.parent_path(), error);
   if (error) {
-    throw stream::system_error(target.parent_path().string(), "cannot be made", error.value());
+    throw stream::system_error(target.parent_path().string(), "cannot be created", error.value());
   }
   std::string temporary = target.parent_path().string();
   temporary.append("/.").append(target.filename().string()).append(kTemporaryEnding);
@@ -97,7 +97,7 @@ bool is_torn_tile(std::string_view path) {
   const std::size_t end = name.rfind(kTemporaryEnding);
   if (!name.starts_with('.') || end == std::string_view::npos || end == 0) return false;
   std::string_view pid = name.substr(end + std::string_view(kTemporaryEnding).size());
-  if (pid.starts_with('-')) pid.remove_prefix(1);  // versions before locks had no number
+  if (pid.starts_with('-')) pid.remove_prefix(1);  // versions before locks wrote no number
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   if (!std::all_of(pid.begin(), pid.end(), is_digit)) return false;
   std::string tile(path.substr(0, path.size() - name.size()));
@@ -114,7 +114,7 @@ void sync_files(const std::string& folder) {
 
 void sync_names(const std::string& folder) {
   const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  // Some file systems cannot sync a folder and say so: nothing is lost by that.
+  // Some file systems cannot sync a folder and say so; nothing is lost by that.
   if (file.number() < 0 || (::fsync(file.number()) != 0 && errno != EINVAL && errno != ENOTSUP)) {
     throw stream::system_error(folder, "cannot be synced", errno);
   }

@@ -14,13 +14,13 @@
 namespace terrace::terrain {
 namespace {
 
-/// Version of the tile maker: raise it when equal inputs give other bytes.
+/// Version of the tile maker; increment it when equal inputs give other bytes.
 constexpr std::uint64_t kGeneration = 4;
 
 }  // namespace
 
 GeographicBox reach_of(const TileAddress& tile, const TileSurface& surface) {
-  // Sides look a unit beyond the tile, normals a sample or a 256th of it.
+  // Sides use a unit beyond the tile, normals a sample or a 256th of the tile.
   const GeographicBox box = box_of(tile);
   const double reach = 1.01 * std::max(surface.spacing(), (box.east - box.west) / 256.0);
   return {box.west - reach, box.south - reach, box.east + reach, box.north + reach};

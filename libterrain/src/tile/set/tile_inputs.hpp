@@ -11,24 +11,24 @@
 
 namespace terrace::terrain {
 
-/// What the bytes of a tile depend on besides its zoom's plan and the surface.
+/// What the bytes of a tile depend on, in addition to its zoom's plan and the surface.
 struct TileInputs {
   TileMeshOptions mesh;
   bool gzip = false;
-  std::string source_options;  ///< that the surface depends on
+  std::string source_options;  ///< the options that the surface depends on
   std::string metadata;        ///< of this tile
 };
 
-/// Contains all places at which make_tile() may query a surface: the tile and a margin. May reach
-/// beyond 180 degrees and the poles.
+/// Returns a box with all places at which make_tile() may query a surface: the tile and a margin.
+/// May extend beyond 180 degrees and the poles.
 GeographicBox reach_of(const TileAddress& tile, const TileSurface& surface);
 
-/// A hash of all that a tile's bytes depend on, or the fact that it has no data: while it stays the
-/// same, the tile is up to date.
+/// Returns a hash of everything that a tile's bytes, or its absence for lack of data, depend on.
+/// The tile is up to date while the hash stays the same.
 std::uint64_t digest_of(const TileAddress& tile, const ZoomPlan& plan, const TileInputs& inputs,
                         TileSurface& surface);
 
-/// A hash of the bytes of a file. Throws: stream::Error if it cannot be read.
+/// Returns a hash of the bytes of a file. Throws: stream::Error if it cannot be read.
 std::uint64_t digest_of_file(const std::string& path);
 
 }  // namespace terrace::terrain

@@ -19,10 +19,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What another version has made is made anew: its tiles may not fit beside those of this one.
+/// Tiles of another version are rebuilt, because they may not match adjacent tiles of this version.
 std::string head_line() { return std::string("terrace tiles 2 ") + TERRACE_TERRAIN_VERSION; }
 
-/// Takes the number before the next blank off a line.
+/// Removes the number before the next blank from a line.
 template <class Number>
 bool take(std::string_view& line, Number& number) {
   const std::size_t end = line.find(' ');
@@ -59,8 +59,8 @@ bool by_address(const TileJournal::Record& a, const TileJournal::Record& b) {
 }
 
 struct Lines {
-  std::vector<TileJournal::Record> records;  ///< sorted, of each tile the last
-  bool tidy = true;                          ///< sorted as they stand in the file, each tile once
+  std::vector<TileJournal::Record> records;  ///< sorted; of each tile the last one
+  bool tidy = true;                          ///< whether the file is sorted, with each tile once
   std::uint64_t good_bytes = 0;              ///< 0: not a journal of this version
 };
 
@@ -77,7 +77,7 @@ Lines read_lines(const std::string& path) {
     read.records.push_back(*record);
     read.good_bytes += line.size() + 1;
   }
-  // The last of several equal addresses comes first.
+  // Puts the last of several equal addresses first.
   std::reverse(read.records.begin(), read.records.end());
   std::stable_sort(read.records.begin(), read.records.end(), by_address);
   const auto same = [](const TileJournal::Record& a, const TileJournal::Record& b) {
@@ -99,7 +99,7 @@ std::uint64_t checksum_of(std::span<const std::byte> bytes) {
 TileJournal::TileJournal(const std::string& folder) : folder_(folder), path_(folder + "/" + kName) {
   Lines read = read_lines(path_);
   if (read.good_bytes > 0) {
-    // What a crash left behind the last whole line goes.
+    // Remove what a crash left after the last complete line.
     std::error_code error;
     if (fs::file_size(path_, error) != read.good_bytes) {
       fs::resize_file(path_, read.good_bytes, error);

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 constexpr const char* kLayerName = "layer.json";
 constexpr const char* kLockName = ".terrace-tiles.lock";
 
-/// The options that the surface depends on besides the store.
+/// Returns the options, apart from the store, that the surface depends on.
 std::string source_options_of(const TilesRequest& request) {
   std::string text = request.fill == Fill::interpolate ? "interpolate" : "flat";
   if (request.flat_height) text += ":" + number_text(*request.flat_height);
@@ -65,17 +65,17 @@ std::string fingerprint_of(const stream::Store& store, const TileSetOptions& opt
   return text;
 }
 
-/// A folder that holds a finished set may only be written again with the same inputs and options.
+/// Throws: stream::Error if the folder has a finished set with other inputs or options.
 void refuse_another(const std::string& layer_path, const std::string& fingerprint) {
   if (!fs::exists(layer_path) || read_layer(layer_path).fingerprint == fingerprint) return;
   throw stream::Error(
       {.file = layer_path,
        .where = {},
-       .cause = "finished, and made of another store or with other options",
+       .cause = "is finished, and made from another store or with other options",
        .remedy = "give `replace` to replace it: tiles that stay the same are kept"});
 }
 
-/// Whether there is anything in `folder` without a tile set, begun or finished.
+/// Whether `folder` contains files but no tile set, finished or not.
 bool holds_others(const std::string& folder) {
   if (fs::exists(folder + "/" + TileJournal::kName) || fs::exists(folder + "/" + kLayerName)) {
     return false;
@@ -89,7 +89,7 @@ bool holds_others(const std::string& folder) {
                      [](const auto& entry) { return entry.path().filename() != kLockName; });
 }
 
-/// False also for a file that cannot be read.
+/// Also false for a file that cannot be read.
 bool is_our_layer(const std::string& path) {
   try {
     return !read_layer(path).fingerprint.empty();
@@ -98,35 +98,35 @@ bool is_our_layer(const std::string& path) {
   }
 }
 
-/// An identical file is not touched.
+/// Writes the file, unless it is identical.
 void write_layer(const std::string& path, const std::string& text) {
   const std::vector<std::byte> before = read_tile_file(path);
   const auto bytes = std::as_bytes(std::span(text));
   if (std::equal(before.begin(), before.end(), bytes.begin(), bytes.end())) return;
-  // Another program may have put its own there since the run began.
+  // Another program may have put its own file there since the run began.
   stream::AtomicFile file(path,
                           {[](const fs::path& there) { return is_our_layer(there.string()); }});
   file.write(text);
   file.commit();
 }
 
-/// The folder of a tile set for as long as a run writes to it: made if need be, and locked against
-/// other runs.
+/// The folder of a tile set during a run that writes to it: created if necessary, and locked
+/// against other runs.
 class TileFolder {
  public:
-  /// `folder` may be written if it is missing or empty, or a tile set of ours with `force`, or an
-  /// unfinished one with `resume`, and no other run writes to it. Throws: stream::Error with the
-  /// remedy.
+  /// `folder` may be written if it is missing or empty, if it is a tile set of ours and `force` is
+  /// set, or an unfinished one and `resume` is set; and if no other run writes to it. Throws:
+  /// stream::Error with the remedy.
   TileFolder(const std::string& folder, bool force, bool resume);
   /// Removes a folder that was created here and stayed empty.
   ~TileFolder();
   TileFolder(const TileFolder&) = delete;
   TileFolder& operator=(const TileFolder&) = delete;
 
-  /// Where links lead.
+  /// The path with links resolved.
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// Throws: stream::Error if the folder has been moved away while the run lasted, and what has its
-  /// name now is another one.
+  /// Throws: stream::Error if the folder was moved away during the run and its name now belongs to
+  /// another one.
   void check_same() const;
 
  private:
@@ -143,11 +143,11 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
   if (fs::exists(path_) && !fs::is_directory(path_)) refuse("is not a folder", "name another one");
   // Nothing is created in a foreign folder, not even the lock.
   if (holds_others(path_)) {
-    refuse("is not empty and holds no tile set", "name another folder, or empty it yourself");
+    refuse("is not empty and contains no tile set", "name another folder, or empty it yourself");
   }
   std::error_code error;
   made_ = fs::create_directories(path_, error);
-  if (error) throw stream::system_error(folder, "cannot be made", error.value());
+  if (error) throw stream::system_error(folder, "cannot be created", error.value());
   lock_ = stream::FileLock(fs::path(path_) / kLockName);
   if (!lock_.held()) {
     refuse("another run is writing tiles to it", "wait until it ends, or name another folder");
@@ -156,15 +156,15 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
   const std::string journal_path = path_ + "/" + TileJournal::kName;
   if (fs::exists(layer_path)) {
     if (read_layer(layer_path).fingerprint.empty()) {
-      refuse("holds a tile set that terrace did not write", "name another folder");
+      refuse("contains a tile set that terrace did not write", "name another folder");
     }
     if (!force && !resume) {
-      refuse("holds a tile set already",
-             "give `replace` to replace it (what stays the same is kept), or name another folder");
+      refuse("already contains a tile set",
+             "give `replace` to replace it (unchanged tiles are kept), or name another folder");
     }
   } else if (fs::exists(journal_path) && !force && !resume) {
-    refuse("holds a tile set that was begun and not finished",
-           "give `resume` to go on, or `replace` to replace it");
+    refuse("contains an unfinished tile set",
+           "give `resume` to continue, or `replace` to replace it");
   }
   stream::remove_abandoned(layer_path);
   stream::remove_abandoned(journal_path);
@@ -175,37 +175,37 @@ void TileFolder::check_same() const {
   throw stream::Error({.file = path_,
                        .where = {},
                        .cause = "has been moved or replaced by another program in the meantime",
-                       .remedy = "run again, with a folder that stays"});
+                       .remedy = "run again, and do not move the folder"});
 }
 
 TileFolder::~TileFolder() {
   lock_.release();
   std::error_code ignored;
-  if (made_) fs::remove(path_, ignored);  // fails if it is not empty, as it should
+  if (made_) fs::remove(path_, ignored);  // fails if it is not empty, as intended
 }
 
-/// The zoom at which a 64th of a tile is not wider than the distance of samples.
+/// Returns the zoom at which a 64th of a tile is at most as wide as the spacing of samples.
 unsigned native_zoom(double spacing) {
   unsigned zoom = 0;
   while (zoom < kDeepestZoom && std::ldexp(180.0 / 64.0, -static_cast<int>(zoom)) > spacing) ++zoom;
   return zoom;
 }
 
-/// Throws: UsageError for options that do not go together.
+/// Throws: UsageError for options that do not work together.
 void check_request(const TilesRequest& request) {
   for (const unsigned zoom : {request.first_zoom, request.last_zoom.value_or(0)}) {
     if (zoom > kDeepestZoom) {
-      throw UsageError("`zoom` " + std::to_string(zoom) + ": from 0 to " +
+      throw UsageError("`zoom` " + std::to_string(zoom) + ": must be from 0 to " +
                        std::to_string(kDeepestZoom));
     }
   }
   if (request.max_error && !(*request.max_error > 0.0 && std::isfinite(*request.max_error))) {
-    throw UsageError("`max_error` is a number of metres above 0");
+    throw UsageError("`max_error` must be a positive number of metres");
   }
   if (request.metadata && request.first_zoom > 0) {
     throw UsageError(
-        "`metadata` says in each tile which lie below it, from zoom 0 on: begin with `zoom` 0, or "
-        "go without");
+        "`metadata` lists in each tile the tiles below it, from zoom 0 on: begin with `zoom` 0, or "
+        "leave it out");
   }
 }
 
@@ -231,11 +231,11 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
                                .source_options = source_options_of(request)};
   if (request.first_zoom > options.last_zoom) {
     throw UsageError("`zoom` " + std::to_string(request.first_zoom) + "-" +
-                     std::to_string(options.last_zoom) + ": the smaller one first");
+                     std::to_string(options.last_zoom) + ": give the smaller one first");
   }
   if (options.last_zoom > native) {
-    context.say("zoom " + std::to_string(native) + " shows every sample: deeper ones, to " +
-                std::to_string(options.last_zoom) + ", show no more");
+    context.say("zoom " + std::to_string(native) + " already shows every sample: deeper ones, to " +
+                std::to_string(options.last_zoom) + ", add no detail");
   }
   const std::string layer_path = options.folder + "/" + kLayerName;
   const std::string fingerprint = fingerprint_of(store, options);
@@ -260,7 +260,7 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
     const double bound = options.max_error(zoom.zoom);
     if (zoom.max_error > bound) {
       context.say("zoom " + std::to_string(zoom.zoom) + ": " + readable_number(bound) +
-                  " m was asked for, less than what the 15 bits of a tile's coordinates show here");
+                  " m was requested, which is finer than the 15 bits of a tile's coordinates here");
     }
     layer.max_errors[zoom.zoom] = std::max(zoom.max_error, bound);
   }

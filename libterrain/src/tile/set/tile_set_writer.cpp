@@ -27,16 +27,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// At least, so that threads end at about the same time.
+/// The minimum, so that threads finish at about the same time.
 constexpr std::size_t kFamiliesPerThread = 8;
 
-/// Tiles that may have data, sorted by row, then column. The two of zoom 0 always count.
+/// Returns the tiles that may have data, sorted by row, then column. Always includes the two of
+/// zoom 0.
 std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface, const Context& context) {
   if (zoom == 0) return {{0, 0, 0}, {0, 1, 0}};
   return tiles_with_samples(surface, zoom, context);
 }
 
-/// The largest difference of heights within a tile, as far as it is known without reading.
+/// Returns the largest range of heights within a tile, as far as it is known without reading.
 double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface) {
   double widest = 0.0;
   const GeographicBox data = surface.bounds();
@@ -54,7 +55,7 @@ double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface)
   return widest;
 }
 
-/// The number of a tile among some sorted by row.
+/// Returns the index of a tile among tiles sorted by row.
 std::optional<std::size_t> number_of(const TileAddress& tile,
                                      const std::vector<TileAddress>& tiles) {
   const auto found = std::lower_bound(tiles.begin(), tiles.end(), tile, by_row);
@@ -95,14 +96,14 @@ void TileSetWriter::begin_change() {
     std::error_code error;
     fs::remove(layer_path_, error);
     if (error) throw stream::system_error(layer_path_, "cannot be removed", error.value());
-    // Not to be there again after a power cut that tiles have survived.
+    // It must not reappear after a power failure that the tiles survived.
     sync_names(options_.folder);
   });
 }
 
 std::string TileSetWriter::children_json(const TileAddress& tile) const {
   std::vector<TileAddress> there;
-  // Metadata begin at zoom 0, so zooms have their own numbers.
+  // Metadata begin at zoom 0, so zooms_ is indexed by zoom.
   if (tile.zoom + 1 < zooms_.size()) {
     const Zoom& below = *zooms_[tile.zoom + 1];
     for (const TileAddress& child : children_of(tile)) {
@@ -155,7 +156,7 @@ void TileSetWriter::begin_zooms() {
   for (unsigned zoom = options_.request.first_zoom; zoom <= options_.last_zoom; ++zoom) {
     auto begun = std::make_unique<Zoom>();
     begun->tiles = candidates(zoom, surface, context_);
-    // A quarter more, for what is filled beside the samples.
+    // A quarter more, for the fill next to samples.
     begun->range = 1.25 * widest_range(begun->tiles, surface);
     begun->plan = plan_zoom(zoom, options_.max_error(zoom), begun->range, surface);
     zooms_.push_back(std::move(begun));
@@ -190,7 +191,7 @@ void TileSetWriter::add_families(std::vector<Family>& stage, std::size_t zoom, s
 }
 
 std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
-  // The uppermost zoom that has enough tiles for all threads; those above it are written one by
+  // The uppermost zoom with enough tiles for all threads; the tiles above it are written one by
   // one.
   std::size_t zoom = zooms_.size() - 1;
   while (zoom > 0 && zooms_[zoom - 1]->tiles.size() >= kFamiliesPerThread * surfaces_.size()) {
@@ -203,8 +204,8 @@ std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
       stages.back().push_back({{zooms_[above].get(), i}});
     }
   };
-  // The largest tiles come first, lest few threads work on them when all else is done. Not if
-  // there are metadata: those of a tile need its children, so each zoom waits for the one below.
+  // Start with the largest tiles, so that not only a few threads work at the end. With metadata a
+  // tile needs its children first, so each zoom waits for the one below.
   std::size_t first = options_.request.metadata ? zoom : 0;
   while (first < zoom && zooms_[first]->tiles.size() < surfaces_.size()) add_zoom(first++);
   for (std::size_t i = 0; i < zooms_[first]->tiles.size(); ++i) {
@@ -254,13 +255,13 @@ void TileSetWriter::write_zooms() {
           [&](std::size_t i, unsigned worker) { write(stage[i], *surfaces_[worker], done); },
           context_.stop);
     }
-    // Each tile is below one of the zoom above that may have data, too.
+    // Every tile is also below one of the zoom above that may have data.
     assert(finished == tiles ||
            std::ranges::any_of(zooms_, [](const auto& zoom) { return zoom->too_far.load(); }));
     again = false;
     for (auto zoom = zooms_.rbegin(); zoom != zooms_.rend(); ++zoom) {
       (*zoom)->sides.clear();
-      // Metadata above tell which of these tiles there are.
+      // The metadata above list which of these tiles exist.
       (*zoom)->open = (*zoom)->too_far || (again && options_.request.metadata);
       if ((*zoom)->too_far) take_larger_steps(**zoom);
       again = again || (*zoom)->open;
@@ -274,8 +275,8 @@ void TileSetWriter::take_larger_steps(Zoom& zoom) {
   if (zoom.range > 1e7) {
     throw stream::Error({.file = options_.folder,
                          .where = "zoom " + std::to_string(zoom.plan.zoom),
-                         .cause = "heights beyond 10,000 km have no place on a globe",
-                         .remedy = "look at the unit and the nodata value of the source"});
+                         .cause = "heights beyond 10,000 km are not on a globe",
+                         .remedy = "check the unit and the nodata value of the source"});
   }
   zoom.range = std::max(1.0, 2.0 * zoom.range);
   zoom.plan =
@@ -322,7 +323,7 @@ void TileSetWriter::remove_others() {
   if (!gone.empty()) begin_change();
   const auto remove = [](const fs::path& path) {
     fs::remove(path);
-    // Fails on folders that are not empty, as it should.
+    // Fails on folders that are not empty, as intended.
     std::error_code ignored;
     if (fs::remove(path.parent_path(), ignored)) {
       fs::remove(path.parent_path().parent_path(), ignored);

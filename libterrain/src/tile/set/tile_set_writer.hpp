@@ -19,22 +19,22 @@
 
 namespace terrace::terrain {
 
-/// A request, and what it becomes with the store at hand.
+/// A request, and the values derived from it and the store.
 struct TileSetOptions {
   const TilesRequest& request;
-  std::string folder;  ///< where links lead
+  std::string folder;  ///< with links resolved
   unsigned last_zoom = 0;
-  std::string source_options;  ///< those that the surface depends on
+  std::string source_options;  ///< the options that the surface depends on
 
   [[nodiscard]] TileMeshOptions mesh() const {
     return {request.quality, request.normals, request.water};
   }
-  /// The bound of a zoom, metres.
+  /// The bound of a zoom, in metres.
   [[nodiscard]] double max_error(unsigned zoom) const;
 };
 
-/// Writes the tiles of one folder. Files that are whole and up to date are kept.
-/// Before anything changes, `layer.json` is removed: an unfinished set has none.
+/// Writes the tiles of one folder. Keeps files that are complete and up to date. Removes
+/// `layer.json` before any change, so that an unfinished set has none.
 class TileSetWriter {
  public:
   TileSetWriter(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
@@ -53,7 +53,7 @@ class TileSetWriter {
   /// in the folder.
   void check_strangers() const;
   void write_zooms();
-  /// After all zooms: removes tiles of an earlier set that this one does not have, and temporary
+  /// Call after all zooms: removes tiles of an earlier set that are not in this one, and temporary
   /// files of killed runs; completes the journal.
   void finish();
 
@@ -63,36 +63,37 @@ class TileSetWriter {
  private:
   /// The outcome of one tile.
   struct Written {
-    bool made = false;  ///< else its record was up to date
+    bool made = false;  ///< otherwise its record was up to date
     bool kept = false;  ///< its file was not touched
     FinishedTile finished;
   };
   struct Zoom {
-    std::vector<TileAddress> tiles;  ///< that may have data, sorted by row, then column
-    double range = 0.0;              ///< of heights that a tile's steps must have room for
+    std::vector<TileAddress> tiles;  ///< those that may have data, sorted by row, then column
+    double range = 0.0;              ///< of heights that a tile's steps must cover
     ZoomPlan plan;
     SharedSides sides;
-    bool open = true;                   ///< its tiles are to be written
-    std::atomic<bool> too_far = false;  ///< that room did not suffice
+    bool open = true;                   ///< its tiles remain to be written
+    std::atomic<bool> too_far = false;  ///< the range was not sufficient
     std::vector<Written> written;       ///< by tile
   };
-  /// Tiles that a thread writes one after another: one of some zoom and those below it, each after
-  /// its children, so that most of what is decoded for one serves the next.
+  /// Tiles that a thread writes one after another: a tile and those below it, each after its
+  /// children, so that most of the data decoded for one serves the next.
   using Family = std::vector<std::pair<Zoom*, std::size_t>>;
 
   void begin_zooms();
-  /// Families that may be written at once, by stages that wait for the one before.
+  /// Returns the families, in stages that wait for the previous one; those of a stage may be
+  /// written at once.
   std::vector<std::vector<Family>> stages();
-  /// Adds what is below a tile by families of the zoom `last`, and tiles above that one by one,
-  /// each after its children: threads that work at one time work near each other.
+  /// Adds the tiles below a tile by families of the zoom `last`, and the tiles above that zoom one
+  /// by one, each after its children. So threads work close to each other at any time.
   void add_families(std::vector<Family>& stage, std::size_t zoom, std::size_t number,
                     std::size_t last);
-  /// Adds the tiles of open zooms below a tile, and itself.
+  /// Adds a tile, after the tiles of open zooms below it.
   void add_to(Family& family, std::size_t zoom, std::size_t number);
   void write(const Family& family, TileSurface& surface,
              const std::function<void(const TileAddress&, const Written&)>& done);
   Written write_tile(const TileAddress& tile, Zoom& zoom, TileSurface& surface);
-  /// The tiles of the next zoom below a tile, as its metadata tells them.
+  /// Returns the tiles of the next zoom below a tile, as its metadata list them.
   [[nodiscard]] std::string children_json(const TileAddress& tile) const;
   void take_larger_steps(Zoom& zoom);
   void conclude(const Zoom& zoom);
@@ -109,7 +110,7 @@ class TileSetWriter {
   std::optional<TileLayer> finished_;  ///< the set that was there before
   TileJournal journal_;
   std::vector<TileJournal::Record> records_;
-  std::vector<std::unique_ptr<Zoom>> zooms_;  ///< from the first one asked for on
+  std::vector<std::unique_ptr<Zoom>> zooms_;  ///< from the first requested one on
   bool repeats_ = false;                      ///< tiles of this run are written again
   std::once_flag changed_;
 };

@@ -31,20 +31,20 @@
 namespace terrace::terrain {
 namespace {
 
-/// Metres by which rounding may exceed a bound: samples are placed on the globe to a hundredth of a
-/// millimetre.
+/// In metres: how much rounding may exceed a bound. Samples are placed on the globe to a hundredth
+/// of a millimetre.
 constexpr double kHeightSlack = 1e-4;
 
-/// What a tile may unpack to.
+/// Limit on the size of an uncompressed tile.
 constexpr std::uint64_t kMostBorderBytes = std::uint64_t{1} << 28;
-/// Metres by which neighbours' heights may differ, besides the rounding of each.
+/// In metres: how much the heights of neighbours may differ, in addition to the rounding of each.
 constexpr double kBorderSlack = 1e-3;
 
 /// A side of a tile.
 struct BorderSide {
-  /// Place along it in units of the tile, and metres.
+  /// The position along it in units of the tile, and metres.
   std::vector<std::pair<std::uint16_t, double>> vertices;
-  double rounding = 0.0;  ///< metres, of a height
+  double rounding = 0.0;  ///< of a height, in metres
 };
 
 struct TileBorders {
@@ -66,7 +66,7 @@ TileBorders borders_of(const TileMesh& mesh) {
           take(edges.north, mesh.u)};
 }
 
-/// What is wrong between the sides of two neighbours; empty if they fit.
+/// Describes how the sides of two neighbours differ; empty if they match.
 std::string misfit(const BorderSide& one, const BorderSide& other) {
   const auto &a = one.vertices, &b = other.vertices;
   const bool same_places = a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
@@ -89,7 +89,7 @@ DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& 
   try {
     return decode_tile(stream::gunzip(bytes, kMostBorderBytes, name), name);
   } catch (const stream::Error& packed) {
-    // One plain tile of 65536 begins as gzip does.
+    // One in 65536 uncompressed tiles begins like gzip.
     try {
       return decode_tile(bytes, name);
     } catch (const stream::Error&) {
@@ -98,14 +98,14 @@ DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& 
   }
 }
 
-/// A tile that was looked at.
+/// The result of checking a tile.
 struct Checked {
   bool decoded = false;
   std::vector<TileFault> faults;
   TileBorders borders;
 };
 
-/// The number in "byte 17" of a message.
+/// Parses the number in "byte 17" of a message.
 std::uint64_t byte_of(std::string_view where) {
   std::uint64_t byte = 0;
   if (where.starts_with("byte "))
@@ -138,13 +138,13 @@ class SetCheck {
   [[nodiscard]] double bound_of(unsigned zoom) const;
   [[nodiscard]] bool is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const;
   [[nodiscard]] Checked check(const TileAddress& tile, const TileHeights& heights) const;
-  /// A part of the globe that a thread measures in all tiles over it, so that most of what is
+  /// A part of the globe that a thread measures in all tiles over it, so that most of the data
   /// decoded for one serves the others.
   struct Region {
     TileAddress tile;
-    std::vector<std::size_t> tiles;  ///< the numbers of this one and of those below it
+    std::vector<std::size_t> tiles;  ///< the indices of this tile and of those below it
   };
-  /// The heights of each tile. Tiles that cannot be read are skipped: check() reports them.
+  /// Measures the heights of each tile. Skips unreadable tiles, which check() reports.
   [[nodiscard]] std::vector<TileHeights> measure(const std::vector<TileAddress>& tiles) const;
   [[nodiscard]] std::vector<Region> regions_of(const std::vector<TileAddress>& tiles) const;
   void compare(const TileAddress& tile, const char* side, const BorderSide& own,
@@ -156,7 +156,7 @@ class SetCheck {
   unsigned threads_;
   const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
   const Context& context_;
-  std::vector<TileJournal::Record> records_;  ///< what was written, where that is known
+  std::vector<TileJournal::Record> records_;  ///< of the written tiles, if there is a journal
 };
 
 double SetCheck::bound_of(unsigned zoom) const {
@@ -181,7 +181,7 @@ Checked SetCheck::check(const TileAddress& tile, const TileHeights& heights) con
   try {
     const std::vector<std::byte> bytes = read_tile_file(path_of(tile));
     if (!is_as_written(tile, bytes)) {
-      checked.faults.push_back({0, "not the bytes that were written: its checksum is another one"});
+      checked.faults.push_back({0, "not the bytes that were written: its checksum differs"});
     }
     decoded = unpack_tile(bytes, path_of(tile));
   } catch (const stream::Error& error) {
@@ -195,7 +195,7 @@ Checked SetCheck::check(const TileAddress& tile, const TileHeights& heights) con
   checked.borders = borders_of(decoded.mesh);
   if (heights.uncovered > 0) {
     checked.faults.push_back(
-        {0, counted(heights.uncovered, "sample", "of the store lies", "of the store lie") +
+        {0, counted(heights.uncovered, "sample", "of the store is", "of the store are") +
                 " over no triangle"});
   }
   const double bound = bound_of(tile.zoom);
@@ -214,7 +214,7 @@ std::vector<SetCheck::Region> SetCheck::regions_of(const std::vector<TileAddress
   const unsigned deepest = tiles.empty() ? 0 : tiles.back().zoom;
   std::vector<TileAddress> found{{0, 0, 0}, {0, 1, 0}};
   for (;;) {
-    // Boxes with their borders: samples there may lie in no other region.
+    // Uses boxes with their borders: samples there may be in no other region.
     std::erase_if(found, [&](const TileAddress& tile) {
       return !may_have_samples(box_of(tile), *surfaces_.front());
     });
@@ -288,8 +288,8 @@ void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSi
 }
 
 void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
-  // Northern sides of the row below and of this row, by column, the eastern side of the tile before
-  // this one, and the western one of the row's first tile, which is beside the last.
+  // Northern sides of the row below and of this row, by column; the eastern side of the previous
+  // tile; and the western side of the row's first tile, which is next to the last.
   std::map<std::uint32_t, BorderSide> below, row;
   BorderSide before, first;
   std::optional<TileAddress> last;
@@ -366,8 +366,8 @@ TileCheckResult check_tiles(const TileCheckRequest& request, const Context& cont
   if (!is_tile_folder(request.folder)) {
     throw stream::Error({.file = request.folder,
                          .where = {},
-                         .cause = "holds no set of tiles",
-                         .remedy = "name the folder into which they were written"});
+                         .cause = "contains no tile set",
+                         .remedy = "name the folder that it was written to"});
   }
   const TileResources resources = tile_resources(context, request.folder);
   std::unique_ptr<TileSource> source;
@@ -380,7 +380,7 @@ TileCheckResult check_tiles(const TileCheckRequest& request, const Context& cont
   if (!std::filesystem::exists(layer_path)) {
     throw stream::Error({.file = request.folder,
                          .where = {},
-                         .cause = "holds a tile set that was begun and not finished",
+                         .cause = "contains an unfinished tile set",
                          .remedy = "finish it first: make the set again with `resume`"});
   }
   TileLayer layer = read_layer(layer_path);

@@ -15,7 +15,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Measures the parts of one tile. Each gets the triangles that may lie over it.
+/// Measures the parts of one tile. Each part gets the triangles that may be over it.
 class Measurement {
  public:
   Measurement(const TileAddress& address, const TileMesh& mesh, TileSurface& surface)
@@ -32,7 +32,7 @@ class Measurement {
 
   [[nodiscard]] bool over(std::uint32_t triangle, const GeographicBox& box) const;
   void measure(const GeographicBox& box, const std::vector<std::uint32_t>& triangles);
-  /// In units of the tile. Rounding must not take a sample out of it.
+  /// Converts to units of the tile. Clamps, because rounding must not move a sample out of it.
   [[nodiscard]] double unit(double degrees, double from) const {
     return std::clamp((degrees - from) * units_, 0.0, static_cast<double>(kTileUnits));
   }
@@ -49,7 +49,7 @@ bool Measurement::over(std::uint32_t triangle, const GeographicBox& box) const {
   const auto& t = mesh_.triangles[triangle];
   const auto meets = [&](const std::vector<std::uint16_t>& c, double from, double to) {
     const auto [low, high] = std::minmax({c[t[0]], c[t[1]], c[t[2]]});
-    // A unit more, so that rounding loses none.
+    // A unit more, to allow for rounding.
     return low - 1 <= to && high + 1 >= from;
   };
   return meets(mesh_.u, (box.west - whole_.west) * units_, (box.east - whole_.west) * units_) &&
@@ -74,7 +74,7 @@ void Measurement::measure(const GeographicBox& box, const std::vector<std::uint3
   std::vector<double> u, v, height;
   std::vector<std::size_t> index;
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    // Where parts meet each sample counts once.
+    // Where parts meet, each sample counts once.
     const bool elsewhere = (samples_.longitude[i] == box.east && box.east != whole_.east) ||
                            (samples_.latitude[i] == box.north && box.north != whole_.north);
     if (elsewhere) continue;
@@ -117,7 +117,7 @@ void Measurement::measure(const GeographicBox& box, const std::vector<std::uint3
 void TileHeights::add(const TileHeights& part) {
   samples += part.samples;
   uncovered += part.uncovered;
-  // The same sample whatever part came first.
+  // Break ties so that the order of parts does not matter.
   const auto rank = [](const TileHeights& h) {
     return std::tuple(h.max_error, -h.longitude, -h.latitude);
   };

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Missing tiles of a zoom that are named one by one.
+/// The most missing tiles of a zoom that are reported one by one.
 constexpr std::uint64_t kMostNamed = 1000;
 
 class Inventory {
@@ -77,7 +77,7 @@ void Inventory::files() {
   if (error) throw stream::system_error(folder_, "cannot be read", error.value());
   std::sort(strange.begin(), strange.end());
   for (const std::string& name : strange) {
-    problem(folder_ + "/" + name, "a tile at a place that the set does not have");
+    problem(folder_ + "/" + name, "its path does not name a tile of the set");
   }
   for (auto& tiles : result.tiles) std::sort(tiles.begin(), tiles.end(), by_row);
 }
@@ -89,16 +89,17 @@ void Inventory::zoom(unsigned zoom) {
   if (zoom < layer_.first_zoom && !ranges.empty()) {
     problem(layer_path_, label + " has tiles, but is above minzoom");
   }
-  if (zoom >= layer_.first_zoom && ranges.empty()) problem(layer_path_, label + " has no tile");
+  if (zoom >= layer_.first_zoom && ranges.empty()) problem(layer_path_, label + " has no tiles");
   std::vector<unsigned> named(there.size());
   std::uint64_t missing = 0;
   for (const TileRange& range : ranges) {
     const std::uint64_t width = std::uint64_t{range.x1} - range.x0 + 1;
     const std::uint64_t height = std::uint64_t{range.y1} - range.y0 + 1;
-    // A range that claims a planet is not walked through.
+    // A range that claims a whole planet is not enumerated.
     if (width * height > 64 * (there.size() + (std::uint64_t{1} << 20))) {
       problem(layer_path_, label + " claims " + counted(width * height, "tile") + ", but only " +
-                               with_commas(there.size()) + " are there");
+                               with_commas(there.size()) +
+                               (there.size() == 1 ? " exists" : " exist"));
       continue;
     }
     for (std::uint32_t y = range.y0; y <= range.y1; ++y) {
@@ -110,20 +111,21 @@ void Inventory::zoom(unsigned zoom) {
           ++named[static_cast<std::size_t>(at - there.begin())];
           ++at;
         } else if (missing++ < kMostNamed) {
-          problem(folder_ + "/" + tile_path(tile), "layer.json names this tile: it is not there");
+          problem(folder_ + "/" + tile_path(tile),
+                  "layer.json lists this tile, but it does not exist");
         }
       }
     }
   }
   if (missing > kMostNamed) {
-    problem(layer_path_, label + ": " + counted(missing - kMostNamed, "more tile", "is", "are") +
-                             " named and not there");
+    problem(layer_path_, label + ": " + counted(missing - kMostNamed, "more listed tile",
+                                                "does not exist", "do not exist"));
   }
   for (std::size_t i = 0; i < there.size(); ++i) {
     if (named[i] == 1) continue;
     problem(folder_ + "/" + tile_path(there[i]),
-            named[i] == 0 ? "a tile that layer.json does not name"
-                          : "a tile that layer.json names more than once");
+            named[i] == 0 ? "a tile that layer.json does not list"
+                          : "a tile that layer.json lists more than once");
   }
   if (zoom == 0 && layer_.first_zoom == 0) {
     for (std::uint32_t x = 0; x < 2; ++x) {
@@ -132,7 +134,7 @@ void Inventory::zoom(unsigned zoom) {
         return range.x0 <= x && x <= range.x1;
       });
       if (!claimed) {
-        problem(layer_path_, tile_path(root) + " is not named: globes ask for both roots");
+        problem(layer_path_, tile_path(root) + " is not listed: globes request both roots");
       }
     }
   }

@@ -15,16 +15,15 @@ namespace terrace::terrain {
 
 /// The files of a tile set in its folder.
 struct TileInventory {
-  /// Per zoom the tiles that are there, sorted by row, then column.
+  /// The existing tiles per zoom, sorted by row, then column.
   std::vector<std::vector<TileAddress>> tiles;
   std::vector<stream::Problem> problems;
-  /// Files that a killed run was writing: beside the set, not in it.
+  /// Temporary files of a killed run, which are not part of the set.
   std::uint64_t torn = 0;
 };
 
-/// Compares layer.json with the files: each tile that it names is there, each that is there is
-/// named once. Throws: stream::Error if the folder cannot be read;
-/// stream::Stopped.
+/// Compares layer.json with the files: each listed tile must exist, and each existing tile must be
+/// listed once. Throws: stream::Error if the folder cannot be read; stream::Stopped.
 TileInventory take_inventory(const std::string& folder, const TileLayer& layer,
                              const Context& context);
 

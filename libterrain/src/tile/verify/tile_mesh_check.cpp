@@ -19,7 +19,7 @@ namespace {
 
 using stream::Point3;
 
-/// Metres and shares that a header may be off: what rounding does, and no more.
+/// Tolerances of a header, in metres and as shares: only for rounding.
 constexpr double kLengthSlack = 1e-3;
 constexpr double kShareSlack = 1e-3;
 constexpr std::uint64_t kLowestAt = 24, kHighestAt = 28, kSphereAt = 32, kHorizonAt = 64;
@@ -29,10 +29,10 @@ double distance(const Point3& a, const Point3& b) {
   return std::sqrt(dot(d, d));
 }
 
-/// Returns the faults of a tile's header. Sound: its heights are those of the lowest and the
-/// highest vertex, the sphere holds all vertices and is not wider than its centre asks for, the
-/// centre lies in the tile, the horizon occlusion point is not hidden while a vertex is seen, and
-/// not farther out than that takes. The tile has a vertex. O(n).
+/// Returns the faults of a tile's header. It is sound if its heights are those of the lowest and
+/// the highest vertex, the sphere contains all vertices and is not wider than its centre requires,
+/// the centre is in the tile, and the horizon occlusion point is not hidden while a vertex is
+/// visible, and not farther out than that requires. The tile must have a vertex. O(n).
 std::vector<TileFault> check_tile_header(const TileAddress& address, const DecodedTile& tile) {
   std::vector<TileFault> faults;
   const auto fault = [&](std::uint64_t offset, std::string what) {
@@ -49,12 +49,12 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   if (mesh.lowest<mesh.highest&& * low> 0) {
     fault(kLowestAt, "its lowest height is " +
                          readable_number(static_cast<double>(mesh.lowest), 6) +
-                         " m, and no vertex is there");
+                         " m, but no vertex has it");
   }
   if (mesh.lowest < mesh.highest && *high < kTileUnits) {
     fault(kHighestAt, "its highest height is " +
                           readable_number(static_cast<double>(mesh.highest), 6) +
-                          " m, and no vertex is there");
+                          " m, but no vertex has it");
   }
   const Sphere& sphere = tile.header.sphere;
   double farthest = 0.0;
@@ -64,13 +64,13 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
                          readable_number(farthest - sphere.radius) + " m");
   } else if (sphere.radius > farthest * (1.0 + kShareSlack) + kLengthSlack) {
     fault(kSphereAt + 24, "the bounding sphere is " + readable_number(sphere.radius / farthest) +
-                              " times as wide as its centre asks for");
+                              " times as wide as its centre requires");
   }
   if (distance(tile.header.centre, bounding_sphere(points).centre) >
       bounding_sphere(points).radius + kLengthSlack) {
-    fault(0, "the centre lies outside the sphere around the tile");
+    fault(0, "the centre is outside the sphere around the tile");
   }
-  // The point may lie in any direction: what counts is how far out.
+  // The point may be in any direction; only its distance matters.
   const Point3& given = tile.header.horizon_occlusion;
   const double length = std::sqrt(dot(given, given));
   const Point3 towards{given[0] * kEquatorialRadius, given[1] * kEquatorialRadius,
@@ -81,7 +81,7 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   }
   const Point3 right = horizon_occlusion_point(towards, points);
   const double needed = std::sqrt(dot(right, right));
-  constexpr int kDigits = 12;  // these numbers are little above 1
+  constexpr int kDigits = 12;  // these numbers are slightly above 1
   if (length < needed * (1.0 - 1e-9)) {
     fault(kHorizonAt, "the horizon occlusion point is hidden while a vertex is not: it is " +
                           readable_number(length, kDigits) + " radii out, " +
@@ -93,7 +93,7 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   return faults;
 }
 
-/// How far a normal's upward component may be off: a normal has 2 x 8 bits.
+/// Tolerance for a normal's upward component: a normal has 2 x 8 bits.
 constexpr double kNormalSlack = 0.02;
 
 class MeshCheck {
@@ -147,7 +147,7 @@ class MeshCheck {
   std::uint64_t index_size_ = 0, triangles_at_ = 0, edges_at_ = 0, extensions_at_ = 0;
 };
 
-/// "triangle 5 ..." or "7 triangles ..., first triangle 5".
+/// Returns "triangle 5 ..." or "7 triangles ..., first triangle 5".
 std::string first_and_more(std::uint64_t count, const std::string& kind, std::uint64_t first,
                            const std::string& what) {
   if (count == 1) return kind + " " + std::to_string(first) + " " + what;
@@ -180,8 +180,8 @@ void MeshCheck::triangles() {
 }
 
 void MeshCheck::cover() {
-  // Directed edges: each at most once, and its opposite beside it unless on a border. With whole
-  // area and no turned triangle that is a cover without overlap.
+  // Each directed edge may occur once, and must have its opposite unless it is on a border.
+  // Together with the whole area and no inverted triangle, this means a cover without overlap.
   struct Edge {
     std::uint32_t low, high;
     bool forward;
@@ -221,9 +221,7 @@ void MeshCheck::cover() {
   if (open > 0) {
     fault(triangle_at(first_open),
           counted(open, "edge", "inside the tile has", "inside the tile have") +
-              " one triangle only, the first "
-              "at triangle " +
-              std::to_string(first_open));
+              " only one triangle, the first at triangle " + std::to_string(first_open));
   }
   if (crowded > 0) {
     fault(triangle_at(first_crowded), counted(crowded, "edge", "has", "have") +
@@ -304,13 +302,13 @@ void MeshCheck::extensions(const std::vector<std::string>& wanted) {
     if (promised == there) return;
     fault(extensions_at_,
           std::string("the extension ") + name +
-              (there ? " is not among those of layer.json" : " of layer.json is not there"));
+              (there ? " is not listed in layer.json" : " of layer.json is missing"));
   };
   compare("octvertexnormals", !mesh_.normals.empty());
   compare("watermask", !mesh_.water.empty());
   compare("metadata", !mesh_.metadata.empty());
   if (!mesh_.metadata.empty() && !nlohmann::json::accept(mesh_.metadata)) {
-    fault(extensions_at_, "the metadata is no JSON");
+    fault(extensions_at_, "the metadata is not JSON");
   }
 }
 

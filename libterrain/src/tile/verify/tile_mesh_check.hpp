@@ -10,17 +10,17 @@
 
 namespace terrace::terrain {
 
-/// What is wrong in a tile: at which byte (of the unpacked ones, if it is compressed), and what.
+/// A fault in a tile: the byte (after decompression, if it is compressed), and what is wrong.
 struct TileFault {
   std::uint64_t offset = 0;
   std::string what;
 };
 
-/// Checks a tile by itself: triangles counter-clockwise and with an area, that cover the square
-/// once; all corners there, no vertex unused; lists of border vertices exact and sorted; sphere,
-/// centre and horizon occlusion point of the header; normals upward; the extensions that
-/// `extensions` (of layer.json) promises and no others. Of each kind of fault the first is named
-/// and all are counted. O(n log n).
+/// Checks a tile by itself: triangles are counter-clockwise, have an area and cover the square
+/// once; all corners exist and no vertex is unused; lists of border vertices are exact and sorted;
+/// sphere, centre and horizon occlusion point of the header are sound; normals point upward; and it
+/// has exactly the extensions that `extensions` (of layer.json) promises. Reports the first fault
+/// of each kind and counts them all. O(n log n).
 std::vector<TileFault> check_tile_mesh(const TileAddress& address, const DecodedTile& tile,
                                        const std::vector<std::string>& extensions);
 
