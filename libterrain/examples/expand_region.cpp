@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Builds a store of a raster or a point file, shows its coarsest mesh, expands what lies in one
-// place to all its points, and collapses it again. Usage: expand_region INPUT STORE
+// Builds a store of a raster or a point file, shows its coarsest mesh, expands a part of it to full
+// detail, and collapses it again. Usage: expand_region INPUT STORE
 #include <cstdio>
 
 #include <terrace/stream/store.hpp>
@@ -20,14 +20,14 @@ int main(int argc, char** argv) {
   const std::uint64_t coarse = model.triangulation().hash();
   std::printf("top: %zu of %llu points\n", model.point_count(), 1ULL * store.points());
 
-  // Stored coordinates: columns and rows of a raster.
+  // In stored coordinates: columns and rows for a raster.
   const stream::Box3& box = store.bounds();
   const auto at = [&box](std::size_t axis, double part) {
     return box.min[axis] + part * (box.max[axis] - box.min[axis]);
   };
   const tri::Box3 middle = tri::box2(at(0, 0.45), at(1, 0.45), at(0, 0.55), at(1, 0.55));
   const auto& finer = model.refine(middle, 0).changes;
-  std::printf("the middle: %zu triangles more, %zu less\n", finer.added_triangles.size(),
+  std::printf("the middle: %zu triangles added, %zu removed\n", finer.added_triangles.size(),
               finer.removed_triangles.size());
 
   model.set_level(model.top());

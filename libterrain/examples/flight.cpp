@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera flies over a store: the mesh grows finer where it looks, coarser where it has been, and
-// each frame tells which triangles came and went. Usage: flight INPUT STORE
+// A camera flies over a store. The mesh becomes finer where the camera looks and coarser where it
+// has been, and each frame lists the triangles that were added and removed. Usage: flight INPUT
+// STORE
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -16,12 +17,12 @@ int main(int argc, char** argv) {
   if (argc != 3) return std::fprintf(stderr, "usage: flight INPUT STORE\n"), 2;
   terrain::build_store({.inputs = {argv[1]}, .store = argv[2], .replace = true}, {.threads = 2});
   const stream::Store store = stream::Store::open(argv[2]);
-  terrain::StoreView<std::int32_t> view(store);  // a raster; of points <double>
+  terrain::StoreView<std::int32_t> view(store);  // for rasters; for points use <double>
 
   std::set<tri::TriangleId> drawn;  // what a renderer would keep
   for (const auto t : view.model().triangulation().all_triangles()) drawn.insert(t);
   for (int frame = 0; frame < 2000 && (frame < 100 || !view.settled()); ++frame) {
-    // Metres east, north and up from the middle of the store; it stops after 100 frames.
+    // Metres east, north and up from the middle of the store; the camera stops after 100 frames.
     const double east = -10'000.0 + 200.0 * std::min(frame, 100);
     const tri::Pose pose{{east, -20'000.0, 9000.0}, {0, 1, -0.5}, {0, 0, 1}};
     tri::View wish;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Heights and slopes at places of a store, and what lies along a line. Usage: heights INPUT STORE
+// Samples heights and slopes at places of a store and along a line. Usage: heights INPUT STORE
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   terrain::build_store({.inputs = {argv[1]}, .store = argv[2], .replace = true}, context);
   const stream::Store store = stream::Store::open(argv[2]);
 
-  // Stored coordinates: columns and rows of a raster, between samples too. Ask for many at once.
+  // Stored coordinates: columns and rows of a raster, also between samples. Pass many at once.
   const auto sampler = terrain::make_sampler(store, {}, context);
   const std::vector<terrain::Point2> places{{600, 600}, {600.5, 600.25}, {-1, 0}};
   std::vector<terrain::SurfacePoint> surface(places.size());
@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
                 surface[i].per_row);
   }
 
-  // Coordinates of the CRS, here degrees: every 500 m and at the end.
+  // Coordinates of the CRS, here degrees: a row every 500 m and at the end.
   std::size_t rows = 0;
   const auto profile = terrain::write_profile(
       store, {.line = {{8.3, 46.4}, {8.6, 46.6}}, .step = 500.0},

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera flies round a scanned body: its surface grows finer where the camera comes near, coarser
-// where it has been, and each frame tells which triangles came and went. At rest the surface is
-// computed from scratch once. Usage: scan_flight POINTS STORE (POINTS is made if it is not there)
+// A camera flies around a scanned body. Its surface becomes finer where the camera approaches and
+// coarser where it has been, and each frame lists the triangles that were added and removed. Once
+// the camera rests, the surface is recomputed from scratch. Usage: scan_flight POINTS STORE
+// (creates POINTS if missing)
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -17,7 +18,7 @@ using namespace terrace;
 
 namespace {
 
-/// A body of about 100 m with ten lobes, along a spiral from pole to pole.
+/// Writes a body of about 100 m with ten lobes, along a spiral from pole to pole.
 void scan(const char* file) {
   std::ofstream out(file);
   constexpr int kPoints = 40'000;
@@ -46,7 +47,7 @@ int main(int argc, char** argv) {
     for (const auto t : delta.changes.added_triangles) drawn.insert(t);
   };
   for (int frame = 0; frame < 2000 && (frame < 100 || !view.settled()); ++frame) {
-    // Metres from the middle of the body; it stops after 100 frames.
+    // Metres from the middle of the body; the camera stops after 100 frames.
     const double angle = 0.02 * std::min(frame, 100), c = std::cos(angle), s = std::sin(angle);
     const tri::Pose pose{{70.0 * c, 70.0 * s, 0.0}, {-c - 0.5 * s, 0.5 * c - s, 0.0}, {0, 0, 1}};
     tri::View wish;

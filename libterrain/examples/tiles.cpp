@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles for a web globe, begun, stopped on the way, and finished. Usage: tiles INPUT STORE FOLDER
+// Makes tiles for a web globe, stops halfway and resumes. Usage: tiles INPUT STORE FOLDER
 #include <cstdio>
 #include <stop_token>
 
@@ -15,10 +15,11 @@ int main(int argc, char** argv) {
   terrain::build_store({.inputs = {argv[1]}, .store = argv[2], .replace = true}, {.threads = 2});
   const stream::Store store = stream::Store::open(argv[2]);
   terrain::TilesRequest request{.folder = argv[3]};
-  request.vertical = terrain::HeightReference::orthometric;  // above the sea
+  request.vertical = terrain::HeightReference::orthometric;  // above sea level
   request.replace = true;
 
-  // Whoever has the stop source may ask for the end: another thread, or the progress itself.
+  // Any owner of the stop source may request a stop: another thread, or the progress handler
+  // itself.
   std::stop_source stop;
   terrain::Context context{.threads = 2, .stop = stop.get_token()};
   context.progress = [&](const terrain::Progress& progress) {
@@ -27,10 +28,10 @@ int main(int argc, char** argv) {
   try {
     terrain::write_tiles(store, request, context);
   } catch (const stream::Stopped&) {
-    std::printf("stopped as asked\n");
+    std::printf("stopped as requested\n");
   }
 
-  // What was made is kept.
+  // Finished tiles are kept.
   request.replace = false;
   request.resume = true;
   const terrain::TilesOutcome outcome = terrain::write_tiles(store, request, {.threads = 2});

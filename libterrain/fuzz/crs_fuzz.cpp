@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Coordinate reference systems. The first line says how they are given: "text" as --crs takes them
-// (WKT or codes), "wkt" as a source has them, "keys" as GeoKeys, one a line (number=values or
-// number="text"), "shift" as --towgs84. What is known maps places without fault, and what a store
-// would keep of it is read back.
+// Coordinate reference systems. The first line says how they are given: "text" as for --crs (WKT or
+// codes), "wkt" as in a source, "keys" as GeoKeys, one per line (number=values or number="text"),
+// "shift" as for --towgs84. A known CRS must convert places without failing, and survive being
+// stored and read back.
 #include <charconv>
 #include <cmath>
 #include <vector>
@@ -41,7 +41,7 @@ stream::Crs crs_of_keys(std::string_view text) {
   return crs;
 }
 
-/// Places are mapped to places or to NaN.
+/// Converts places to places or NaN.
 void use(const CoordinateSystem& system) {
   std::vector<Point2> places{{0, 0},      {10, 50},   {500000, 5e6}, {-180, 90},
                              {1e7, -1e7}, {1e300, 1}, {360, -90.001}};
@@ -51,7 +51,7 @@ void use(const CoordinateSystem& system) {
   try {
     if (system.reaches_wgs84()) system.to_geographic(back);
   } catch (const stream::Error&) {
-    // PROJ cannot compute every shift that can be written.
+    // PROJ cannot compute every valid shift.
   }
   require(!system.title().empty(), "a title");
   // A store keeps its CRS as WKT.
@@ -69,7 +69,7 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   std::optional<CoordinateSystem> system;
   try {
     if (how == "text") {
-      // Not the name of a file of this machine.
+      // Must not be the name of a file on this machine.
       if (text.find_first_of("[(:") == std::string_view::npos) return false;
       if (text.find('/') < text.find_first_of("[(:")) return false;
       system = CoordinateSystem::parse(std::string(text));

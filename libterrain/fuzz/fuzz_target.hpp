@@ -13,25 +13,25 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/// What the fuzz targets of this library and of the command share. A target is one file with one
-/// function, accepts(); fuzz_main.cpp hands it to libFuzzer, replay_main.cpp runs it over a corpus.
+/// The common parts of this library's and the command's fuzz targets. A target is one file with one
+/// function, accepts(). fuzz_main.cpp passes it to libFuzzer, and replay_main.cpp runs it over a
+/// corpus.
 
 namespace terrace::terrain::fuzz {
 
-/// Reads any bytes: true if they were read to their end and hold what they should, false if they
-/// were refused as bad input is. Ends the process by fail() where a promise was broken.
+/// Reads any bytes. Returns true if they were read to the end and are valid, false if they were
+/// refused as bad input. Aborts the process if an invariant is violated.
 bool accepts(const std::uint8_t* data, std::size_t size);
 
-/// Stops the fuzzer where the code broke a promise, in release builds too.
+/// Aborts if an invariant is violated, also in release builds.
 inline void require(bool good, const char* what) {
   if (good) return;
-  std::fprintf(stderr, "broken promise: %s\n", what);
+  std::fprintf(stderr, "invariant violated: %s\n", what);
   std::abort();
 }
 
-/// Stops the fuzzer where work grows faster than with the bytes of the input: more
-/// than two seconds of processor time and ten microseconds for each byte, a hundred times what
-/// parsers take.
+/// Aborts if the work grows faster than the size of the input: if it takes more than two seconds of
+/// processor time plus ten microseconds per byte, a hundred times what parsers need.
 class WorkLimit {
  public:
   explicit WorkLimit(std::uint64_t bytes) : items_(bytes) {}
@@ -47,7 +47,7 @@ class WorkLimit {
   std::clock_t begin_ = std::clock();
 };
 
-/// Bytes as a file in memory, so that a reader takes its ordinary way.
+/// A file in memory with the given bytes, so that a reader opens it like any other.
 class MemoryFile {
  public:
   explicit MemoryFile(std::string_view bytes) : file_(memfd_create("fuzz", 0)) {
@@ -67,7 +67,7 @@ class MemoryFile {
   std::string name_;
 };
 
-/// A folder that goes with the process.
+/// A folder that is removed at the end of the process.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -92,7 +92,7 @@ inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
-/// The line at the beginning of `text`, without its end; takes it off.
+/// Removes the first line from `text` and returns it, without its end.
 inline std::string_view take_line(std::string_view& text) {
   const std::size_t end = text.find('\n');
   const std::string_view line = text.substr(0, end);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An overlay of a small store: the bytes of its header, its pages and its directory, to which the
-// checksums are added here, since nobody guesses those.
+// An overlay of a small store: the bytes of its header, its pages and its directory. The checksums
+// are computed here, because a fuzzer cannot guess them.
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -19,7 +19,7 @@ namespace terrace::terrain::fuzz {
 
 namespace {
 
-/// 40 points in clusters, made anew in every run: what the store's bytes are does not matter.
+/// 40 points in clusters, rebuilt in every run; the store's exact bytes do not matter.
 const stream::Store& small_store() {
   static const ScratchFolder folder;
   static const stream::Store store = [] {
@@ -58,8 +58,9 @@ T get(const std::string& bytes, std::size_t at) {
   return value;
 }
 
-/// Mends the checksums of an overlay: see FORMAT.md. The mark is 16 bytes; then version, the
-/// store's checksum, the number of pages, where they end, and the length of the name.
+/// Corrects the checksums of an overlay, see FORMAT.md. The mark has 16 bytes; then follow the
+/// version, the store's checksum, the number of pages, the end of the pages, and the length of the
+/// name.
 constexpr std::size_t kStoreAt = 20, kCountAt = 24, kEndAt = 32, kNameAt = 40, kHead = 44,
                       kEntry = 20;
 
@@ -99,7 +100,7 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
       store.read(id, points);
       for (const stream::OverlayValue& value : list) {
         require(std::isfinite(value.value), "heights are finite");
-        if (value.index >= points.size()) continue;  // the users of an overlay go past these
+        if (value.index >= points.size()) continue;  // users of an overlay skip these
       }
       values += list.size();
     });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Regions and metrics: JSON files, and what the command line takes in their place. The first line
-// says which: "region" or "metric" for a file's text, "box" for a box.
+// Regions and metrics: JSON files, and the text that the command line accepts. The first line says
+// which: "region" or "metric" for the text of a file, "box" for a box.
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -29,7 +29,7 @@ void use(const Region& region) {
     const Point2& corner = polygon.front().front();
     static_cast<void>(region.contains({corner[0], corner[1], 0}));
   }
-  // Far outside there is nothing.
+  // Nothing is infinitely far away.
   require(!region.contains({std::numeric_limits<double>::infinity(), 0, 0}), "nothing at infinity");
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs a fuzz target over the files of a corpus folder, so that the target compiles everywhere and
-// every input that once failed stays tested. A file whose name begins with "good" must be accepted,
-// any other be refused: a target that gives up on everything would find nothing.
+// every input that once failed stays tested. A file with a name that starts with "good" must be
+// accepted, any other must be refused; otherwise a target that refuses everything would find
+// nothing.
 #include <fstream>
 #include <iterator>
 #include <vector>

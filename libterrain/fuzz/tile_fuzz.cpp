@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a folder of terrain tiles holds. The first byte says which: 't' a tile, 'l' layer.json, 'j'
-// the journal behind its first line. A tile that can be read can be checked, and what was read of
-// the others is the same when it has been written and read again.
+// The files of a tile folder. The first byte says which: 't' a tile, 'l' layer.json, 'j' the
+// journal after its first line. A readable tile must be checkable, and the other files must be the
+// same after they have been written and read again.
 #include <algorithm>
 #include <fstream>
 #include <span>
@@ -78,7 +78,7 @@ bool read_journal(std::string_view text) {
     journal.add({1, 2, 1}, {.bytes = 7, .checksum = 8, .inputs = 9, .max_error = 0.5});
   }
   const std::vector<TileJournal::Record> more = read_tile_records(folder);
-  require(more.size() >= std::max<std::size_t>(records.size(), 1), "the journal goes on");
+  require(more.size() >= std::max<std::size_t>(records.size(), 1), "the journal continues");
   return !records.empty();
 }
 

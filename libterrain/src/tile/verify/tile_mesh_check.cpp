@@ -147,7 +147,7 @@ class MeshCheck {
   std::uint64_t index_size_ = 0, triangles_at_ = 0, edges_at_ = 0, extensions_at_ = 0;
 };
 
-/// Returns "triangle 5 ..." or "7 triangles ..., first triangle 5".
+/// Returns "triangle 5 ..." or "triangle 5 and 6 more ...".
 std::string first_and_more(std::uint64_t count, const std::string& kind, std::uint64_t first,
                            const std::string& what) {
   if (count == 1) return kind + " " + std::to_string(first) + " " + what;
